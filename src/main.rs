@@ -1,0 +1,2 @@
+//! `twincast`: arguments, then the library, then an exit code.
+fn main() {}

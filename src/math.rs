@@ -1,0 +1,158 @@
+//! Vectors, boxes and rounding-error bounds.
+//!
+//! Vectors and matrices are glam's. What is added here is what a ray tracer needs of them: [`Aabb`], and the
+//! machinery of rounding-error analysis in Higham's notation (Higham 2002, *Accuracy and Stability of Numerical
+//! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
+
+pub use glam::{
+    Affine3, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4,
+};
+
+/// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.
+pub const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;
+
+/// Half the distance from 1 to the next f64.
+pub const UNIT_ROUNDOFF_64: f64 = f64::EPSILON / 2.0;
+
+/// Coordinates of a larger magnitude count as infinite, as in Embree (its `FLT_LARGE`): products of three such
+/// numbers with a direction still fit into f64, and reciprocals into f32.
+pub const LARGEST_COORDINATE: f32 = 1.844e18;
+
+/// Bounds the relative error of `n` chained f32 operations: n u / (1 - n u).
+pub const fn gamma(n: u32) -> f32 {
+    let nu = n as f32 * UNIT_ROUNDOFF;
+    nu / (1.0 - nu)
+}
+
+/// Bounds the relative error of `n` chained f64 operations.
+pub const fn gamma64(n: u32) -> f64 {
+    let nu = n as f64 * UNIT_ROUNDOFF_64;
+    nu / (1.0 - nu)
+}
+
+/// Whether a vertex may take part in tracing: finite, and small enough not to overflow.
+pub fn is_traceable(p: Vec3) -> bool {
+    // Written so that NaN gives false.
+    p.abs().max_element() <= LARGEST_COORDINATE && !p.is_nan()
+}
+
+/// An axis-aligned box. Empty where `min > max` on any axis; [`Aabb::EMPTY`] is the neutral element of
+/// [`Aabb::union`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest corner, in the units of the scene.
+    pub min: Vec3,
+    /// Largest corner.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The box that contains nothing.
+    pub const EMPTY: Self = Self {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
+
+    /// The smallest box around the points; empty for none.
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, Self::include)
+    }
+
+    /// The smallest box around `self` and `point`.
+    #[inline]
+    pub fn include(self, point: Vec3) -> Self {
+        Self {
+            min: self.min.min(point),
+            max: self.max.max(point),
+        }
+    }
+
+    /// The smallest box around both.
+    #[inline]
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// Whether it contains no point.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// The middle. Halves before it adds, so that large boxes do not overflow.
+    #[inline]
+    pub fn centre(&self) -> Vec3 {
+        self.min * 0.5 + self.max * 0.5
+    }
+
+    /// Edge lengths; negative where empty.
+    #[inline]
+    pub fn size(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Half the surface area, the measure of the surface area heuristic; 0 where empty.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        let d = self.size().max(Vec3::ZERO);
+        d.x * d.y + d.y * d.z + d.z * d.x
+    }
+}
+
+/// An axis-aligned box in f64: the bounds of a scene before it is recentred.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DAabb {
+    /// Smallest corner.
+    pub min: DVec3,
+    /// Largest corner.
+    pub max: DVec3,
+}
+
+impl DAabb {
+    /// The box that contains nothing.
+    pub const EMPTY: Self = Self {
+        min: DVec3::INFINITY,
+        max: DVec3::NEG_INFINITY,
+    };
+
+    /// The smallest box around `self` and `point`.
+    pub fn include(self, point: DVec3) -> Self {
+        Self {
+            min: self.min.min(point),
+            max: self.max.max(point),
+        }
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// Whether it contains no point.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// The middle; the origin where empty.
+    pub fn centre(&self) -> DVec3 {
+        if self.is_empty() {
+            DVec3::ZERO
+        } else {
+            self.min * 0.5 + self.max * 0.5
+        }
+    }
+
+    /// Half the length of the diagonal; 0 where empty.
+    pub fn radius(&self) -> f64 {
+        if self.is_empty() {
+            0.0
+        } else {
+            (self.max * 0.5 - self.min * 0.5).length()
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! What this render needs, and nothing else.

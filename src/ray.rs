@@ -1,0 +1,64 @@
+//! What is asked of a tracer, and what it answers.
+
+use crate::math::Vec3;
+
+/// A half-line with a valid range. A hit counts for `tmin <= t <= tmax`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Start, in world coordinates (recentred scene units).
+    pub origin: Vec3,
+    /// Direction; need not be a unit vector.
+    pub direction: Vec3,
+    /// Nearest valid t, at least 0.
+    pub tmin: f32,
+    /// Farthest valid t; may be infinite. A ray with `tmax < tmin` hits nothing.
+    pub tmax: f32,
+}
+
+impl Ray {
+    /// A ray over [0, infinity].
+    pub const fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self {
+            origin,
+            direction,
+            tmin: 0.0,
+            tmax: f32::INFINITY,
+        }
+    }
+
+    /// Whether it can hit anything: finite origin and direction, a direction that is not zero, a range that is not
+    /// empty. Every tracer answers a miss for any other ray.
+    #[inline]
+    pub fn is_valid(&self) -> bool {
+        self.origin.is_finite()
+            && self.direction.is_finite()
+            && self.direction != Vec3::ZERO
+            && self.tmin >= 0.0
+            && self.tmin <= self.tmax
+    }
+}
+
+/// Where a ray met the scene: ids and parameters, nothing else. `surface` computes the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in units of the ray's direction.
+    pub t: f32,
+    /// Weight of a triangle's second corner; a shape's own first parameter.
+    pub u: f32,
+    /// Weight of a triangle's third corner; a shape's own second parameter.
+    pub v: f32,
+    /// Index of the triangle in its mesh, or of the shape in its list.
+    pub primitive: u32,
+    /// Index into [`Scene::geometries`](crate::Scene::geometries).
+    pub geometry: u32,
+    /// Index into [`Scene::instances`](crate::Scene::instances).
+    pub instance: u32,
+}
+
+impl Hit {
+    /// The order that decides between hits at equal t: the lowest wins.
+    #[inline]
+    pub const fn id(&self) -> (u32, u32, u32) {
+        (self.instance, self.geometry, self.primitive)
+    }
+}

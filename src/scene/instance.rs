@@ -1,0 +1,25 @@
+//! Sets of geometries, and where they stand.
+
+use std::ops::Range;
+
+use crate::math::DAffine3;
+
+/// Geometries that are placed together.
+#[derive(Clone, Debug, Default)]
+pub struct Group {
+    /// Name in the file, for messages; may be empty.
+    pub name: String,
+    /// Indices into [`Scene::geometries`](crate::Scene::geometries).
+    pub geometries: Range<u32>,
+}
+
+/// One placement of a group.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name in the file, for messages; may be empty.
+    pub name: String,
+    /// Index into [`Scene::groups`](crate::Scene::groups).
+    pub group: u32,
+    /// From the group's coordinates to the scene's.
+    pub transform: DAffine3,
+}

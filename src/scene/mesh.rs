@@ -1,0 +1,105 @@
+//! A triangle mesh.
+
+use std::sync::Arc;
+
+use crate::math::{DAabb, DAffine3, DVec3, Vec2, Vec3, Vec4, is_traceable};
+
+/// Triangles over shared vertices. Attribute lists are empty or as long as `positions`.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name in the file, for messages; may be empty.
+    pub name: String,
+    /// What every position is relative to. Loaders of formats with f64 or decimal coordinates choose it so that the
+    /// offsets keep the mesh's shape ([`Mesh::set_positions`]); zero where the file holds f32.
+    pub origin: DVec3,
+    /// Vertex positions as offsets from `origin`. May hold NaN or infinities: such triangles are never hit.
+    pub positions: Arc<Vec<Vec3>>,
+    /// Unit shading normals; empty for flat shading.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, v up (OpenGL's and OBJ's convention, not glTF's).
+    pub uvs: Vec<Vec2>,
+    /// Linear RGBA that multiplies the material's diffuse colour.
+    pub colors: Vec<Vec4>,
+    /// Corners of each triangle; every index is below `positions.len()` (loaders check).
+    pub triangles: Arc<Vec<[u32; 3]>>,
+    /// Index into [`Scene::materials`](crate::Scene::materials).
+    pub material: u32,
+}
+
+impl Mesh {
+    /// A bare mesh at the origin.
+    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            positions: Arc::new(positions),
+            triangles: Arc::new(triangles),
+            ..Self::default()
+        }
+    }
+
+    /// Stores f64 positions as f32 offsets from an origin, chosen by [`choose_origin`].
+    pub fn set_positions(&mut self, positions: &[DVec3]) {
+        let bounds = positions
+            .iter()
+            .filter(|p| p.is_finite())
+            .fold(DAabb::EMPTY, |all, &p| all.include(p));
+        self.origin = choose_origin(&bounds);
+        self.positions = Arc::new(
+            positions
+                .iter()
+                .map(|p| (p - self.origin).as_vec3())
+                .collect(),
+        );
+    }
+
+    /// The bounds of the traceable vertices under `transform`.
+    pub fn bounds(&self, transform: &DAffine3) -> DAabb {
+        let place = |p: &Vec3| transform.transform_point3(self.origin + p.as_dvec3());
+        self.positions
+            .iter()
+            .filter(|&&p| is_traceable(p))
+            .fold(DAabb::EMPTY, |all, p| all.include(place(p)))
+    }
+
+    /// How many triangles have a corner that is NaN, infinite or too large to trace.
+    pub fn untraceable_triangles(&self) -> usize {
+        let bad = |&i: &u32| !is_traceable(self.positions[i as usize]);
+        self.triangles
+            .iter()
+            .filter(|corners| corners.iter().any(bad))
+            .count()
+    }
+
+    /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
+    /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
+    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat.
+    pub fn smooth_normals(&mut self) {
+        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+        for corners in self.triangles.iter() {
+            let p = corners.map(|i| self.positions[i as usize].as_dvec3());
+            let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+            if !normal.is_finite() {
+                continue;
+            }
+            for k in 0..3 {
+                let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+                // The angle by its tangent: accurate for slivers too.
+                sums[corners[k] as usize] += normal * libm::atan2(a.cross(b).length(), a.dot(b));
+            }
+        }
+        self.normals = sums
+            .into_iter()
+            .map(|n| n.normalize_or_zero().as_vec3())
+            .collect();
+    }
+}
+
+/// The origin for positions within `bounds`: zero where f32 keeps the shape anyway, else the middle. "Anyway" is
+/// within 8 radii of zero, where at most 3 bits of the 24 are spent on the distance.
+pub(crate) fn choose_origin(bounds: &DAabb) -> DVec3 {
+    let centre = bounds.centre();
+    if centre.abs().max_element() <= 8.0 * bounds.radius() {
+        DVec3::ZERO
+    } else {
+        centre
+    }
+}

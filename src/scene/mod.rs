@@ -1,0 +1,163 @@
+//! A scene as its file describes it: plain data, no accelerator, nothing left to parse.
+//!
+//! Coordinates are right-handed, +y up, metres. Positions keep f64 precision: a [`Mesh`] holds f32 offsets from an f64
+//! origin, transforms are f64. What the tracers see is made of it by [`World`](crate::World).
+
+mod camera;
+mod instance;
+mod light;
+mod material;
+mod mesh;
+mod texture;
+
+pub use camera::Camera;
+pub use instance::{Group, Instance};
+pub use light::{Attenuation, Light};
+pub use material::{Material, Specular};
+pub use mesh::Mesh;
+pub(crate) use mesh::choose_origin;
+pub use texture::{Filter, Texture, Wrap};
+
+use crate::math::{DAabb, DAffine3, Vec3};
+use crate::shape::Shape;
+
+/// Everything one file describes.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Meshes and lists of shapes; [`Hit::geometry`](crate::Hit) indexes this.
+    pub geometries: Vec<Geometry>,
+    /// Sets of geometries that are placed together.
+    pub groups: Vec<Group>,
+    /// Placements of groups; [`Hit::instance`](crate::Hit) indexes this.
+    pub instances: Vec<Instance>,
+    /// What geometries are made of.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub textures: Vec<Texture>,
+    /// Light sources; where there are none, the renderer adds a headlight.
+    pub lights: Vec<Light>,
+    /// Viewpoints; where there are none, the view is framed on the bounds.
+    pub cameras: Vec<Camera>,
+    /// Light that reaches every point from everywhere, linear RGB.
+    pub ambient: Vec3,
+    /// What a ray that hits nothing sees, linear RGB.
+    pub background: Vec3,
+}
+
+/// Something rays can hit: triangles, or shapes of any other kind.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// Triangles.
+    Mesh(Mesh),
+    /// Shapes that are not meshes, all of one material.
+    Shapes {
+        /// The shapes, in the group's coordinates.
+        shapes: Vec<Shape>,
+        /// Index into [`Scene::materials`].
+        material: u32,
+    },
+}
+
+impl Geometry {
+    /// How many primitives it has: triangles or shapes.
+    pub fn primitive_count(&self) -> usize {
+        match self {
+            Self::Mesh(mesh) => mesh.triangles.len(),
+            Self::Shapes { shapes, .. } => shapes.len(),
+        }
+    }
+
+    /// Index of its material in [`Scene::materials`].
+    pub fn material(&self) -> u32 {
+        match self {
+            Self::Mesh(mesh) => mesh.material,
+            Self::Shapes { material, .. } => *material,
+        }
+    }
+
+    /// The bounds of its traceable vertices under `transform`, exact up to f64 rounding for meshes.
+    pub fn bounds(&self, transform: &DAffine3) -> DAabb {
+        match self {
+            Self::Mesh(mesh) => mesh.bounds(transform),
+            Self::Shapes { shapes, .. } => shapes.iter().fold(DAabb::EMPTY, |all, shape| {
+                let b = shape.bounds();
+                if b.is_empty() {
+                    return all;
+                }
+                (0..8).fold(all, |all, corner| {
+                    let pick = |axis: usize| {
+                        if corner >> axis & 1 == 0 {
+                            b.min[axis]
+                        } else {
+                            b.max[axis]
+                        }
+                    };
+                    all.include(
+                        transform.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()),
+                    )
+                })
+            }),
+        }
+    }
+}
+
+impl Scene {
+    /// A scene that shows `geometries` once each, as they are, with the given materials.
+    pub fn from_geometries(geometries: Vec<Geometry>, materials: Vec<Material>) -> Self {
+        let group = Group {
+            name: String::new(),
+            geometries: 0..geometries.len() as u32,
+        };
+        Self {
+            geometries,
+            groups: vec![group],
+            instances: vec![Instance {
+                name: String::new(),
+                group: 0,
+                transform: DAffine3::IDENTITY,
+            }],
+            materials,
+            ..Self::default()
+        }
+    }
+
+    /// The geometries of one group, with their indices.
+    pub fn group_geometries(&self, group: u32) -> impl Iterator<Item = (u32, &Geometry)> {
+        self.groups[group as usize]
+            .geometries
+            .clone()
+            .map(|g| (g, &self.geometries[g as usize]))
+    }
+
+    /// Primitives as placed: those of a group that is placed twice count twice.
+    pub fn primitive_count(&self) -> u64 {
+        self.instances
+            .iter()
+            .flat_map(|instance| self.group_geometries(instance.group))
+            .map(|(_, geometry)| geometry.primitive_count() as u64)
+            .sum()
+    }
+
+    /// Bounds of everything that can be hit, in scene coordinates.
+    pub fn bounds(&self) -> DAabb {
+        self.instances.iter().fold(DAabb::EMPTY, |all, instance| {
+            self.group_geometries(instance.group)
+                .fold(all, |all, (_, geometry)| {
+                    all.union(geometry.bounds(&instance.transform))
+                })
+        })
+    }
+
+    /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities.
+    pub fn transform(&mut self, transform: &DAffine3) {
+        for instance in &mut self.instances {
+            instance.transform = *transform * instance.transform;
+        }
+        for light in &mut self.lights {
+            light.transform(transform);
+        }
+        for camera in &mut self.cameras {
+            camera.transform(transform);
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Every primitive for every ray: the yardstick.

@@ -1,0 +1,363 @@
+//! The scene as the tracers hold it: recentred, f32, one or two levels.
+//!
+//! A [`Scene`] keeps f64 positions; tracers work in f32. So everything is moved by [`World::centre`] first, which keeps
+//! the shape of a mesh that lies far from zero. Groups that are placed once are baked into world coordinates and
+//! traced as one level; groups that are placed several times are kept once, with a transform for each placement.
+//! Baking all of them would make one level of every scene, and a million instances would cost a million meshes.
+//!
+//! What stands here in f32 is *the* scene: exactness is judged against it, and an instanced triangle's corners are
+//! `to_world` times its f32 positions, in exact arithmetic.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, gamma64, is_traceable};
+use crate::ray::Hit;
+use crate::scene::{Geometry, Instance, Mesh, Scene, choose_origin};
+use crate::shape::Shape;
+
+/// A scene made ready for tracing.
+#[derive(Clone, Debug, Default)]
+pub struct World {
+    /// What was subtracted from every scene coordinate.
+    pub centre: DVec3,
+    /// Every geometry that is traced: first the fixed ones, then those of the objects.
+    pub parts: Vec<Part>,
+    /// The parts in world coordinates.
+    pub fixed: Range<usize>,
+    /// Parts (in their own coordinates) that are placed by transforms.
+    pub objects: Vec<Range<usize>>,
+    /// Where the objects stand, by rising scene instance.
+    pub placements: Vec<Placement>,
+    lookup: Vec<Lookup>,
+}
+
+/// One geometry, as traced.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Index into [`Scene::geometries`].
+    pub geometry: u32,
+    /// Index into [`Scene::instances`] for a fixed part; for a part of an object the placement tells.
+    pub instance: u32,
+    /// What can be hit.
+    pub primitives: Primitives,
+}
+
+/// The primitives of a part.
+#[derive(Clone, Debug)]
+pub enum Primitives {
+    /// A triangle mesh; shared with the scene where nothing had to be moved.
+    Triangles {
+        /// Corners; may be NaN or infinite, such triangles cannot be hit.
+        positions: Arc<Vec<Vec3>>,
+        /// Indices of each triangle's corners, all below `positions.len()`.
+        triangles: Arc<Vec<[u32; 3]>>,
+    },
+    /// Anything else.
+    Shapes(Arc<Vec<Shape>>),
+}
+
+/// An object in its place.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Index into [`World::objects`].
+    pub object: u32,
+    /// From the object's coordinates to the world's; invertible.
+    pub to_world: Affine3,
+    /// Its inverse in f64.
+    pub to_object: DAffine3,
+}
+
+/// Where the parts of a scene instance are.
+#[derive(Clone, Copy, Debug)]
+struct Lookup {
+    first_part: usize,
+    first_geometry: u32,
+    placement: Option<u32>,
+}
+
+impl World {
+    /// The part and the placement that a hit names.
+    pub fn locate(&self, hit: &Hit) -> (&Part, Option<&Placement>) {
+        let lookup = self.lookup[hit.instance as usize];
+        let part = &self.parts[lookup.first_part + (hit.geometry - lookup.first_geometry) as usize];
+        (part, lookup.placement.map(|p| &self.placements[p as usize]))
+    }
+}
+
+impl World {
+    /// Recentres `scene` and decides what is baked.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let mut uses = vec![0usize; scene.groups.len()];
+        for (i, instance) in scene.instances.iter().enumerate() {
+            uses[instance.group as usize] += 1;
+            check_transform(i, instance)?;
+        }
+        let is_baked = |instance: &Instance| {
+            let is_mesh = |(_, geometry): (u32, &Geometry)| matches!(geometry, Geometry::Mesh(_));
+            let only_meshes = scene.group_geometries(instance.group).all(is_mesh);
+            // A scaled sphere is no sphere, so shapes are baked only where they merely move.
+            uses[instance.group as usize] == 1
+                && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
+        };
+        let (baked, placed): (Vec<_>, Vec<_>) = scene
+            .instances
+            .iter()
+            .enumerate()
+            .partition(|(_, instance)| is_baked(instance));
+
+        let mut world = Self {
+            centre: choose_centre(scene),
+            ..Self::default()
+        };
+        let to_world = DAffine3::from_translation(-world.centre);
+        let nowhere = Lookup {
+            first_part: 0,
+            first_geometry: 0,
+            placement: None,
+        };
+        world.lookup = vec![nowhere; scene.instances.len()];
+        for (i, instance) in baked {
+            let transform = to_world * instance.transform;
+            world.lookup[i] = world.add_group(scene, instance.group, i as u32, &transform);
+        }
+        world.fixed = 0..world.parts.len();
+
+        let mut added: Vec<Option<(u32, Lookup, DVec3)>> = vec![None; scene.groups.len()];
+        for (i, instance) in placed {
+            let group = instance.group;
+            let (object, lookup, origin) = *added[group as usize].get_or_insert_with(|| {
+                let origin = group_origin(scene, group);
+                let lookup =
+                    world.add_group(scene, group, i as u32, &DAffine3::from_translation(-origin));
+                world.objects.push(lookup.first_part..world.parts.len());
+                (world.objects.len() as u32 - 1, lookup, origin)
+            });
+            let exact = to_world * instance.transform * DAffine3::from_translation(origin);
+            let rounded = exact.as_affine3();
+            // The inverse of what is traced, not of what was asked for: the two differ by f32 rounding.
+            let to_object = rounded.as_daffine3().inverse();
+            if !to_object.is_finite() {
+                return Err(singular(i, instance));
+            }
+            world.lookup[i] = Lookup {
+                placement: Some(world.placements.len() as u32),
+                ..lookup
+            };
+            world.placements.push(Placement {
+                instance: i as u32,
+                object,
+                to_world: rounded,
+                to_object,
+            });
+        }
+        Ok(world)
+    }
+
+    /// The bounds of everything fixed, and of every object where it stands; exact for meshes.
+    pub fn bounds(&self) -> Aabb {
+        let fixed = self.parts[self.fixed.clone()]
+            .iter()
+            .map(Part::bounds)
+            .fold(Aabb::EMPTY, Aabb::union);
+        self.placements.iter().fold(fixed, |all, placement| {
+            let parts = &self.parts[self.objects[placement.object as usize].clone()];
+            all.union(
+                placement.bounds(
+                    parts
+                        .iter()
+                        .map(Part::bounds)
+                        .fold(Aabb::EMPTY, Aabb::union),
+                ),
+            )
+        })
+    }
+
+    /// Primitives as placed: those of an object that is placed twice count twice.
+    pub fn primitive_count(&self) -> u64 {
+        let count = |parts: Range<usize>| -> u64 {
+            self.parts[parts]
+                .iter()
+                .map(|p| p.primitives.len() as u64)
+                .sum()
+        };
+        let placed = self
+            .placements
+            .iter()
+            .map(|p| count(self.objects[p.object as usize].clone()));
+        count(self.fixed.clone()) + placed.sum::<u64>()
+    }
+
+    fn add_group(
+        &mut self,
+        scene: &Scene,
+        group: u32,
+        instance: u32,
+        transform: &DAffine3,
+    ) -> Lookup {
+        let lookup = Lookup {
+            first_part: self.parts.len(),
+            first_geometry: scene.groups[group as usize].geometries.start,
+            placement: None,
+        };
+        for (geometry, description) in scene.group_geometries(group) {
+            let primitives = match description {
+                Geometry::Mesh(mesh) => Primitives::Triangles {
+                    positions: transformed(mesh, transform),
+                    triangles: Arc::clone(&mesh.triangles),
+                },
+                Geometry::Shapes { shapes, .. } => {
+                    let moved = shapes
+                        .iter()
+                        .map(|shape| shape.translated(transform.translation));
+                    Primitives::Shapes(Arc::new(moved.collect()))
+                }
+            };
+            self.parts.push(Part {
+                geometry,
+                instance,
+                primitives,
+            });
+        }
+        lookup
+    }
+}
+
+impl Part {
+    /// The box around the part's traceable primitives, in the part's own coordinates.
+    pub fn bounds(&self) -> Aabb {
+        match &self.primitives {
+            Primitives::Triangles {
+                positions,
+                triangles,
+            } => triangles
+                .iter()
+                .map(|corners| corners.map(|i| positions[i as usize]))
+                .filter(|corners| corners.iter().all(|&p| is_traceable(p)))
+                .flatten()
+                .fold(Aabb::EMPTY, Aabb::include),
+            Primitives::Shapes(shapes) => shapes
+                .iter()
+                .map(Shape::bounds)
+                .fold(Aabb::EMPTY, Aabb::union),
+        }
+    }
+}
+
+impl Primitives {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Triangles { triangles, .. } => triangles.len(),
+            Self::Shapes(shapes) => shapes.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Placement {
+    /// A box around the object whose own box is `object`, in world coordinates, rounded outwards.
+    pub fn bounds(&self, object: Aabb) -> Aabb {
+        if object.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let to_world = self.to_world.as_daffine3();
+        let (centre, half) = (
+            object.min.as_dvec3() * 0.5 + object.max.as_dvec3() * 0.5,
+            object.size().as_dvec3() * 0.5,
+        );
+        let middle = to_world.transform_point3(centre);
+        let reach = to_world.matrix3.abs() * half;
+        // f64 rounding of the sums, far below one step of f32.
+        let slack = (to_world.matrix3.abs() * (centre.abs() + half) + to_world.translation.abs())
+            * gamma64(16);
+        let down = |x: f64| (x as f32).next_down();
+        let up = |x: f64| (x as f32).next_up();
+        let (low, high) = (middle - reach - slack, middle + reach + slack);
+        Aabb {
+            min: Vec3::new(down(low.x), down(low.y), down(low.z)),
+            max: Vec3::new(up(high.x), up(high.y), up(high.z)),
+        }
+    }
+}
+
+/// The mesh's positions under `transform`, rounded once; shared where nothing moves.
+fn transformed(mesh: &Mesh, transform: &DAffine3) -> Arc<Vec<Vec3>> {
+    // First, so that the mesh's own origin and the world's centre cancel before anything is rounded to f32.
+    let origin = transform.transform_point3(mesh.origin);
+    if transform.matrix3 == DMat3::IDENTITY && origin == DVec3::ZERO {
+        return Arc::clone(&mesh.positions);
+    }
+    Arc::new(
+        mesh.positions
+            .iter()
+            .map(|p| (transform.matrix3 * p.as_dvec3() + origin).as_vec3())
+            .collect(),
+    )
+}
+
+/// Where zero of the world is put: at zero of the scene while f32 keeps the scene's shape there; else at the origin of
+/// the largest mesh, which then need not be copied; else in the middle of the bounds.
+fn choose_centre(scene: &Scene) -> DVec3 {
+    let bounds = scene.bounds();
+    if choose_origin(&bounds) == DVec3::ZERO {
+        return DVec3::ZERO;
+    }
+    let meshes = scene.instances.iter().flat_map(|instance| {
+        scene
+            .group_geometries(instance.group)
+            .filter_map(|(_, geometry)| match geometry {
+                Geometry::Mesh(mesh) => Some((
+                    mesh.triangles.len(),
+                    instance.transform.transform_point3(mesh.origin),
+                )),
+                Geometry::Shapes { .. } => None,
+            })
+    });
+    let largest = meshes
+        .max_by_key(|(triangles, _)| *triangles)
+        .map(|(_, origin)| origin);
+    largest
+        .filter(|o| (*o - bounds.centre()).length() <= 8.0 * bounds.radius())
+        .unwrap_or_else(|| bounds.centre())
+}
+
+/// The origin of an object's own coordinates, by the same rule.
+fn group_origin(scene: &Scene, group: u32) -> DVec3 {
+    let bounds = scene
+        .group_geometries(group)
+        .fold(DAabb::EMPTY, |all, (_, geometry)| {
+            all.union(geometry.bounds(&DAffine3::IDENTITY))
+        });
+    choose_origin(&bounds)
+}
+
+fn check_transform(index: usize, instance: &Instance) -> Result<()> {
+    let determinant = instance.transform.matrix3.determinant();
+    let invertible = determinant != 0.0 && instance.transform.inverse().is_finite();
+    if invertible && instance.transform.is_finite() {
+        Ok(())
+    } else {
+        Err(singular(index, instance))
+    }
+}
+
+fn singular(index: usize, instance: &Instance) -> Error {
+    let name = &instance.name;
+    Error::Backend {
+        backend: "scene",
+        message: format!(
+            "instance {index} ({name:?}) has a singular transform; give it a scale that is not zero"
+        ),
+    }
+}
