@@ -51,24 +51,13 @@ pub enum Error {
 
 impl Error {
     /// An [`Error::Input`] about `path`, at `place` (may be empty).
-    pub fn input(
-        path: impl Into<PathBuf>,
-        place: impl Into<String>,
-        message: impl Into<String>,
-    ) -> Self {
-        Self::Input {
-            path: path.into(),
-            place: place.into(),
-            message: message.into(),
-        }
+    pub fn input(path: impl Into<PathBuf>, place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Input { path: path.into(), place: place.into(), message: message.into() }
     }
 
     /// An [`Error::Output`] about `path`.
     pub fn output(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
-        Self::Output {
-            path: path.into(),
-            message: message.into(),
-        }
+        Self::Output { path: path.into(), message: message.into() }
     }
 
     /// The program's exit code for it.
@@ -97,28 +86,14 @@ pub struct Warning {
 
 impl Warning {
     /// A warning about `path`, at `place` (may be empty).
-    pub fn new(
-        path: impl Into<PathBuf>,
-        place: impl Into<String>,
-        message: impl Into<String>,
-    ) -> Self {
-        Self {
-            path: path.into(),
-            place: place.into(),
-            message: message.into(),
-        }
+    pub fn new(path: impl Into<PathBuf>, place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { path: path.into(), place: place.into(), message: message.into() }
     }
 }
 
 impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let colon = if self.place.is_empty() { "" } else { ": " };
-        write!(
-            f,
-            "{}: {}{colon}{}",
-            self.path.display(),
-            self.place,
-            self.message
-        )
+        write!(f, "{}: {}{colon}{}", self.path.display(), self.place, self.message)
     }
 }

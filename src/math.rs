@@ -4,9 +4,7 @@
 //! machinery of rounding-error analysis in Higham's notation (Higham 2002, *Accuracy and Stability of Numerical
 //! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
 
-pub use glam::{
-    Affine3, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4,
-};
+pub use glam::{Affine3, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.
 pub const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;
@@ -48,10 +46,7 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing.
-    pub const EMPTY: Self = Self {
-        min: Vec3::INFINITY,
-        max: Vec3::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// The smallest box around the points; empty for none.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
@@ -61,19 +56,13 @@ impl Aabb {
     /// The smallest box around `self` and `point`.
     #[inline]
     pub fn include(self, point: Vec3) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
+        Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// The smallest box around both.
     #[inline]
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Whether it contains no point.
@@ -112,25 +101,16 @@ pub struct DAabb {
 
 impl DAabb {
     /// The box that contains nothing.
-    pub const EMPTY: Self = Self {
-        min: DVec3::INFINITY,
-        max: DVec3::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// The smallest box around `self` and `point`.
     pub fn include(self, point: DVec3) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
+        Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Whether it contains no point.
@@ -140,19 +120,11 @@ impl DAabb {
 
     /// The middle; the origin where empty.
     pub fn centre(&self) -> DVec3 {
-        if self.is_empty() {
-            DVec3::ZERO
-        } else {
-            self.min * 0.5 + self.max * 0.5
-        }
+        if self.is_empty() { DVec3::ZERO } else { self.min * 0.5 + self.max * 0.5 }
     }
 
     /// Half the length of the diagonal; 0 where empty.
     pub fn radius(&self) -> f64 {
-        if self.is_empty() {
-            0.0
-        } else {
-            (self.max * 0.5 - self.min * 0.5).length()
-        }
+        if self.is_empty() { 0.0 } else { (self.max * 0.5 - self.min * 0.5).length() }
     }
 }

@@ -18,12 +18,7 @@ pub struct Ray {
 impl Ray {
     /// A ray over [0, infinity].
     pub const fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self {
-            origin,
-            direction,
-            tmin: 0.0,
-            tmax: f32::INFINITY,
-        }
+        Self { origin, direction, tmin: 0.0, tmax: f32::INFINITY }
     }
 
     /// Whether it can hit anything: finite origin and direction, a direction that is not zero, a range that is not

@@ -46,18 +46,8 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) for a size or a sample count of 0.
-    pub fn new(
-        scene: &'a Scene,
-        world: &'a World,
-        camera: Camera,
-        settings: Settings,
-    ) -> Result<Self> {
-        Ok(Self {
-            scene,
-            world,
-            camera,
-            settings,
-        })
+    pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
+        Ok(Self { scene, world, camera, settings })
     }
 
     /// Renders the whole picture on rayon's current thread pool.

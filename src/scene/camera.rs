@@ -27,36 +27,24 @@ impl Camera {
             return None;
         };
         let frame = DMat3::from_cols(right, back.cross(right), back);
-        (eye.is_finite() && frame.is_finite()).then(|| Self {
-            name: String::new(),
-            eye,
-            frame,
-            fov_y,
-        })
+        (eye.is_finite() && frame.is_finite()).then(|| Self { name: String::new(), eye, frame, fov_y })
     }
 
     /// A view of the whole of `bounds`, from the front, a little from the right and above.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
         let fov_y: f64 = 40f64.to_radians();
         let half = (fov_y / 2.0).min(libm::atan(libm::tan(fov_y / 2.0) * aspect));
-        let radius = if bounds.radius() > 0.0 {
-            bounds.radius()
-        } else {
-            1.0
-        };
+        let radius = if bounds.radius() > 0.0 { bounds.radius() } else { 1.0 };
         let direction = DVec3::new(0.45, 0.35, 1.0).normalize();
         let eye = bounds.centre() + direction * (radius / libm::sin(half));
-        Self::look_at(eye, bounds.centre(), DVec3::Y, fov_y)
-            .expect("the direction is neither zero nor vertical")
+        Self::look_at(eye, bounds.centre(), DVec3::Y, fov_y).expect("the direction is neither zero nor vertical")
     }
 
     /// Moves the camera. Scale and shear move the eye and leave the angle of view as it is.
     pub(crate) fn transform(&mut self, transform: &DAffine3) {
         self.eye = transform.transform_point3(self.eye);
         let back = (transform.matrix3 * self.frame.z_axis).normalize();
-        let right = (transform.matrix3 * self.frame.y_axis)
-            .cross(back)
-            .normalize();
+        let right = (transform.matrix3 * self.frame.y_axis).cross(back).normalize();
         self.frame = DMat3::from_cols(right, back.cross(right), back);
     }
 }

@@ -15,17 +15,9 @@ pub struct Attenuation {
 
 impl Attenuation {
     /// No weakening.
-    pub const NONE: Self = Self {
-        constant: 1.0,
-        linear: 0.0,
-        quadratic: 0.0,
-    };
+    pub const NONE: Self = Self { constant: 1.0, linear: 0.0, quadratic: 0.0 };
     /// As physics has it: 1 / d^2.
-    pub const INVERSE_SQUARE: Self = Self {
-        constant: 0.0,
-        linear: 0.0,
-        quadratic: 1.0,
-    };
+    pub const INVERSE_SQUARE: Self = Self { constant: 0.0, linear: 0.0, quadratic: 1.0 };
 
     /// The factor at distance `d`.
     pub fn factor(&self, d: f32) -> f32 {

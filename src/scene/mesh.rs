@@ -29,44 +29,26 @@ pub struct Mesh {
 impl Mesh {
     /// A bare mesh at the origin.
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
-        Self {
-            positions: Arc::new(positions),
-            triangles: Arc::new(triangles),
-            ..Self::default()
-        }
+        Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
     }
 
     /// Stores f64 positions as f32 offsets from an origin, chosen by [`choose_origin`].
     pub fn set_positions(&mut self, positions: &[DVec3]) {
-        let bounds = positions
-            .iter()
-            .filter(|p| p.is_finite())
-            .fold(DAabb::EMPTY, |all, &p| all.include(p));
+        let bounds = positions.iter().filter(|p| p.is_finite()).fold(DAabb::EMPTY, |all, &p| all.include(p));
         self.origin = choose_origin(&bounds);
-        self.positions = Arc::new(
-            positions
-                .iter()
-                .map(|p| (p - self.origin).as_vec3())
-                .collect(),
-        );
+        self.positions = Arc::new(positions.iter().map(|p| (p - self.origin).as_vec3()).collect());
     }
 
     /// The bounds of the traceable vertices under `transform`.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
         let place = |p: &Vec3| transform.transform_point3(self.origin + p.as_dvec3());
-        self.positions
-            .iter()
-            .filter(|&&p| is_traceable(p))
-            .fold(DAabb::EMPTY, |all, p| all.include(place(p)))
+        self.positions.iter().filter(|&&p| is_traceable(p)).fold(DAabb::EMPTY, |all, p| all.include(place(p)))
     }
 
     /// How many triangles have a corner that is NaN, infinite or too large to trace.
     pub fn untraceable_triangles(&self) -> usize {
         let bad = |&i: &u32| !is_traceable(self.positions[i as usize]);
-        self.triangles
-            .iter()
-            .filter(|corners| corners.iter().any(bad))
-            .count()
+        self.triangles.iter().filter(|corners| corners.iter().any(bad)).count()
     }
 
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
@@ -86,10 +68,7 @@ impl Mesh {
                 sums[corners[k] as usize] += normal * libm::atan2(a.cross(b).length(), a.dot(b));
             }
         }
-        self.normals = sums
-            .into_iter()
-            .map(|n| n.normalize_or_zero().as_vec3())
-            .collect();
+        self.normals = sums.into_iter().map(|n| n.normalize_or_zero().as_vec3()).collect();
     }
 }
 
@@ -97,9 +76,5 @@ impl Mesh {
 /// within 8 radii of zero, where at most 3 bits of the 24 are spent on the distance.
 pub(crate) fn choose_origin(bounds: &DAabb) -> DVec3 {
     let centre = bounds.centre();
-    if centre.abs().max_element() <= 8.0 * bounds.radius() {
-        DVec3::ZERO
-    } else {
-        centre
-    }
+    if centre.abs().max_element() <= 8.0 * bounds.radius() { DVec3::ZERO } else { centre }
 }

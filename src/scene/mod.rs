@@ -86,15 +86,9 @@ impl Geometry {
                 }
                 (0..8).fold(all, |all, corner| {
                     let pick = |axis: usize| {
-                        if corner >> axis & 1 == 0 {
-                            b.min[axis]
-                        } else {
-                            b.max[axis]
-                        }
+                        if corner >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] }
                     };
-                    all.include(
-                        transform.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()),
-                    )
+                    all.include(transform.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()))
                 })
             }),
         }
@@ -104,18 +98,11 @@ impl Geometry {
 impl Scene {
     /// A scene that shows `geometries` once each, as they are, with the given materials.
     pub fn from_geometries(geometries: Vec<Geometry>, materials: Vec<Material>) -> Self {
-        let group = Group {
-            name: String::new(),
-            geometries: 0..geometries.len() as u32,
-        };
+        let group = Group { name: String::new(), geometries: 0..geometries.len() as u32 };
         Self {
             geometries,
             groups: vec![group],
-            instances: vec![Instance {
-                name: String::new(),
-                group: 0,
-                transform: DAffine3::IDENTITY,
-            }],
+            instances: vec![Instance { name: String::new(), group: 0, transform: DAffine3::IDENTITY }],
             materials,
             ..Self::default()
         }
@@ -123,10 +110,7 @@ impl Scene {
 
     /// The geometries of one group, with their indices.
     pub fn group_geometries(&self, group: u32) -> impl Iterator<Item = (u32, &Geometry)> {
-        self.groups[group as usize]
-            .geometries
-            .clone()
-            .map(|g| (g, &self.geometries[g as usize]))
+        self.groups[group as usize].geometries.clone().map(|g| (g, &self.geometries[g as usize]))
     }
 
     /// Primitives as placed: those of a group that is placed twice count twice.
@@ -142,9 +126,7 @@ impl Scene {
     pub fn bounds(&self) -> DAabb {
         self.instances.iter().fold(DAabb::EMPTY, |all, instance| {
             self.group_geometries(instance.group)
-                .fold(all, |all, (_, geometry)| {
-                    all.union(geometry.bounds(&instance.transform))
-                })
+                .fold(all, |all, (_, geometry)| all.union(geometry.bounds(&instance.transform)))
         })
     }
 

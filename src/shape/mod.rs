@@ -54,10 +54,7 @@ impl Shape {
     pub fn translated(&self, offset: DVec3) -> Self {
         let moved = |p: Vec3| (p.as_dvec3() + offset).as_vec3();
         match self {
-            Self::Sphere(sphere) => Self::Sphere(Sphere {
-                centre: moved(sphere.centre),
-                ..*sphere
-            }),
+            Self::Sphere(sphere) => Self::Sphere(Sphere { centre: moved(sphere.centre), ..*sphere }),
         }
     }
 }

@@ -16,9 +16,7 @@ pub struct Sphere {
 impl Sphere {
     /// The box around it, rounded outwards.
     pub fn bounds(&self) -> Aabb {
-        let traceable = is_traceable(self.centre)
-            && self.radius > 0.0
-            && is_traceable(Vec3::splat(self.radius));
+        let traceable = is_traceable(self.centre) && self.radius > 0.0 && is_traceable(Vec3::splat(self.radius));
         if !traceable {
             return Aabb::EMPTY;
         }
@@ -58,10 +56,7 @@ impl Sphere {
         } else {
             return None;
         };
-        Some(ShapeHit {
-            t,
-            uv: self.uv(origin + d * t),
-        })
+        Some(ShapeHit { t, uv: self.uv(origin + d * t) })
     }
 
     /// The unit normal, outwards, at `point` on the surface.
@@ -74,9 +69,6 @@ impl Sphere {
         let n = self.normal(point);
         let turn = libm::atan2(n.x, -n.z) / std::f64::consts::TAU;
         let latitude = libm::asin(n.y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
-        Vec2::new(
-            (turn + if turn < 0.0 { 1.0 } else { 0.0 }) as f32,
-            (latitude + 0.5) as f32,
-        )
+        Vec2::new((turn + if turn < 0.0 { 1.0 } else { 0.0 }) as f32, (latitude + 0.5) as f32)
     }
 }

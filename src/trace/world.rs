@@ -103,25 +103,14 @@ impl World {
             let is_mesh = |(_, geometry): (u32, &Geometry)| matches!(geometry, Geometry::Mesh(_));
             let only_meshes = scene.group_geometries(instance.group).all(is_mesh);
             // A scaled sphere is no sphere, so shapes are baked only where they merely move.
-            uses[instance.group as usize] == 1
-                && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
+            uses[instance.group as usize] == 1 && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
         };
-        let (baked, placed): (Vec<_>, Vec<_>) = scene
-            .instances
-            .iter()
-            .enumerate()
-            .partition(|(_, instance)| is_baked(instance));
+        let (baked, placed): (Vec<_>, Vec<_>) =
+            scene.instances.iter().enumerate().partition(|(_, instance)| is_baked(instance));
 
-        let mut world = Self {
-            centre: choose_centre(scene),
-            ..Self::default()
-        };
+        let mut world = Self { centre: choose_centre(scene), ..Self::default() };
         let to_world = DAffine3::from_translation(-world.centre);
-        let nowhere = Lookup {
-            first_part: 0,
-            first_geometry: 0,
-            placement: None,
-        };
+        let nowhere = Lookup { first_part: 0, first_geometry: 0, placement: None };
         world.lookup = vec![nowhere; scene.instances.len()];
         for (i, instance) in baked {
             let transform = to_world * instance.transform;
@@ -134,8 +123,7 @@ impl World {
             let group = instance.group;
             let (object, lookup, origin) = *added[group as usize].get_or_insert_with(|| {
                 let origin = group_origin(scene, group);
-                let lookup =
-                    world.add_group(scene, group, i as u32, &DAffine3::from_translation(-origin));
+                let lookup = world.add_group(scene, group, i as u32, &DAffine3::from_translation(-origin));
                 world.objects.push(lookup.first_part..world.parts.len());
                 (world.objects.len() as u32 - 1, lookup, origin)
             });
@@ -146,61 +134,29 @@ impl World {
             if !to_object.is_finite() {
                 return Err(singular(i, instance));
             }
-            world.lookup[i] = Lookup {
-                placement: Some(world.placements.len() as u32),
-                ..lookup
-            };
-            world.placements.push(Placement {
-                instance: i as u32,
-                object,
-                to_world: rounded,
-                to_object,
-            });
+            world.lookup[i] = Lookup { placement: Some(world.placements.len() as u32), ..lookup };
+            world.placements.push(Placement { instance: i as u32, object, to_world: rounded, to_object });
         }
         Ok(world)
     }
 
     /// The bounds of everything fixed, and of every object where it stands; exact for meshes.
     pub fn bounds(&self) -> Aabb {
-        let fixed = self.parts[self.fixed.clone()]
-            .iter()
-            .map(Part::bounds)
-            .fold(Aabb::EMPTY, Aabb::union);
+        let fixed = self.parts[self.fixed.clone()].iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union);
         self.placements.iter().fold(fixed, |all, placement| {
             let parts = &self.parts[self.objects[placement.object as usize].clone()];
-            all.union(
-                placement.bounds(
-                    parts
-                        .iter()
-                        .map(Part::bounds)
-                        .fold(Aabb::EMPTY, Aabb::union),
-                ),
-            )
+            all.union(placement.bounds(parts.iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union)))
         })
     }
 
     /// Primitives as placed: those of an object that is placed twice count twice.
     pub fn primitive_count(&self) -> u64 {
-        let count = |parts: Range<usize>| -> u64 {
-            self.parts[parts]
-                .iter()
-                .map(|p| p.primitives.len() as u64)
-                .sum()
-        };
-        let placed = self
-            .placements
-            .iter()
-            .map(|p| count(self.objects[p.object as usize].clone()));
+        let count = |parts: Range<usize>| -> u64 { self.parts[parts].iter().map(|p| p.primitives.len() as u64).sum() };
+        let placed = self.placements.iter().map(|p| count(self.objects[p.object as usize].clone()));
         count(self.fixed.clone()) + placed.sum::<u64>()
     }
 
-    fn add_group(
-        &mut self,
-        scene: &Scene,
-        group: u32,
-        instance: u32,
-        transform: &DAffine3,
-    ) -> Lookup {
+    fn add_group(&mut self, scene: &Scene, group: u32, instance: u32, transform: &DAffine3) -> Lookup {
         let lookup = Lookup {
             first_part: self.parts.len(),
             first_geometry: scene.groups[group as usize].geometries.start,
@@ -213,17 +169,11 @@ impl World {
                     triangles: Arc::clone(&mesh.triangles),
                 },
                 Geometry::Shapes { shapes, .. } => {
-                    let moved = shapes
-                        .iter()
-                        .map(|shape| shape.translated(transform.translation));
+                    let moved = shapes.iter().map(|shape| shape.translated(transform.translation));
                     Primitives::Shapes(Arc::new(moved.collect()))
                 }
             };
-            self.parts.push(Part {
-                geometry,
-                instance,
-                primitives,
-            });
+            self.parts.push(Part { geometry, instance, primitives });
         }
         lookup
     }
@@ -233,19 +183,13 @@ impl Part {
     /// The box around the part's traceable primitives, in the part's own coordinates.
     pub fn bounds(&self) -> Aabb {
         match &self.primitives {
-            Primitives::Triangles {
-                positions,
-                triangles,
-            } => triangles
+            Primitives::Triangles { positions, triangles } => triangles
                 .iter()
                 .map(|corners| corners.map(|i| positions[i as usize]))
                 .filter(|corners| corners.iter().all(|&p| is_traceable(p)))
                 .flatten()
                 .fold(Aabb::EMPTY, Aabb::include),
-            Primitives::Shapes(shapes) => shapes
-                .iter()
-                .map(Shape::bounds)
-                .fold(Aabb::EMPTY, Aabb::union),
+            Primitives::Shapes(shapes) => shapes.iter().map(Shape::bounds).fold(Aabb::EMPTY, Aabb::union),
         }
     }
 }
@@ -272,15 +216,12 @@ impl Placement {
             return Aabb::EMPTY;
         }
         let to_world = self.to_world.as_daffine3();
-        let (centre, half) = (
-            object.min.as_dvec3() * 0.5 + object.max.as_dvec3() * 0.5,
-            object.size().as_dvec3() * 0.5,
-        );
+        let (centre, half) =
+            (object.min.as_dvec3() * 0.5 + object.max.as_dvec3() * 0.5, object.size().as_dvec3() * 0.5);
         let middle = to_world.transform_point3(centre);
         let reach = to_world.matrix3.abs() * half;
         // f64 rounding of the sums, far below one step of f32.
-        let slack = (to_world.matrix3.abs() * (centre.abs() + half) + to_world.translation.abs())
-            * gamma64(16);
+        let slack = (to_world.matrix3.abs() * (centre.abs() + half) + to_world.translation.abs()) * gamma64(16);
         let down = |x: f64| (x as f32).next_down();
         let up = |x: f64| (x as f32).next_up();
         let (low, high) = (middle - reach - slack, middle + reach + slack);
@@ -298,12 +239,7 @@ fn transformed(mesh: &Mesh, transform: &DAffine3) -> Arc<Vec<Vec3>> {
     if transform.matrix3 == DMat3::IDENTITY && origin == DVec3::ZERO {
         return Arc::clone(&mesh.positions);
     }
-    Arc::new(
-        mesh.positions
-            .iter()
-            .map(|p| (transform.matrix3 * p.as_dvec3() + origin).as_vec3())
-            .collect(),
-    )
+    Arc::new(mesh.positions.iter().map(|p| (transform.matrix3 * p.as_dvec3() + origin).as_vec3()).collect())
 }
 
 /// Where zero of the world is put: at zero of the scene while f32 keeps the scene's shape there; else at the origin of
@@ -314,50 +250,33 @@ fn choose_centre(scene: &Scene) -> DVec3 {
         return DVec3::ZERO;
     }
     let meshes = scene.instances.iter().flat_map(|instance| {
-        scene
-            .group_geometries(instance.group)
-            .filter_map(|(_, geometry)| match geometry {
-                Geometry::Mesh(mesh) => Some((
-                    mesh.triangles.len(),
-                    instance.transform.transform_point3(mesh.origin),
-                )),
-                Geometry::Shapes { .. } => None,
-            })
+        scene.group_geometries(instance.group).filter_map(|(_, geometry)| match geometry {
+            Geometry::Mesh(mesh) => Some((mesh.triangles.len(), instance.transform.transform_point3(mesh.origin))),
+            Geometry::Shapes { .. } => None,
+        })
     });
-    let largest = meshes
-        .max_by_key(|(triangles, _)| *triangles)
-        .map(|(_, origin)| origin);
-    largest
-        .filter(|o| (*o - bounds.centre()).length() <= 8.0 * bounds.radius())
-        .unwrap_or_else(|| bounds.centre())
+    let largest = meshes.max_by_key(|(triangles, _)| *triangles).map(|(_, origin)| origin);
+    largest.filter(|o| (*o - bounds.centre()).length() <= 8.0 * bounds.radius()).unwrap_or_else(|| bounds.centre())
 }
 
 /// The origin of an object's own coordinates, by the same rule.
 fn group_origin(scene: &Scene, group: u32) -> DVec3 {
     let bounds = scene
         .group_geometries(group)
-        .fold(DAabb::EMPTY, |all, (_, geometry)| {
-            all.union(geometry.bounds(&DAffine3::IDENTITY))
-        });
+        .fold(DAabb::EMPTY, |all, (_, geometry)| all.union(geometry.bounds(&DAffine3::IDENTITY)));
     choose_origin(&bounds)
 }
 
 fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     let determinant = instance.transform.matrix3.determinant();
     let invertible = determinant != 0.0 && instance.transform.inverse().is_finite();
-    if invertible && instance.transform.is_finite() {
-        Ok(())
-    } else {
-        Err(singular(index, instance))
-    }
+    if invertible && instance.transform.is_finite() { Ok(()) } else { Err(singular(index, instance)) }
 }
 
 fn singular(index: usize, instance: &Instance) -> Error {
     let name = &instance.name;
     Error::Backend {
         backend: "scene",
-        message: format!(
-            "instance {index} ({name:?}) has a singular transform; give it a scale that is not zero"
-        ),
+        message: format!("instance {index} ({name:?}) has a singular transform; give it a scale that is not zero"),
     }
 }
