@@ -4,6 +4,7 @@
 
 use super::build::MAX_DEPTH;
 use super::node::{NO_CHILD, Tree, WIDTH};
+use super::simd::Simd;
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
 
@@ -38,19 +39,22 @@ struct Entry {
 /// Every level of the tree leaves at most seven siblings waiting.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
 
-/// Children waiting to be visited, the nearest on top.
-struct Stack {
+/// Children waiting to be visited, the nearest on top. Made once a batch, since filling it costs as much as a few nodes.
+pub(super) struct Stack {
     entries: [Entry; STACK],
     len: usize,
 }
 
 impl Stack {
-    /// Holds the root.
+    pub fn new() -> Self {
+        Self { entries: [Entry::default(); STACK], len: 0 }
+    }
+
+    /// Holds the root alone.
     #[inline(always)]
-    fn new(rays: u32) -> Self {
-        let mut entries = [Entry::default(); STACK];
-        entries[0] = Entry { near: f32::NEG_INFINITY, index: 0, rays, count: 0 };
-        Self { entries, len: 1 }
+    fn start(&mut self, rays: u32) {
+        self.entries[0] = Entry { near: f32::NEG_INFINITY, index: 0, rays, count: 0 };
+        self.len = 1;
     }
 
     #[inline(always)]
@@ -74,8 +78,14 @@ impl Stack {
 
 /// Visits the leaves that the ray enters before `limit`, near ones first.
 #[inline(always)]
-pub(super) fn single(tree: &Tree, ray: &SlabRay, mut limit: f32, mut leaf: impl FnMut(u32, u8) -> Visit) {
-    let mut stack = Stack::new(1);
+pub(super) fn single<S: Simd>(
+    stack: &mut Stack,
+    tree: &Tree,
+    ray: &SlabRay,
+    mut limit: f32,
+    mut leaf: impl FnMut(u32, u8) -> Visit,
+) {
+    stack.start(1);
     while let Some(entry) = stack.pop() {
         if entry.near > limit {
             continue;
@@ -88,7 +98,7 @@ pub(super) fn single(tree: &Tree, ray: &SlabRay, mut limit: f32, mut leaf: impl 
             continue;
         }
         let node = &tree.nodes[entry.index as usize];
-        let (mut mask, near) = ray.enter(node, limit);
+        let (mut mask, near) = ray.enter::<S>(node, limit);
         let base = stack.len;
         while mask != 0 {
             let i = mask.trailing_zeros() as usize;
@@ -102,7 +112,8 @@ pub(super) fn single(tree: &Tree, ray: &SlabRay, mut limit: f32, mut leaf: impl 
 /// Visits, for each ray of a packet, at least the leaves that it enters before its limit. `leaf` gets a leaf, the
 /// ray's place in the packet and its nearest hit. Only the rays in the bit mask `live` take part.
 #[inline(always)]
-pub(super) fn packet<const N: usize>(
+pub(super) fn packet<S: Simd, const N: usize>(
+    stack: &mut Stack,
     tree: &Tree,
     rays: &[SlabRay; N],
     mut live: u32,
@@ -110,7 +121,7 @@ pub(super) fn packet<const N: usize>(
     mut leaf: impl FnMut(u32, u8, usize, &mut Nearest) -> Visit,
 ) {
     let mut limit = std::array::from_fn::<f32, N, _>(|k| nearest[k].limit());
-    let mut stack = Stack::new(live);
+    stack.start(live);
     while let Some(entry) = stack.pop() {
         let mut waiting = entry.rays & live;
         if entry.count != 0 {
@@ -130,7 +141,7 @@ pub(super) fn packet<const N: usize>(
         while waiting != 0 {
             let k = waiting.trailing_zeros() as usize;
             waiting &= waiting - 1;
-            let (mask, near) = rays[k].enter(node, limit[k]);
+            let (mask, near) = rays[k].enter::<S>(node, limit[k]);
             for i in 0..WIDTH {
                 if mask >> i & 1 != 0 {
                     entering[i] |= 1 << k;
