@@ -25,6 +25,7 @@ pub(super) struct SlabRay {
     far_offset: [f32; 3],
     /// Which of a node's six bounds is met first, by axis.
     near: [usize; 3],
+    /// Rounded down, for t is rounded before it is held against it; not below 0.
     tmin: f32,
 }
 
@@ -47,7 +48,7 @@ impl SlabRay {
             near_offset: [0.0; 3],
             far_offset: [0.0; 3],
             near: [0; 3],
-            tmin: ray.tmin.next_down(),
+            tmin: if ray.tmin > 0.0 { ray.tmin.next_down() } else { 0.0 },
         };
         for axis in 0..3 {
             let component = ray.direction[axis];
@@ -64,7 +65,8 @@ impl SlabRay {
         slab
     }
 
-    /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each.
+    /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each,
+    /// not below 0.
     #[inline(always)]
     pub fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (u32, [f32; WIDTH]) {
         let mut near = S::V8::splat(self.tmin);

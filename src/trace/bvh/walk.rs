@@ -36,6 +36,10 @@ struct Entry {
     count: u8,
 }
 
+impl Entry {
+    const ROOT: Self = Self { near: 0.0, index: 0, rays: 1, count: 0 };
+}
+
 /// Every level of the tree leaves at most seven siblings waiting.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
 
@@ -53,7 +57,7 @@ impl Stack {
     /// Holds the root alone.
     #[inline(always)]
     fn start(&mut self, rays: u32) {
-        self.entries[0] = Entry { near: f32::NEG_INFINITY, index: 0, rays, count: 0 };
+        self.entries[0] = Entry { rays, ..Entry::ROOT };
         self.len = 1;
     }
 
@@ -85,27 +89,43 @@ pub(super) fn single<S: Simd>(
     mut limit: f32,
     mut leaf: impl FnMut(u32, u8) -> Visit,
 ) {
-    stack.start(1);
-    while let Some(entry) = stack.pop() {
-        if entry.near > limit {
-            continue;
-        }
-        if entry.count != 0 {
-            match leaf(entry.index, entry.count) {
+    stack.len = 0;
+    let mut next = Entry::ROOT;
+    loop {
+        if next.count == 0 {
+            let node = tree.node(next.index);
+            let (mut mask, near) = ray.enter::<S>(node, limit);
+            if mask != 0 {
+                let child = |i: usize| Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] };
+                let first = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                next = child(first);
+                // Mostly one or two children are entered: the nearest goes on, the other waits.
+                let base = stack.len;
+                while mask != 0 {
+                    let i = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
+                    let mut other = child(i);
+                    if other.near < next.near {
+                        std::mem::swap(&mut next, &mut other);
+                    }
+                    stack.insert(base, other);
+                }
+                continue;
+            }
+        } else {
+            match leaf(next.index, next.count) {
                 Visit::Until(t) => limit = t,
                 Visit::Stop => return,
             }
-            continue;
         }
-        let node = &tree.nodes[entry.index as usize];
-        let (mut mask, near) = ray.enter::<S>(node, limit);
-        let base = stack.len;
-        while mask != 0 {
-            let i = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            debug_assert_ne!(node.count[i], NO_CHILD, "an empty box is never entered");
-            stack.insert(base, Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] });
-        }
+        next = loop {
+            match stack.pop() {
+                Some(entry) if entry.near <= limit => break entry,
+                Some(_) => {}
+                None => return,
+            }
+        };
     }
 }
 
@@ -135,7 +155,7 @@ pub(super) fn packet<S: Simd, const N: usize>(
             }
             continue;
         }
-        let node = &tree.nodes[entry.index as usize];
+        let node = tree.node(entry.index);
         let mut entering = [0u32; WIDTH];
         let mut first = [f32::INFINITY; WIDTH];
         while waiting != 0 {
