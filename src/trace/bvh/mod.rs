@@ -122,17 +122,24 @@ impl Bvh {
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
         let Stacks { upper, level: lower } = stacks;
-        walk::single::<S>(upper, self.placements.tree(), &slab, nearest.limit(), |first, count| {
-            for placement in self.placements.leaf(first, count) {
-                let object_ray = placement.object_ray(ray);
-                if object_ray.is_valid() {
-                    let through = Through { instance: placement.instance, to_world: &placement.to_world };
-                    let level = &self.objects[placement.object as usize];
-                    level.trace::<S, ANY>(ray, &object_ray, Some(through), lower, nearest);
+        walk::single::<S>(
+            upper,
+            self.placements.tree(),
+            &slab,
+            nearest.limit(),
+            #[inline(always)]
+            |first, count| {
+                for placement in self.placements.leaf(first, count) {
+                    let object_ray = placement.object_ray(ray);
+                    if object_ray.is_valid() {
+                        let through = Through { instance: placement.instance, to_world: &placement.to_world };
+                        let level = &self.objects[placement.object as usize];
+                        level.trace::<S, ANY>(ray, &object_ray, Some(through), lower, nearest);
+                    }
                 }
-            }
-            Visit::after::<ANY>(nearest)
-        });
+                Visit::after::<ANY>(nearest)
+            },
+        );
     }
 
     /// Rays that walk the fixed trees together, and the placed objects one by one.
@@ -218,18 +225,32 @@ impl Level {
         if !self.triangles.tree().is_empty() {
             let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(local, blur);
-            walk::single::<S>(stack, self.triangles.tree(), &slab, nearest.limit(), |first, count| {
-                self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
-                Visit::after::<ANY>(nearest)
-            });
+            walk::single::<S>(
+                stack,
+                self.triangles.tree(),
+                &slab,
+                nearest.limit(),
+                #[inline(always)]
+                |first, count| {
+                    self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
+                    Visit::after::<ANY>(nearest)
+                },
+            );
         }
         let is_done = ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single::<S>(stack, self.shapes.tree(), &slab, nearest.limit(), |first, count| {
-                self.shapes.offer_leaf(first, count, local, through, nearest);
-                Visit::after::<ANY>(nearest)
-            });
+            walk::single::<S>(
+                stack,
+                self.shapes.tree(),
+                &slab,
+                nearest.limit(),
+                #[inline(always)]
+                |first, count| {
+                    self.shapes.offer_leaf(first, count, local, through, nearest);
+                    Visit::after::<ANY>(nearest)
+                },
+            );
         }
     }
 

@@ -3,7 +3,7 @@
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
 use super::build::MAX_DEPTH;
-use super::node::{NO_CHILD, Tree, WIDTH};
+use super::node::{Tree, WIDTH};
 use super::simd::Simd;
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
