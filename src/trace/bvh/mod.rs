@@ -272,6 +272,7 @@ impl Level {
                 &slabs,
                 live,
                 nearest,
+                #[inline(always)]
                 |first, count, k, nearest: &mut Nearest| {
                     self.triangles.offer_leaf::<S>(first, count, &rays[k], &filters[k], None, nearest);
                     Visit::after::<ANY>(nearest)
@@ -286,6 +287,7 @@ impl Level {
                 &slabs,
                 live,
                 nearest,
+                #[inline(always)]
                 |first, count, k, nearest: &mut Nearest| {
                     self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
                     Visit::after::<ANY>(nearest)
