@@ -46,8 +46,7 @@ mod tests {
     #[test]
     fn the_screen_matrix_agrees_with_the_rays() {
         let settings = Settings { width: 40, height: 20, spp: 1, ..Settings::default() };
-        let camera =
-            Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 0.0), DVec3::Y, 0.7).unwrap();
+        let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 0.0), DVec3::Y, 0.7).unwrap();
         let metadata = metadata(&camera, &settings, 0.0);
         let to_camera = DMat4::from_cols_array(&metadata.world_to_camera.unwrap());
         let to_screen = DMat4::from_cols_array(&metadata.world_to_screen.unwrap());
