@@ -21,13 +21,14 @@ impl Ray {
         Self { origin, direction, tmin: 0.0, tmax: f32::INFINITY }
     }
 
-    /// Whether it can hit anything: finite origin and direction, a direction that is not zero, a range that is not
-    /// empty. Every tracer answers a miss for any other ray.
+    /// Whether it can hit anything: finite origin and direction, a direction that is not zero (nor denormal on every
+    /// axis, where too few bits are left to tell it from others), a range that is not empty. Every tracer answers a
+    /// miss for any other ray.
     #[inline]
     pub fn is_valid(&self) -> bool {
         self.origin.is_finite()
             && self.direction.is_finite()
-            && self.direction != Vec3::ZERO
+            && self.direction.abs().max_element() >= f32::MIN_POSITIVE
             && self.tmin >= 0.0
             && self.tmin <= self.tmax
     }
@@ -36,7 +37,7 @@ impl Ray {
 /// Where a ray met the scene: ids and parameters, nothing else. `surface` computes the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Distance in units of the ray's direction.
+    /// Distance in units of the ray's direction; finite.
     pub t: f32,
     /// Weight of a triangle's second corner; a shape's own first parameter.
     pub u: f32,

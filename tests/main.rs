@@ -1,4 +1,6 @@
-//! One test binary.
+//! One test binary: what crosses modules, file by file.
 
 mod cli;
+mod parity;
 mod render;
+mod scenes;

@@ -5,6 +5,7 @@
 //! alike. A closed family is an enum and not a trait object: the compiler lists every place a new shape must reach.
 
 mod sphere;
+pub mod triangle;
 
 pub use sphere::Sphere;
 

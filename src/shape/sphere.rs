@@ -48,7 +48,7 @@ impl Sphere {
         // q is 0 only for a ray that starts on the sphere and touches it.
         let (t0, t1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         let (near, far) = if t0 <= t1 { (t0, t1) } else { (t1, t0) };
-        let valid = |t: f64| (ray.tmin..=ray.tmax).contains(&(t as f32));
+        let valid = |t: f64| (ray.tmin..=ray.tmax).contains(&(t as f32)) && (t as f32).is_finite();
         let t = if valid(near) {
             near
         } else if valid(far) {

@@ -8,6 +8,7 @@ pub mod brute;
 pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
+mod nearest;
 mod world;
 
 pub use world::{Part, Placement, Primitives, World};

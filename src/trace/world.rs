@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, gamma64, is_traceable};
-use crate::ray::Hit;
+use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Instance, Mesh, Scene, choose_origin};
 use crate::shape::Shape;
 
@@ -210,6 +210,16 @@ impl Primitives {
 }
 
 impl Placement {
+    /// `ray` in the object's coordinates, at the same t: the direction is not normalised again. Off by the rounding of
+    /// each component to f32, so it serves to find boxes and shapes; triangles are tested in the world.
+    pub fn object_ray(&self, ray: &Ray) -> Ray {
+        Ray {
+            origin: self.to_object.transform_point3(ray.origin.as_dvec3()).as_vec3(),
+            direction: self.to_object.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
+            ..*ray
+        }
+    }
+
     /// A box around the object whose own box is `object`, in world coordinates, rounded outwards.
     pub fn bounds(&self, object: Aabb) -> Aabb {
         if object.is_empty() {

@@ -1,1 +1,260 @@
-//! The native BVH.
+//! The native tracer: a bounding volume hierarchy with eight children a node.
+//!
+//! | file | idea |
+//! | --- | --- |
+//! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
+//! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
+//! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
+//! | `walk` | one ray, and packets of rays, from the root to the leaves |
+//! | `triangles`, `shapes`, `placements` | what leaves hold: blocks of four triangles, shapes, placed objects |
+//! | `isa` | the same code compiled twice, for AVX2 and for any processor |
+//!
+//! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
+//! instances has none of the second and third.
+//!
+//! Boxes only ever reject what cannot be hit, and [`triangle::intersect`](crate::shape::triangle::intersect) depends on
+//! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
+//! instruction set.
+
+mod build;
+mod isa;
+mod node;
+mod placements;
+mod shapes;
+mod slab;
+mod triangles;
+mod walk;
+
+pub use isa::Isa;
+
+use super::nearest::Nearest;
+use super::{Batch, Tracer, Width, World};
+use crate::math::{Aabb, Affine3};
+use crate::ray::{Hit, Ray};
+use placements::PlacementTree;
+use shapes::ShapeTree;
+use slab::SlabRay;
+use triangles::{Filter, TriangleTree};
+use walk::Visit;
+
+/// The native tracer.
+pub struct Bvh {
+    fixed: Level,
+    objects: Vec<Level>,
+    placements: PlacementTree,
+    isa: Isa,
+}
+
+/// Everything in one coordinate system.
+struct Level {
+    triangles: TriangleTree,
+    shapes: ShapeTree,
+}
+
+/// A part's ids, as hits name them.
+#[derive(Clone, Copy, Debug)]
+struct PartId {
+    geometry: u32,
+    instance: u32,
+}
+
+/// How the ray came to a level: in the world, or through a placement.
+#[derive(Clone, Copy)]
+struct Through<'a> {
+    instance: u32,
+    to_world: &'a Affine3,
+}
+
+impl Bvh {
+    /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
+    pub fn build(world: &World) -> Self {
+        Self::build_for(world, Isa::detect())
+    }
+
+    /// The same, with the instruction set given; hits do not depend on it.
+    ///
+    /// # Panics
+    /// Where this processor does not have `isa`.
+    pub fn build_for(world: &World, isa: Isa) -> Self {
+        assert!(isa.is_available(), "{isa:?} is not available on this processor");
+        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone())).collect();
+        let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
+        let placements = PlacementTree::build(&world.placements, &bounds);
+        Self { fixed: Level::build(world, world.fixed.clone()), objects, placements, isa }
+    }
+
+    /// Memory the trees hold, in bytes.
+    pub fn bytes(&self) -> usize {
+        let level = |level: &Level| level.triangles.bytes() + level.shapes.bytes();
+        level(&self.fixed) + self.objects.iter().map(level).sum::<usize>() + self.placements.bytes()
+    }
+
+    /// The instruction set its kernels use.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// One ray, from the root: the nearest hit, or just any.
+    #[inline(always)]
+    fn trace<const ANY: bool>(&self, ray: &Ray) -> Option<Hit> {
+        let mut nearest = Nearest::new(ray);
+        if !ray.is_valid() {
+            return None;
+        }
+        self.fixed.trace::<ANY>(ray, ray, None, &mut nearest);
+        self.enter_placements::<ANY>(ray, &mut nearest);
+        nearest.hit()
+    }
+
+    /// Placed objects for one ray.
+    #[inline(always)]
+    fn enter_placements<const ANY: bool>(&self, ray: &Ray, nearest: &mut Nearest) {
+        if self.placements.is_empty() || ANY && nearest.hit().is_some() {
+            return;
+        }
+        let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
+        walk::single(self.placements.tree(), &slab, nearest.limit(), |first, count| {
+            for placement in self.placements.leaf(first, count) {
+                let object_ray = placement.object_ray(ray);
+                if object_ray.is_valid() {
+                    let through = Through { instance: placement.instance, to_world: &placement.to_world };
+                    let level = &self.objects[placement.object as usize];
+                    level.trace::<ANY>(ray, &object_ray, Some(through), nearest);
+                }
+            }
+            Visit::after::<ANY>(nearest)
+        });
+    }
+
+    /// Rays that walk the fixed trees together, and the placed objects one by one.
+    #[inline(always)]
+    fn trace_packet<const N: usize, const ANY: bool>(&self, rays: &[Ray; N]) -> [Option<Hit>; N] {
+        let mut nearest = rays.map(|ray| Nearest::new(&ray));
+        self.fixed.trace_packet::<N, ANY>(rays, &mut nearest);
+        for (ray, nearest) in rays.iter().zip(&mut nearest).filter(|(ray, _)| ray.is_valid()) {
+            self.enter_placements::<ANY>(ray, nearest);
+        }
+        nearest.map(|nearest| nearest.hit())
+    }
+
+    /// Many rays in packets of N; the rest, and N = 1, ray by ray.
+    #[inline(always)]
+    fn trace_batch<const N: usize, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
+        let (packets, rest) = rays.as_chunks::<N>();
+        if N > 1 {
+            for (i, packet) in packets.iter().enumerate() {
+                for (k, hit) in self.trace_packet::<N, ANY>(packet).into_iter().enumerate() {
+                    answer(i * N + k, hit);
+                }
+            }
+        }
+        let done = if N > 1 { rays.len() - rest.len() } else { 0 };
+        for (k, ray) in rays[done..].iter().enumerate() {
+            answer(done + k, self.trace::<ANY>(ray));
+        }
+    }
+
+    /// The width matched once a batch.
+    #[inline(always)]
+    fn trace_width<const ANY: bool>(&self, rays: &[Ray], width: Width, answer: impl FnMut(usize, Option<Hit>)) {
+        match width {
+            Width::One => self.trace_batch::<1, ANY>(rays, answer),
+            Width::Four => self.trace_batch::<4, ANY>(rays, answer),
+            Width::Eight => self.trace_batch::<8, ANY>(rays, answer),
+            Width::Sixteen => self.trace_batch::<16, ANY>(rays, answer),
+        }
+    }
+}
+
+impl Level {
+    fn build(world: &World, parts: std::ops::Range<usize>) -> Self {
+        let parts = &world.parts[parts];
+        Self { triangles: TriangleTree::build(parts), shapes: ShapeTree::build(parts) }
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.triangles.tree().bounds().union(self.shapes.tree().bounds())
+    }
+
+    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
+    #[inline(always)]
+    fn trace<const ANY: bool>(&self, ray: &Ray, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+        // Rounding the local ray moves it by as much again as the slab test itself may err.
+        let blur = if through.is_some() { 4.0 } else { 1.0 };
+        if !self.triangles.tree().is_empty() {
+            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
+            let filter = Filter::new(local, blur);
+            walk::single(self.triangles.tree(), &slab, nearest.limit(), |first, count| {
+                self.triangles.offer_leaf(first, count, ray, &filter, through, nearest);
+                Visit::after::<ANY>(nearest)
+            });
+        }
+        let is_done = ANY && nearest.hit().is_some();
+        if !is_done && !self.shapes.tree().is_empty() {
+            let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
+            walk::single(self.shapes.tree(), &slab, nearest.limit(), |first, count| {
+                self.shapes.offer_leaf(first, count, local, through, nearest);
+                Visit::after::<ANY>(nearest)
+            });
+        }
+    }
+
+    /// Rays in the world against a level in the world.
+    #[inline(always)]
+    fn trace_packet<const N: usize, const ANY: bool>(&self, rays: &[Ray; N], nearest: &mut [Nearest; N]) {
+        let live = rays.iter().enumerate().fold(0, |live, (k, ray)| live | u32::from(ray.is_valid()) << k);
+        if !self.triangles.tree().is_empty() {
+            let slabs = rays.map(|ray| SlabRay::new(&ray, self.triangles.tree().reach(), 1.0));
+            let filters = rays.map(|ray| Filter::new(&ray, 1.0));
+            walk::packet(self.triangles.tree(), &slabs, live, nearest, |first, count, k, nearest: &mut Nearest| {
+                self.triangles.offer_leaf(first, count, &rays[k], &filters[k], None, nearest);
+                Visit::after::<ANY>(nearest)
+            });
+        }
+        if !self.shapes.tree().is_empty() {
+            let slabs = rays.map(|ray| SlabRay::new(&ray, self.shapes.tree().reach(), 1.0));
+            walk::packet(self.shapes.tree(), &slabs, live, nearest, |first, count, k, nearest: &mut Nearest| {
+                self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
+                Visit::after::<ANY>(nearest)
+            });
+        }
+    }
+}
+
+impl Tracer for Bvh {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        isa::dispatch(
+            self.isa,
+            #[inline(always)]
+            || self.trace::<false>(ray),
+        )
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        isa::dispatch(
+            self.isa,
+            #[inline(always)]
+            || self.trace::<true>(ray).is_some(),
+        )
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        isa::dispatch(
+            self.isa,
+            #[inline(always)]
+            || self.trace_width::<false>(rays, batch.width, |i, hit| hits[i] = hit),
+        );
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        isa::dispatch(
+            self.isa,
+            #[inline(always)]
+            || {
+                self.trace_width::<true>(rays, batch.width, |i, hit| occluded[i] = hit.is_some());
+            },
+        );
+    }
+}

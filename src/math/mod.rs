@@ -4,6 +4,8 @@
 //! machinery of rounding-error analysis in Higham's notation (Higham 2002, *Accuracy and Stability of Numerical
 //! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
 
+pub mod expansion;
+
 pub use glam::{Affine3, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.

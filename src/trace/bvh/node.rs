@@ -1,0 +1,89 @@
+//! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
+
+use crate::math::{Aabb, Vec3};
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+
+/// Marks a child slot without a child; its box is empty, so that no ray enters it.
+pub(super) const NO_CHILD: u8 = u8::MAX;
+
+/// Eight children: 256 bytes, four cache lines.
+#[repr(C, align(64))]
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    /// Of each child: min x, y, z, max x, y, z.
+    pub bounds: [[f32; WIDTH]; 6],
+    /// Of an inner child its node; of a leaf its first item.
+    pub index: [u32; WIDTH],
+    /// 0 for an inner child, [`NO_CHILD`] for none, else the leaf's number of items.
+    pub count: [u8; WIDTH],
+}
+
+impl Node {
+    /// A node without children.
+    pub fn empty() -> Self {
+        let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        Self { bounds: [low, low, low, high, high, high], index: [0; WIDTH], count: [NO_CHILD; WIDTH] }
+    }
+
+    /// Fills one slot.
+    pub fn set(&mut self, slot: usize, bounds: &Aabb, index: u32, count: u8) {
+        for axis in 0..3 {
+            self.bounds[axis][slot] = bounds.min[axis];
+            self.bounds[axis + 3][slot] = bounds.max[axis];
+        }
+        self.index[slot] = index;
+        self.count[slot] = count;
+    }
+
+    /// The box of one slot.
+    pub fn child_bounds(&self, slot: usize) -> Aabb {
+        let corner = |first: usize| {
+            Vec3::new(self.bounds[first][slot], self.bounds[first + 1][slot], self.bounds[first + 2][slot])
+        };
+        Aabb { min: corner(0), max: corner(3) }
+    }
+}
+
+/// A tree over items of any kind; leaves name ranges of them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    /// The root is the first; empty for no items.
+    pub nodes: Vec<Node>,
+}
+
+impl Tree {
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The box around everything.
+    pub fn bounds(&self) -> Aabb {
+        let children = |root: &Node| (0..WIDTH).map(|slot| root.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union);
+        self.nodes.first().map_or(Aabb::EMPTY, children)
+    }
+
+    /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to.
+    pub fn reach(&self) -> Vec3 {
+        let bounds = self.bounds();
+        bounds.min.abs().max(bounds.max.abs())
+    }
+
+    /// Memory it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+    }
+
+    /// Visits every leaf in order and lets it be renamed: `(first, count)` becomes what `rename` returns.
+    pub fn rename_leaves(&mut self, mut rename: impl FnMut(u32, u8) -> (u32, u8)) {
+        for node in &mut self.nodes {
+            for slot in 0..WIDTH {
+                if node.count[slot] != 0 && node.count[slot] != NO_CHILD {
+                    (node.index[slot], node.count[slot]) = rename(node.index[slot], node.count[slot]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Leaves of shapes that are not triangles.
+
+use super::build::{self, Item};
+use super::node::Tree;
+use super::{PartId, Through};
+use crate::ray::{Hit, Ray};
+use crate::shape::Shape;
+use crate::trace::nearest::Nearest;
+use crate::trace::{Part, Primitives};
+
+/// One shape and its ids.
+struct Entry {
+    shape: Shape,
+    primitive: u32,
+    part: PartId,
+}
+
+/// All shapes of a level.
+pub(super) struct ShapeTree {
+    tree: Tree,
+    entries: Vec<Entry>,
+}
+
+impl ShapeTree {
+    /// Over the shapes of `parts` that can be hit.
+    pub fn build(parts: &[Part]) -> Self {
+        let mut items = Vec::new();
+        for (p, part) in parts.iter().enumerate() {
+            let Primitives::Shapes(list) = &part.primitives else { continue };
+            for (i, shape) in list.iter().enumerate() {
+                let bounds = shape.bounds();
+                if !bounds.is_empty() {
+                    items.push(Item { bounds, part: p as u32, primitive: i as u32 });
+                }
+            }
+        }
+        let tree = build::build(&mut items, 1);
+        let entry = |item: &Item| {
+            let part = &parts[item.part as usize];
+            let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };
+            let ids = PartId { geometry: part.geometry, instance: part.instance };
+            Entry { shape: list[item.primitive as usize], primitive: item.primitive, part: ids }
+        };
+        Self { tree, entries: items.iter().map(entry).collect() }
+    }
+
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Memory it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes() + size_of_val(&self.entries[..])
+    }
+
+    /// Offers what `local` (the ray in this level's coordinates) hits in a leaf.
+    #[inline]
+    pub fn offer_leaf(&self, first: u32, count: u8, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+        for Entry { shape, primitive, part } in &self.entries[first as usize..first as usize + usize::from(count)] {
+            if let Some(hit) = shape.intersect(local) {
+                let instance = through.map_or(part.instance, |through| through.instance);
+                let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
+                nearest.offer(hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance });
+            }
+        }
+    }
+}

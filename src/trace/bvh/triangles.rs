@@ -1,0 +1,223 @@
+//! Leaves of triangles: blocks of four, rejected together in f32, decided one by one.
+//!
+//! The f32 test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
+//! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants,
+//! without FMA. Here it only rejects: a triangle falls out when two edge functions have opposite signs by more than their
+//! rounding error. What remains goes to the exact test.
+
+use super::build::{self, Item};
+use super::node::Tree;
+use super::{PartId, Through};
+use crate::math::{Aabb, UNIT_ROUNDOFF, is_traceable};
+use crate::ray::{Hit, Ray};
+use crate::shape::triangle::{self, Placed};
+use crate::trace::nearest::Nearest;
+use crate::trace::{Part, Primitives};
+
+/// Triangles in a block.
+const LANES: usize = 4;
+
+/// In a lane without a triangle.
+const NO_TRIANGLE: u32 = u32::MAX;
+
+/// Four triangles, component by component.
+#[derive(Clone, Debug)]
+struct Block {
+    /// Component i of corner k is `corners[3 * k + i]`.
+    corners: [[f32; LANES]; 9],
+    primitive: [u32; LANES],
+    part: [u32; LANES],
+}
+
+/// All triangles of a level.
+pub(super) struct TriangleTree {
+    tree: Tree,
+    blocks: Vec<Block>,
+    parts: Vec<PartId>,
+}
+
+impl TriangleTree {
+    /// Over the traceable triangles of `parts`.
+    pub fn build(parts: &[Part]) -> Self {
+        let mut items = Vec::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
+        for (p, part) in parts.iter().enumerate() {
+            let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
+            for (i, corners) in triangles.iter().enumerate() {
+                let corners = corners.map(|i| positions[i as usize]);
+                if corners.iter().all(|&corner| is_traceable(corner)) {
+                    items.push(Item { bounds: Aabb::around(corners), part: p as u32, primitive: i as u32 });
+                }
+            }
+        }
+        let mut tree = build::build(&mut items, LANES);
+        let mut blocks = Vec::with_capacity(items.len() / 3);
+        tree.rename_leaves(|first, count| {
+            let leaf = &items[first as usize..first as usize + count as usize];
+            let first_block = blocks.len() as u32;
+            blocks.extend(leaf.chunks(LANES).map(|items| Block::new(parts, items)));
+            (first_block, leaf.len().div_ceil(LANES) as u8)
+        });
+        let parts = parts.iter().map(|part| PartId { geometry: part.geometry, instance: part.instance }).collect();
+        Self { tree, blocks, parts }
+    }
+
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Memory it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes() + size_of_val(&self.blocks[..]) + size_of_val(&self.parts[..])
+    }
+
+    /// Offers what `ray` (in the world) hits in a leaf; `filter` is of the ray in this level's coordinates.
+    #[inline(always)]
+    pub fn offer_leaf(
+        &self,
+        first: u32,
+        count: u8,
+        ray: &Ray,
+        filter: &Filter,
+        through: Option<Through<'_>>,
+        nearest: &mut Nearest,
+    ) {
+        for block in &self.blocks[first as usize..first as usize + usize::from(count)] {
+            let mut candidates = filter.candidates(block);
+            while candidates != 0 {
+                let lane = candidates.trailing_zeros() as usize;
+                candidates &= candidates - 1;
+                self.offer(block, lane, ray, through, nearest);
+            }
+        }
+    }
+
+    #[inline]
+    fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+        let corners = block.triangle(lane);
+        let part = self.parts[block.part[lane] as usize];
+        let (hit, instance) = match through {
+            None => (triangle::intersect(ray, &corners), part.instance),
+            Some(Through { instance, to_world }) => (triangle::intersect(ray, &Placed { corners, to_world }), instance),
+        };
+        if let Some(hit) = hit {
+            let (primitive, geometry) = (block.primitive[lane], part.geometry);
+            let (t, u, v) = (hit.t as f32, hit.u as f32, hit.v as f32);
+            nearest.offer(hit.t, Hit { t, u, v, primitive, geometry, instance });
+        }
+    }
+}
+
+impl Block {
+    fn new(parts: &[Part], items: &[Item]) -> Self {
+        let mut block = Self { corners: [[0.0; LANES]; 9], primitive: [NO_TRIANGLE; LANES], part: [0; LANES] };
+        for (lane, item) in items.iter().enumerate() {
+            let Primitives::Triangles { positions, triangles } = &parts[item.part as usize].primitives else {
+                unreachable!("items of a triangle tree come from meshes")
+            };
+            for (k, &corner) in triangles[item.primitive as usize].iter().enumerate() {
+                for axis in 0..3 {
+                    block.corners[3 * k + axis][lane] = positions[corner as usize][axis];
+                }
+            }
+            block.primitive[lane] = item.primitive;
+            block.part[lane] = item.part;
+        }
+        block
+    }
+
+    #[inline]
+    fn triangle(&self, lane: usize) -> [crate::math::Vec3; 3] {
+        [0, 3, 6].map(|k| [self.corners[k][lane], self.corners[k + 1][lane], self.corners[k + 2][lane]].into())
+    }
+}
+
+/// A ray made ready for the f32 reject test.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filter {
+    /// Axes such that the direction is largest along the third.
+    axes: [usize; 3],
+    /// Origin, in the order of `axes`.
+    origin: [f32; 3],
+    /// Direction along the first two axes over that along the third; at most 1 in magnitude.
+    shear: [f32; 2],
+    /// Error of a sheared component, relative to the largest component of a corner relative to the origin.
+    error: f32,
+    /// Added to that largest component: how far the origin itself may be off, in its own roundings.
+    blur: f32,
+}
+
+impl Filter {
+    /// `blur` is by how much more than its own rounding the ray may be off (1: not at all).
+    #[inline(always)]
+    pub fn new(ray: &Ray, blur: f32) -> Self {
+        let d = ray.direction.abs();
+        let z = if d.x > d.y && d.x > d.z {
+            0
+        } else if d.y > d.z {
+            1
+        } else {
+            2
+        };
+        let axes = [(z + 1) % 3, (z + 2) % 3, z];
+        let (direction, origin) = (ray.direction.to_array(), ray.origin.to_array());
+        let along = direction[z];
+        Self {
+            axes,
+            origin: axes.map(|axis| origin[axis]),
+            shear: [direction[axes[0]] / along, direction[axes[1]] / along],
+            error: 8.0 * UNIT_ROUNDOFF * blur,
+            blur: if blur > 1.0 { ray.origin.abs().max_element() } else { 0.0 },
+        }
+    }
+
+    /// A bit for every triangle that the ray's line may pass.
+    ///
+    /// With L the largest component of the corners relative to the origin and S the largest after the shear, a sheared
+    /// component errs by e = 8 u L (a subtraction, a quotient, a product and a subtraction, of magnitudes up to L
+    /// each), an edge function by 4 e S + 2 e^2 and its own rounding 4 u S^2.
+    #[inline(always)]
+    fn candidates(&self, block: &Block) -> u32 {
+        let [kx, ky, kz] = self.axes;
+        let mut x = [[0f32; LANES]; 3];
+        let mut y = [[0f32; LANES]; 3];
+        let mut largest = [self.blur; LANES];
+        let mut sheared = [0f32; LANES];
+        for k in 0..3 {
+            for i in 0..LANES {
+                let px = block.corners[3 * k + kx][i] - self.origin[0];
+                let py = block.corners[3 * k + ky][i] - self.origin[1];
+                let pz = block.corners[3 * k + kz][i] - self.origin[2];
+                largest[i] = max(max(largest[i], px.abs()), max(py.abs(), pz.abs()));
+                x[k][i] = px - self.shear[0] * pz;
+                y[k][i] = py - self.shear[1] * pz;
+                sheared[i] = max(sheared[i], max(x[k][i].abs(), y[k][i].abs()));
+            }
+        }
+        let mut mask = 0;
+        for i in 0..LANES {
+            let u = x[2][i] * y[1][i] - y[2][i] * x[1][i];
+            let v = x[0][i] * y[2][i] - y[0][i] * x[2][i];
+            let w = x[1][i] * y[0][i] - y[1][i] * x[0][i];
+            let e = self.error * largest[i];
+            // The sum doubled against rounding of the bound; a constant against underflow.
+            let bound =
+                2.0 * (e * (4.0 * sheared[i] + 2.0 * e) + 4.0 * UNIT_ROUNDOFF * sheared[i] * sheared[i]) + 1e-36;
+            let low = min(min(u, v), w);
+            let high = max(max(u, v), w);
+            let outside = low < -bound && high > bound;
+            mask |= u32::from(!outside && block.primitive[i] != NO_TRIANGLE) << i;
+        }
+        mask
+    }
+}
+
+/// Maps to one instruction, unlike `f32::max`, which treats NaN otherwise.
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}

@@ -1,0 +1,149 @@
+//! From the root to the leaves: one ray, or a packet of rays that share one stack.
+//!
+//! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
+
+use super::build::MAX_DEPTH;
+use super::node::{NO_CHILD, Tree, WIDTH};
+use super::slab::SlabRay;
+use crate::trace::nearest::Nearest;
+
+/// What a leaf says to the walk.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Visit {
+    /// Go on, up to this t.
+    Until(f32),
+    /// Enough.
+    Stop,
+}
+
+impl Visit {
+    /// After offers to `nearest`: an any-hit query stops at the first hit.
+    #[inline(always)]
+    pub fn after<const ANY: bool>(nearest: &Nearest) -> Self {
+        if ANY && nearest.hit().is_some() { Self::Stop } else { Self::Until(nearest.limit()) }
+    }
+}
+
+/// A child to be visited.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// Where the ray, or the first ray of the packet, enters it.
+    near: f32,
+    index: u32,
+    /// The rays of the packet that enter it.
+    rays: u32,
+    count: u8,
+}
+
+/// Every level of the tree leaves at most seven siblings waiting.
+const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
+
+/// Children waiting to be visited, the nearest on top.
+struct Stack {
+    entries: [Entry; STACK],
+    len: usize,
+}
+
+impl Stack {
+    /// Holds the root.
+    #[inline(always)]
+    fn new(rays: u32) -> Self {
+        let mut entries = [Entry::default(); STACK];
+        entries[0] = Entry { near: f32::NEG_INFINITY, index: 0, rays, count: 0 };
+        Self { entries, len: 1 }
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<Entry> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.entries[self.len])
+    }
+
+    /// Pushes so that of what came since `base` the nearest ends on top.
+    #[inline(always)]
+    fn insert(&mut self, base: usize, entry: Entry) {
+        let mut at = self.len;
+        while at > base && self.entries[at - 1].near < entry.near {
+            self.entries[at] = self.entries[at - 1];
+            at -= 1;
+        }
+        self.entries[at] = entry;
+        self.len += 1;
+    }
+}
+
+/// Visits the leaves that the ray enters before `limit`, near ones first.
+#[inline(always)]
+pub(super) fn single(tree: &Tree, ray: &SlabRay, mut limit: f32, mut leaf: impl FnMut(u32, u8) -> Visit) {
+    let mut stack = Stack::new(1);
+    while let Some(entry) = stack.pop() {
+        if entry.near > limit {
+            continue;
+        }
+        if entry.count != 0 {
+            match leaf(entry.index, entry.count) {
+                Visit::Until(t) => limit = t,
+                Visit::Stop => return,
+            }
+            continue;
+        }
+        let node = &tree.nodes[entry.index as usize];
+        let (mut mask, near) = ray.enter(node, limit);
+        let base = stack.len;
+        while mask != 0 {
+            let i = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            debug_assert_ne!(node.count[i], NO_CHILD, "an empty box is never entered");
+            stack.insert(base, Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] });
+        }
+    }
+}
+
+/// Visits, for each ray of a packet, at least the leaves that it enters before its limit. `leaf` gets a leaf, the
+/// ray's place in the packet and its nearest hit. Only the rays in the bit mask `live` take part.
+#[inline(always)]
+pub(super) fn packet<const N: usize>(
+    tree: &Tree,
+    rays: &[SlabRay; N],
+    mut live: u32,
+    nearest: &mut [Nearest; N],
+    mut leaf: impl FnMut(u32, u8, usize, &mut Nearest) -> Visit,
+) {
+    let mut limit = std::array::from_fn::<f32, N, _>(|k| nearest[k].limit());
+    let mut stack = Stack::new(live);
+    while let Some(entry) = stack.pop() {
+        let mut waiting = entry.rays & live;
+        if entry.count != 0 {
+            while waiting != 0 {
+                let k = waiting.trailing_zeros() as usize;
+                waiting &= waiting - 1;
+                match leaf(entry.index, entry.count, k, &mut nearest[k]) {
+                    Visit::Until(t) => limit[k] = t,
+                    Visit::Stop => live &= !(1 << k),
+                }
+            }
+            continue;
+        }
+        let node = &tree.nodes[entry.index as usize];
+        let mut entering = [0u32; WIDTH];
+        let mut first = [f32::INFINITY; WIDTH];
+        while waiting != 0 {
+            let k = waiting.trailing_zeros() as usize;
+            waiting &= waiting - 1;
+            let (mask, near) = rays[k].enter(node, limit[k]);
+            for i in 0..WIDTH {
+                if mask >> i & 1 != 0 {
+                    entering[i] |= 1 << k;
+                    first[i] = if near[i] < first[i] { near[i] } else { first[i] };
+                }
+            }
+        }
+        let base = stack.len;
+        for i in 0..WIDTH {
+            if entering[i] != 0 {
+                let entry = Entry { near: first[i], index: node.index[i], rays: entering[i], count: node.count[i] };
+                stack.insert(base, entry);
+            }
+        }
+    }
+}

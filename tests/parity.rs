@@ -1,0 +1,203 @@
+//! Every way through the native tracer gives the answers of brute force, to the bit.
+
+use twincast::math::Vec3;
+use twincast::scene::{Mesh, Scene};
+use twincast::trace::brute::Brute;
+use twincast::trace::bvh::{Bvh, Isa};
+use twincast::{Batch, Hit, Ray, Tracer, Width, World};
+
+use crate::scenes::{self, Random};
+
+/// Closest hits by single rays and packets, with every instruction set, and occlusion, against brute force.
+#[track_caller]
+fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
+    let world = World::new(scene).expect("the scene is sound");
+    let brute = Brute::new(&world);
+    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
+    for isa in [Isa::Portable, Isa::Avx2] {
+        if !isa.is_available() {
+            continue;
+        }
+        let bvh = Bvh::build_for(&world, isa);
+        for width in Width::ALL {
+            let batch = Batch { width, coherent: false };
+            let mut hits = vec![None; rays.len()];
+            bvh.closest_batch(rays, &mut hits, batch);
+            for (i, ray) in rays.iter().enumerate() {
+                assert_eq!(hits[i], expected[i], "{isa:?} {width:?} {ray:?}");
+            }
+            let mut occluded = vec![false; rays.len()];
+            bvh.occluded_batch(rays, &mut occluded, batch);
+            for (i, ray) in rays.iter().enumerate() {
+                assert_eq!(occluded[i], expected[i].is_some(), "occluded {isa:?} {width:?} {ray:?}");
+            }
+        }
+        for (ray, expected) in rays.iter().zip(&expected).take(100) {
+            assert_eq!(bvh.closest(ray), *expected);
+            assert_eq!(bvh.occluded(ray), expected.is_some());
+            assert_eq!(brute.occluded(ray), expected.is_some());
+        }
+    }
+    expected.iter().flatten().count()
+}
+
+#[test]
+fn random_soups() {
+    for (seed, size) in [(1, 0.02), (2, 0.3), (3, 2.0)] {
+        let mesh = scenes::soup(3000, size, seed);
+        let rays = scenes::rays(2000, &mesh.positions.clone(), seed);
+        let hits = assert_parity(&scenes::of_mesh(mesh), &rays);
+        assert!(hits > 150, "{hits} hits");
+    }
+}
+
+#[test]
+fn closed_mesh_at_every_scale_and_place() {
+    for scale in [1e-20f32, 1e-6, 1.0, 1e6, 1e15] {
+        for offset in [Vec3::ZERO, Vec3::new(1000.0, -300.0, 50.0)] {
+            let mut mesh = scenes::bumpy_sphere(24, 0.2, 7);
+            let moved: Vec<Vec3> = mesh.positions.iter().map(|p| (*p + offset) * scale).collect();
+            let mut rays = scenes::rays(600, &mesh.positions.clone(), 3);
+            for ray in &mut rays {
+                ray.origin = (ray.origin + offset) * scale;
+                ray.direction *= scale;
+            }
+            mesh.positions = moved.into();
+            assert_parity(&scenes::of_mesh(mesh), &rays);
+        }
+    }
+}
+
+#[test]
+fn instances_and_spheres() {
+    let scene = scenes::instanced(5);
+    let targets: Vec<Vec3> = (0..200).scan(Random::new(9), |random, _| Some(random.vec3() * 3.0)).collect();
+    let mut rays = scenes::rays(3000, &targets, 5);
+    for ray in &mut rays {
+        ray.origin *= 2.0;
+    }
+    let hits = assert_parity(&scene, &rays);
+    assert!(hits > 200, "{hits} hits");
+}
+
+#[test]
+fn degenerate_meshes() {
+    let mut mesh = scenes::soup(1000, 0.3, 11);
+    let positions = std::sync::Arc::make_mut(&mut mesh.positions);
+    positions[30] = Vec3::NAN;
+    positions[33].x = f32::INFINITY;
+    positions[36].y = 1e30;
+    positions[40] = positions[39];
+    positions[44] = positions[42].lerp(positions[43], 0.5);
+    let targets = mesh.positions.iter().copied().filter(|p| p.is_finite() && p.length() < 10.0).collect::<Vec<_>>();
+    assert_parity(&scenes::of_mesh(mesh), &scenes::rays(1500, &targets, 2));
+
+    // Flat boxes, and rays within their planes.
+    let grid: Vec<Vec3> =
+        (0..121).map(|i| Vec3::new((i % 11) as f32, 0.0, (i / 11) as f32) * 0.2 - Vec3::new(1.0, 0.0, 1.0)).collect();
+    let cell = |i: u32| [[i, i + 1, i + 11], [i + 1, i + 12, i + 11]];
+    let cells = (0..110).filter(|i| i % 11 != 10).flat_map(cell).collect();
+    let rays: Vec<Ray> = scenes::rays(1500, &grid, 8)
+        .into_iter()
+        .map(|ray| if ray.origin.x > 0.0 { Ray { origin: Vec3 { y: 0.0, ..ray.origin }, ..ray } } else { ray })
+        .collect();
+    assert_parity(&scenes::of_mesh(Mesh::new(grid, cells)), &rays);
+
+    assert_parity(&scenes::of_mesh(Mesh::default()), &scenes::rays(100, &[Vec3::ONE], 1));
+}
+
+#[test]
+fn deep_trees() {
+    // Coincident triangles cannot be told apart by any plane.
+    let many = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]; 100_000]);
+    let ray = Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
+    let world = World::new(&scenes::of_mesh(many)).expect("sound");
+    let hit = Bvh::build(&world).closest(&ray).expect("all of them are hit");
+    assert_eq!((hit.primitive, hit.t), (0, 1.0), "the lowest id wins");
+
+    // Sizes that halve: each split separates one triangle only.
+    let scales: Vec<f32> = (0..120).map(|i| 0.5f32.powi(i)).collect();
+    let positions: Vec<Vec3> = scales
+        .iter()
+        .flat_map(|&s| [Vec3::new(s, 0.0, 0.0), Vec3::new(s, s * 0.1, 0.0), Vec3::new(s, 0.0, s * 0.1)])
+        .collect();
+    let triangles = (0..120).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let rays: Vec<Ray> = scales
+        .iter()
+        .flat_map(|&s| {
+            [
+                Ray::new(Vec3::new(2.0, s * 0.03, s * 0.03), Vec3::NEG_X),
+                Ray::new(Vec3::new(-1.0, s * 0.03, s * 0.03), Vec3::X),
+            ]
+        })
+        .collect();
+    assert!(assert_parity(&scenes::of_mesh(Mesh::new(positions, triangles)), &rays) > 100);
+}
+
+#[test]
+fn odd_rays() {
+    let mesh = scenes::bumpy_sphere(10, 0.2, 3);
+    let o = Vec3::new(0.1, 0.2, 3.0);
+    let d = Vec3::new(0.0, -0.05, -1.0);
+    let whole = Ray::new(o, d);
+    let nan = f32::NAN;
+    let rays = [
+        whole,
+        Ray { direction: Vec3::ZERO, ..whole },
+        Ray { direction: Vec3::new(nan, 0.0, 1.0), ..whole },
+        Ray { origin: Vec3::new(nan, 0.0, 1.0), ..whole },
+        Ray { origin: Vec3::INFINITY, ..whole },
+        Ray { direction: Vec3::INFINITY, ..whole },
+        Ray { tmin: 5.0, tmax: 1.0, ..whole },
+        Ray { tmax: nan, ..whole },
+        Ray { tmin: nan, ..whole },
+        Ray { tmin: -1.0, ..whole },
+        Ray { tmax: 1.0, ..whole },
+        Ray { tmin: 2.5, ..whole },
+        Ray { direction: d * 1e-30, ..whole },
+        Ray { direction: d * 1e30, ..whole },
+        Ray { direction: Vec3::new(1e-40, -0.0, -1.0), ..whole },
+        Ray { direction: Vec3::new(-0.0, 0.0, -1e-42), ..whole },
+    ];
+    let hits = assert_parity(&scenes::of_mesh(mesh.clone()), &rays);
+    assert!(hits >= 5, "{hits} hits");
+    let world = World::new(&scenes::of_mesh(mesh)).expect("sound");
+    let bvh = Bvh::build(&world);
+    let t = bvh.closest(&whole).expect("hit").t;
+    assert!(bvh.closest(&Ray { tmin: t, tmax: t, ..whole }).is_some(), "the range is closed");
+    assert!(bvh.closest(&Ray { tmax: t.next_down(), ..whole }).is_none());
+    assert_ne!(bvh.closest(&Ray { tmin: t.next_up(), ..whole }).map(|hit| hit.t), Some(t));
+    for ray in &rays[1..10] {
+        assert_eq!(bvh.closest(ray), None, "{ray:?}");
+    }
+}
+
+/// From inside a closed mesh nothing leaks, at corners and edges either.
+#[test]
+fn watertight() {
+    let mesh = scenes::bumpy_sphere(16, 0.2, 1);
+    let world = World::new(&scenes::of_mesh(mesh.clone())).expect("sound");
+    let bvh = Bvh::build(&world);
+    let mut random = Random::new(4);
+    for i in 0..200_000 {
+        let corners = mesh.triangles[random.below(mesh.triangles.len())].map(|i| mesh.positions[i as usize]);
+        let target = if i % 2 == 0 { corners[0] } else { corners[0].lerp(corners[1], random.unit()) };
+        let origin = random.vec3() * 0.4;
+        let ray = Ray::new(origin, target - origin);
+        assert!(bvh.closest(&ray).is_some() && bvh.occluded(&ray), "leak: {ray:?}");
+    }
+}
+
+#[test]
+fn the_tree_does_not_depend_on_threads() {
+    let world = World::new(&scenes::of_mesh(scenes::soup(20_000, 0.05, 9))).expect("sound");
+    let rays = scenes::rays(500, &[Vec3::ZERO, Vec3::ONE], 4);
+    let trace = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let bvh = Bvh::build(&world);
+            (bvh.bytes(), rays.iter().map(|ray| bvh.closest(ray)).collect::<Vec<_>>())
+        })
+    };
+    assert_eq!(trace(1), trace(2));
+}
