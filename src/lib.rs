@@ -12,6 +12,7 @@ pub mod image;
 pub mod io;
 pub mod lab;
 pub mod math;
+pub mod output;
 pub mod plan;
 mod ray;
 pub mod render;
