@@ -3,19 +3,9 @@
 //! Texels are decoded to linear light before they are mixed: mixing sRGB codes would darken every edge between light
 //! and dark.
 
-use std::sync::LazyLock;
-
+use crate::image::srgb::srgb_to_linear;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Texture, Wrap};
-
-/// Linear light of each 8-bit sRGB code (IEC 61966-2-1:1999).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        let encoded = code as f64 / 255.0;
-        let linear = if encoded <= 0.04045 { encoded / 12.92 } else { libm::pow((encoded + 0.055) / 1.055, 2.4) };
-        linear as f32
-    })
-});
 
 /// The linear RGBA colour at `uv` (v up). White for an image without pixels and for coordinates that are not finite.
 pub fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
@@ -47,8 +37,7 @@ fn texel(texture: &Texture, x: i64, y: i64) -> Vec4 {
     let x = wrap(texture.wrap_u, x, i64::from(texture.width));
     let y = wrap(texture.wrap_v, y, i64::from(texture.height));
     let [r, g, b, a] = texture.pixels[(y * i64::from(texture.width) + x) as usize];
-    let linear = |code: u8| LINEAR[usize::from(code)];
-    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+    Vec4::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), f32::from(a) / 255.0)
 }
 
 /// Brings an index into `0..size`.

@@ -35,7 +35,18 @@ impl Tracer for Engine<'_> {
 
 /// Every engine of this build, for `world`.
 fn engines(world: &World) -> Vec<Engine<'_>> {
-    vec![Engine { name: "toy", tracer: Box::new(toy::Toy(world)) }]
+    let mut engines = vec![
+        Engine { name: "toy", tracer: Box::new(toy::Toy(world)) },
+        Engine { name: "native", tracer: Box::new(Bvh::build(world)) },
+    ];
+    #[cfg(feature = "embree")]
+    {
+        use twincast::trace::embree::{Embree, Options};
+        let embree = Embree::new(world, &Options::default()).expect("embree takes a valid scene");
+        engines.push(Engine { name: "embree", tracer: Box::new(embree) });
+    }
+    engines.push(Engine { name: "brute", tracer: Box::new(Brute::new(world)) });
+    engines
 }
 
 /// A picture without anything but itself to wait for.
