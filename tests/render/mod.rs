@@ -6,8 +6,9 @@ mod toy;
 
 use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Camera, Geometry, Material, Mesh};
-use twincast::{Batch, Image, Renderer};
-use twincast::{Hit, Ray, Scene, Settings, Tracer, World};
+use twincast::trace::brute::Brute;
+use twincast::trace::bvh::Bvh;
+use twincast::{Batch, Hit, Image, Ray, Renderer, Scene, Settings, Tracer, World};
 
 /// Any engine behind one type.
 struct Engine<'a> {
