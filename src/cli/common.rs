@@ -117,7 +117,7 @@ impl CameraArgs {
     pub(crate) fn choose(&self, scene: &Scene, aspect: f64) -> Result<(Camera, String)> {
         let bounds = scene.bounds();
         if let Some(eye) = self.eye {
-            return Ok((self.from_flags(eye, &bounds)?, "from the flags".to_owned()));
+            return Ok((self.flagged(eye, &bounds)?, "from the flags".to_owned()));
         }
         if let Some(name) = &self.camera {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);
@@ -131,7 +131,7 @@ impl CameraArgs {
         })
     }
 
-    fn from_flags(&self, eye: DVec3, bounds: &DAabb) -> Result<Camera> {
+    fn flagged(&self, eye: DVec3, bounds: &DAabb) -> Result<Camera> {
         let target = self.look_at.unwrap_or_else(|| bounds.centre());
         let up = self.up.unwrap_or(DVec3::Y);
         let fov = self.fov.unwrap_or(DEFAULT_FOV).to_radians();
@@ -239,7 +239,7 @@ mod tests {
             fov: parse_fov(words[7]).ok(),
             camera: None,
         };
-        let again = args.from_flags(args.eye.unwrap(), &bounds).unwrap();
+        let again = args.flagged(args.eye.unwrap(), &bounds).unwrap();
         assert_eq!(again.eye, camera.eye);
         assert!((again.fov_y - camera.fov_y).abs() < 1e-12);
         let turned = [again.frame.x_axis - camera.frame.x_axis, again.frame.z_axis - camera.frame.z_axis];
@@ -252,11 +252,11 @@ mod tests {
         let at_target = CameraArgs { eye: Some(DVec3::ONE), look_at: Some(DVec3::ONE), ..CameraArgs::default() };
         let upright = CameraArgs { eye: Some(DVec3::Y), look_at: Some(DVec3::ZERO), ..CameraArgs::default() };
         for (args, word) in [(at_target, "one point"), (upright, "--up 0,1,0")] {
-            let error = args.from_flags(args.eye.unwrap(), &bounds).unwrap_err();
+            let error = args.flagged(args.eye.unwrap(), &bounds).unwrap_err();
             assert!(error.exit_code() == 2 && error.to_string().contains(word), "{error}");
         }
-        let mut scene = Scene::default();
-        scene.cameras = vec![Camera { name: "front".to_owned(), ..Camera::framing(&bounds, 1.0) }];
+        let front = Camera { name: "front".to_owned(), ..Camera::framing(&bounds, 1.0) };
+        let scene = Scene { cameras: vec![front], ..Scene::default() };
         let args = CameraArgs { camera: Some("back".to_owned()), ..CameraArgs::default() };
         let error = args.choose(&scene, 1.0).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains("\"front\""), "{error}");

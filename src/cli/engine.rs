@@ -97,7 +97,8 @@ impl Job<'_> {
     #[cfg(feature = "embree")]
     fn embree(&self) -> Result<(crate::trace::embree::Embree, Pass)> {
         use crate::trace::embree::{Embree, Options};
-        let build = || Embree::new(self.world, &Options::default());
+        let options = Options { threads: Some(rayon::current_num_threads()), ..Options::default() };
+        let build = || Embree::new(self.world, &options);
         self.pass(build, |embree| format!("embree {}", embree.version()), Embree::bytes)
     }
 
@@ -107,15 +108,16 @@ impl Job<'_> {
         let (embree, embree_pass) = self.embree()?;
         let report =
             crate::lab::explain_pixels(self.renderer, &native, &embree, &native_pass.image, &embree_pass.image);
-        let (differing, unexplained) = (report.differing, report.unexplained);
-        let words = match (differing, unexplained) {
-            (0, _) => format!("all {} pixels of native and embree are equal", self.pixels),
-            (_, 0) => format!("{differing} pixels of native and embree differ, all by a tie or a boundary ray"),
-            _ => format!(
-                "{differing} pixels of native and embree differ, {unexplained} of them by no tie or boundary ray"
+        let words = match report.differing {
+            0 => format!("all {} pixels of native and embree are equal", report.pixels),
+            differing => format!(
+                "{differing} pixels of native and embree differ: {} by a tie or a boundary ray, {} by a wrong answer of \
+                 embree, {} unexplained",
+                report.tie_or_boundary, report.embree_wrong, report.unexplained
             ),
         };
-        Ok(Outcome { passes: vec![native_pass, embree_pass], verdict: Some((words, unexplained == 0)) })
+        let holds = report.unexplained == 0;
+        Ok(Outcome { passes: vec![native_pass, embree_pass], verdict: Some((words, holds)) })
     }
 
     fn pass<T: Tracer>(

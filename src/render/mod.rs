@@ -126,6 +126,11 @@ impl<'a> Renderer<'a> {
         Ok(renderer)
     }
 
+    /// What is rendered, as the engines hold it.
+    pub const fn world(&self) -> &'a World {
+        self.world
+    }
+
     /// What the render will do.
     pub const fn plan(&self) -> &Plan {
         &self.plan
