@@ -75,7 +75,12 @@ fn spawned_rays_leave_their_triangle() {
             let size = 10f64.powi(scale);
             // Near zero, and away from it by up to 100 times its size.
             let place = random.vector() * size * if random.next() < 0.5 { 0.0 } else { 100.0 };
-            let corners = [(); 3].map(|()| (place + random.vector() * size).as_vec3());
+            let [a, b] = [(); 2].map(|()| place + random.vector() * size);
+            // Half of them slivers, down to a height of 10^-4 of their length.
+            let sliver = 10f64.powf(-4.0 * random.next());
+            let c =
+                if random.next() < 0.5 { place } else { a.lerp(b, random.next()) } + random.vector() * size * sliver;
+            let corners = [a, b, c].map(|p| p.as_vec3());
             let scene = mesh_scene(corners, DAffine3::IDENTITY);
             let world = World::new(&scene).unwrap();
             let Primitives::Triangles { positions, .. } = &world.parts[0].primitives else { unreachable!() };
