@@ -135,7 +135,7 @@ impl fmt::Display for Plan {
         for (_, name) in parts.iter().filter(|(on, _)| *on) {
             write!(f, ", {name}")?;
         }
-        write!(f, ", {} materials", self.materials)
+        write!(f, ", {} {}", self.materials, if self.materials == 1 { "material" } else { "materials" })
     }
 }
 

@@ -1,6 +1,6 @@
 //! `twincast render`: from a scene file to finished pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -45,9 +45,6 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: u32,
 
-    #[command(flatten)]
-    camera: CameraArgs,
-
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
     print_camera: bool,
@@ -91,6 +88,10 @@ pub(super) struct RenderArgs {
     /// Say nothing but warnings and errors
     #[arg(short, long)]
     quiet: bool,
+
+    // Last, for clap puts what follows a heading under it.
+    #[command(flatten)]
+    camera: CameraArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -120,7 +121,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     let cancel = interrupt::install()?;
     outputs::check(&args.output, &args.stats)?;
-    let reference = args.reference.as_deref().map(image::read).transpose()?;
+    let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
@@ -264,6 +265,15 @@ impl RenderArgs {
         }
         Err(Error::Check(failed.into_iter().map(|(words, _)| words).collect::<Vec<_>>().join("; ")))
     }
+}
+
+fn read_reference(path: &Path, size: Size) -> Result<Image> {
+    let picture = image::read(path)?;
+    if (picture.width, picture.height) == (size.width, size.height) {
+        return Ok(picture);
+    }
+    let (own, Size { width, height }) = (format_args!("{}x{}", picture.width, picture.height), size);
+    Err(Error::Usage(format!("--reference {}: it is {own} and --size is {width}x{height}", path.display())))
 }
 
 fn placed_triangles(scene: &Scene) -> u64 {
