@@ -90,7 +90,7 @@ pub fn instanced(seed: u64) -> Scene {
     let group = |geometries| Group { name: String::new(), geometries };
     let mut instances = Vec::new();
     for (i, group) in [0u32, 1, 1, 2, 2, 2, 1].into_iter().enumerate() {
-        let v = |p: Vec3| DVec3::from(p.as_dvec3());
+        let v = |p: Vec3| p.as_dvec3();
         let transform = DAffine3::from_scale_rotation_translation(
             DVec3::splat(1.0) + v(random.vec3()) * 0.5,
             glam::DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
@@ -111,7 +111,7 @@ pub fn instanced(seed: u64) -> Scene {
 pub fn rays(count: usize, targets: &[Vec3], seed: u64) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let mut ray = |i: usize| {
-        let origin = random.vec3() * if i % 5 == 0 { 0.5 } else { 4.0 };
+        let origin = random.vec3() * if i.is_multiple_of(5) { 0.5 } else { 4.0 };
         let direction = match i % 4 {
             0 => random.vec3(),
             1 => targets[random.below(targets.len())] - origin,

@@ -54,7 +54,7 @@ pub(super) fn build(items: &mut [Item], block: usize) -> Tree {
         let range = Range::new(items, 0);
         Builder { block }.node(items, range, 0, &mut nodes);
     }
-    Tree { nodes }
+    Tree::new(nodes)
 }
 
 /// A range of items, and what a split needs to know of it.

@@ -7,7 +7,7 @@
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `walk` | one ray, and packets of rays, from the root to the leaves |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: blocks of four triangles, shapes, placed objects |
-//! | `isa` | the same code compiled twice, for AVX2 and for any processor |
+//! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
 //! instances has none of the second and third.
@@ -21,6 +21,7 @@ mod isa;
 mod node;
 mod placements;
 mod shapes;
+mod simd;
 mod slab;
 mod triangles;
 mod walk;
@@ -33,9 +34,10 @@ use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use placements::PlacementTree;
 use shapes::ShapeTree;
+use simd::Simd;
 use slab::SlabRay;
 use triangles::{Filter, TriangleTree};
-use walk::Visit;
+use walk::{Stack, Visit};
 
 /// The native tracer.
 pub struct Bvh {
@@ -43,6 +45,12 @@ pub struct Bvh {
     objects: Vec<Level>,
     placements: PlacementTree,
     isa: Isa,
+}
+
+/// One stack for the placements, one for what is below them.
+struct Stacks {
+    upper: Stack,
+    level: Stack,
 }
 
 /// Everything in one coordinate system.
@@ -96,30 +104,31 @@ impl Bvh {
 
     /// One ray, from the root: the nearest hit, or just any.
     #[inline(always)]
-    fn trace<const ANY: bool>(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest = Nearest::new(ray);
+    fn trace<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
         if !ray.is_valid() {
             return None;
         }
-        self.fixed.trace::<ANY>(ray, ray, None, &mut nearest);
-        self.enter_placements::<ANY>(ray, &mut nearest);
+        let mut nearest = Nearest::new(ray);
+        self.fixed.trace::<S, ANY>(ray, ray, None, &mut stacks.level, &mut nearest);
+        self.enter_placements::<S, ANY>(ray, stacks, &mut nearest);
         nearest.hit()
     }
 
     /// Placed objects for one ray.
     #[inline(always)]
-    fn enter_placements<const ANY: bool>(&self, ray: &Ray, nearest: &mut Nearest) {
+    fn enter_placements<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
         if self.placements.is_empty() || ANY && nearest.hit().is_some() {
             return;
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
-        walk::single(self.placements.tree(), &slab, nearest.limit(), |first, count| {
+        let Stacks { upper, level: lower } = stacks;
+        walk::single::<S>(upper, self.placements.tree(), &slab, nearest.limit(), |first, count| {
             for placement in self.placements.leaf(first, count) {
                 let object_ray = placement.object_ray(ray);
                 if object_ray.is_valid() {
                     let through = Through { instance: placement.instance, to_world: &placement.to_world };
                     let level = &self.objects[placement.object as usize];
-                    level.trace::<ANY>(ray, &object_ray, Some(through), nearest);
+                    level.trace::<S, ANY>(ray, &object_ray, Some(through), lower, nearest);
                 }
             }
             Visit::after::<ANY>(nearest)
@@ -128,40 +137,58 @@ impl Bvh {
 
     /// Rays that walk the fixed trees together, and the placed objects one by one.
     #[inline(always)]
-    fn trace_packet<const N: usize, const ANY: bool>(&self, rays: &[Ray; N]) -> [Option<Hit>; N] {
+    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
+        &self,
+        rays: &[Ray; N],
+        stacks: &mut Stacks,
+    ) -> [Option<Hit>; N] {
         let mut nearest = rays.map(|ray| Nearest::new(&ray));
-        self.fixed.trace_packet::<N, ANY>(rays, &mut nearest);
+        self.fixed.trace_packet::<S, N, ANY>(rays, &mut stacks.level, &mut nearest);
         for (ray, nearest) in rays.iter().zip(&mut nearest).filter(|(ray, _)| ray.is_valid()) {
-            self.enter_placements::<ANY>(ray, nearest);
+            self.enter_placements::<S, ANY>(ray, stacks, nearest);
         }
         nearest.map(|nearest| nearest.hit())
     }
 
     /// Many rays in packets of N; the rest, and N = 1, ray by ray.
     #[inline(always)]
-    fn trace_batch<const N: usize, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
-        let (packets, rest) = rays.as_chunks::<N>();
-        if N > 1 {
-            for (i, packet) in packets.iter().enumerate() {
-                for (k, hit) in self.trace_packet::<N, ANY>(packet).into_iter().enumerate() {
-                    answer(i * N + k, hit);
-                }
+    fn trace_batch<S: Simd, const N: usize, const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        mut answer: impl FnMut(usize, Option<Hit>),
+    ) {
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+        let packets = if N > 1 { rays.as_chunks::<N>().0 } else { &[] };
+        for (i, packet) in packets.iter().enumerate() {
+            for (k, hit) in self.trace_packet::<S, N, ANY>(packet, &mut stacks).into_iter().enumerate() {
+                answer(i * N + k, hit);
             }
         }
-        let done = if N > 1 { rays.len() - rest.len() } else { 0 };
-        for (k, ray) in rays[done..].iter().enumerate() {
-            answer(done + k, self.trace::<ANY>(ray));
+        for (i, ray) in rays.iter().enumerate().skip(packets.len() * N) {
+            answer(i, self.trace::<S, ANY>(ray, &mut stacks));
         }
     }
+}
 
-    /// The width matched once a batch.
+/// A batch, for one instruction set at a time.
+struct BatchKernel<'a, F, const ANY: bool> {
+    bvh: &'a Bvh,
+    rays: &'a [Ray],
+    width: Width,
+    answer: F,
+}
+
+impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<'_, F, ANY> {
+    type Output = ();
+
     #[inline(always)]
-    fn trace_width<const ANY: bool>(&self, rays: &[Ray], width: Width, answer: impl FnMut(usize, Option<Hit>)) {
+    fn run<S: Simd>(self) {
+        let Self { bvh, rays, width, answer } = self;
         match width {
-            Width::One => self.trace_batch::<1, ANY>(rays, answer),
-            Width::Four => self.trace_batch::<4, ANY>(rays, answer),
-            Width::Eight => self.trace_batch::<8, ANY>(rays, answer),
-            Width::Sixteen => self.trace_batch::<16, ANY>(rays, answer),
+            Width::One => bvh.trace_batch::<S, 1, ANY>(rays, answer),
+            Width::Four => bvh.trace_batch::<S, 4, ANY>(rays, answer),
+            Width::Eight => bvh.trace_batch::<S, 8, ANY>(rays, answer),
+            Width::Sixteen => bvh.trace_batch::<S, 16, ANY>(rays, answer),
         }
     }
 }
@@ -178,21 +205,28 @@ impl Level {
 
     /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
     #[inline(always)]
-    fn trace<const ANY: bool>(&self, ray: &Ray, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    fn trace<S: Simd, const ANY: bool>(
+        &self,
+        ray: &Ray,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        stack: &mut Stack,
+        nearest: &mut Nearest,
+    ) {
         // Rounding the local ray moves it by as much again as the slab test itself may err.
         let blur = if through.is_some() { 4.0 } else { 1.0 };
         if !self.triangles.tree().is_empty() {
             let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(local, blur);
-            walk::single(self.triangles.tree(), &slab, nearest.limit(), |first, count| {
-                self.triangles.offer_leaf(first, count, ray, &filter, through, nearest);
+            walk::single::<S>(stack, self.triangles.tree(), &slab, nearest.limit(), |first, count| {
+                self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
                 Visit::after::<ANY>(nearest)
             });
         }
         let is_done = ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single(self.shapes.tree(), &slab, nearest.limit(), |first, count| {
+            walk::single::<S>(stack, self.shapes.tree(), &slab, nearest.limit(), |first, count| {
                 self.shapes.offer_leaf(first, count, local, through, nearest);
                 Visit::after::<ANY>(nearest)
             });
@@ -201,60 +235,71 @@ impl Level {
 
     /// Rays in the world against a level in the world.
     #[inline(always)]
-    fn trace_packet<const N: usize, const ANY: bool>(&self, rays: &[Ray; N], nearest: &mut [Nearest; N]) {
+    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
+        &self,
+        rays: &[Ray; N],
+        stack: &mut Stack,
+        nearest: &mut [Nearest; N],
+    ) {
         let live = rays.iter().enumerate().fold(0, |live, (k, ray)| live | u32::from(ray.is_valid()) << k);
         if !self.triangles.tree().is_empty() {
             let slabs = rays.map(|ray| SlabRay::new(&ray, self.triangles.tree().reach(), 1.0));
             let filters = rays.map(|ray| Filter::new(&ray, 1.0));
-            walk::packet(self.triangles.tree(), &slabs, live, nearest, |first, count, k, nearest: &mut Nearest| {
-                self.triangles.offer_leaf(first, count, &rays[k], &filters[k], None, nearest);
-                Visit::after::<ANY>(nearest)
-            });
+            walk::packet::<S, N>(
+                stack,
+                self.triangles.tree(),
+                &slabs,
+                live,
+                nearest,
+                |first, count, k, nearest: &mut Nearest| {
+                    self.triangles.offer_leaf::<S>(first, count, &rays[k], &filters[k], None, nearest);
+                    Visit::after::<ANY>(nearest)
+                },
+            );
         }
         if !self.shapes.tree().is_empty() {
             let slabs = rays.map(|ray| SlabRay::new(&ray, self.shapes.tree().reach(), 1.0));
-            walk::packet(self.shapes.tree(), &slabs, live, nearest, |first, count, k, nearest: &mut Nearest| {
-                self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
-                Visit::after::<ANY>(nearest)
-            });
+            walk::packet::<S, N>(
+                stack,
+                self.shapes.tree(),
+                &slabs,
+                live,
+                nearest,
+                |first, count, k, nearest: &mut Nearest| {
+                    self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
+                    Visit::after::<ANY>(nearest)
+                },
+            );
         }
+    }
+}
+
+impl Bvh {
+    fn run_batch<const ANY: bool>(&self, rays: &[Ray], width: Width, answer: impl FnMut(usize, Option<Hit>)) {
+        isa::dispatch(self.isa, BatchKernel::<_, ANY> { bvh: self, rays, width, answer });
     }
 }
 
 impl Tracer for Bvh {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        isa::dispatch(
-            self.isa,
-            #[inline(always)]
-            || self.trace::<false>(ray),
-        )
+        let mut found = None;
+        self.run_batch::<false>(std::slice::from_ref(ray), Width::One, |_, hit| found = hit);
+        found
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        isa::dispatch(
-            self.isa,
-            #[inline(always)]
-            || self.trace::<true>(ray).is_some(),
-        )
+        let mut found = false;
+        self.run_batch::<true>(std::slice::from_ref(ray), Width::One, |_, hit| found = hit.is_some());
+        found
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        isa::dispatch(
-            self.isa,
-            #[inline(always)]
-            || self.trace_width::<false>(rays, batch.width, |i, hit| hits[i] = hit),
-        );
+        self.run_batch::<false>(rays, batch.width, |i, hit| hits[i] = hit);
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        isa::dispatch(
-            self.isa,
-            #[inline(always)]
-            || {
-                self.trace_width::<true>(rays, batch.width, |i, hit| occluded[i] = hit.is_some());
-            },
-        );
+        self.run_batch::<true>(rays, batch.width, |i, hit| occluded[i] = hit.is_some());
     }
 }

@@ -47,28 +47,42 @@ impl Node {
 }
 
 /// A tree over items of any kind; leaves name ranges of them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Tree {
     /// The root is the first; empty for no items.
-    pub nodes: Vec<Node>,
+    nodes: Vec<Node>,
+    bounds: Aabb,
 }
 
 impl Tree {
+    /// Of nodes of which the first is the root.
+    pub fn new(nodes: Vec<Node>) -> Self {
+        let children = |root: &Node| (0..WIDTH).map(|slot| root.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union);
+        let bounds = nodes.first().map_or(Aabb::EMPTY, children);
+        Self { nodes, bounds }
+    }
+
+    /// One node.
+    #[inline(always)]
+    pub fn node(&self, index: u32) -> &Node {
+        &self.nodes[index as usize]
+    }
+
     /// Whether there is nothing to hit.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
     /// The box around everything.
+    #[inline]
     pub fn bounds(&self) -> Aabb {
-        let children = |root: &Node| (0..WIDTH).map(|slot| root.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union);
-        self.nodes.first().map_or(Aabb::EMPTY, children)
+        self.bounds
     }
 
     /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to.
+    #[inline]
     pub fn reach(&self) -> Vec3 {
-        let bounds = self.bounds();
-        bounds.min.abs().max(bounds.max.abs())
+        self.bounds.min.abs().max(self.bounds.max.abs())
     }
 
     /// Memory it holds, in bytes.

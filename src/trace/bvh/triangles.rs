@@ -7,6 +7,7 @@
 
 use super::build::{self, Item};
 use super::node::Tree;
+use super::simd::{Simd, Vector};
 use super::{PartId, Through};
 use crate::math::{Aabb, UNIT_ROUNDOFF, is_traceable};
 use crate::ray::{Hit, Ray};
@@ -17,9 +18,6 @@ use crate::trace::{Part, Primitives};
 /// Triangles in a block.
 const LANES: usize = 4;
 
-/// In a lane without a triangle.
-const NO_TRIANGLE: u32 = u32::MAX;
-
 /// Four triangles, component by component.
 #[derive(Clone, Debug)]
 struct Block {
@@ -27,6 +25,8 @@ struct Block {
     corners: [[f32; LANES]; 9],
     primitive: [u32; LANES],
     part: [u32; LANES],
+    /// A bit for every lane that has a triangle.
+    lanes: u32,
 }
 
 /// All triangles of a level.
@@ -72,7 +72,7 @@ impl TriangleTree {
 
     /// Offers what `ray` (in the world) hits in a leaf; `filter` is of the ray in this level's coordinates.
     #[inline(always)]
-    pub fn offer_leaf(
+    pub fn offer_leaf<S: Simd>(
         &self,
         first: u32,
         count: u8,
@@ -82,7 +82,7 @@ impl TriangleTree {
         nearest: &mut Nearest,
     ) {
         for block in &self.blocks[first as usize..first as usize + usize::from(count)] {
-            let mut candidates = filter.candidates(block);
+            let mut candidates = filter.candidates::<S>(block);
             while candidates != 0 {
                 let lane = candidates.trailing_zeros() as usize;
                 candidates &= candidates - 1;
@@ -109,7 +109,7 @@ impl TriangleTree {
 
 impl Block {
     fn new(parts: &[Part], items: &[Item]) -> Self {
-        let mut block = Self { corners: [[0.0; LANES]; 9], primitive: [NO_TRIANGLE; LANES], part: [0; LANES] };
+        let mut block = Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], lanes: 0 };
         for (lane, item) in items.iter().enumerate() {
             let Primitives::Triangles { positions, triangles } = &parts[item.part as usize].primitives else {
                 unreachable!("items of a triangle tree come from meshes")
@@ -121,6 +121,7 @@ impl Block {
             }
             block.primitive[lane] = item.primitive;
             block.part[lane] = item.part;
+            block.lanes |= 1 << lane;
         }
         block
     }
@@ -176,48 +177,34 @@ impl Filter {
     /// component errs by e = 8 u L (a subtraction, a quotient, a product and a subtraction, of magnitudes up to L
     /// each), an edge function by 4 e S + 2 e^2 and its own rounding 4 u S^2.
     #[inline(always)]
-    fn candidates(&self, block: &Block) -> u32 {
+    fn candidates<S: Simd>(&self, block: &Block) -> u32 {
+        let splat = S::V4::splat;
         let [kx, ky, kz] = self.axes;
-        let mut x = [[0f32; LANES]; 3];
-        let mut y = [[0f32; LANES]; 3];
-        let mut largest = [self.blur; LANES];
-        let mut sheared = [0f32; LANES];
+        let mut x = [splat(0.0); 3];
+        let mut y = [splat(0.0); 3];
+        let mut largest = splat(self.blur);
+        let mut sheared = splat(0.0);
         for k in 0..3 {
-            for i in 0..LANES {
-                let px = block.corners[3 * k + kx][i] - self.origin[0];
-                let py = block.corners[3 * k + ky][i] - self.origin[1];
-                let pz = block.corners[3 * k + kz][i] - self.origin[2];
-                largest[i] = max(max(largest[i], px.abs()), max(py.abs(), pz.abs()));
-                x[k][i] = px - self.shear[0] * pz;
-                y[k][i] = py - self.shear[1] * pz;
-                sheared[i] = max(sheared[i], max(x[k][i].abs(), y[k][i].abs()));
-            }
+            let px = S::V4::load(&block.corners[3 * k + kx]).sub(splat(self.origin[0]));
+            let py = S::V4::load(&block.corners[3 * k + ky]).sub(splat(self.origin[1]));
+            let pz = S::V4::load(&block.corners[3 * k + kz]).sub(splat(self.origin[2]));
+            largest = largest.max(px.abs()).max(py.abs().max(pz.abs()));
+            x[k] = px.sub(pz.mul(splat(self.shear[0])));
+            y[k] = py.sub(pz.mul(splat(self.shear[1])));
+            sheared = sheared.max(x[k].abs().max(y[k].abs()));
         }
-        let mut mask = 0;
-        for i in 0..LANES {
-            let u = x[2][i] * y[1][i] - y[2][i] * x[1][i];
-            let v = x[0][i] * y[2][i] - y[0][i] * x[2][i];
-            let w = x[1][i] * y[0][i] - y[1][i] * x[0][i];
-            let e = self.error * largest[i];
-            // The sum doubled against rounding of the bound; a constant against underflow.
-            let bound =
-                2.0 * (e * (4.0 * sheared[i] + 2.0 * e) + 4.0 * UNIT_ROUNDOFF * sheared[i] * sheared[i]) + 1e-36;
-            let low = min(min(u, v), w);
-            let high = max(max(u, v), w);
-            let outside = low < -bound && high > bound;
-            mask |= u32::from(!outside && block.primitive[i] != NO_TRIANGLE) << i;
-        }
-        mask
+        let edge = |a: usize, b: usize| x[a].mul(y[b]).sub(y[a].mul(x[b]));
+        let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+        let e = largest.mul(splat(self.error));
+        // The sum doubled against rounding of the bound; a constant against underflow.
+        let edges = e.mul(sheared.mul(splat(8.0)).add(e.mul(splat(4.0))));
+        let own = sheared.mul(sheared).mul(splat(8.0 * UNIT_ROUNDOFF));
+        let bound = edges.add(own).add(splat(1e-36));
+        let low = u.min(v).min(w).add(bound);
+        let high = u.max(v).max(w).sub(bound);
+        let zero = splat(0.0);
+        // Whatever overflowed is not rejected.
+        let outside = low.less(zero) & zero.less(high);
+        !outside & block.lanes
     }
-}
-
-/// Maps to one instruction, unlike `f32::max`, which treats NaN otherwise.
-#[inline(always)]
-fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }

@@ -4,6 +4,7 @@
 
 use super::build::MAX_DEPTH;
 use super::node::{NO_CHILD, Tree, WIDTH};
+use super::simd::Simd;
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
 
@@ -35,22 +36,29 @@ struct Entry {
     count: u8,
 }
 
+impl Entry {
+    const ROOT: Self = Self { near: 0.0, index: 0, rays: 1, count: 0 };
+}
+
 /// Every level of the tree leaves at most seven siblings waiting.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
 
-/// Children waiting to be visited, the nearest on top.
-struct Stack {
+/// Children waiting to be visited, the nearest on top. Made once a batch, since filling it costs as much as a few nodes.
+pub(super) struct Stack {
     entries: [Entry; STACK],
     len: usize,
 }
 
 impl Stack {
-    /// Holds the root.
+    pub fn new() -> Self {
+        Self { entries: [Entry::default(); STACK], len: 0 }
+    }
+
+    /// Holds the root alone.
     #[inline(always)]
-    fn new(rays: u32) -> Self {
-        let mut entries = [Entry::default(); STACK];
-        entries[0] = Entry { near: f32::NEG_INFINITY, index: 0, rays, count: 0 };
-        Self { entries, len: 1 }
+    fn start(&mut self, rays: u32) {
+        self.entries[0] = Entry { rays, ..Entry::ROOT };
+        self.len = 1;
     }
 
     #[inline(always)]
@@ -74,35 +82,58 @@ impl Stack {
 
 /// Visits the leaves that the ray enters before `limit`, near ones first.
 #[inline(always)]
-pub(super) fn single(tree: &Tree, ray: &SlabRay, mut limit: f32, mut leaf: impl FnMut(u32, u8) -> Visit) {
-    let mut stack = Stack::new(1);
-    while let Some(entry) = stack.pop() {
-        if entry.near > limit {
-            continue;
-        }
-        if entry.count != 0 {
-            match leaf(entry.index, entry.count) {
+pub(super) fn single<S: Simd>(
+    stack: &mut Stack,
+    tree: &Tree,
+    ray: &SlabRay,
+    mut limit: f32,
+    mut leaf: impl FnMut(u32, u8) -> Visit,
+) {
+    stack.len = 0;
+    let mut next = Entry::ROOT;
+    loop {
+        if next.count == 0 {
+            let node = tree.node(next.index);
+            let (mut mask, near) = ray.enter::<S>(node, limit);
+            if mask != 0 {
+                let child = |i: usize| Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] };
+                let first = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                next = child(first);
+                // Mostly one or two children are entered: the nearest goes on, the other waits.
+                let base = stack.len;
+                while mask != 0 {
+                    let i = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
+                    let mut other = child(i);
+                    if other.near < next.near {
+                        std::mem::swap(&mut next, &mut other);
+                    }
+                    stack.insert(base, other);
+                }
+                continue;
+            }
+        } else {
+            match leaf(next.index, next.count) {
                 Visit::Until(t) => limit = t,
                 Visit::Stop => return,
             }
-            continue;
         }
-        let node = &tree.nodes[entry.index as usize];
-        let (mut mask, near) = ray.enter(node, limit);
-        let base = stack.len;
-        while mask != 0 {
-            let i = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            debug_assert_ne!(node.count[i], NO_CHILD, "an empty box is never entered");
-            stack.insert(base, Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] });
-        }
+        next = loop {
+            match stack.pop() {
+                Some(entry) if entry.near <= limit => break entry,
+                Some(_) => {}
+                None => return,
+            }
+        };
     }
 }
 
 /// Visits, for each ray of a packet, at least the leaves that it enters before its limit. `leaf` gets a leaf, the
 /// ray's place in the packet and its nearest hit. Only the rays in the bit mask `live` take part.
 #[inline(always)]
-pub(super) fn packet<const N: usize>(
+pub(super) fn packet<S: Simd, const N: usize>(
+    stack: &mut Stack,
     tree: &Tree,
     rays: &[SlabRay; N],
     mut live: u32,
@@ -110,7 +141,7 @@ pub(super) fn packet<const N: usize>(
     mut leaf: impl FnMut(u32, u8, usize, &mut Nearest) -> Visit,
 ) {
     let mut limit = std::array::from_fn::<f32, N, _>(|k| nearest[k].limit());
-    let mut stack = Stack::new(live);
+    stack.start(live);
     while let Some(entry) = stack.pop() {
         let mut waiting = entry.rays & live;
         if entry.count != 0 {
@@ -124,13 +155,13 @@ pub(super) fn packet<const N: usize>(
             }
             continue;
         }
-        let node = &tree.nodes[entry.index as usize];
+        let node = tree.node(entry.index);
         let mut entering = [0u32; WIDTH];
         let mut first = [f32::INFINITY; WIDTH];
         while waiting != 0 {
             let k = waiting.trailing_zeros() as usize;
             waiting &= waiting - 1;
-            let (mask, near) = rays[k].enter(node, limit[k]);
+            let (mask, near) = rays[k].enter::<S>(node, limit[k]);
             for i in 0..WIDTH {
                 if mask >> i & 1 != 0 {
                     entering[i] |= 1 << k;
