@@ -76,9 +76,10 @@ fn find() -> (PathBuf, PathBuf) {
 fn version(prefix: &Path) -> Option<(u32, u32)> {
     let header = fs::read_to_string(prefix.join("include/OpenImageIO/oiioversion.h")).ok()?;
     let number = |name: &str| {
-        let mut words = header.lines().map(str::split_whitespace).find_map(|mut words| {
-            (words.next() == Some("#define") && words.next() == Some(name)).then_some(words)
-        })?;
+        let mut words = header
+            .lines()
+            .map(str::split_whitespace)
+            .find_map(|mut words| (words.next() == Some("#define") && words.next() == Some(name)).then_some(words))?;
         words.next()?.parse().ok()
     };
     Some((number("OIIO_VERSION_MAJOR")?, number("OIIO_VERSION_MINOR")?))

@@ -1,10 +1,14 @@
 #include "twincast/ffi/oiio.h"
 
+#include <cerrno>
+#include <fstream>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/strutil.h>
 
 #include "twincast/src/image/oiio.rs.h"
@@ -56,32 +60,35 @@ std::unique_ptr<OIIO::ImageOutput> writer(const std::string& path)
     return file;
 }
 
+void save(const std::string& path, const std::vector<unsigned char>& bytes)
+{
+    std::ofstream file(path, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+    file.close();
+    if (!file)
+        throw std::system_error(errno, std::generic_category(), "cannot be written");
+}
+
 }  // namespace
 
 rust::Vec<rust::String> suffixes()
 {
     // Formats that make no file, or none from colours: a window, a network stream, nothing, terminal text, depth.
     const std::set<std::string> no_files { "iv", "socket", "null", "term", "zfile" };
-    std::set<std::string> written;
-    for (auto& name : OIIO::Strutil::splits(OIIO::get_string_attribute("output_format_list"), ","))
-        if (!no_files.count(name))
-            written.insert(name);
-
-    // "png:png;tiff:tif,tiff,tx"
     rust::Vec<rust::String> result;
+    // "png:png;tiff:tif,tiff,tx": all formats, also those that are only read.
     for (auto& format : OIIO::Strutil::splits(OIIO::get_string_attribute("extension_list"), ";")) {
         auto colon = format.find(':');
-        if (colon == std::string::npos || !written.count(format.substr(0, colon)))
+        if (colon == std::string::npos || no_files.count(format.substr(0, colon)))
             continue;
-        for (auto& suffix : OIIO::Strutil::splits(format.substr(colon + 1), ","))
-            result.push_back(OIIO::Strutil::lower(suffix));
+        for (auto& suffix : OIIO::Strutil::splits(format.substr(colon + 1), ",")) {
+            if (OIIO::ImageOutput::create("a." + suffix))
+                result.push_back(OIIO::Strutil::lower(suffix));
+            else
+                OIIO::geterror();  // forgets it
+        }
     }
     return result;
-}
-
-bool keeps_alpha(Bytes path)
-{
-    return writer(text(path))->supports("alpha");
 }
 
 void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes samples)
@@ -118,6 +125,11 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
 
     const std::string name = text(path);
     auto file              = writer(name);
+    // Where its JPEG writer cannot write, OpenImageIO ends the process (libjpeg's default): it gets memory instead.
+    OIIO::Filesystem::IOVecOutput memory;
+    const bool in_memory = std::string(file->format_name()) == "jpeg";
+    if (in_memory && !file->set_ioproxy(&memory))
+        throw std::runtime_error("this OpenImageIO cannot write JPEG to memory");
     if (!file->open(name, spec))
         fail(file, "cannot be opened for writing");
     if (!file->write_image(type, samples.data()))
@@ -125,6 +137,8 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
     // Compressed formats write their last bytes here: a full disk may show only now.
     if (!file->close())
         fail(file, "cannot be finished");
+    if (in_memory)
+        save(name, memory.buffer());
 }
 
 Input::Input(std::unique_ptr<OIIO::ImageInput> file)

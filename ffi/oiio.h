@@ -16,7 +16,6 @@ struct Attributes;
 using Bytes = rust::Slice<const uint8_t>;
 
 rust::Vec<rust::String> suffixes();
-bool keeps_alpha(Bytes path);
 void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes samples);
 
 class Input {

@@ -112,10 +112,7 @@ mod tests {
         // (1 + 4) / 16 samples
         assert!((d.rmse - (5.0f64 / 16.0).sqrt()).abs() < 1e-15);
         let picture = a.difference_image(&b).unwrap();
-        assert_eq!(
-            picture,
-            image(&[[0.0, 0.0, 0.0, 1.0], [1.0; 4], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0, 1.0]])
-        );
+        assert_eq!(picture, image(&[[0.0, 0.0, 0.0, 1.0], [1.0; 4], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0, 1.0]]));
     }
 
     #[test]

@@ -40,13 +40,23 @@ impl Default for WriteOptions {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Encoding {
     pub kind: Type,
+    pub alpha: bool,
     /// Edge of a tile; 0 for rows, as most formats have them.
     pub tile: u32,
 }
 
 /// Formats that hold linear floating values. In all others samples are 8-bit sRGB.
 const EXR: [&str; 3] = ["exr", "sxr", "mxr"];
-const RADIANCE: [&str; 3] = ["hdr", "rgbe", "pfm"];
+const RADIANCE: [&str; 2] = ["hdr", "rgbe"];
+
+/// 8-bit formats that define alpha, and as straight. The others either have none, or leave open what it means to
+/// colours, and every reader guesses differently: there the image is laid over black.
+const WITH_ALPHA: [&str; 4] = ["png", "tif", "tiff", "tga"];
+
+const JPEG: [&str; 6] = ["jpg", "jpeg", "jpe", "jif", "jfif", "jfi"];
+
+/// libjpeg's limit. Checked here because some of its users end the process where it is exceeded.
+const LONGEST_JPEG: u32 = 65_500;
 
 /// Most pixels in a file that is read: 4 GiB as [`Image`].
 const MOST_PIXELS: u64 = 1 << 28;
@@ -58,7 +68,7 @@ const UNSUSPICIOUS_PIXELS: u64 = 1 << 24;
 const PIXELS_PER_BYTE: u64 = 1 << 14;
 
 /// Writes an image. The suffix decides the format: linear for OpenEXR (tiled, zip, channels R, G, B, A) and Radiance;
-/// else 8-bit sRGB, alpha straight where the format holds it, and otherwise over black.
+/// else 8-bit sRGB, with straight alpha in PNG, TIFF and Targa, over black in all others.
 ///
 /// The file appears when it is whole, and on failure the old one stays; see
 /// [`write_atomically`](crate::output::write_atomically).
@@ -75,6 +85,10 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
     }
     if options.tile == 0 || options.tile > 1 << 16 {
         return Err(Error::Usage(format!("tiles of {0} x {0} pixels; 1 to 65536 is possible", options.tile)));
+    }
+    if JPEG.contains(&suffix.as_str()) && width.max(height) > LONGEST_JPEG {
+        let message = format!("{width} x {height} pixels are too many for JPEG, which ends at {LONGEST_JPEG}");
+        return Err(Error::output(path, message));
     }
     let encoding = encoding(&suffix, options);
     output::write_atomically(path, |part| write_part(path, part, image, encoding, metadata))
@@ -114,9 +128,8 @@ pub fn read_metadata(path: &Path) -> Result<Metadata> {
 }
 
 fn write_part(path: &Path, part: &Path, image: &Image, encoding: Encoding, metadata: &Metadata) -> Result<()> {
-    let written = backend::keeps_alpha(part)
-        .map(|alpha| samples::encode(image, encoding.kind, alpha))
-        .and_then(|samples| backend::write(part, &samples, encoding, metadata));
+    let samples = samples::encode(image, encoding.kind, encoding.alpha);
+    let written = backend::write(part, &samples, encoding, metadata);
     // Libraries put the name that they were given into their messages.
     written.map_err(|message| {
         Error::output(path, message.replace(&*part.to_string_lossy(), &path.to_string_lossy()).trim())
@@ -126,11 +139,11 @@ fn write_part(path: &Path, part: &Path, image: &Image, encoding: Encoding, metad
 fn encoding(suffix: &str, options: &WriteOptions) -> Encoding {
     if EXR.contains(&suffix) {
         let kind = if options.depth == Depth::Half { Type::Half } else { Type::Float };
-        Encoding { kind, tile: options.tile }
+        Encoding { kind, alpha: true, tile: options.tile }
     } else if RADIANCE.contains(&suffix) {
-        Encoding { kind: Type::Float, tile: 0 }
+        Encoding { kind: Type::Float, alpha: false, tile: 0 }
     } else {
-        Encoding { kind: Type::U8, tile: 0 }
+        Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0 }
     }
 }
 
@@ -192,11 +205,11 @@ mod tests {
         let options = WriteOptions { depth: Depth::Float, tile: 32 };
         let of = |suffix| {
             let e = encoding(suffix, &options);
-            (e.kind, e.tile)
+            (e.kind, e.alpha, e.tile)
         };
-        assert_eq!(of("exr"), (Type::Float, 32));
-        assert_eq!(of("hdr"), (Type::Float, 0));
-        assert_eq!(of("png"), (Type::U8, 0));
-        assert_eq!(of("tif"), (Type::U8, 0));
+        assert_eq!(of("exr"), (Type::Float, true, 32));
+        assert_eq!(of("hdr"), (Type::Float, false, 0));
+        assert_eq!(of("png"), (Type::U8, true, 0));
+        assert_eq!(of("jpg"), (Type::U8, false, 0));
     }
 }

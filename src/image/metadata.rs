@@ -35,15 +35,6 @@ impl Default for Metadata {
     }
 }
 
-/// The names of the attributes in OpenEXR files.
-pub(super) mod name {
-    pub const WORLD_TO_CAMERA: &str = "worldToCamera";
-    pub const WORLD_TO_SCREEN: &str = "worldToScreen";
-    pub const FOVCOT: &str = "fovcot";
-    pub const SAMPLES_PER_PIXEL: &str = "samplesPerPixel";
-    pub const RENDER_TIME_SECONDS: &str = "renderTimeSeconds";
-}
-
 /// Files hold f32.
 pub(super) fn narrow(matrix: &[f64; 16]) -> [f32; 16] {
     matrix.map(|x| x as f32)

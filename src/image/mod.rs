@@ -10,6 +10,8 @@ mod file;
 mod metadata;
 #[cfg(feature = "oiio")]
 mod oiio;
+#[cfg(all(test, feature = "oiio"))]
+mod parity;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure;
 mod samples;

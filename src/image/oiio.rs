@@ -52,8 +52,6 @@ mod ffi {
 
         /// Suffixes of the formats that can be written.
         fn suffixes() -> Result<Vec<String>>;
-        /// Whether the format that the file's suffix stands for holds alpha.
-        fn keeps_alpha(path: &[u8]) -> Result<bool>;
         fn write(path: &[u8], layout: &Layout, attributes: &Attributes, samples: &[u8]) -> Result<()>;
 
         /// A file opened for reading.
@@ -86,11 +84,6 @@ pub(super) fn writable_suffixes() -> Result<Vec<String>> {
     Ok(suffixes)
 }
 
-/// Whether a file of this suffix holds alpha.
-pub(super) fn keeps_alpha(path: &Path) -> Result<bool> {
-    ffi::keeps_alpha(bytes(path)).map_err(message)
-}
-
 /// Writes a file.
 pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata: &Metadata) -> Result<()> {
     let (kind, values) = match &samples.values {
@@ -115,7 +108,11 @@ pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata
         world_to_camera: matrix(&metadata.world_to_camera),
         world_to_screen: matrix(&metadata.world_to_screen),
         fovcot: number(metadata.fovcot),
-        samples_per_pixel: metadata.samples_per_pixel.map(|n| i32::try_from(n).unwrap_or(i32::MAX)).into_iter().collect(),
+        samples_per_pixel: metadata
+            .samples_per_pixel
+            .map(|n| i32::try_from(n).unwrap_or(i32::MAX))
+            .into_iter()
+            .collect(),
         render_time_seconds: number(metadata.render_time_seconds),
     };
     ffi::write(bytes(path), &layout, &attributes, values).map_err(message)
@@ -126,8 +123,7 @@ pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Resul
     let input = ffi::open(bytes(path)).map_err(message)?;
     let layout = input.layout().map_err(message)?;
     check(layout.width.into(), layout.height.into())?;
-    let alpha =
-        layout.alpha.then_some(if layout.straight { Alpha::Straight } else { Alpha::Premultiplied });
+    let alpha = layout.alpha.then_some(if layout.straight { Alpha::Straight } else { Alpha::Premultiplied });
     let channels = Channels { colour: layout.channels >= 3, alpha };
     let count = layout.width as usize * layout.height as usize * channels.count();
     let values = match layout.kind {

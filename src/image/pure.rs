@@ -1,7 +1,7 @@
 //! Image files without OpenImageIO: OpenEXR by the crate exr, PNG and JPEG by the crate image.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use exr::prelude::{self as openexr, ReadChannels, ReadLayers, WritableImage, f16};
@@ -10,10 +10,17 @@ use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 use openexr::{AttributeValue, FlatSamples, Text};
 
 use super::file::Encoding;
-use super::metadata::{Metadata, name, narrow, widen};
+use super::metadata::{Metadata, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 
 type Result<T> = std::result::Result<T, String>;
+
+// Attributes under the names that OpenImageIO gives them. The crate has a field for the program, but names it `software`.
+const SOFTWARE: &str = "Software";
+const WORLD_TO_SCREEN: &str = "worldToScreen";
+const FOVCOT: &str = "fovcot";
+const SAMPLES_PER_PIXEL: &str = "samplesPerPixel";
+const RENDER_TIME_SECONDS: &str = "renderTimeSeconds";
 
 /// As OpenImageIO is told, too.
 const JPEG_QUALITY: u8 = 95;
@@ -23,15 +30,6 @@ pub(super) fn writable_suffixes() -> Result<Vec<String>> {
     Ok(["exr", "jpeg", "jpg", "png"].map(str::to_owned).to_vec())
 }
 
-fn suffix(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
-}
-
-/// Whether a file of this suffix holds alpha.
-pub(super) fn keeps_alpha(path: &Path) -> Result<bool> {
-    Ok(!suffix(path).starts_with("jp"))
-}
-
 /// Writes a file.
 pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata: &Metadata) -> Result<()> {
     match &samples.values {
@@ -39,9 +37,7 @@ pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata
         Values::Half(bits) => {
             write_exr(path, samples, encoding, metadata, |i| f16::from_bits(bits[i])).map_err(|e| e.to_string())
         }
-        Values::Float(values) => {
-            write_exr(path, samples, encoding, metadata, |i| values[i]).map_err(|e| e.to_string())
-        }
+        Values::Float(values) => write_exr(path, samples, encoding, metadata, |i| values[i]).map_err(|e| e.to_string()),
         Values::U16(_) => Err("16-bit integers are not written".to_owned()),
     }
 }
@@ -50,7 +46,7 @@ fn write_bytes(path: &Path, samples: &Samples, bytes: &[u8]) -> Result<()> {
     let mut file = BufWriter::new(File::create(path).map_err(|e| e.to_string())?);
     let (width, height) = (samples.width, samples.height);
     let colour = if samples.channels.alpha.is_some() { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
-    let written = if suffix(path) == "png" {
+    let written = if path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("png")) {
         PngEncoder::new(&mut file).write_image(bytes, width, height, colour)
     } else {
         JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).write_image(bytes, width, height, colour)
@@ -59,13 +55,13 @@ fn write_bytes(path: &Path, samples: &Samples, bytes: &[u8]) -> Result<()> {
     file.flush().map_err(|e| e.to_string())
 }
 
-fn write_exr<T: openexr::IntoNativeSample>(
+fn write_exr<T: exr::image::IntoSample>(
     path: &Path,
     samples: &Samples,
     encoding: Encoding,
     metadata: &Metadata,
     sample: impl Fn(usize) -> T + Sync,
-) -> openexr::UnitResult {
+) -> exr::error::UnitResult {
     let (width, height) = (samples.width as usize, samples.height as usize);
     let tile = encoding.tile as usize;
     let pixel = |at: openexr::Vec2<usize>| {
@@ -87,7 +83,6 @@ fn write_exr<T: openexr::IntoNativeSample>(
 
 fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
     let mut attributes = openexr::LayerAttributes {
-        software_name: Text::new_or_none(&metadata.software),
         world_to_camera: metadata.world_to_camera.as_ref().map(narrow),
         ..Default::default()
     };
@@ -97,28 +92,25 @@ fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
         }
     };
     let number = |x: Option<f64>| x.map(|x| AttributeValue::F32(x as f32));
-    put(name::WORLD_TO_SCREEN, metadata.world_to_screen.as_ref().map(narrow).map(AttributeValue::Matrix4x4));
-    put(name::FOVCOT, number(metadata.fovcot));
+    put(SOFTWARE, Text::new_or_none(&metadata.software).map(AttributeValue::Text));
+    put(WORLD_TO_SCREEN, metadata.world_to_screen.as_ref().map(narrow).map(AttributeValue::Matrix4x4));
+    put(FOVCOT, number(metadata.fovcot));
     put(
-        name::SAMPLES_PER_PIXEL,
+        SAMPLES_PER_PIXEL,
         metadata.samples_per_pixel.map(|n| AttributeValue::I32(i32::try_from(n).unwrap_or(i32::MAX))),
     );
-    put(name::RENDER_TIME_SECONDS, number(metadata.render_time_seconds));
+    put(RENDER_TIME_SECONDS, number(metadata.render_time_seconds));
     attributes
 }
 
 /// Reads a file, unless `check` refuses its width and height. The format is told by the content.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    if openexr_magic(path)? {
-        read_exr(path, check)
-    } else {
-        read_other(path, check)
-    }
+    if openexr_magic(path)? { read_exr(path, check) } else { read_other(path, check) }
 }
 
 fn openexr_magic(path: &Path) -> Result<bool> {
-    let file = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
-    Ok(exr::meta::magic_number::is_exr(file).unwrap_or(false))
+    let mut file = File::open(path).map_err(|e| e.to_string())?;
+    Ok(exr::meta::magic_number::is_exr(&mut file).unwrap_or(false))
 }
 
 fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
@@ -130,11 +122,8 @@ fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sam
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
     let channels = Channels { colour: true, alpha: Some(Alpha::Straight) };
     let deep = decoded.color().bytes_per_pixel() > decoded.color().channel_count();
-    let values = if deep {
-        Values::U16(decoded.into_rgba16().into_raw())
-    } else {
-        Values::U8(decoded.into_rgba8().into_raw())
-    };
+    let values =
+        if deep { Values::U16(decoded.into_rgba16().into_raw()) } else { Values::U8(decoded.into_rgba8().into_raw()) };
     Ok(Samples { width, height, channels, values })
 }
 
@@ -188,17 +177,20 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
         _ => None,
     };
     Ok(Metadata {
-        software: attributes.software_name.as_ref().map(Text::to_string).unwrap_or_default(),
+        software: match attributes.other.get(&Text::from(SOFTWARE)) {
+            Some(AttributeValue::Text(name)) => name.to_string(),
+            _ => attributes.software_name.as_ref().map(Text::to_string).unwrap_or_default(),
+        },
         world_to_camera: attributes.world_to_camera.as_ref().map(widen),
-        world_to_screen: match attributes.other.get(&Text::from(name::WORLD_TO_SCREEN)) {
+        world_to_screen: match attributes.other.get(&Text::from(WORLD_TO_SCREEN)) {
             Some(AttributeValue::Matrix4x4(m)) => Some(widen(m)),
             _ => None,
         },
-        fovcot: number(name::FOVCOT),
-        samples_per_pixel: match attributes.other.get(&Text::from(name::SAMPLES_PER_PIXEL)) {
+        fovcot: number(FOVCOT),
+        samples_per_pixel: match attributes.other.get(&Text::from(SAMPLES_PER_PIXEL)) {
             Some(&AttributeValue::I32(n)) => n.try_into().ok(),
             _ => None,
         },
-        render_time_seconds: number(name::RENDER_TIME_SECONDS),
+        render_time_seconds: number(RENDER_TIME_SECONDS),
     })
 }

@@ -172,13 +172,7 @@ mod tests {
             Type::U8,
             true,
         );
-        let expected = [
-            [128, 0, 255, 128],
-            [0, 0, 255, 255],
-            [0, 0, 0, 0],
-            [0, 0, 0, 0],
-            [188, 255, 255, 255],
-        ];
+        let expected = [[128, 0, 255, 128], [0, 0, 255, 255], [0, 0, 0, 0], [0, 0, 0, 0], [188, 255, 255, 255]];
         assert_eq!(samples.channels, RGBA);
         assert_eq!(samples.values, Values::U8(expected.concat()));
     }

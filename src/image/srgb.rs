@@ -6,8 +6,7 @@
 use std::sync::LazyLock;
 
 /// Linear light for each of the 256 codes: [0, 1], rounded from f64.
-static LINEAR: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 / 255.0) as f32));
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 / 255.0) as f32));
 
 /// The linear light of an encoded value, both 0 to 1.
 pub(super) fn decode(encoded: f64) -> f64 {
