@@ -1,1 +1,5 @@
 //! One test binary.
+
+mod allocation;
+mod io;
+mod mutation;
