@@ -96,15 +96,20 @@ impl<'a> Iterator for Words<'a> {
 
     #[inline]
     fn next(&mut self) -> Option<&'a [u8]> {
+        let mut line = self.line;
         while let Some(b) = self.text.get(self.at).filter(|b| is_space(**b)) {
-            self.line += usize::from(*b == b'\n');
+            line += usize::from(*b == b'\n');
             self.at += 1;
         }
         let begin = self.at;
         while self.text.get(self.at).is_some_and(|b| !is_space(*b)) {
             self.at += 1;
         }
-        (self.at > begin).then(|| &self.text[begin..self.at])
+        // At the end of the text the line stays the last word's.
+        (self.at > begin).then(|| {
+            self.line = line;
+            &self.text[begin..self.at]
+        })
     }
 }
 

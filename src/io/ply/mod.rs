@@ -53,6 +53,7 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
     let mut vertices = Vertices::default();
     let mut faces = Faces::default();
     for element in &header.elements {
+        let problem = |message| Error::input(path, format!("line {}", element.line), message);
         let least = items.least_size(element);
         let needed = (element.count).checked_mul(least as u64);
         if needed.is_none_or(|needed| needed > items.remaining() as u64) {
@@ -62,8 +63,9 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
                 element.count,
                 items.remaining()
             );
-            return Err(Error::input(path, format!("line {}", element.line), message));
+            return Err(problem(message));
         }
+        check_properties(element).map_err(problem)?;
         let result = match element.name.as_str() {
             "vertex" => vertices.read(element, &mut items),
             "face" => faces.read(element, &mut items, &vertices.positions),
@@ -133,16 +135,14 @@ struct Vertices {
 impl Vertices {
     fn read(&mut self, element: &Element, items: &mut impl Items) -> Placeless<()> {
         let index = |names: &[&str]| element.index(names);
-        let position = ["x", "y", "z"].map(|axis| index(&[axis]));
-        let [Some(x), Some(y), Some(z)] = position else {
-            return Err("element vertex needs the properties x, y and z".into());
-        };
+        let position = coordinates(element)?.map(Some);
         let normal = ["nx", "ny", "nz"].map(|axis| index(&[axis]));
         let uv = [index(&["u", "s", "texture_u", "texcoord_u"]), index(&["v", "t", "texture_v", "texcoord_v"])];
         let rgb = [["red", "r", "diffuse_red"], ["green", "g", "diffuse_green"], ["blue", "b", "diffuse_blue"]];
         let rgb = rgb.map(|names| index(&names));
         let alpha = index(&["alpha", "a", "diffuse_alpha"]);
-        self.is_double = [x, y, z].iter().any(|&i| element.properties[i].scalar == Scalar::F64);
+        let is_double = |index: usize| element.properties[index].scalar == Scalar::F64;
+        self.is_double = position.into_iter().flatten().any(is_double);
 
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
@@ -205,7 +205,7 @@ struct Faces {
 
 impl Faces {
     fn read(&mut self, element: &Element, items: &mut impl Items, positions: &[DVec3]) -> Placeless<()> {
-        let list = indices(element, &["vertex_indices", "vertex_index"])?;
+        let list = indices(element)?;
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
         self.triangles = items.triangles(element, count);
@@ -245,7 +245,7 @@ impl Faces {
 
     /// Strips of triangles, one after the other in each list; -1 ends a strip.
     fn read_strips(&mut self, element: &Element, items: &mut impl Items, positions: &[DVec3]) -> Placeless<()> {
-        let list = indices(element, &["vertex_indices", "vertex_index"])?;
+        let list = indices(element)?;
         let mut values = Vec::new();
         for _ in 0..element.count {
             values.clear();
@@ -272,8 +272,26 @@ impl Faces {
     }
 }
 
+/// Whether the header gives an element what the mesh needs of it.
+fn check_properties(element: &Element) -> Placeless<()> {
+    match element.name.as_str() {
+        "vertex" => coordinates(element).map(drop),
+        "face" | "tristrips" => indices(element).map(drop),
+        _ => Ok(()),
+    }
+}
+
+/// The properties x, y and z.
+fn coordinates(element: &Element) -> Placeless<[usize; 3]> {
+    match ["x", "y", "z"].map(|axis| element.index(&[axis])) {
+        [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
+        _ => Err("element vertex needs the properties x, y and z".into()),
+    }
+}
+
 /// The list of corners among an element's properties.
-fn indices(element: &Element, names: &[&str]) -> Placeless<usize> {
+fn indices(element: &Element) -> Placeless<usize> {
+    let names = ["vertex_indices", "vertex_index"];
     let index = element.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()));
     index.ok_or_else(|| format!("element {} needs the list property {}", element.name, names[0]))
 }
