@@ -2,6 +2,8 @@
 
 mod allocation;
 mod cli;
+#[cfg(feature = "embree")]
+mod embree;
 mod image;
 mod io;
 mod mutation;

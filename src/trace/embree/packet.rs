@@ -111,11 +111,11 @@ impl<const G: usize> Rays<G> {
         let mut active = Active([[-1; 4]; G]);
         let mut rows = [[Vec4::ZERO; G]; ray_row::COUNT];
         rows[ray_row::MASK] = [Vec4::splat(f32::from_bits(u32::MAX)); G];
-        for g in 0..G {
+        for (g, active) in active.0.iter_mut().enumerate() {
             let four: [Ray; 4] = from_fn(|k| match rays.get(4 * g + k) {
                 Some(ray) if ray.is_valid() => *ray,
                 _ => {
-                    active.0[g][k] = 0;
+                    active[k] = 0;
                     NOWHERE
                 }
             });

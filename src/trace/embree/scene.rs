@@ -80,7 +80,7 @@ impl SceneBuilder {
     pub(super) fn add_triangles(&mut self, id: u32, positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<()> {
         check_indices(positions.len(), triangles)?;
         let geometry = self.geometry(sys::RTC_GEOMETRY_TYPE_TRIANGLE)?;
-        self.fill(&geometry, sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, &positions_of(positions))?;
+        self.fill(&geometry, sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions)?;
         self.fill(&geometry, sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles)?;
         self.attach(&geometry, id)
     }
@@ -143,13 +143,13 @@ impl SceneBuilder {
         geometry: &GeometryHandle,
         kind: sys::RTCBufferType,
         format: sys::RTCFormat,
-        items: &[[T; 3]],
+        items: &[T],
     ) -> Result<()> {
         id(items.len())?;
         // SAFETY: the geometry is alive; the format is three 4-byte numbers, the size of an item.
         let buffer = unsafe {
-            const { assert!(size_of::<T>() == 4) };
-            sys::rtcSetNewGeometryBuffer(geometry.0, kind, 0, format, size_of::<[T; 3]>(), items.len())
+            const { assert!(size_of::<T>() == 12) };
+            sys::rtcSetNewGeometryBuffer(geometry.0, kind, 0, format, size_of::<T>(), items.len())
         };
         self.0.device.check("allocating a buffer")?;
         if buffer.is_null() {
@@ -168,10 +168,6 @@ impl SceneBuilder {
         }
         self.0.device.check("adding a geometry")
     }
-}
-
-fn positions_of(positions: &[Vec3]) -> &[[f32; 3]] {
-    bytemuck::cast_slice(positions)
 }
 
 /// Embree reads vertices unchecked while it traces.
