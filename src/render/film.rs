@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::tiles::Tile;
+use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::Vec4;
 
@@ -13,9 +14,16 @@ pub(super) struct Film(Mutex<Image>);
 
 impl Film {
     /// A transparent picture.
-    pub(super) fn new(width: u32, height: u32) -> Self {
-        let pixels = vec![Vec4::ZERO; width as usize * height as usize];
-        Self(Mutex::new(Image { width, height, pixels }))
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where it does not fit into memory.
+    pub(super) fn new(width: u32, height: u32) -> Result<Self> {
+        let count = width as usize * height as usize;
+        let mut pixels = Vec::new();
+        let too_large = |_| Error::Usage(format!("a picture of {width}x{height} pixels does not fit into memory"));
+        pixels.try_reserve_exact(count).map_err(too_large)?;
+        pixels.resize(count, Vec4::ZERO);
+        Ok(Self(Mutex::new(Image { width, height, pixels })))
     }
 
     /// Puts in a tile's pixels, in the order of [`Tile::pixels`].

@@ -139,10 +139,11 @@ impl<'a> Renderer<'a> {
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors
-    /// [`Error::Interrupted`](crate::Error::Interrupted) once `control.cancel` is set.
+    /// [`Error::Interrupted`](crate::Error::Interrupted) once `control.cancel` is set, and
+    /// [`Error::Usage`](crate::Error::Usage) for a picture that does not fit into memory.
     pub fn render<T: Tracer>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
-        let film = Film::new(self.settings.width, self.settings.height);
+        let film = Film::new(self.settings.width, self.settings.height)?;
         let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile_order);
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
