@@ -5,11 +5,14 @@
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
+#[doc(hidden)]
+pub mod cli;
 mod error;
 pub mod image;
 pub mod io;
 pub mod lab;
 pub mod math;
+pub mod output;
 pub mod plan;
 mod ray;
 pub mod render;

@@ -1,2 +1,5 @@
 //! `twincast`: arguments, then the library, then an exit code.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    twincast::cli::main()
+}

@@ -1,4 +1,25 @@
 //! Pixels, and the files they are kept in.
+//!
+//! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
+//! (OpenEXR, Radiance), 8-bit sRGB everywhere else, TIFF included. `samples.rs` turns pixels into a file's samples, and a
+//! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
+//! same pixels.
+
+mod compare;
+mod file;
+mod metadata;
+#[cfg(feature = "oiio")]
+mod oiio;
+#[cfg(all(test, feature = "oiio"))]
+mod parity;
+#[cfg(any(test, not(feature = "oiio")))]
+mod pure;
+mod samples;
+pub mod srgb;
+
+pub use compare::Difference;
+pub use file::{Depth, WriteOptions, check_writable, read, read_metadata, write};
+pub use metadata::Metadata;
 
 use crate::math::Vec4;
 
@@ -11,4 +32,11 @@ pub struct Image {
     pub height: u32,
     /// Row by row, `width * height` of them.
     pub pixels: Vec<Vec4>,
+}
+
+impl Image {
+    /// An image of transparent black.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height, pixels: vec![Vec4::ZERO; width as usize * height as usize] }
+    }
 }

@@ -1,9 +1,30 @@
 //! Scene files: one file a format. A loader fills a [`Scene`] and never sees an accelerator.
+//!
+//! A loader is a function of the file's path (for messages and for the files it refers to) and bytes. Counts in a file
+//! are promises, and are compared with the bytes that are there before anything is allocated for them; indices are
+//! compared with what they point into before they reach a [`Scene`]. What all formats share is done once, afterwards:
+//! normals on request, axes and units, and a last check of the whole scene.
+
+mod check;
+mod color;
+mod gltf;
+mod mapped;
+mod obj;
+mod ply;
+mod polygon;
+mod stl;
+mod text;
+mod texture;
+mod weld;
 
 use std::path::Path;
+use std::sync::Arc;
 
-use crate::error::{Result, Warning};
-use crate::scene::Scene;
+use self::mapped::Mapped;
+use self::weld::Weld;
+use crate::error::{Error, Result, Warning};
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::scene::{Geometry, Mesh, Scene};
 
 /// How a file is understood.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,10 +73,110 @@ pub enum Normals {
     Smooth,
 }
 
-/// Reads a scene. The suffix decides the format: glb, gltf, obj, ply, stl.
+/// A result whose error is a message that has no file and no place yet.
+type Placeless<T> = std::result::Result<T, String>;
+
+/// The suffixes that [`load`] knows.
+pub const SUFFIXES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+
+/// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
+///
+/// What is odd but can be rendered comes back as warnings: a missing texture, triangles with corners that are not
+/// finite (they stay in their mesh and are never hit), features that the renderer does not have.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for anything that is wrong with the file or with what it refers to.
-pub fn load(_path: &Path, _options: &LoadOptions) -> Result<(Scene, Vec<Warning>)> {
-    todo!()
+/// [`Error::Input`] for anything that is wrong with the file or with what it refers to.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, Vec<Warning>)> {
+    let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+    // First, so that a directory, a missing or an empty file is called that, whatever its name.
+    let bytes = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?;
+    if bytes.is_empty() {
+        return Err(Error::input(path, "", "is empty, where a scene is needed"));
+    }
+    let mut warnings = Vec::new();
+    let mut scene = match suffix.as_str() {
+        "glb" | "gltf" => gltf::load(path, &bytes, &mut warnings)?,
+        "obj" => obj::load(path, &bytes, &mut warnings)?,
+        "ply" => ply::load(path, &bytes, &mut warnings)?,
+        "stl" => stl::load(path, &bytes, &mut warnings)?,
+        _ => {
+            let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
+            return Err(Error::input(path, "", message));
+        }
+    };
+    drop(bytes);
+    scene.transform(&options.transform());
+    check::check(&scene).map_err(|message| Error::input(path, "", message))?;
+    for geometry in &mut scene.geometries {
+        if let Geometry::Mesh(mesh) = geometry {
+            options.normals.apply(mesh);
+        }
+    }
+    let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
+    if bad > 0 {
+        let message = format!("{bad} triangles have corners that are NaN, infinite or too far away; no ray hits them");
+        warnings.push(Warning::new(path, "", message));
+    }
+    Ok((scene, warnings))
+}
+
+impl LoadOptions {
+    /// From the file's coordinates to the scene's.
+    fn transform(&self) -> DAffine3 {
+        let turn = match self.up_axis {
+            UpAxis::Y => DMat3::IDENTITY,
+            UpAxis::Z => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
+        };
+        DAffine3::from_mat3(turn * self.unit.metres())
+    }
+}
+
+impl Unit {
+    /// How many metres it is.
+    pub const fn metres(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Centimetre => 0.01,
+            Self::Millimetre => 0.001,
+            Self::Inch => 0.0254,
+        }
+    }
+}
+
+impl Normals {
+    fn apply(self, mesh: &mut Mesh) {
+        match self {
+            Self::File => {}
+            Self::Flat => mesh.normals = Vec::new(),
+            Self::Smooth => smooth(mesh),
+        }
+    }
+}
+
+/// Smooth normals across vertices that differ in other attributes only, as they do at seams of textures.
+fn smooth(mesh: &mut Mesh) {
+    let mut weld = Weld::new();
+    // Adding 0 makes one zero of the two.
+    let welded: Vec<u32> = mesh.positions.iter().map(|p| weld.index((*p + 0.0).to_array().map(f32::to_bits))).collect();
+    let positions = weld.into_keys().into_iter().map(|bits| bits.map(f32::from_bits).into()).collect();
+    let triangles = mesh.triangles.iter().map(|corners| corners.map(|i| welded[i as usize])).collect();
+    let mut joined = Mesh { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Mesh::default() };
+    joined.smooth_normals();
+    mesh.normals = welded.into_iter().map(|i| joined.normals[i as usize]).collect();
+}
+
+fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
+    scene.geometries.iter().filter_map(|geometry| match geometry {
+        Geometry::Mesh(mesh) => Some(mesh),
+        Geometry::Shapes { .. } => None,
+    })
+}
+
+/// What the system says about a file, as a message.
+fn system_message(error: &std::io::Error) -> String {
+    match error.kind() {
+        // These are our own words.
+        std::io::ErrorKind::IsADirectory | std::io::ErrorKind::InvalidInput => error.to_string(),
+        _ => format!("cannot be read: {error}"),
+    }
 }

@@ -1,13 +1,35 @@
 //! From pixels to camera rays, and from radiance to a film.
+//!
+//! A picture depends on scene, camera, size, samples and seed. Threads, tiles and their order, and how rays are bundled
+//! change when a pixel is computed, never what.
 
-use std::sync::atomic::AtomicBool;
+mod camera;
+mod counted;
+mod film;
+pub(crate) mod sampler;
+mod tiles;
+mod wavefront;
 
-use crate::error::Result;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+pub use counted::Counted;
+pub use tiles::TileOrder;
+
+use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::Vec4;
+use crate::math::{DVec2, Vec3, Vec4};
+use crate::plan::Plan;
 use crate::ray::Ray;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Material, Scene};
+use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
+use camera::Pinhole;
+use film::Film;
+use sampler::Sampler;
+use tiles::{Tile, tiles};
+
+/// Most pixels a picture may have along one side.
+pub const LARGEST_SIDE: u32 = 65_536;
 
 /// What picture to make of a scene.
 #[derive(Clone, Debug)]
@@ -22,6 +44,25 @@ pub struct Settings {
     pub seed: u64,
     /// How rays are bundled; never changes a native picture.
     pub batch: Batch,
+    /// Which tiles come first; never changes a picture.
+    pub tile_order: TileOrder,
+    /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
+    pub background: Option<Vec3>,
+}
+
+impl Default for Settings {
+    /// 1280 x 720 pixels of 4 samples.
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            spp: 4,
+            seed: 0,
+            batch: Batch::default(),
+            tile_order: TileOrder::default(),
+            background: None,
+        }
+    }
 }
 
 /// How a running render is watched and stopped.
@@ -37,35 +78,101 @@ pub struct Control<'a> {
 pub struct Renderer<'a> {
     scene: &'a Scene,
     world: &'a World,
-    camera: Camera,
     settings: Settings,
+    plan: Plan,
+    pinhole: Pinhole,
+    sampler: Sampler,
+    lights: Vec<LightSource>,
+    /// Ambient light, zero where the plan leaves it out.
+    ambient: Vec3,
+    /// What a geometry is made of whose material does not exist.
+    fallback: Material,
 }
 
 impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for a size or a sample count of 0.
+    /// [`Error::Usage`](crate::Error::Usage) for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
+    /// angle of view outside (0, 180) degrees.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
-        Ok(Self { scene, world, camera, settings })
+        let Settings { width, height, spp, seed, .. } = settings;
+        for side in [width, height] {
+            if side == 0 || side > LARGEST_SIDE {
+                let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
+                return Err(Error::Usage(message));
+            }
+        }
+        if spp == 0 {
+            return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
+        }
+        if !(camera.fov_y > 0.0 && camera.fov_y < std::f64::consts::PI) {
+            let degrees = camera.fov_y.to_degrees();
+            return Err(Error::Usage(format!("angle of view {degrees}: must be above 0 and below 180 degrees")));
+        }
+        let plan = Plan::new(scene, world, settings.background);
+        let mut renderer = Self {
+            scene,
+            world,
+            pinhole: Pinhole::new(&camera, world.centre, width, height),
+            sampler: Sampler::new(spp, seed),
+            lights: Vec::new(),
+            ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
+            fallback: Material::default(),
+            plan,
+            settings,
+        };
+        renderer.lights = renderer.light_sources(camera.eye - world.centre);
+        Ok(renderer)
+    }
+
+    /// What is rendered, as the engines hold it.
+    pub const fn world(&self) -> &'a World {
+        self.world
+    }
+
+    /// What the render will do.
+    pub const fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors
-    /// [`Error::Interrupted`](crate::Error::Interrupted) once `control.cancel` is set.
-    pub fn render<T: Tracer>(&self, _tracer: &T, _control: Control<'_>) -> Result<Image> {
-        todo!()
+    /// [`Error::Interrupted`](crate::Error::Interrupted) once `control.cancel` is set, and
+    /// [`Error::Usage`](crate::Error::Usage) for a picture that does not fit into memory.
+    pub fn render<T: Tracer>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
+        let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
+        let film = Film::new(self.settings.width, self.settings.height)?;
+        let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile_order);
+        let next = AtomicUsize::new(0);
+        // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
+        rayon::broadcast(|_| {
+            while let Some(tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
+                if cancelled() {
+                    return;
+                }
+                film.put(tile, &self.tile(tracer, tile));
+                if let Some(on_tile) = control.on_tile {
+                    on_tile(tile.len() as u64);
+                }
+            }
+        });
+        if cancelled() { Err(Error::Interrupted) } else { Ok(film.into_image()) }
     }
 
     /// One pixel, the same to the bit as in the whole picture. A tracer that records what it is asked learns every ray
     /// that the pixel depends on.
-    pub fn pixel<T: Tracer>(&self, _tracer: &T, _x: u32, _y: u32) -> Vec4 {
-        todo!()
+    ///
+    /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the
+    /// native ones, and Embree with [`Width::One`](crate::Width).
+    pub fn pixel<T: Tracer>(&self, tracer: &T, x: u32, y: u32) -> Vec4 {
+        self.tile(tracer, &Tile { x, y, width: 1, height: 1 })[0]
     }
 
     /// The camera ray of one sample of a pixel.
-    pub fn camera_ray(&self, _x: u32, _y: u32, _sample: u32) -> Ray {
-        todo!()
+    pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
+        let corner = DVec2::new(f64::from(x), f64::from(y));
+        self.pinhole.ray(corner + self.sampler.place(x, y, sample))
     }
 }

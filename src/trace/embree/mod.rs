@@ -1,1 +1,243 @@
-//! Intel Embree.
+//! Intel Embree (Wald, Woop, Benthin, Johnson, Ernst 2014, *Embree: a kernel framework for efficient CPU ray tracing*).
+//!
+//! [`Embree`] is the engine; below it, `device` owns what every scene shares, `scene` builds and commits, `packet`
+//! lays rays out as Embree wants them and `query` asks. Versions 3.13 and 4 are served by one source: the bindings are
+//! made from the header that is installed, and the two layouts of a hit are told apart by their size alone.
+//!
+//! A scene under construction and a committed one are different types, so that a query on an uncommitted scene, which
+//! Embree leaves undefined, does not compile. The simpler design, one type with a flag, would have cost a test and an
+//! error path a ray.
+//!
+//! Embree's answers are passed on as they are. They bend the conventions of [`trace`](super) a little: t is not
+//! correctly rounded, so a hit at exactly `tmin` or `tmax` may be missed, and at equal t any of the primitives may be
+//! named.
+
+mod device;
+mod packet;
+mod query;
+mod scene;
+mod sys;
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::ray::{Hit, Ray};
+use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
+use device::Device;
+use packet::{Answer, RayHits, Rays};
+use query::{Mode, PacketQuery, Packets};
+use scene::{Scene, SceneBuilder};
+
+pub use sys::VERSION;
+
+/// How Embree builds and what it may trade.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// How much time the build may take.
+    pub quality: Quality,
+    /// Do not let rays slip between neighbouring triangles (`RTC_SCENE_FLAG_ROBUST`). Slower; `quality` beyond medium
+    /// then has no effect.
+    pub robust: bool,
+    /// Save memory rather than time (`RTC_SCENE_FLAG_COMPACT`); `quality` beyond medium then has no effect.
+    pub compact: bool,
+    /// Threads that build; one for every processor by default. Queries run on the thread that asks.
+    pub threads: Option<usize>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { quality: Quality::Medium, robust: true, compact: false, threads: None }
+    }
+}
+
+/// How good a tree the build makes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Fast to build: sorted along a space-filling curve.
+    Low,
+    /// Binned surface area heuristic.
+    #[default]
+    Medium,
+    /// With spatial splits.
+    High,
+}
+
+/// A world in Embree's hands.
+pub struct Embree {
+    scene: Scene,
+    /// Who the geometries of Embree's scenes are: first the fixed parts, then those of the objects.
+    parts: Vec<PartIds>,
+    fixed: usize,
+    placements: Vec<PlacementIds>,
+    device: Arc<Device>,
+}
+
+#[derive(Clone, Copy)]
+struct PartIds {
+    geometry: u32,
+    instance: u32,
+}
+
+#[derive(Clone, Copy)]
+struct PlacementIds {
+    first_part: usize,
+    instance: u32,
+}
+
+impl Embree {
+    /// Hands `world` to Embree and builds its trees. Embree keeps copies of the triangles, not of the shapes.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] for a triangle with an index past the vertices, for more primitives than 32 bits count, and
+    /// for everything that Embree reports (out of memory, an unsupported processor);
+    /// [`Error::Unavailable`] where the library that was loaded lays out its hits in another way than the header that
+    /// this build was made with.
+    pub fn new(world: &World, options: &Options) -> Result<Self> {
+        let device = Device::new(options.threads)?;
+        let build = |parts: &[Part]| -> Result<SceneBuilder> {
+            let mut builder = SceneBuilder::new(&device, options)?;
+            for (id, part) in parts.iter().enumerate() {
+                add_part(&mut builder, id, part)?;
+            }
+            Ok(builder)
+        };
+        let objects = world.objects.iter().map(|parts| Ok(Arc::new(build(&world.parts[parts.clone()])?.commit()?)));
+        let objects = objects.collect::<Result<Vec<_>>>()?;
+        let fixed = &world.parts[world.fixed.clone()];
+        let mut builder = build(fixed)?;
+        for (i, placement) in world.placements.iter().enumerate() {
+            builder.add_instance(id(fixed.len() + i)?, &objects[placement.object as usize], &placement.to_world)?;
+        }
+        let part_ids = |part: &Part| PartIds { geometry: part.geometry, instance: part.instance };
+        let placements = world.placements.iter().map(|placement| PlacementIds {
+            first_part: world.objects[placement.object as usize].start,
+            instance: placement.instance,
+        });
+        Ok(Self {
+            scene: builder.commit()?,
+            parts: world.parts.iter().map(part_ids).collect(),
+            fixed: fixed.len(),
+            placements: placements.collect(),
+            device,
+        })
+    }
+
+    /// Bytes that Embree holds for this world: trees and copies of the triangles.
+    pub fn bytes(&self) -> usize {
+        self.device.bytes()
+    }
+
+    /// The version of the library that was loaded, as in `4.3.0`.
+    pub fn version(&self) -> String {
+        self.device.version()
+    }
+
+    /// Embree's ids turned into the scene's.
+    #[inline]
+    fn hit(&self, answer: Answer) -> Hit {
+        let Answer { t, u, v, primitive, geometry, instance } = answer;
+        let (part, instance) = match instance {
+            None => {
+                let part = self.parts[geometry as usize];
+                (part, part.instance)
+            }
+            Some(instance) => {
+                let placement = self.placements[instance as usize - self.fixed];
+                (self.parts[placement.first_part + geometry as usize], placement.instance)
+            }
+        };
+        Hit { t, u, v, primitive, geometry: part.geometry, instance }
+    }
+
+    fn closest_one(&self, ray: &Ray, mode: &mut Mode) -> Option<Hit> {
+        ray.is_valid().then(|| query::intersect(&self.scene, mode, ray)).flatten().map(|answer| self.hit(answer))
+    }
+
+    fn occluded_one(&self, ray: &Ray, mode: &mut Mode) -> bool {
+        ray.is_valid() && query::occluded(&self.scene, mode, ray)
+    }
+
+    fn closest_packets<const G: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode)
+    where
+        Packets: PacketQuery<G>,
+    {
+        for (rays, hits) in rays.chunks(4 * G).zip(hits.chunks_mut(4 * G)) {
+            let (rays, active) = Rays::<G>::load(rays);
+            let mut packet = RayHits::new(rays);
+            Packets::intersect(&mut packet, &active, &self.scene, mode);
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = packet.answer(lane).map(|answer| self.hit(answer));
+            }
+        }
+    }
+
+    fn occluded_packets<const G: usize>(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode)
+    where
+        Packets: PacketQuery<G>,
+    {
+        for (rays, occluded) in rays.chunks(4 * G).zip(occluded.chunks_mut(4 * G)) {
+            let (mut packet, active) = Rays::<G>::load(rays);
+            Packets::occluded(&mut packet, &active, &self.scene, mode);
+            for (lane, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = packet.is_occluded(lane);
+            }
+        }
+    }
+}
+
+impl Tracer for Embree {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_one(ray, &mut Mode::new(false))
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.occluded_one(ray, &mut Mode::new(false))
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        let mode = &mut Mode::new(batch.coherent);
+        match batch.width {
+            Width::One => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.closest_one(ray, mode)),
+            Width::Four => self.closest_packets::<1>(rays, hits, mode),
+            Width::Eight => self.closest_packets::<2>(rays, hits, mode),
+            Width::Sixteen => self.closest_packets::<4>(rays, hits, mode),
+        }
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        let mode = &mut Mode::new(batch.coherent);
+        match batch.width {
+            Width::One => rays.iter().zip(occluded).for_each(|(ray, o)| *o = self.occluded_one(ray, mode)),
+            Width::Four => self.occluded_packets::<1>(rays, occluded, mode),
+            Width::Eight => self.occluded_packets::<2>(rays, occluded, mode),
+            Width::Sixteen => self.occluded_packets::<4>(rays, occluded, mode),
+        }
+    }
+}
+
+/// Adds `part` as geometry `index` of Embree's scene; nothing where it has no primitives.
+fn add_part(builder: &mut SceneBuilder, index: usize, part: &Part) -> Result<()> {
+    let added = match &part.primitives {
+        primitives if primitives.is_empty() => Ok(()),
+        Primitives::Triangles { positions, triangles } => builder.add_triangles(id(index)?, positions, triangles),
+        Primitives::Shapes(shapes) => builder.add_shapes(id(index)?, shapes),
+    };
+    added.map_err(|e| match e {
+        Error::Backend { backend, message } => {
+            Error::Backend { backend, message: format!("geometry {}: {message}", part.geometry) }
+        }
+        e => e,
+    })
+}
+
+/// `count` as Embree counts; its largest number means "none".
+fn id(count: usize) -> Result<u32> {
+    let number = u32::try_from(count).ok().filter(|&number| number != sys::INVALID_ID);
+    number.ok_or_else(|| backend(format!("{count} is more than Embree can count: ids have 32 bits")))
+}
+
+fn backend(message: impl Into<String>) -> Error {
+    Error::Backend { backend: "embree", message: message.into() }
+}

@@ -1,0 +1,53 @@
+# What a user needs is installed by the target that needs it (Debian packages, with apt-get). Rust itself is expected.
+
+CARGO ?= cargo
+PREFIX ?= /usr/local
+DESTDIR ?=
+
+# What `make render` renders.
+SCENE ?= scenes/gallery/gallery.glb
+SIZE ?= 1280x720
+SPP ?= 16
+
+TWINCAST = target/release/twincast
+
+.PHONY: help render test check test-embree4 install packages build
+
+help: ## list these targets
+	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/^([a-z0-9-]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+
+packages:
+	@scripts/install-packages.sh
+
+build: packages
+	$(CARGO) build --locked --release
+
+render: build ## render the README's scene to out/gallery.exr and out/gallery.png
+	@mkdir -p out
+	$(TWINCAST) render $(SCENE) -o out/gallery.exr -o out/gallery.png --size $(SIZE) --spp $(SPP)
+	@echo "rendered $(SCENE) at $(SIZE), $(SPP) samples a pixel: out/gallery.exr (linear) and out/gallery.png (sRGB)"
+
+test: packages ## run every test
+	$(CARGO) test --locked
+
+check: packages ## formatting, lints, documentation, and everything once more without default features
+	$(CARGO) fmt --check
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
+	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
+	$(CARGO) build --locked --no-default-features
+	$(CARGO) test --locked --no-default-features
+
+test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5
+	@scripts/test-embree4.sh
+
+install: build ## put binary, man page and completions under PREFIX (/usr/local); honours DESTDIR
+	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'
+	install -d '$(DESTDIR)$(PREFIX)/share/man/man1' \
+	    '$(DESTDIR)$(PREFIX)/share/bash-completion/completions' \
+	    '$(DESTDIR)$(PREFIX)/share/zsh/site-functions' \
+	    '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d'
+	$(TWINCAST) man > '$(DESTDIR)$(PREFIX)/share/man/man1/twincast.1'
+	$(TWINCAST) completions bash > '$(DESTDIR)$(PREFIX)/share/bash-completion/completions/twincast'
+	$(TWINCAST) completions zsh > '$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_twincast'
+	$(TWINCAST) completions fish > '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/twincast.fish'

@@ -1,0 +1,216 @@
+#include "twincast/ffi/oiio.h"
+
+#include <cerrno>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/strutil.h>
+
+#include "twincast/src/image/oiio.rs.h"
+
+namespace twincast::oiio {
+
+namespace {
+
+std::string text(Bytes bytes)
+{
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+// Throws the library's own words, or `otherwise` where it has none.
+[[noreturn]] void fail(std::string words, const char* otherwise)
+{
+    throw std::runtime_error(words.empty() ? otherwise : words);
+}
+
+template<typename File> [[noreturn]] void fail(const File& file, const char* otherwise)
+{
+    fail(file->geterror(), otherwise);
+}
+
+OIIO::TypeDesc type_of(Kind kind)
+{
+    switch (kind) {
+    case Kind::U8: return OIIO::TypeDesc::UINT8;
+    case Kind::U16: return OIIO::TypeDesc::UINT16;
+    case Kind::Half: return OIIO::TypeDesc::HALF;
+    case Kind::Float: return OIIO::TypeDesc::FLOAT;
+    }
+    throw std::logic_error("not a type of sample");
+}
+
+// OpenImageIO gets an address and no length: this is where the length is made sure of.
+void check_length(const Layout& layout, size_t bytes)
+{
+    size_t expected = size_t(layout.width) * layout.height * layout.channels * type_of(layout.kind).size();
+    if (bytes != expected)
+        throw std::logic_error("the samples are not as many as the layout says");
+}
+
+std::unique_ptr<OIIO::ImageOutput> writer(const std::string& path)
+{
+    auto file = OIIO::ImageOutput::create(path);
+    if (!file)
+        fail(OIIO::geterror(), "no writer for this suffix");
+    return file;
+}
+
+void save(const std::string& path, const std::vector<unsigned char>& bytes)
+{
+    std::ofstream file(path, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+    file.close();
+    if (!file)
+        throw std::system_error(errno, std::generic_category(), "cannot be written");
+}
+
+}  // namespace
+
+rust::Vec<rust::String> suffixes()
+{
+    // Formats that make no file, or none from colours: a window, a network stream, nothing, terminal text, depth.
+    const std::set<std::string> no_files { "iv", "socket", "null", "term", "zfile" };
+    rust::Vec<rust::String> result;
+    // "png:png;tiff:tif,tiff,tx": all formats, also those that are only read.
+    for (auto& format : OIIO::Strutil::splits(OIIO::get_string_attribute("extension_list"), ";")) {
+        auto colon = format.find(':');
+        if (colon == std::string::npos || no_files.count(format.substr(0, colon)))
+            continue;
+        for (auto& suffix : OIIO::Strutil::splits(format.substr(colon + 1), ",")) {
+            if (OIIO::ImageOutput::create("a." + suffix))
+                result.push_back(OIIO::Strutil::lower(suffix));
+            else
+                OIIO::geterror();  // forgets it
+        }
+    }
+    return result;
+}
+
+void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes samples)
+{
+    check_length(layout, samples.size());
+    const OIIO::TypeDesc type = type_of(layout.kind);
+    OIIO::ImageSpec spec(int(layout.width), int(layout.height), int(layout.channels), type);
+    spec.alpha_channel = layout.alpha ? int(layout.channels) - 1 : -1;
+    if (layout.straight)
+        spec.attribute("oiio:UnassociatedAlpha", 1);
+    const bool integers = layout.kind == Kind::U8 || layout.kind == Kind::U16;
+    spec.attribute("oiio:ColorSpace", integers ? "sRGB" : "Linear");
+    if (layout.tile) {
+        spec.tile_width = spec.tile_height = int(layout.tile);
+        spec.tile_depth                    = 1;
+    }
+    if (!integers)
+        spec.attribute("compression", "zip");
+    else
+        spec.attribute("CompressionQuality", 95);  // JPEG, WebP; others take no notice
+    spec.attribute("jpeg:subsampling", "4:4:4");
+
+    spec.attribute("Software", std::string(attributes.software));
+    if (attributes.world_to_camera.size() == 16)
+        spec.attribute("worldtocamera", OIIO::TypeMatrix, attributes.world_to_camera.data());
+    if (attributes.world_to_screen.size() == 16)
+        spec.attribute("worldtoscreen", OIIO::TypeMatrix, attributes.world_to_screen.data());
+    for (float value : attributes.fovcot)
+        spec.attribute("fovcot", value);
+    for (int value : attributes.samples_per_pixel)
+        spec.attribute("samplesPerPixel", value);
+    for (float value : attributes.render_time_seconds)
+        spec.attribute("renderTimeSeconds", value);
+
+    const std::string name = text(path);
+    auto file              = writer(name);
+    // Where its JPEG writer cannot write, OpenImageIO ends the process (libjpeg's default): it gets memory instead.
+    OIIO::Filesystem::IOVecOutput memory;
+    const bool in_memory = std::string(file->format_name()) == "jpeg";
+    if (in_memory && !file->set_ioproxy(&memory))
+        throw std::runtime_error("this OpenImageIO cannot write JPEG to memory");
+    if (!file->open(name, spec))
+        fail(file, "cannot be opened for writing");
+    if (!file->write_image(type, samples.data()))
+        fail(file, "cannot be written");
+    // Compressed formats write their last bytes here: a full disk may show only now.
+    if (!file->close())
+        fail(file, "cannot be finished");
+    if (in_memory)
+        save(name, memory.buffer());
+}
+
+Input::Input(std::unique_ptr<OIIO::ImageInput> file)
+    : file(std::move(file))
+{
+}
+
+std::unique_ptr<Input> open(Bytes path)
+{
+    // Straight alpha as it is: OpenImageIO would multiply encoded colours by it.
+    OIIO::ImageSpec wishes;
+    wishes.attribute("oiio:UnassociatedAlpha", 1);
+    auto file = OIIO::ImageInput::open(text(path), &wishes);
+    if (!file)
+        fail(OIIO::geterror(), "not an image that OpenImageIO reads");
+    return std::make_unique<Input>(std::move(file));
+}
+
+Layout Input::layout() const
+{
+    const OIIO::ImageSpec& spec = file->spec();
+    if (spec.deep || spec.depth > 1)
+        throw std::runtime_error("a deep or volume image; only flat ones are read");
+    if (spec.width < 0 || spec.height < 0 || spec.nchannels < 1)
+        throw std::runtime_error("an image without pixels");
+
+    Layout layout {};
+    layout.width  = uint32_t(spec.width);
+    layout.height = uint32_t(spec.height);
+    // Colours come first, whatever else there is (depth, normals) comes after them.
+    const bool gray  = spec.nchannels < 3;
+    const int colour = gray ? 1 : 3;
+    layout.alpha     = spec.nchannels > colour && spec.alpha_channel == colour;
+    layout.channels  = uint32_t(colour + layout.alpha);
+    layout.straight  = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
+    layout.kind      = spec.format == OIIO::TypeDesc::UINT8       ? Kind::U8
+                       : spec.format.is_floating_point()          ? Kind::Float
+                                                                  : Kind::U16;
+    return layout;
+}
+
+Attributes Input::attributes() const
+{
+    const OIIO::ImageSpec& spec = file->spec();
+    Attributes found {};
+    auto matrix = [&](const char* name, rust::Vec<float>& into) {
+        if (auto* attribute = spec.find_attribute(name, OIIO::TypeMatrix))
+            for (int i = 0; i < 16; ++i)
+                into.push_back(static_cast<const float*>(attribute->data())[i]);
+    };
+    auto number = [&](const char* name, rust::Vec<float>& into) {
+        if (spec.find_attribute(name, OIIO::TypeFloat))
+            into.push_back(spec.get_float_attribute(name));
+    };
+    // Lossy: a file may hold any bytes.
+    const std::string software = spec.get_string_attribute("Software");
+    found.software             = rust::String::lossy(software);
+    matrix("worldtocamera", found.world_to_camera);
+    matrix("worldtoscreen", found.world_to_screen);
+    number("fovcot", found.fovcot);
+    number("renderTimeSeconds", found.render_time_seconds);
+    if (spec.find_attribute("samplesPerPixel", OIIO::TypeInt))
+        found.samples_per_pixel.push_back(spec.get_int_attribute("samplesPerPixel"));
+    return found;
+}
+
+void Input::read(rust::Slice<uint8_t> samples) const
+{
+    const Layout expected = layout();
+    check_length(expected, samples.size());
+    if (!file->read_image(0, 0, 0, int(expected.channels), type_of(expected.kind), samples.data()))
+        fail(file, "cannot be read");
+}
+
+}  // namespace twincast::oiio

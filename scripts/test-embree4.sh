@@ -1,0 +1,122 @@
+#!/usr/bin/env bash
+# Runs the test suite on Debian 13, whose Embree is version 4 and whose OpenImageIO is 2.5.
+#
+# A Debian 13 root is made once, with debootstrap, in the user's cache folder, and reused. Everything that is mounted
+# into it is mounted in a mount namespace of this script's own, so nothing stays mounted however the script ends. The
+# source tree is read-only in there; what cargo builds goes to the cache folder.
+#
+#   TWINCAST_DEBIAN_MIRROR   where packages come from; by default the mirror that this machine's apt uses
+#   TWINCAST_CACHE           the cache folder; by default $XDG_CACHE_HOME/twincast or ~/.cache/twincast
+#
+# Arguments go to `cargo test`. Where no mirror can be reached it says that it skipped and exits 0.
+set -euo pipefail
+
+source_tree=$(cd "$(dirname "$0")/.." && pwd)
+cd "$source_tree"
+suite=trixie
+cache=${TWINCAST_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/twincast}
+root=$cache/$suite
+target=$cache/target-$suite
+cargo_home=${CARGO_HOME:-$HOME/.cargo}
+
+say() { echo "test-embree4: $*"; }
+fail() { say "$@" >&2; exit 1; }
+
+# First pass, as the user: what needs the user's own Rust. Then once more, as root, in a mount namespace.
+if [ -z "${TWINCAST_IN_NAMESPACE:-}" ]; then
+    sysroot=$(rustc --print sysroot) || fail "needs a Rust toolchain"
+    [ -x "$sysroot/bin/cargo" ] || fail "the Rust toolchain in $sysroot has no cargo"
+    cargo fetch --locked --quiet
+    mkdir -p "$cache" "$target"
+    as_root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo > /dev/null || fail "needs root or sudo to make a Debian 13 root"
+        as_root=(sudo)
+    fi
+    exec "${as_root[@]}" env TWINCAST_IN_NAMESPACE=1 TWINCAST_CACHE="$cache" CARGO_HOME="$cargo_home" \
+        TWINCAST_DEBIAN_MIRROR="${TWINCAST_DEBIAN_MIRROR:-}" SYSROOT="$sysroot" OWNER="$(id -u):$(id -g)" \
+        unshare --mount --propagation private "$0" "$@"
+fi
+
+# The user's mirror and whatever apt settings it takes to reach it.
+apt_settings() {
+    apt-config dump | grep -E '^Acquire::(https?::(Proxy|CAInfo|Verify)|Check-)' || true
+}
+
+mirror() {
+    if [ -n "${TWINCAST_DEBIAN_MIRROR:-}" ]; then
+        echo "$TWINCAST_DEBIAN_MIRROR"
+        return
+    fi
+    # shellcheck disable=SC2016  # apt's own placeholder
+    apt-get indextargets --format '$(REPO_URI)' 2> /dev/null | grep -E '/debian/?$' | sort -u | head -n 1 || true
+}
+
+mount_into_root() { # SOURCE PLACE [ro]
+    mkdir -p "$root$2"
+    mount --bind "$1" "$root$2"
+    [ "${3:-}" != ro ] || mount -o remount,bind,ro "$root$2"
+}
+
+make_root() {
+    command -v apt-get > /dev/null || fail "needs apt-get: it runs on Debian and its kin only"
+    local from proxy settings
+    from=$(mirror)
+    from=${from:-http://deb.debian.org/debian}
+    if ! /usr/lib/apt/apt-helper download-file "${from%/}/dists/$suite/InRelease" "$cache/InRelease" > /dev/null; then
+        say "SKIPPED: the Debian mirror $from cannot be reached"
+        exit 0
+    fi
+    rm -f "$cache/InRelease"
+    scripts/install-packages.sh debootstrap
+
+    say "making a Debian 13 root in $root from $from"
+    rm -rf --one-file-system "$root"
+    settings=$(apt_settings)
+    eval "$(apt-config shell proxy Acquire::http::Proxy)"
+    http_proxy=${proxy:-${http_proxy:-}} debootstrap --variant=minbase "$suite" "$root" "$from" > "$cache/debootstrap.log" 2>&1 ||
+        fail "debootstrap failed; the end of $cache/debootstrap.log: $(tail -n 5 "$cache/debootstrap.log")"
+    # A link that leads out of the root would make cp write to this machine's own file.
+    rm -f "$root/etc/resolv.conf"
+    cp -L /etc/resolv.conf "$root/etc/resolv.conf"
+    if [ -e /etc/ssl/certs/ca-certificates.crt ]; then
+        mkdir -p "$root/etc/ssl/certs"
+        cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
+    fi
+    printf '%s\n' "$settings" > "$root/etc/apt/apt.conf.d/99host"
+}
+
+install_in_root() {
+    mapfile -t packages < scripts/packages
+    chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive sh -c \
+        'apt-get update -qq && apt-get install -qq --no-install-recommends g++ make git "$@" && apt-get clean' \
+        sh "${packages[@]}" > "$cache/apt.log" 2>&1 ||
+        fail "apt-get failed in the Debian 13 root; the end of $cache/apt.log: $(tail -n 5 "$cache/apt.log")"
+}
+
+# The stamp holds the list of packages, so that a longer list makes a new root.
+stamp=$root/.complete
+if ! cmp --quiet "$stamp" scripts/packages; then
+    make_root
+    mount -t proc proc "$root/proc"
+    install_in_root
+    cp scripts/packages "$stamp"
+else
+    mount -t proc proc "$root/proc"
+fi
+
+mount --rbind /dev "$root/dev"
+mount_into_root "$SYSROOT" "$SYSROOT" ro
+mount_into_root "$cargo_home" "$cargo_home"
+mount_into_root "$source_tree" /work/twincast ro
+mount_into_root "$target" /work/target
+if [ -d ../shared ]; then
+    mount_into_root "$(cd ../shared && pwd)" /work/shared ro
+fi
+
+say "testing with $(chroot "$root" dpkg-query --show --showformat '${Package} ${Version}, ' libembree-dev libopenimageio-dev)in $root"
+# As the owner of the tree, so that nothing in cargo's home or in the cache ends up as root's.
+exec chroot --userspec="$OWNER" "$root" env -i \
+    HOME=/tmp PATH="$SYSROOT/bin:/usr/local/bin:/usr/bin:/bin" CARGO_HOME="$cargo_home" CARGO_TARGET_DIR=/work/target \
+    CARGO_NET_OFFLINE=true RUST_BACKTRACE=1 \
+    sh -c 'cd /work/twincast && exec cargo test --locked "$@"' sh "$@"

@@ -1,0 +1,148 @@
+//! One scene through the engine or engines that were asked for.
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use clap::ValueEnum;
+
+use super::{interrupt, progress};
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::render::{Control, Counted, Renderer};
+use crate::trace::bvh::Bvh;
+use crate::trace::{Tracer, Width, World};
+
+/// Which engine renders.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum BackendArg {
+    /// The BVH of this program
+    #[default]
+    Native,
+    /// Intel Embree
+    Embree,
+    /// Each of them; fails if their pictures differ where no tie or boundary ray explains it
+    Both,
+}
+
+impl BackendArg {
+    /// An error where this build lacks it.
+    pub(super) fn check_available(self) -> Result<()> {
+        if self == Self::Native || cfg!(feature = "embree") {
+            return Ok(());
+        }
+        Err(Error::Unavailable(
+            "backend embree is not in this build: install libembree-dev and build with --features embree".to_owned(),
+        ))
+    }
+
+    /// The packet width that serves it best. Both engines are compared ray by ray, where every answer stands alone.
+    pub(super) const fn best_width(self) -> Width {
+        match self {
+            Self::Native | Self::Both => Width::One,
+            Self::Embree => Width::Eight,
+        }
+    }
+}
+
+/// A picture by one engine, and what it took.
+pub(super) struct Pass {
+    /// The engine, with its version where it has one.
+    pub(super) engine: String,
+    pub(super) image: Image,
+    pub(super) build_seconds: f64,
+    pub(super) render_seconds: f64,
+    /// Bytes the engine uses for the scene.
+    pub(super) bytes: usize,
+    pub(super) camera_rays: u64,
+    pub(super) shadow_rays: u64,
+}
+
+/// What both engines were made to render.
+pub(super) struct Job<'a> {
+    pub(super) world: &'a World,
+    pub(super) renderer: &'a Renderer<'a>,
+    pub(super) pixels: u64,
+    pub(super) cancel: &'a AtomicBool,
+    pub(super) quiet: bool,
+}
+
+/// What came of it.
+pub(super) struct Outcome {
+    /// One pass, or native's and then Embree's.
+    pub(super) passes: Vec<Pass>,
+    /// Where both rendered: what to say, and whether every difference is explained.
+    pub(super) verdict: Option<(String, bool)>,
+}
+
+impl Job<'_> {
+    /// Renders. The engine is chosen here, once; below everything is generic.
+    pub(super) fn run(&self, backend: BackendArg) -> Result<Outcome> {
+        backend.check_available()?;
+        match backend {
+            BackendArg::Native => Ok(Outcome { passes: vec![self.native()?.1], verdict: None }),
+            #[cfg(feature = "embree")]
+            BackendArg::Embree => Ok(Outcome { passes: vec![self.embree()?.1], verdict: None }),
+            #[cfg(feature = "embree")]
+            BackendArg::Both => self.both(),
+            #[cfg(not(feature = "embree"))]
+            BackendArg::Embree | BackendArg::Both => unreachable!("check_available refused it"),
+        }
+    }
+
+    fn native(&self) -> Result<(Bvh, Pass)> {
+        let build = || Ok(Bvh::build(self.world));
+        self.pass(build, |_| "native (BVH)".to_owned(), Bvh::bytes)
+    }
+
+    #[cfg(feature = "embree")]
+    fn embree(&self) -> Result<(crate::trace::embree::Embree, Pass)> {
+        use crate::trace::embree::{Embree, Options};
+        let options = Options { threads: Some(rayon::current_num_threads()), ..Options::default() };
+        let build = || Embree::new(self.world, &options);
+        self.pass(build, |embree| format!("embree {}", embree.version()), Embree::bytes)
+    }
+
+    #[cfg(feature = "embree")]
+    fn both(&self) -> Result<Outcome> {
+        let (native, native_pass) = self.native()?;
+        let (embree, embree_pass) = self.embree()?;
+        let report =
+            crate::lab::explain_pixels(self.renderer, &native, &embree, &native_pass.image, &embree_pass.image);
+        let words = match report.differing {
+            0 => format!("all {} pixels of native and embree are equal", report.pixels),
+            differing => format!(
+                "{differing} pixels of native and embree differ: {} by a tie or a boundary ray, {} by a wrong answer of \
+                 embree, {} unexplained",
+                report.tie_or_boundary, report.embree_wrong, report.unexplained
+            ),
+        };
+        let holds = report.unexplained == 0;
+        Ok(Outcome { passes: vec![native_pass, embree_pass], verdict: Some((words, holds)) })
+    }
+
+    fn pass<T: Tracer>(
+        &self,
+        build: impl FnOnce() -> Result<T>,
+        name: impl FnOnce(&T) -> String,
+        bytes: impl FnOnce(&T) -> usize,
+    ) -> Result<(T, Pass)> {
+        let start = Instant::now();
+        let tracer = build()?;
+        let build_seconds = start.elapsed().as_secs_f64();
+        interrupt::check()?;
+
+        let engine = name(&tracer);
+        let bar = progress::bar(self.pixels, &engine, self.quiet);
+        let counted = Counted::new(&tracer);
+        let on_tile = |pixels| bar.inc(pixels);
+        let start = Instant::now();
+        let image = self.renderer.render(&counted, Control { cancel: Some(self.cancel), on_tile: Some(&on_tile) });
+        let render_seconds = start.elapsed().as_secs_f64();
+        bar.finish_and_clear();
+
+        let (camera_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
+        let bytes = bytes(&tracer);
+        let pass = Pass { engine, image: image?, build_seconds, render_seconds, bytes, camera_rays, shadow_rays };
+        Ok((tracer, pass))
+    }
+}

@@ -1,0 +1,23 @@
+//! Ctrl-C: stop cleanly at the first, at once at the second.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::{Error, Result};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130.
+pub(super) fn install() -> Result<&'static AtomicBool> {
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| Error::Unavailable(format!("Ctrl-C cannot be handled: {error}")))?;
+    Ok(&INTERRUPTED)
+}
+
+/// Between two phases of work: an error once Ctrl-C was pressed.
+pub(super) fn check() -> Result<()> {
+    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+}

@@ -1,0 +1,65 @@
+//! What a picture's file says about its camera.
+
+use crate::image::Metadata;
+use crate::math::{DAffine3, DMat4};
+use crate::render::Settings;
+use crate::scene::Camera;
+
+/// Nearest distance of the depth range that `worldToScreen` maps to -1..1; the far end is infinite. Rays know neither.
+const NEAR: f64 = 0.01;
+
+/// What there is to say about a picture that took `seconds` to render.
+pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Metadata {
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let world_to_camera = DMat4::from(DAffine3::from_mat3_translation(camera.frame, camera.eye).inverse());
+    let world_to_screen = projection(camera.fov_y, aspect) * world_to_camera;
+    Metadata {
+        world_to_camera: Some(world_to_camera.to_cols_array()),
+        world_to_screen: Some(world_to_screen.to_cols_array()),
+        fovcot: Some(aspect),
+        samples_per_pixel: Some(settings.spp),
+        render_time_seconds: Some(seconds),
+        ..Metadata::default()
+    }
+}
+
+/// OpenGL's perspective with the far plane at infinity.
+fn projection(fov_y: f64, aspect: f64) -> DMat4 {
+    let f = 1.0 / libm::tan(fov_y / 2.0);
+    DMat4::from_cols_array_2d(&[
+        [f / aspect, 0.0, 0.0, 0.0],
+        [0.0, f, 0.0, 0.0],
+        [0.0, 0.0, -1.0, -1.0],
+        [0.0, 0.0, -2.0 * NEAR, 0.0],
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::render::Renderer;
+    use crate::scene::Scene;
+    use crate::trace::World;
+
+    /// A point along a pixel's ray must be projected to where the pixel is.
+    #[test]
+    fn the_screen_matrix_agrees_with_the_rays() {
+        let settings = Settings { width: 40, height: 20, spp: 1, ..Settings::default() };
+        let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 0.0), DVec3::Y, 0.7).unwrap();
+        let metadata = metadata(&camera, &settings, 0.0);
+        let to_camera = DMat4::from_cols_array(&metadata.world_to_camera.unwrap());
+        let to_screen = DMat4::from_cols_array(&metadata.world_to_screen.unwrap());
+        let (scene, world) = (Scene::default(), World::default());
+        let renderer = Renderer::new(&scene, &world, camera, settings).unwrap();
+        for (x, y) in [(0, 0), (39, 3), (17, 19)] {
+            let ray = renderer.camera_ray(x, y, 0);
+            let point = ray.origin.as_dvec3() + ray.direction.as_dvec3() * 7.0;
+            let screen = to_screen.project_point3(point);
+            let expected_x = (f64::from(x) + 0.5) / 20.0 - 1.0;
+            let expected_y = 1.0 - (f64::from(y) + 0.5) / 10.0;
+            assert!((screen.x - expected_x).abs() < 1e-5 && (screen.y - expected_y).abs() < 1e-5, "{screen}");
+            assert!(to_camera.transform_point3(point).z < 0.0, "ahead is -z");
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The command line: one file a subcommand.
+//!
+//! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
+//! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
+
+mod common;
+mod completions;
+mod engine;
+mod interrupt;
+mod man;
+mod metadata;
+mod outputs;
+mod progress;
+mod render;
+mod report;
+
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::{Error, Result, Warning};
+
+/// A ray caster with two engines that check each other: Intel Embree and a native BVH.
+#[derive(Debug, Parser)]
+#[command(name = "twincast", version, long_version = LONG_VERSION, after_help = EXIT_CODES, max_term_width = 110)]
+#[command(subcommand_required = true, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(Box<render::RenderArgs>),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
+}
+
+impl Command {
+    fn run(&self) -> Result<()> {
+        match self {
+            Self::Render(args) => render::run(args),
+            Self::Completions(args) => completions::run(args),
+            Self::Man(args) => man::run(args),
+        }
+    }
+}
+
+const LONG_VERSION: &str = match (cfg!(feature = "embree"), cfg!(feature = "oiio")) {
+    (true, true) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native, embree\nimage files: OpenImageIO"),
+    (true, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native, embree\nimage files: EXR, PNG"),
+    (false, true) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native\nimage files: OpenImageIO"),
+    (false, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native\nimage files: EXR, PNG"),
+};
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    the check it ran did not hold
+  2    bad usage
+  3    bad scene or input file
+  4    output could not be written
+  5    a backend or feature that is not in this build
+  130  interrupted";
+
+/// Runs the program on the process's own arguments.
+pub fn main() -> ExitCode {
+    match Cli::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain("error", &error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Prints on stdout. A reader that has gone away is no error.
+fn say(text: impl std::fmt::Display) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(format!("{text}\n").as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::output("<stdout>", error.to_string())),
+        _ => Ok(()),
+    }
+}
+
+/// Prints warnings on stderr.
+fn warn(warnings: &[Warning]) {
+    for warning in warnings {
+        complain("warning", warning);
+    }
+}
+
+fn complain(kind: &str, message: &dyn std::fmt::Display) {
+    // Nobody is left to be told that stderr is closed.
+    let _ = writeln!(std::io::stderr(), "{kind}: {message}");
+}

@@ -1,0 +1,309 @@
+//! `twincast render`: from a scene file to finished pictures.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+
+use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
+use super::engine::{BackendArg, Job, Outcome};
+use super::metadata::metadata;
+use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_memory, size, time};
+use super::{interrupt, outputs, say, warn};
+use crate::error::{Error, Result};
+use crate::image::{self, Image};
+use crate::math::Vec3;
+use crate::render::{Renderer, Settings, TileOrder};
+use crate::scene::{Geometry, Scene};
+use crate::trace::{Batch, Primitives, Width, World};
+
+/// Render a scene
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  twincast render bunny.glb -o bunny.png
+  twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
+  twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
+  twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
+pub(super) struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+
+    /// Picture to write; the suffix decides the format (may be repeated)
+    #[arg(short, long, value_name = "FILE", required_unless_present = "print_camera")]
+    output: Vec<PathBuf>,
+
+    /// Engine
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendArg,
+
+    /// Pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    size: Size,
+
+    /// Samples a pixel; 1 is the pixel's centre
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    spp: u32,
+
+    /// Print the camera as flags that give it again; without --output, do nothing else
+    #[arg(long)]
+    print_camera: bool,
+
+    /// Picture of the same size to compare with; exit code 1 if it differs by more than --threshold
+    #[arg(long, value_name = "FILE", requires = "output")]
+    reference: Option<PathBuf>,
+
+    /// Largest root mean square difference of the linear channels that passes
+    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = parse_threshold, requires = "reference")]
+    threshold: f64,
+
+    /// Threads; 0 is one for each core
+    #[arg(short, long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
+    threads: usize,
+
+    /// Chooses among equally good sample patterns
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Write times, rays, rays a second and memory as JSON
+    #[arg(long, value_name = "FILE.json", requires = "output")]
+    stats: Option<PathBuf>,
+
+    /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
+    #[arg(long, value_name = "N")]
+    packet: Option<Packet>,
+
+    /// Order of the tiles; never changes a picture
+    #[arg(long, value_enum, default_value_t)]
+    tile_order: Order,
+
+    /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
+    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
+    background: Option<Vec3>,
+
+    /// Say more: plan, rays, memory
+    #[arg(short, long, conflicts_with = "quiet")]
+    verbose: bool,
+
+    /// Say nothing but warnings and errors
+    #[arg(short, long)]
+    quiet: bool,
+
+    // Last, for clap puts what follows a heading under it.
+    #[command(flatten)]
+    camera: CameraArgs,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Packet {
+    #[value(name = "1")]
+    One,
+    #[value(name = "4")]
+    Four,
+    #[value(name = "8")]
+    Eight,
+    #[value(name = "16")]
+    Sixteen,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Order {
+    /// Row by row from the top
+    Scanline,
+    /// Along a curve from neighbour to neighbour
+    #[default]
+    Hilbert,
+    /// From the middle outwards
+    Spiral,
+}
+
+pub(super) fn run(args: &RenderArgs) -> Result<()> {
+    args.backend.check_available()?;
+    let cancel = interrupt::install()?;
+    outputs::check(&args.output, &args.stats)?;
+    let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
+
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    pool.install(|| {
+        let start = Instant::now();
+        let (scene, warnings) = args.scene.load()?;
+        warn(&warnings);
+        let load_seconds = start.elapsed().as_secs_f64();
+        interrupt::check()?;
+
+        let aspect = f64::from(args.size.width) / f64::from(args.size.height);
+        let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
+        if args.print_camera {
+            say(camera_flags(&camera, &scene.bounds()))?;
+            if args.output.is_empty() {
+                return Ok(());
+            }
+        }
+
+        let start = Instant::now();
+        let world = World::new(&scene)?;
+        let settings = args.settings();
+        let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
+        let prepare_seconds = start.elapsed().as_secs_f64();
+        interrupt::check()?;
+
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let job = Job { world: &world, renderer: &renderer, pixels, cancel, quiet: args.quiet };
+        let outcome = job.run(args.backend)?;
+        let picture = &outcome.passes[0];
+
+        let start = Instant::now();
+        let metadata = metadata(&camera, &settings, picture.render_seconds);
+        outputs::write_pictures(&args.output, &picture.image, &metadata)?;
+        let write_seconds = start.elapsed().as_secs_f64();
+
+        let stored = stored_triangles(&world);
+        let stats = Stats {
+            scene: args.scene.scene.display().to_string(),
+            triangles: placed_triangles(&scene),
+            size: [settings.width, settings.height],
+            spp: settings.spp,
+            threads: rayon::current_num_threads(),
+            packet: settings.batch.width.rays(),
+            load_seconds,
+            prepare_seconds,
+            write_seconds,
+            peak_memory: peak_memory(),
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
+        };
+        if let Some(path) = &args.stats {
+            outputs::write_json(path, &stats)?;
+        }
+        if !args.quiet {
+            say(args.summary(&scene, &renderer, &camera_source, &stats))?;
+        }
+        args.judge(&outcome, reference.as_ref())
+    })
+}
+
+impl RenderArgs {
+    fn settings(&self) -> Settings {
+        let width = match self.packet {
+            None => self.backend.best_width(),
+            Some(Packet::One) => Width::One,
+            Some(Packet::Four) => Width::Four,
+            Some(Packet::Eight) => Width::Eight,
+            Some(Packet::Sixteen) => Width::Sixteen,
+        };
+        Settings {
+            width: self.size.width,
+            height: self.size.height,
+            spp: self.spp,
+            seed: self.seed,
+            batch: Batch { width, coherent: true },
+            tile_order: match self.tile_order {
+                Order::Scanline => TileOrder::Scanline,
+                Order::Hilbert => TileOrder::Hilbert,
+                Order::Spiral => TileOrder::Spiral,
+            },
+            background: self.background,
+        }
+    }
+
+    fn summary(&self, scene: &Scene, renderer: &Renderer, camera_source: &str, stats: &Stats) -> Summary {
+        let mut summary = Summary::default();
+        let parts = [
+            counted(stats.triangles, "triangle", "triangles"),
+            counted(scene.materials.len() as u64, "material", "materials"),
+            counted(scene.lights.len() as u64, "light", "lights"),
+        ];
+        summary.line("scene", format_args!("{}: {}", stats.scene, parts.join(", ")));
+        if self.verbose {
+            summary.line("plan", renderer.plan());
+        }
+        summary.line("camera", camera_source);
+        let [width, height] = stats.size;
+        let samples = counted(u64::from(stats.spp), "sample", "samples");
+        let threads = counted(stats.threads as u64, "thread", "threads");
+        summary.line("picture", format_args!("{width}x{height}, {samples} a pixel, {threads}"));
+        if self.verbose {
+            summary.line("load", format_args!("{}, prepare {}", time(stats.load_seconds), time(stats.prepare_seconds)));
+        }
+        for engine in &stats.engines {
+            let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
+            summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
+            if self.verbose {
+                let Rays { camera, shadow } = &engine.rays;
+                let speed = engine.rays_per_second / 1e6;
+                let (camera, shadow) = (grouped(*camera), grouped(*shadow));
+                summary.line("rays", format_args!("{camera} camera + {shadow} shadow, {speed:.2} million a second"));
+                let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
+                summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
+            }
+        }
+        if let (true, Some(peak)) = (self.verbose, stats.peak_memory) {
+            summary.line("peak", format_args!("{} of memory for everything", size(peak)));
+        }
+        for path in self.output.iter().chain(&self.stats) {
+            summary.line("wrote", path.display());
+        }
+        summary
+    }
+
+    /// Says how the checks that were asked for went; an error where one did not hold.
+    fn judge(&self, outcome: &Outcome, reference: Option<&Image>) -> Result<()> {
+        let mut checks = Vec::new();
+        checks.extend(outcome.verdict.clone());
+        if let (Some(reference), Some(path)) = (reference, &self.reference) {
+            let rmse = outcome.passes[0].image.difference(reference)?.rmse;
+            let (path, limit) = (path.display(), self.threshold);
+            let above = if rmse <= limit { "within" } else { "above" };
+            checks.push((format!("{path}: root mean square difference {rmse:.3e}, {above} {limit}"), rmse <= limit));
+        }
+        let (held, failed): (Vec<_>, Vec<_>) = checks.into_iter().partition(|(_, holds)| *holds);
+        if !self.quiet {
+            held.iter().try_for_each(|(words, _)| say(format_args!("{:<8}  {words}", "check")))?;
+        }
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Check(failed.into_iter().map(|(words, _)| words).collect::<Vec<_>>().join("; ")))
+    }
+}
+
+fn read_reference(path: &Path, size: Size) -> Result<Image> {
+    let picture = image::read(path)?;
+    if (picture.width, picture.height) == (size.width, size.height) {
+        return Ok(picture);
+    }
+    let (own, Size { width, height }) = (format_args!("{}x{}", picture.width, picture.height), size);
+    Err(Error::Usage(format!("--reference {}: it is {own} and --size is {width}x{height}", path.display())))
+}
+
+fn placed_triangles(scene: &Scene) -> u64 {
+    let triangles = |geometry: &Geometry| match geometry {
+        Geometry::Mesh(mesh) => mesh.triangles.len() as u64,
+        Geometry::Shapes { .. } => 0,
+    };
+    let placed = scene.instances.iter().flat_map(|instance| scene.group_geometries(instance.group));
+    placed.map(|(_, geometry)| triangles(geometry)).sum()
+}
+
+fn stored_triangles(world: &World) -> u64 {
+    let triangles = world.parts.iter().map(|part| match &part.primitives {
+        Primitives::Triangles { triangles, .. } => triangles.len() as u64,
+        Primitives::Shapes(_) => 0,
+    });
+    triangles.sum()
+}
+
+fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
+    let limit = text.parse().ok().filter(|limit: &f64| *limit >= 0.0 && limit.is_finite());
+    limit.ok_or_else(|| "expected a number, at least 0".to_owned())
+}
+
+fn parse_threads(text: &str) -> std::result::Result<usize, String> {
+    text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
+}
+
+fn parse_color(text: &str) -> std::result::Result<Vec3, String> {
+    let color = parse_vector(text)?.as_vec3();
+    let valid = color.is_finite() && color.cmpge(Vec3::ZERO).all();
+    valid.then_some(color).ok_or_else(|| "expected three numbers of at least 0".to_owned())
+}

@@ -1,0 +1,151 @@
+//! What a render took: for people, and as JSON.
+
+use std::fmt::{self, Write};
+
+use serde::Serialize;
+
+use super::engine::Pass;
+
+/// What `--stats` writes. Times are seconds, sizes bytes.
+#[derive(Debug, Serialize)]
+pub(super) struct Stats {
+    pub(super) scene: String,
+    pub(super) triangles: u64,
+    pub(super) size: [u32; 2],
+    pub(super) spp: u32,
+    pub(super) threads: usize,
+    pub(super) packet: usize,
+    pub(super) load_seconds: f64,
+    /// Recentring and baking the scene, and planning.
+    pub(super) prepare_seconds: f64,
+    pub(super) write_seconds: f64,
+    /// The most memory the process has held.
+    pub(super) peak_memory: Option<u64>,
+    pub(super) engines: Vec<EngineStats>,
+}
+
+/// One engine's share.
+#[derive(Debug, Serialize)]
+pub(super) struct EngineStats {
+    pub(super) backend: String,
+    pub(super) build_seconds: f64,
+    pub(super) render_seconds: f64,
+    pub(super) rays: Rays,
+    pub(super) rays_per_second: f64,
+    pub(super) bytes: usize,
+    /// Of the triangles as stored: those of an instanced mesh count once.
+    pub(super) bytes_per_triangle: Option<f64>,
+}
+
+/// Rays by kind.
+#[derive(Debug, Serialize)]
+pub(super) struct Rays {
+    pub(super) camera: u64,
+    pub(super) shadow: u64,
+}
+
+impl EngineStats {
+    /// `stored` triangles were built.
+    pub(super) fn new(pass: &Pass, stored: u64) -> Self {
+        let rays = Rays { camera: pass.camera_rays, shadow: pass.shadow_rays };
+        Self {
+            backend: pass.engine.clone(),
+            build_seconds: pass.build_seconds,
+            render_seconds: pass.render_seconds,
+            rays_per_second: (rays.camera + rays.shadow) as f64 / pass.render_seconds.max(1e-9),
+            rays,
+            bytes: pass.bytes,
+            bytes_per_triangle: (stored > 0).then(|| pass.bytes as f64 / stored as f64),
+        }
+    }
+}
+
+/// The most memory this process has held, bytes; none where the system does not tell.
+pub(super) fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+/// Aligned lines of a name and what there is to say.
+#[derive(Debug, Default)]
+pub(super) struct Summary(String);
+
+impl Summary {
+    /// Adds a line.
+    pub(super) fn line(&mut self, name: &str, text: impl fmt::Display) {
+        let newline = if self.0.is_empty() { "" } else { "\n" };
+        write!(self.0, "{newline}{name:<8}  {text}").expect("a String takes everything");
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// 1234567 as 1,234,567.
+pub(super) fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A number of things, with the noun in its right form.
+pub(super) fn counted(n: u64, singular: &str, plural: &str) -> String {
+    format!("{} {}", grouped(n), if n == 1 { singular } else { plural })
+}
+
+/// Bytes in a unit that suits them.
+pub(super) fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        b if b < 1e4 => format!("{b} B"),
+        b if b < 1e7 => format!("{:.0} kB", b / 1e3),
+        b if b < 1e10 => format!("{:.0} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
+}
+
+/// Seconds in a unit that suits them.
+pub(super) fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.1 => format!("{:.1} ms", s * 1e3),
+        s if s < 100.0 => format!("{s:.2} s"),
+        s => format!("{:.0} min {:02.0} s", (s / 60.0).floor(), s % 60.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!([0, 999, 1000, 1234567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
+        assert_eq!(counted(1, "mesh", "meshes"), "1 mesh");
+        assert_eq!([9_999, 123_456, 12_345_678, 12_345_678_901].map(size), ["9999 B", "123 kB", "12 MB", "12.3 GB"]);
+        assert_eq!([0.0123, 5.678, 125.0].map(time), ["12.3 ms", "5.68 s", "2 min 05 s"]);
+    }
+
+    #[test]
+    fn this_process_has_held_memory() {
+        if cfg!(target_os = "linux") {
+            assert!(peak_memory().is_some_and(|bytes| bytes > 100_000));
+        }
+    }
+
+    #[test]
+    fn summaries_are_aligned() {
+        let mut summary = Summary::default();
+        summary.line("scene", "x");
+        summary.line("picture", "y");
+        assert_eq!(summary.to_string(), "scene     x\npicture   y");
+    }
+}

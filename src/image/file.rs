@@ -1,0 +1,215 @@
+//! Writing and reading image files, whichever backend does it.
+
+use std::path::Path;
+
+#[cfg(feature = "oiio")]
+use super::oiio as backend;
+#[cfg(not(feature = "oiio"))]
+use super::pure as backend;
+use super::samples::{self, Type};
+use super::{Image, Metadata};
+use crate::error::{Error, Result};
+use crate::output;
+
+/// How an image is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// The samples of OpenEXR files.
+    pub depth: Depth,
+    /// Edge of the tiles of OpenEXR files, in pixels. Not 0.
+    pub tile: u32,
+}
+
+/// The samples of OpenEXR files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Depth {
+    /// IEEE binary16: 11 significant bits, up to 65504.
+    #[default]
+    Half,
+    /// IEEE binary32: the pixels as they are.
+    Float,
+}
+
+impl Default for WriteOptions {
+    fn default() -> Self {
+        Self { depth: Depth::Half, tile: 64 }
+    }
+}
+
+/// How a backend is to write a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Encoding {
+    pub kind: Type,
+    pub alpha: bool,
+    /// Edge of a tile; 0 for rows, as most formats have them.
+    pub tile: u32,
+}
+
+/// Formats that hold linear floating values. In all others samples are 8-bit sRGB.
+const EXR: [&str; 3] = ["exr", "sxr", "mxr"];
+const RADIANCE: [&str; 2] = ["hdr", "rgbe"];
+
+/// 8-bit formats that define alpha, and as straight. The others either have none, or leave open what it means to
+/// colours, and every reader guesses differently: there the image is laid over black.
+const WITH_ALPHA: [&str; 4] = ["png", "tif", "tiff", "tga"];
+
+const JPEG: [&str; 6] = ["jpg", "jpeg", "jpe", "jif", "jfif", "jfi"];
+
+/// libjpeg's limit. Checked here because some of its users end the process where it is exceeded.
+const LONGEST_JPEG: u32 = 65_500;
+
+/// Most pixels in a file that is read: 4 GiB as [`Image`].
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// A file that claims more pixels than this must have [`PIXELS_PER_BYTE`] to show for them.
+const UNSUSPICIOUS_PIXELS: u64 = 1 << 24;
+
+/// More than the formats' compression gives: deflate's best is 1032 bytes for one.
+const PIXELS_PER_BYTE: u64 = 1 << 14;
+
+/// Writes an image. The suffix decides the format: linear for OpenEXR (tiled, zip, channels R, G, B, A) and Radiance;
+/// else 8-bit sRGB, with straight alpha in PNG, TIFF and Targa, over black in all others.
+///
+/// The file appears when it is whole, and on failure the old one stays; see
+/// [`write_atomically`](crate::output::write_atomically).
+///
+/// # Errors
+/// [`Error::Output`] for a suffix that this build does not write, and for whatever goes wrong with the file;
+/// [`Error::Usage`] for an image without pixels or with too few, and for tiles of size 0.
+pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<()> {
+    let suffix = writable_suffix(path)?;
+    let (width, height) = (image.width, image.height);
+    if width == 0 || height == 0 || image.pixels.len() as u64 != u64::from(width) * u64::from(height) {
+        let found = image.pixels.len();
+        return Err(Error::Usage(format!("an image of {width} x {height} pixels with {found} of them in memory")));
+    }
+    if options.tile == 0 || options.tile > 1 << 16 {
+        return Err(Error::Usage(format!("tiles of {0} x {0} pixels; 1 to 65536 is possible", options.tile)));
+    }
+    if JPEG.contains(&suffix.as_str()) && width.max(height) > LONGEST_JPEG {
+        let message = format!("{width} x {height} pixels are too many for JPEG, which ends at {LONGEST_JPEG}");
+        return Err(Error::output(path, message));
+    }
+    let encoding = encoding(&suffix, options);
+    output::write_atomically(path, |part| write_part(path, part, image, encoding, metadata))
+}
+
+/// Checks, before a long render, that an image can be written to `path`: by writing a small one beside it.
+///
+/// # Errors
+/// [`Error::Output`] for a suffix that this build does not write (it lists those that it does), for a folder that does
+/// not exist or takes no file, and for a path that is itself a folder.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let suffix = writable_suffix(path)?;
+    let encoding = encoding(&suffix, &WriteOptions::default());
+    output::check_writable(path)?;
+    output::probe(path, |part| write_part(path, part, &Image::new(16, 16), encoding, &Metadata::default()))
+}
+
+/// Reads an image. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
+/// spread over R, G and B, and missing alpha is 1. Of files with several images or layers, the first is read.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is missing, broken or in a format that this build does not read, and for one that
+/// claims more than 2^28 pixels, or more than its size makes plausible.
+pub fn read(path: &Path) -> Result<Image> {
+    let bytes = file_size(path)?;
+    let check = |width: u64, height: u64| check_size(width, height, bytes);
+    backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))
+}
+
+/// Reads what an OpenEXR file says about how it was made. Fields that it does not have are None, or empty.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is missing, broken or in another format.
+pub fn read_metadata(path: &Path) -> Result<Metadata> {
+    file_size(path)?;
+    backend::read_metadata(path).map_err(|message| Error::input(path, "", message))
+}
+
+fn write_part(path: &Path, part: &Path, image: &Image, encoding: Encoding, metadata: &Metadata) -> Result<()> {
+    let samples = samples::encode(image, encoding.kind, encoding.alpha);
+    let written = backend::write(part, &samples, encoding, metadata);
+    // Libraries put the name that they were given into their messages.
+    written.map_err(|message| {
+        Error::output(path, message.replace(&*part.to_string_lossy(), &path.to_string_lossy()).trim())
+    })
+}
+
+fn encoding(suffix: &str, options: &WriteOptions) -> Encoding {
+    if EXR.contains(&suffix) {
+        let kind = if options.depth == Depth::Half { Type::Half } else { Type::Float };
+        Encoding { kind, alpha: true, tile: options.tile }
+    } else if RADIANCE.contains(&suffix) {
+        Encoding { kind: Type::Float, alpha: false, tile: 0 }
+    } else {
+        Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0 }
+    }
+}
+
+/// The suffix in lower case, if this build writes it.
+fn writable_suffix(path: &Path) -> Result<String> {
+    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let known = backend::writable_suffixes().map_err(|message| Error::output(path, message))?;
+    if known.contains(&suffix) {
+        return Ok(suffix);
+    }
+    let found = if suffix.is_empty() { "no suffix".to_owned() } else { format!("unknown suffix .{suffix}") };
+    let without = if cfg!(feature = "oiio") { "" } else { "; more with OpenImageIO (feature oiio)" };
+    Err(Error::output(path, format!("{found}; this build writes {}{without}", known.join(", "))))
+}
+
+fn file_size(path: &Path) -> Result<u64> {
+    let file = std::fs::metadata(path).map_err(|e| Error::input(path, "", e.to_string()))?;
+    if file.is_dir() {
+        return Err(Error::input(path, "", "is a folder, not an image file"));
+    }
+    if file.len() == 0 {
+        return Err(Error::input(path, "", "is empty"));
+    }
+    Ok(file.len())
+}
+
+/// Before anything is allocated: whether a file of this size may claim so many pixels.
+fn check_size(width: u64, height: u64, bytes: u64) -> std::result::Result<(), String> {
+    let claim = format!("claims {width} x {height} pixels");
+    if width == 0 || height == 0 {
+        return Err(format!("{claim}; there must be at least one"));
+    }
+    match width.checked_mul(height) {
+        Some(n) if n > MOST_PIXELS => Err(format!("{claim}; at most {MOST_PIXELS} are read")),
+        None => Err(format!("{claim}; at most {MOST_PIXELS} are read")),
+        Some(n) if n > UNSUSPICIOUS_PIXELS && n / PIXELS_PER_BYTE > bytes => {
+            Err(format!("{claim}, but has only {bytes} bytes; it is cut short or broken"))
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn claims_are_checked() {
+        assert!(check_size(100_000, 100_000, u64::MAX).unwrap_err().contains("at most"));
+        assert!(check_size(u64::MAX, 2, 1 << 40).unwrap_err().contains("at most"));
+        assert!(check_size(0, 5, 100).is_err());
+        assert!(check_size(16_384, 16_384, 1000).unwrap_err().contains("only 1000 bytes"));
+        assert!(check_size(16_384, 16_384, 1 << 14).is_ok());
+        assert!(check_size(4096, 4096, 70).is_ok());
+    }
+
+    #[test]
+    fn suffixes_choose_the_encoding() {
+        let options = WriteOptions { depth: Depth::Float, tile: 32 };
+        let of = |suffix| {
+            let e = encoding(suffix, &options);
+            (e.kind, e.alpha, e.tile)
+        };
+        assert_eq!(of("exr"), (Type::Float, true, 32));
+        assert_eq!(of("hdr"), (Type::Float, false, 0));
+        assert_eq!(of("png"), (Type::U8, true, 0));
+        assert_eq!(of("jpg"), (Type::U8, false, 0));
+    }
+}

@@ -1,0 +1,46 @@
+//! What a picture's file says about how it was made.
+
+/// How a picture was made. In OpenEXR files each field is an attribute; other formats keep what they can.
+///
+/// Matrices are written as the field does it, for row vectors: `[x y z 1] M`, translation in the last four elements.
+/// That is also the order of glam's `to_cols_array` for a matrix that multiplies column vectors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metadata {
+    /// The program, with its version (`Software`).
+    pub software: String,
+    /// From world space to the camera's (`worldToCamera`); this camera looks along its -z, +y is up.
+    pub world_to_camera: Option<[f64; 16]>,
+    /// From world space to the screen (`worldToScreen`): after the division by w, x and y are -1 to 1 in the picture.
+    pub world_to_screen: Option<[f64; 16]>,
+    /// "The cotangent (x/y) of the field of view" in OpenImageIO's words; as there, the picture's width over its height
+    /// (`fovcot`).
+    pub fovcot: Option<f64>,
+    /// Camera rays for each pixel (`samplesPerPixel`).
+    pub samples_per_pixel: Option<u32>,
+    /// Wall clock time of the render (`renderTimeSeconds`).
+    pub render_time_seconds: Option<f64>,
+}
+
+impl Default for Metadata {
+    /// This program, and nothing else.
+    fn default() -> Self {
+        Self {
+            software: concat!("twincast ", env!("CARGO_PKG_VERSION")).to_owned(),
+            world_to_camera: None,
+            world_to_screen: None,
+            fovcot: None,
+            samples_per_pixel: None,
+            render_time_seconds: None,
+        }
+    }
+}
+
+/// Files hold f32.
+pub(super) fn narrow(matrix: &[f64; 16]) -> [f32; 16] {
+    matrix.map(|x| x as f32)
+}
+
+/// Back from what files hold.
+pub(super) fn widen(matrix: &[f32; 16]) -> [f64; 16] {
+    matrix.map(f64::from)
+}

@@ -1,0 +1,137 @@
+//! Tests that both backends write and read the same.
+
+use std::path::Path;
+
+use super::file::Encoding;
+use super::samples::{Type, decode, encode};
+use super::{Image, Metadata, oiio, pure};
+use crate::math::Vec4;
+
+const HALF: Encoding = Encoding { kind: Type::Half, alpha: true, tile: 64 };
+const BYTES: Encoding = Encoding { kind: Type::U8, alpha: true, tile: 0 };
+
+/// Not a multiple of a tile, every 8-bit code in each channel, alpha in steps, values over 1, and the odd ones.
+fn picture() -> Image {
+    let (width, height) = (150, 70);
+    let mut image = Image::new(width, height);
+    for (i, pixel) in image.pixels.iter_mut().enumerate() {
+        let x = i as f32 / (width * height) as f32;
+        let alpha = (i % 7) as f32 / 6.0;
+        *pixel = Vec4::new(x * alpha, (1.0 - x) * alpha, 3.0 * x * x * alpha, alpha);
+    }
+    image.pixels[0] = Vec4::new(f32::INFINITY, -1.0, 1e-7, 1.0);
+    image.pixels[1] = Vec4::new(65504.0, 70000.0, 6e-8, 0.25);
+    image
+}
+
+fn metadata() -> Metadata {
+    Metadata {
+        software: "twincast test".to_owned(),
+        world_to_camera: Some(std::array::from_fn(|i| i as f64 * 0.25)),
+        world_to_screen: Some(std::array::from_fn(|i| -(i as f64))),
+        fovcot: Some(1.5),
+        samples_per_pixel: Some(64),
+        render_time_seconds: Some(12.5),
+    }
+}
+
+fn write_both(folder: &Path, suffix: &str, encoding: Encoding) -> [std::path::PathBuf; 2] {
+    let [a, b] = ["oiio", "pure"].map(|name| folder.join(name).with_extension(suffix));
+    let samples = encode(&picture(), encoding.kind, encoding.alpha);
+    oiio::write(&a, &samples, encoding, &metadata()).unwrap();
+    pure::write(&b, &samples, encoding, &metadata()).unwrap();
+    [a, b]
+}
+
+#[test]
+fn pixels_are_identical() {
+    let folder = tempfile::tempdir().unwrap();
+    let bits =
+        |image: &Image| -> Vec<u32> { image.pixels.iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect() };
+    let float = Encoding { kind: Type::Float, alpha: true, tile: 16 };
+    for (suffix, encoding) in [("exr", HALF), ("exr", float), ("png", BYTES)] {
+        let files = write_both(folder.path(), suffix, encoding);
+        let mut images = Vec::new();
+        for file in &files {
+            images.push(decode(oiio::read(file, &|_, _| Ok(())).unwrap()));
+            images.push(decode(pure::read(file, &|_, _| Ok(())).unwrap()));
+        }
+        for image in &images[1..] {
+            assert_eq!(bits(&images[0]), bits(image), "{suffix} {encoding:?}");
+        }
+        if encoding.kind == Type::Float {
+            assert_eq!(bits(&images[0]), bits(&picture()));
+        }
+    }
+}
+
+#[test]
+fn metadata_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in write_both(folder.path(), "exr", HALF) {
+        assert_eq!(oiio::read_metadata(&file).unwrap(), metadata());
+        assert_eq!(pure::read_metadata(&file).unwrap(), metadata());
+    }
+}
+
+#[test]
+fn files_are_tiled_and_zipped() {
+    use exr::meta::BlockDescription;
+    let folder = tempfile::tempdir().unwrap();
+    for file in write_both(folder.path(), "exr", HALF) {
+        let meta = exr::meta::MetaData::read_from_file(&file, true).unwrap();
+        let header = &meta.headers[0];
+        assert_eq!(header.compression, exr::prelude::Compression::ZIP16);
+        let BlockDescription::Tiles(tiles) = header.blocks else { panic!("{file:?} has rows") };
+        assert_eq!(tiles.tile_size, exr::prelude::Vec2(64, 64));
+        let names: Vec<_> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+        assert_eq!(names, ["A", "B", "G", "R"]);
+    }
+}
+
+/// Lossy, so not equal: but close to what was written, and laid over black.
+#[test]
+fn jpeg_is_close() {
+    let folder = tempfile::tempdir().unwrap();
+    let encoding = Encoding { alpha: false, ..BYTES };
+    let written = decode(encode(&picture(), Type::U8, false));
+    for file in write_both(folder.path(), "jpg", encoding) {
+        for read in [oiio::read, pure::read] {
+            let image = decode(read(&file, &|_, _| Ok(())).unwrap());
+            let d = written.difference(&image).unwrap();
+            assert!(d.rmse < 0.02, "{file:?}: {d:?}");
+        }
+    }
+}
+
+/// Every format that the installed OpenImageIO offers takes a picture and gives it back.
+#[test]
+fn every_writable_suffix_works() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut image = Image::new(32, 32);
+    for (i, pixel) in image.pixels.iter_mut().enumerate() {
+        let alpha = if i < 512 { 1.0 } else { 0.5 };
+        *pixel = Vec4::new(0.5 * alpha, 0.25 * alpha, 0.75 * alpha, alpha);
+    }
+    let mut failures = Vec::new();
+    for suffix in oiio::writable_suffixes().unwrap() {
+        let path = folder.path().join("a").with_extension(&suffix);
+        let result = super::write(&path, &image, &Metadata::default(), &Default::default())
+            .map_err(|e| e.to_string())
+            .and_then(|()| super::read(&path).map_err(|e| e.to_string()));
+        match result {
+            Ok(back) => {
+                let alpha = ["exr", "sxr", "mxr", "png", "tga", "tif", "tiff"].contains(&suffix.as_str());
+                let mut expected = image.clone();
+                expected.pixels.iter_mut().filter(|_| !alpha).for_each(|p| p.w = 1.0);
+                let d = expected.difference(&back).unwrap();
+                // 8-bit codes, and what lossy formats make of the edge in the middle.
+                if d.max_abs > 0.05 {
+                    failures.push(format!("{suffix}: {d:?} {} {}", back.pixels[0], back.pixels[1023]));
+                }
+            }
+            Err(e) => failures.push(format!("{suffix}: {e}")),
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}

@@ -1,0 +1,196 @@
+//! Image files without OpenImageIO: OpenEXR by the crate exr, PNG and JPEG by the crate image.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use exr::prelude::{self as openexr, ReadChannels, ReadLayers, WritableImage, f16};
+use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
+use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
+use openexr::{AttributeValue, FlatSamples, Text};
+
+use super::file::Encoding;
+use super::metadata::{Metadata, narrow, widen};
+use super::samples::{Alpha, Channels, Samples, Values};
+
+type Result<T> = std::result::Result<T, String>;
+
+// Attributes under the names that OpenImageIO gives them. The crate has a field for the program, but names it `software`.
+const SOFTWARE: &str = "Software";
+const WORLD_TO_SCREEN: &str = "worldToScreen";
+const FOVCOT: &str = "fovcot";
+const SAMPLES_PER_PIXEL: &str = "samplesPerPixel";
+const RENDER_TIME_SECONDS: &str = "renderTimeSeconds";
+
+/// As OpenImageIO is told, too.
+const JPEG_QUALITY: u8 = 95;
+
+/// What is written; the same is read.
+pub(super) fn writable_suffixes() -> Result<Vec<String>> {
+    Ok(["exr", "jpeg", "jpg", "png"].map(str::to_owned).to_vec())
+}
+
+/// Writes a file.
+pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata: &Metadata) -> Result<()> {
+    match &samples.values {
+        Values::U8(bytes) => write_bytes(path, samples, bytes),
+        Values::Half(bits) => {
+            write_exr(path, samples, encoding, metadata, |i| f16::from_bits(bits[i])).map_err(|e| e.to_string())
+        }
+        Values::Float(values) => write_exr(path, samples, encoding, metadata, |i| values[i]).map_err(|e| e.to_string()),
+        Values::U16(_) => Err("16-bit integers are not written".to_owned()),
+    }
+}
+
+fn write_bytes(path: &Path, samples: &Samples, bytes: &[u8]) -> Result<()> {
+    let mut file = BufWriter::new(File::create(path).map_err(|e| e.to_string())?);
+    let (width, height) = (samples.width, samples.height);
+    let colour = if samples.channels.alpha.is_some() { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
+    let written = if path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("png")) {
+        PngEncoder::new(&mut file).write_image(bytes, width, height, colour)
+    } else {
+        JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).write_image(bytes, width, height, colour)
+    };
+    written.map_err(|e| e.to_string())?;
+    file.flush().map_err(|e| e.to_string())
+}
+
+fn write_exr<T: exr::image::IntoSample>(
+    path: &Path,
+    samples: &Samples,
+    encoding: Encoding,
+    metadata: &Metadata,
+    sample: impl Fn(usize) -> T + Sync,
+) -> exr::error::UnitResult {
+    let (width, height) = (samples.width as usize, samples.height as usize);
+    let tile = encoding.tile as usize;
+    let pixel = |at: openexr::Vec2<usize>| {
+        let i = 4 * (at.y() * width + at.x());
+        (sample(i), sample(i + 1), sample(i + 2), sample(i + 3))
+    };
+    let layer = openexr::Layer::new(
+        (width, height),
+        attributes(metadata),
+        openexr::Encoding {
+            compression: openexr::Compression::ZIP16,
+            blocks: openexr::Blocks::Tiles(openexr::Vec2(tile, tile)),
+            line_order: openexr::LineOrder::Increasing,
+        },
+        openexr::SpecificChannels::rgba(pixel),
+    );
+    openexr::Image::from_layer(layer).write().to_file(path)
+}
+
+fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
+    let mut attributes = openexr::LayerAttributes {
+        world_to_camera: metadata.world_to_camera.as_ref().map(narrow),
+        ..Default::default()
+    };
+    let mut put = |name: &str, value: Option<AttributeValue>| {
+        if let Some(value) = value {
+            attributes.other.insert(Text::from(name), value);
+        }
+    };
+    let number = |x: Option<f64>| x.map(|x| AttributeValue::F32(x as f32));
+    put(SOFTWARE, Text::new_or_none(&metadata.software).map(AttributeValue::Text));
+    put(WORLD_TO_SCREEN, metadata.world_to_screen.as_ref().map(narrow).map(AttributeValue::Matrix4x4));
+    put(FOVCOT, number(metadata.fovcot));
+    put(
+        SAMPLES_PER_PIXEL,
+        metadata.samples_per_pixel.map(|n| AttributeValue::I32(i32::try_from(n).unwrap_or(i32::MAX))),
+    );
+    put(RENDER_TIME_SECONDS, number(metadata.render_time_seconds));
+    attributes
+}
+
+/// Reads a file, unless `check` refuses its width and height. The format is told by the content.
+pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    if openexr_magic(path)? { read_exr(path, check) } else { read_other(path, check) }
+}
+
+fn openexr_magic(path: &Path) -> Result<bool> {
+    let mut file = File::open(path).map_err(|e| e.to_string())?;
+    Ok(exr::meta::magic_number::is_exr(&mut file).unwrap_or(false))
+}
+
+fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|e| e.to_string())?;
+    reader.no_limits(); // ours follow, before anything is allocated
+    let decoder = reader.into_decoder().map_err(|e| e.to_string())?;
+    let (width, height) = decoder.dimensions();
+    check(width.into(), height.into())?;
+    let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
+    let channels = Channels { colour: true, alpha: Some(Alpha::Straight) };
+    let deep = decoded.color().bytes_per_pixel() > decoded.color().channel_count();
+    let values =
+        if deep { Values::U16(decoded.into_rgba16().into_raw()) } else { Values::U8(decoded.into_rgba8().into_raw()) };
+    Ok(Samples { width, height, channels, values })
+}
+
+fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let header = meta.headers.first().ok_or("no layers")?;
+    if header.deep {
+        return Err("a deep image; only flat ones are read".to_owned());
+    }
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    // Every channel is decoded: many channels count as many pixels.
+    let factor = header.channels.list.len().div_ceil(4) as u64;
+    check(width as u64, (height as u64).saturating_mul(factor))?;
+
+    let image = openexr::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_file(path)
+        .map_err(|e| e.to_string())?;
+    let planes = &image.layer_data.channel_data.list;
+    let plane = |name: &str| planes.iter().find(|c| c.name == *name).map(|c| &c.sample_data);
+    let colours = match (plane("R"), plane("G"), plane("B"), plane("Y")) {
+        (Some(r), Some(g), Some(b), _) => vec![r, g, b],
+        (_, _, _, Some(y)) => vec![y],
+        _ if planes.len() == 1 => vec![&planes[0].sample_data],
+        _ => {
+            let names: Vec<_> = planes.iter().map(|c| c.name.to_string()).collect();
+            return Err(format!("no channels R, G and B, or Y; it has {}", names.join(", ")));
+        }
+    };
+    let alpha = plane("A");
+    let channels = Channels { colour: colours.len() == 3, alpha: alpha.map(|_| Alpha::Premultiplied) };
+    let planes: Vec<&FlatSamples> = colours.into_iter().chain(alpha).collect();
+    if planes.iter().any(|p| p.len() != width * height) {
+        return Err("channels of a lower resolution are not read".to_owned());
+    }
+    let values = (0..width * height).flat_map(|i| planes.iter().map(move |p| p.value_by_flat_index(i).to_f32()));
+    Ok(Samples { width: width as u32, height: height as u32, channels, values: Values::Float(values.collect()) })
+}
+
+/// Reads the attributes that [`write`] writes.
+pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let attributes = &meta.headers.first().ok_or("no layers")?.own_attributes;
+    let number = |name: &str| match attributes.other.get(&Text::from(name)) {
+        Some(&AttributeValue::F32(x)) => Some(f64::from(x)),
+        _ => None,
+    };
+    Ok(Metadata {
+        software: match attributes.other.get(&Text::from(SOFTWARE)) {
+            Some(AttributeValue::Text(name)) => name.to_string(),
+            _ => attributes.software_name.as_ref().map(Text::to_string).unwrap_or_default(),
+        },
+        world_to_camera: attributes.world_to_camera.as_ref().map(widen),
+        world_to_screen: match attributes.other.get(&Text::from(WORLD_TO_SCREEN)) {
+            Some(AttributeValue::Matrix4x4(m)) => Some(widen(m)),
+            _ => None,
+        },
+        fovcot: number(FOVCOT),
+        samples_per_pixel: match attributes.other.get(&Text::from(SAMPLES_PER_PIXEL)) {
+            Some(&AttributeValue::I32(n)) => n.try_into().ok(),
+            _ => None,
+        },
+        render_time_seconds: number(RENDER_TIME_SECONDS),
+    })
+}

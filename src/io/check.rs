@@ -1,0 +1,118 @@
+//! The last check of a loaded scene: what everything after the loaders relies on.
+//!
+//! Loaders check as they go, and can name the place in the file; this is the net beneath them, so that no index of any
+//! format, old or new, reaches a tracer unchecked.
+
+use crate::io::Placeless;
+use crate::math::Vec3;
+use crate::scene::{Geometry, Mesh, Scene};
+
+/// Whether all indices are in range, attributes match, transforms are finite, and there is something to render.
+pub(super) fn check(scene: &Scene) -> Placeless<()> {
+    if scene.primitive_count_checked()? == 0 {
+        return Err("nothing to render: it has no triangles; give a file with at least one".into());
+    }
+    for geometry in &scene.geometries {
+        if geometry.material() as usize >= scene.materials.len() {
+            return Err(format!("material {} of {} does not exist", geometry.material(), scene.materials.len()));
+        }
+        if let Geometry::Mesh(mesh) = geometry {
+            check_mesh(mesh).map_err(|message| format!("mesh {:?}: {message}", mesh.name))?;
+        }
+    }
+    for material in &scene.materials {
+        let finite = |color: Vec3| color.is_finite() && color.min_element() >= 0.0;
+        let colors = [material.ambient, material.diffuse, material.specular, material.emission];
+        if !colors.into_iter().all(finite) || !(material.shininess.is_finite() && material.shininess >= 0.0) {
+            return Err(format!("material {:?} has values that are negative or not finite", material.name));
+        }
+        if material.diffuse_texture.is_some_and(|t| t as usize >= scene.textures.len()) {
+            return Err(format!("material {:?} has a texture that does not exist", material.name));
+        }
+    }
+    for texture in &scene.textures {
+        let pixels = u64::from(texture.width) * u64::from(texture.height);
+        if pixels == 0 || pixels != texture.pixels.len() as u64 {
+            return Err(format!("texture {:?} has {} of {pixels} pixels", texture.name, texture.pixels.len()));
+        }
+    }
+    match scene.instances.iter().find(|instance| !instance.transform.is_finite()) {
+        Some(instance) => Err(format!("instance {:?} has a transform that is not finite", instance.name)),
+        None => Ok(()),
+    }
+}
+
+fn check_mesh(mesh: &Mesh) -> Placeless<()> {
+    let count = mesh.positions.len();
+    let attributes = [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len()), ("colors", mesh.colors.len())];
+    for (name, length) in attributes {
+        if length != 0 && length != count {
+            return Err(format!("{length} {name} for {count} positions"));
+        }
+    }
+    if u32::try_from(count.max(mesh.triangles.len())).is_err() {
+        return Err(format!("{count} vertices, {} triangles; at most 2^32 - 1 of each", mesh.triangles.len()));
+    }
+    if !mesh.origin.is_finite() {
+        return Err("its origin is not finite".into());
+    }
+    let highest = mesh.triangles.iter().flatten().max();
+    match highest.filter(|&&i| i as usize >= count) {
+        Some(i) => Err(format!("index {i} is past its {count} vertices")),
+        None => Ok(()),
+    }
+}
+
+impl Scene {
+    /// [`Scene::primitive_count`], for a scene whose groups and ranges may not exist.
+    fn primitive_count_checked(&self) -> Placeless<u64> {
+        let mut sum = 0u64;
+        for instance in &self.instances {
+            let group = self.groups.get(instance.group as usize);
+            let range = group.map(|g| g.geometries.start as usize..g.geometries.end as usize);
+            let Some(geometries) = range.and_then(|range| self.geometries.get(range)) else {
+                return Err(format!("instance {:?} places a group that does not exist", instance.name));
+            };
+            sum += geometries.iter().map(|g| g.primitive_count() as u64).sum::<u64>();
+        }
+        Ok(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::scene::{Material, Texture};
+
+    fn good() -> Scene {
+        let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()])
+    }
+
+    #[test]
+    fn finds_every_fault() {
+        assert_eq!(check(&good()), Ok(()));
+        type Breaks = fn(&mut Scene, &mut Mesh);
+        let faults: [(&str, Breaks); 10] = [
+            ("nothing to render", |_, mesh| mesh.triangles = vec![].into()),
+            ("does not exist", |_, mesh| mesh.material = 1),
+            ("past its 3 vertices", |_, mesh| mesh.triangles = vec![[0, 1, 3]].into()),
+            ("2 normals for 3", |_, mesh| mesh.normals = vec![Vec3::X; 2]),
+            ("1 uvs for 3", |_, mesh| mesh.uvs = vec![Default::default()]),
+            ("not finite", |_, mesh| mesh.origin = DVec3::NAN),
+            ("does not exist", |scene, _| scene.instances[0].group = 1),
+            ("does not exist", |scene, _| scene.groups[0].geometries = 0..2),
+            ("negative or not finite", |scene, _| scene.materials[0].diffuse = Vec3::NEG_ONE),
+            ("0 of 1 pixels", |scene, _| scene.textures.push(Texture { width: 1, height: 1, ..Texture::default() })),
+        ];
+        for (expected, fault) in faults {
+            let mut scene = good();
+            let Geometry::Mesh(mut mesh) = scene.geometries.remove(0) else { unreachable!() };
+            fault(&mut scene, &mut mesh);
+            scene.geometries.push(Geometry::Mesh(mesh));
+            let message = check(&scene).unwrap_err();
+            assert!(message.contains(expected), "{message} has no {expected}");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Accessors: typed views of buffers, checked once, then read by index.
+
+use super::Document;
+use super::schema::Accessor;
+use crate::io::Placeless;
+
+/// Most bytes that accessors without a buffer view, which are all zero, may stand for.
+const MOST_ZEROS: u64 = 1 << 28;
+
+/// A checked accessor: every index below `count` can be read.
+pub(super) struct View<'a> {
+    pub(super) count: usize,
+    component: Component,
+    components: usize,
+    normalized: bool,
+    /// Elements `stride` apart, from the first byte; None for zeros.
+    base: Option<(&'a [u8], usize)>,
+    /// Replaced elements: their rising indices, and their values.
+    sparse: Option<(Vec<u32>, &'a [u8])>,
+}
+
+/// The type of one component.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn from_code(code: u32) -> Placeless<Self> {
+        Ok(match code {
+            5120 => Self::I8,
+            5121 => Self::U8,
+            5122 => Self::I16,
+            5123 => Self::U16,
+            5125 => Self::U32,
+            5126 => Self::F32,
+            _ => return Err(format!("component type {code} is none of 5120 to 5123, 5125, 5126")),
+        })
+    }
+
+    const fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    /// The component at the start of `bytes`, which hold at least one.
+    fn read(self, bytes: &[u8], normalized: bool) -> f32 {
+        let scale = |value: f32, full: f32| if normalized { (value / full).max(-1.0) } else { value };
+        match self {
+            Self::I8 => scale(f32::from(bytes[0] as i8), 127.0),
+            Self::U8 => scale(f32::from(bytes[0]), 255.0),
+            Self::I16 => scale(f32::from(i16::from_le_bytes([bytes[0], bytes[1]])), 32_767.0),
+            Self::U16 => scale(f32::from(u16::from_le_bytes([bytes[0], bytes[1]])), 65_535.0),
+            Self::U32 => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32,
+            Self::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        }
+    }
+
+    /// The same as an index.
+    fn read_index(self, bytes: &[u8]) -> u32 {
+        match self {
+            Self::U8 => bytes[0].into(),
+            Self::U16 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        }
+    }
+}
+
+/// A failure and the JSON pointer below the accessor that it is about.
+type Fault = (&'static str, String);
+
+impl<'a> View<'a> {
+    /// Checks an accessor whose `type` has to be one of `kinds`.
+    pub(super) fn new(document: &'a Document<'_>, index: usize, kinds: &[&str]) -> Result<Self, (String, String)> {
+        let accessor = document.root.accessors.get(index).ok_or_else(|| {
+            let count = document.root.accessors.len();
+            ("/accessors".to_string(), format!("there is no accessor {index}; there are {count}"))
+        })?;
+        Self::check(document, accessor, kinds)
+            .map_err(|(field, message)| (format!("/accessors/{index}{field}"), message))
+    }
+
+    fn check(document: &'a Document<'_>, accessor: &Accessor, kinds: &[&str]) -> Result<Self, Fault> {
+        let component = Component::from_code(accessor.component_type).map_err(|m| ("/componentType", m))?;
+        if !kinds.contains(&accessor.kind.as_str()) {
+            return Err(("/type", format!("{:?} where {} belongs", accessor.kind, kinds.join(" or "))));
+        }
+        let components = match accessor.kind.as_str() {
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 1,
+        };
+        let size = components * component.size();
+        let count = u32::try_from(accessor.count)
+            .map_err(|_| ("/count", format!("{} elements; at most 2^32 - 1", accessor.count)))?
+            as usize;
+        let base = match accessor.buffer_view {
+            Some(view) => {
+                let (bytes, stride) = document.view(view).map_err(|m| ("/bufferView", m))?;
+                let stride = stride.unwrap_or(size);
+                if stride < size {
+                    return Err((
+                        "/bufferView",
+                        format!("its stride of {stride} is less than an element's {size} bytes"),
+                    ));
+                }
+                Some((range(bytes, accessor.byte_offset, count, stride, size, component)?, stride))
+            }
+            None => {
+                document
+                    .spend_zeros(accessor.count.saturating_mul(size as u64), MOST_ZEROS)
+                    .map_err(|m| ("/count", m))?;
+                None
+            }
+        };
+        let mut view = Self { count, component, components, normalized: accessor.normalized, base, sparse: None };
+        if let Some(sparse) = &accessor.sparse {
+            if sparse.count > accessor.count {
+                return Err(("/sparse/count", format!("{} of only {} elements", sparse.count, accessor.count)));
+            }
+            let many = sparse.count as usize;
+            let code = sparse.indices.component_type.unwrap_or_default();
+            let kind = Component::from_code(code).map_err(|m| ("/sparse/indices/componentType", m))?;
+            let (bytes, _) =
+                document.view(sparse.indices.buffer_view).map_err(|m| ("/sparse/indices/bufferView", m))?;
+            let bytes = range(bytes, sparse.indices.byte_offset, many, kind.size(), kind.size(), kind)
+                .map_err(|(_, m)| ("/sparse/indices", m))?;
+            let indices: Vec<u32> = bytes.chunks_exact(kind.size()).take(many).map(|b| kind.read_index(b)).collect();
+            let rises = indices.is_sorted_by(|a, b| a < b);
+            if !rises || indices.last().is_some_and(|&i| i as usize >= count) {
+                return Err(("/sparse/indices", format!("the indices have to rise and stay below {count}")));
+            }
+            let (bytes, _) = document.view(sparse.values.buffer_view).map_err(|m| ("/sparse/values/bufferView", m))?;
+            let values = range(bytes, sparse.values.byte_offset, many, size, size, component)
+                .map_err(|(_, m)| ("/sparse/values", m))?;
+            view.sparse = Some((indices, values));
+        }
+        Ok(view)
+    }
+
+    /// Whether indices may have this type.
+    pub(super) fn is_index(&self) -> bool {
+        matches!(self.component, Component::U8 | Component::U16 | Component::U32)
+    }
+
+    /// How many components an element has.
+    pub(super) fn components(&self) -> usize {
+        self.components
+    }
+
+    /// The bytes of an element; None where it is zero.
+    fn element(&self, index: usize) -> Option<&[u8]> {
+        if let Some((indices, values)) = &self.sparse
+            && let Ok(at) = indices.binary_search(&(index as u32))
+        {
+            return Some(&values[at * self.components * self.component.size()..]);
+        }
+        self.base.map(|(bytes, stride)| &bytes[index * stride..])
+    }
+
+    /// The element `index`, below `count`, as floats; the components that it does not have are 0.
+    pub(super) fn floats<const N: usize>(&self, index: usize) -> [f32; N] {
+        let Some(bytes) = self.element(index) else { return [0.0; N] };
+        let size = self.component.size();
+        std::array::from_fn(|k| {
+            if k < self.components { self.component.read(&bytes[k * size..], self.normalized) } else { 0.0 }
+        })
+    }
+
+    /// The element `index`, below `count`, of an accessor for which [`View::is_index`] holds.
+    pub(super) fn index(&self, index: usize) -> u32 {
+        self.element(index).map_or(0, |bytes| self.component.read_index(bytes))
+    }
+}
+
+/// The bytes of a view from `offset`, where `count` elements lie `stride` apart.
+fn range(
+    bytes: &[u8],
+    offset: u64,
+    count: usize,
+    stride: usize,
+    size: usize,
+    component: Component,
+) -> Result<&[u8], Fault> {
+    if offset % component.size() as u64 != 0 || !stride.is_multiple_of(component.size()) {
+        let message =
+            format!("offset {offset} or stride {stride} is no multiple of the component's {}", component.size());
+        return Err(("/byteOffset", message));
+    }
+    let needed = match count {
+        0 => 0,
+        _ => (count as u128 - 1) * stride as u128 + size as u128,
+    };
+    if u128::from(offset) + needed > bytes.len() as u128 {
+        let message =
+            format!("{count} elements from byte {offset} on take {needed} bytes, past the view's {}", bytes.len());
+        return Err(("/count", message));
+    }
+    // In range: both are at most the view's length, or there is nothing to read.
+    Ok(bytes.get(offset as usize..).unwrap_or_default())
+}

@@ -1,0 +1,227 @@
+//! Materials: Phong's from metallic-roughness, with the base colour's texture.
+//!
+//! Kd = base (1 - metal), Ks = lerp(0.04, base, metal), and the exponent 2 / alpha^2 - 2 with alpha = roughness^2, which
+//! gives the highlight of Blinn-Phong the width of the microfacets' (Walter et al. 2007, *Microfacet models for
+//! refraction through rough surfaces*). Metals would be black without what they mirror: Ks is all that they have.
+
+use std::collections::HashMap;
+
+use super::Document;
+use super::schema::{self, MetallicRoughness};
+use super::uri::{self, Target};
+use crate::error::{Error, Result, Warning};
+use crate::io::texture;
+use crate::math::{Vec2, Vec3};
+use crate::scene::{Filter, Material, Scene, Texture, Wrap};
+
+/// Smallest roughness, so that the exponent stays below about 20,000.
+const LEAST_ROUGHNESS: f32 = 0.1;
+
+/// The materials of a document, converted when a primitive first uses them.
+pub(super) struct Materials<'a> {
+    document: &'a Document<'a>,
+    /// By glTF's index; None is the default material.
+    known: HashMap<Option<usize>, u32>,
+    list: Vec<Material>,
+    /// By glTF's texture; None where the file is missing.
+    known_textures: HashMap<usize, Option<u32>>,
+    textures: Vec<Texture>,
+    transparent: Vec<String>,
+    warnings: Vec<Warning>,
+}
+
+impl<'a> Materials<'a> {
+    pub(super) fn new(document: &'a Document<'a>) -> Self {
+        Self {
+            document,
+            known: HashMap::new(),
+            list: Vec::new(),
+            known_textures: HashMap::new(),
+            textures: Vec::new(),
+            transparent: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The scene's index of a material, and which set of texture coordinates it needs; `pointer` says who asks.
+    pub(super) fn get(&mut self, index: Option<usize>, pointer: &str) -> Result<(u32, Option<u32>)> {
+        let document = self.document;
+        let materials = &document.root.materials;
+        if let Some(index) = index {
+            document.check_index(&format!("{pointer}/material"), index, materials.len(), "material")?;
+        }
+        let source = index.map(|i| &materials[i]);
+        let coordinates = source.and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
+        let set = coordinates.map(|info| info.tex_coord);
+        if let Some(known) = self.known.get(&index) {
+            return Ok((*known, set));
+        }
+        let material = match (index, source) {
+            (Some(index), Some(source)) => self.convert(index, source)?,
+            _ => phong(&MetallicRoughness::default()),
+        };
+        self.list.push(material);
+        let new = self.list.len() as u32 - 1;
+        self.known.insert(index, new);
+        Ok((new, set))
+    }
+
+    /// Hands materials and textures over to the scene.
+    pub(super) fn finish(self, scene: &mut Scene, warnings: &mut Vec<Warning>) {
+        warnings.extend(self.warnings);
+        if !self.transparent.is_empty() {
+            let message =
+                format!("transparency is not supported; rendered opaque: materials {}", self.transparent.join(", "));
+            warnings.push(self.document.warning("/materials", message));
+        }
+        scene.materials = self.list;
+        scene.textures = self.textures;
+    }
+
+    fn convert(&mut self, index: usize, source: &schema::Material) -> Result<Material> {
+        let pointer = format!("/materials/{index}");
+        let pbr = &source.pbr_metallic_roughness;
+        let mut numbers = pbr.base_color_factor.iter().chain(&source.emissive_factor);
+        let shares = [pbr.metallic_factor, pbr.roughness_factor];
+        if !numbers.all(|x| x.is_finite() && *x >= 0.0) || !shares.iter().all(|x| (0.0..=1.0).contains(x)) {
+            return Err(self.document.error(pointer, "factors have to be finite and from 0 up, shares from 0 to 1"));
+        }
+        if matches!(source.alpha_mode.as_deref(), Some("BLEND" | "MASK")) {
+            self.transparent.push(format!("{:?}", source.name));
+        }
+        let strength = source.extensions.get("KHR_materials_emissive_strength");
+        let strength = strength.and_then(|e| e.get("emissiveStrength")).and_then(serde_json::Value::as_f64);
+        let strength = strength.unwrap_or(1.0) as f32;
+        let texture = match &pbr.base_color_texture {
+            Some(info) => {
+                self.texture(info.index, &format!("{pointer}/pbrMetallicRoughness/baseColorTexture/index"))?
+            }
+            None => None,
+        };
+        let emission = Vec3::from(source.emissive_factor) * strength;
+        if !(emission.is_finite() && emission.min_element() >= 0.0) {
+            return Err(self.document.error(pointer, "the emissive strength has to be finite and from 0 up"));
+        }
+        Ok(Material { name: source.name.clone(), emission, diffuse_texture: texture, ..phong(pbr) })
+    }
+
+    fn texture(&mut self, index: usize, pointer: &str) -> Result<Option<u32>> {
+        let document = self.document;
+        let root = &document.root;
+        document.check_index(pointer, index, root.textures.len(), "texture")?;
+        if let Some(known) = self.known_textures.get(&index) {
+            return Ok(*known);
+        }
+        let source = &root.textures[index];
+        let Some(image) = source.source else {
+            let message = "the texture has no image that can be read; the material is rendered without it";
+            self.warnings.push(document.warning(format!("/textures/{index}"), message));
+            self.known_textures.insert(index, None);
+            return Ok(None);
+        };
+        document.check_index(&format!("/textures/{index}/source"), image, root.images.len(), "image")?;
+        let sampler = match source.sampler {
+            Some(s) => {
+                document.check_index(&format!("/textures/{index}/sampler"), s, root.samplers.len(), "sampler")?;
+                Some(&root.samplers[s])
+            }
+            None => None,
+        };
+        let made = self.image(image)?.map(|picture| {
+            let wrap = |code: Option<u32>| match code {
+                Some(33_071) => Wrap::Clamp,
+                Some(33_648) => Wrap::Mirror,
+                _ => Wrap::Repeat,
+            };
+            let filter =
+                if sampler.and_then(|s| s.mag_filter) == Some(9728) { Filter::Nearest } else { Filter::Linear };
+            self.textures.push(Texture {
+                wrap_u: wrap(sampler.and_then(|s| s.wrap_s)),
+                wrap_v: wrap(sampler.and_then(|s| s.wrap_t)),
+                filter,
+                scale: Vec2::ONE,
+                ..picture
+            });
+            self.textures.len() as u32 - 1
+        });
+        self.known_textures.insert(index, made);
+        Ok(made)
+    }
+
+    /// Decodes an image. None, and a warning, where its file is missing.
+    fn image(&mut self, index: usize) -> Result<Option<Texture>> {
+        let document = self.document;
+        let image = &document.root.images[index];
+        let pointer = format!("/images/{index}");
+        let decode = |bytes: &[u8]| {
+            let name = if image.name.is_empty() { &pointer } else { &image.name };
+            let told = |m| document.error(&pointer, format!("image {:?} {m}", image.name));
+            texture::decode(bytes, name).map(Some).map_err(told)
+        };
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => match uri::resolve(document.path, uri).map_err(|m| document.error(&pointer, m))? {
+                Target::Data(bytes) => decode(&bytes),
+                Target::File(file) => {
+                    let texture = texture::open(&file).map_err(|e| self.at(&pointer, e))?;
+                    if texture.is_none() {
+                        let message =
+                            format!("texture {:?} is missing; the material is rendered without it", file.display());
+                        self.warnings.push(document.warning(format!("{pointer}/uri"), message));
+                    }
+                    Ok(texture)
+                }
+            },
+            (None, Some(view)) => {
+                let (bytes, _) = document.view(view).map_err(|m| document.error(format!("{pointer}/bufferView"), m))?;
+                decode(bytes)
+            }
+            (None, None) => Err(document.error(pointer, "the image has neither a URI nor a buffer view")),
+        }
+    }
+
+    /// An error about a picture file, as one about the document that names it.
+    fn at(&self, pointer: &str, error: Error) -> Error {
+        match error {
+            Error::Input { path, message, .. } => {
+                self.document.error(pointer, format!("{}: {message}", path.display()))
+            }
+            other => other,
+        }
+    }
+}
+
+/// The conversion that the module documents.
+fn phong(pbr: &MetallicRoughness) -> Material {
+    let [r, g, b, _] = pbr.base_color_factor;
+    let (base, metal) = (Vec3::new(r, g, b), pbr.metallic_factor);
+    let alpha = pbr.roughness_factor.max(LEAST_ROUGHNESS).powi(2);
+    let diffuse = base * (1.0 - metal);
+    Material {
+        ambient: diffuse,
+        diffuse,
+        specular: Vec3::splat(0.04).lerp(base, metal),
+        shininess: (2.0 / (alpha * alpha) - 2.0).max(0.0),
+        ..Material::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metallic_roughness_becomes_phong() {
+        let base_color_factor = [0.5, 0.25, 1.0, 1.0];
+        let rough = MetallicRoughness { base_color_factor, metallic_factor: 0.0, ..Default::default() };
+        let material = phong(&rough);
+        assert_eq!(material.diffuse, Vec3::new(0.5, 0.25, 1.0));
+        assert_eq!((material.specular, material.shininess), (Vec3::splat(0.04), 0.0));
+        let metal = MetallicRoughness { base_color_factor, roughness_factor: 0.5, ..Default::default() };
+        let material = phong(&metal);
+        assert_eq!((material.diffuse, material.specular), (Vec3::ZERO, Vec3::new(0.5, 0.25, 1.0)));
+        // alpha = 1/4: 2 * 16 - 2.
+        assert_eq!(material.shininess, 30.0);
+        let mirror = MetallicRoughness { roughness_factor: 0.0, ..Default::default() };
+        assert!((phong(&mirror).shininess - 19_998.0).abs() < 1.0);
+    }
+}

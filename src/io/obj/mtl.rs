@@ -1,0 +1,278 @@
+//! MTL, the materials of an OBJ file (Wavefront 1995).
+//!
+//! Kd, Ks, Ke and Ka are taken as linear. A highlight is Blinn-Phong's; `illum 0` and `illum 1` have none. What this
+//! renderer does not have yet (transparency, the other maps) is named in a warning.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result, Warning};
+use crate::io::Placeless;
+use crate::io::text::{Lines, Words, name, number, quoted};
+use crate::io::{mapped::Mapped, system_message, texture};
+use crate::math::{Vec2, Vec3};
+use crate::scene::{Material, Texture, Wrap};
+
+/// The materials of all MTL files that one OBJ file names; the first of a name counts.
+#[derive(Default)]
+pub(super) struct Library(HashMap<String, Entry>);
+
+#[derive(Default)]
+struct Entry {
+    file: PathBuf,
+    ambient: Option<Vec3>,
+    diffuse: Option<Vec3>,
+    specular: Vec3,
+    emission: Vec3,
+    shininess: Option<f32>,
+    illumination: Option<i32>,
+    /// The line that makes it transparent.
+    transparent: Option<usize>,
+    map: Option<Map>,
+}
+
+/// `map_Kd` with its options.
+#[derive(Clone)]
+struct Map {
+    line: usize,
+    file: String,
+    scale: Vec2,
+    offset: Vec2,
+    clamp: bool,
+}
+
+impl Library {
+    /// Reads the file (or, where no file has the whole name, the files) that `mtllib` on `line` of `obj` names.
+    /// A missing one is a warning.
+    pub(super) fn read(&mut self, obj: &Path, line: usize, names: &str, warnings: &mut Vec<Warning>) -> Result<()> {
+        let folder = obj.parent().unwrap_or(Path::new(""));
+        let whole = folder.join(portable(names));
+        // A name may contain spaces; the format also lets several names stand in a line.
+        let files: Vec<PathBuf> = if whole.is_file() {
+            vec![whole]
+        } else {
+            names.split_whitespace().map(|n| folder.join(portable(n))).collect()
+        };
+        for file in files {
+            match Mapped::open(&file) {
+                Ok(bytes) => self.parse(&file, &bytes, warnings)?,
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                    let message = format!("material library {:?} is missing; its materials are grey", file.display());
+                    warnings.push(Warning::new(obj, format!("line {line}"), message));
+                }
+                Err(e) => return Err(Error::input(file, "", system_message(&e))),
+            }
+        }
+        Ok(())
+    }
+
+    fn parse(&mut self, file: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<()> {
+        let mut entry: Option<(String, Entry)> = None;
+        let mut ignored: Option<(usize, String)> = None;
+        for (line, text) in Lines::new(bytes) {
+            let mut words = Words::new(&text, line);
+            let Some(keyword) = words.next() else { continue };
+            let fail = |message: String| Error::input(file, format!("line {line}"), message);
+            if keyword == b"newmtl" {
+                self.add(entry.take());
+                entry = Some((name(words.rest()), Entry { file: file.to_path_buf(), ..Entry::default() }));
+            } else if !keyword.starts_with(b"#") {
+                let Some((_, entry)) = &mut entry else {
+                    return Err(fail(format!("{} comes before the first newmtl", quoted(keyword))));
+                };
+                if !entry.statement(keyword, line, &mut words).map_err(fail)? {
+                    ignored.get_or_insert_with(|| (line, quoted(keyword)));
+                }
+            }
+        }
+        self.add(entry);
+        if let Some((line, word)) = ignored {
+            let message = format!("{word} is not supported and left out, as are any others like it");
+            warnings.push(Warning::new(file, format!("line {line}"), message));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, entry: Option<(String, Entry)>) {
+        if let Some((name, entry)) = entry {
+            self.0.entry(name).or_insert(entry);
+        }
+    }
+
+    /// The named materials, in that order, and their textures. `colored`: where the vertices have colours of their own,
+    /// a material that the library does not have is white.
+    pub(super) fn resolve(
+        &self,
+        obj: &Path,
+        names: Vec<String>,
+        colored: bool,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(Vec<Material>, Vec<Texture>)> {
+        let mut textures = Textures::default();
+        let mut materials = Vec::new();
+        let plain = if colored { Vec3::ONE } else { Material::default().diffuse };
+        let mut transparent: Option<(&Entry, usize)> = None;
+        for name in names {
+            let Some(entry) = self.0.get(&name) else {
+                // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
+                if !name.is_empty() && !self.0.is_empty() {
+                    let message = format!("material {} is in no material library; it is grey", quoted(name.as_bytes()));
+                    warnings.push(Warning::new(obj, "", message));
+                }
+                materials.push(Material { name, ambient: plain, diffuse: plain, ..Material::default() });
+                continue;
+            };
+            transparent = transparent.or(entry.transparent.map(|line| (entry, line)));
+            let texture = match &entry.map {
+                Some(map) => textures.get(&entry.file, map, warnings)?,
+                None => None,
+            };
+            materials.push(entry.material(name, texture));
+        }
+        if let Some((entry, line)) = transparent {
+            let message = "transparency (d, Tr) is not supported; everything is rendered opaque";
+            warnings.push(Warning::new(&entry.file, format!("line {line}"), message));
+        }
+        Ok((materials, textures.list))
+    }
+}
+
+impl Entry {
+    /// Takes one statement; false for one that changes the look but is not supported.
+    fn statement(&mut self, keyword: &[u8], line: usize, words: &mut Words<'_>) -> Placeless<bool> {
+        match keyword {
+            b"Ka" => self.ambient = Some(color(keyword, words)?),
+            b"Kd" => self.diffuse = Some(color(keyword, words)?),
+            b"Ks" => self.specular = color(keyword, words)?,
+            b"Ke" => self.emission = color(keyword, words)?,
+            b"Ns" => self.shininess = Some(scalar(keyword, words)?.max(0.0)),
+            b"d" | b"Tr" => {
+                // `d -halo 0.5` is transparency too.
+                let value = words
+                    .filter_map(number::<f32>)
+                    .last()
+                    .ok_or_else(|| format!("{} needs a number", quoted(keyword)))?;
+                let opacity = if keyword == b"d" { value } else { 1.0 - value };
+                self.transparent = (opacity < 1.0).then_some(line);
+            }
+            b"illum" => self.illumination = Some(words.number().ok_or("illum needs a whole number")?),
+            b"map_Kd" => self.map = Some(Map::parse(line, words)?),
+            // Physical values that Phong's model has no use for.
+            b"Ni" | b"Tf" | b"sharpness" | b"Pr" | b"Pm" | b"Ps" | b"Pc" | b"Pcr" | b"aniso" | b"anisor" => {}
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn material(&self, name: String, diffuse_texture: Option<u32>) -> Material {
+        // A texture alone means the texture as it is.
+        let plain = if diffuse_texture.is_some() { Vec3::ONE } else { Material::default().diffuse };
+        let diffuse = self.diffuse.unwrap_or(plain);
+        let has_highlight = !matches!(self.illumination, Some(0 | 1));
+        Material {
+            name,
+            ambient: self.ambient.unwrap_or(diffuse),
+            diffuse,
+            specular: if has_highlight { self.specular } else { Vec3::ZERO },
+            shininess: self.shininess.unwrap_or(Material::default().shininess),
+            emission: self.emission,
+            diffuse_texture,
+            ..Material::default()
+        }
+    }
+}
+
+impl Map {
+    fn parse(line: usize, words: &mut Words<'_>) -> Placeless<Self> {
+        let mut map = Self { line, file: String::new(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false };
+        loop {
+            let rest = words.rest();
+            let mut ahead = Words::new(rest, line);
+            let option = ahead.next().ok_or("map_Kd needs a file name")?;
+            // Options with 1 to 3 numbers, of which the later ones may be missing.
+            let numbers = match option {
+                b"-s" | b"-o" | b"-t" => 3,
+                b"-mm" => 2,
+                b"-clamp" | b"-blendu" | b"-blendv" | b"-cc" | b"-bm" | b"-boost" | b"-texres" | b"-imfchan"
+                | b"-type" => 1,
+                _ => {
+                    map.file = name(rest);
+                    return Ok(map);
+                }
+            };
+            words.next();
+            let mut values = [if option == b"-s" { 1.0 } else { 0.0 }; 3];
+            for (k, value) in values.iter_mut().enumerate().take(numbers) {
+                let next = Words::new(words.rest(), line).next();
+                let Some(word) = next else { break };
+                if matches!(option, b"-clamp" | b"-blendu" | b"-blendv" | b"-cc" | b"-imfchan" | b"-type") {
+                    map.clamp |= option == b"-clamp" && word == b"on";
+                } else if let Some(number) = number::<f32>(word).filter(|n| n.is_finite()) {
+                    *value = number;
+                } else if k == 0 {
+                    return Err(format!("{} needs a number, not {}", quoted(option), quoted(word)));
+                } else {
+                    break;
+                }
+                words.next();
+            }
+            match option {
+                b"-s" => map.scale = Vec2::new(values[0], values[1]),
+                b"-o" => map.offset = Vec2::new(values[0], values[1]),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The textures in use, each file and setting once.
+#[derive(Default)]
+struct Textures {
+    list: Vec<Texture>,
+    known: HashMap<(PathBuf, [u32; 4], bool), Option<u32>>,
+}
+
+impl Textures {
+    fn get(&mut self, library: &Path, map: &Map, warnings: &mut Vec<Warning>) -> Result<Option<u32>> {
+        let file = library.parent().unwrap_or(Path::new("")).join(portable(&map.file));
+        let settings = [map.scale.x, map.scale.y, map.offset.x, map.offset.y].map(f32::to_bits);
+        let key = (file, settings, map.clamp);
+        if let Some(known) = self.known.get(&key) {
+            return Ok(*known);
+        }
+        let texture = texture::open(&key.0)?;
+        if texture.is_none() {
+            let message = format!("texture {:?} is missing; the material is rendered without it", key.0.display());
+            warnings.push(Warning::new(library, format!("line {}", map.line), message));
+        }
+        let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
+        let index = texture.map(|texture| {
+            let placed = Texture { scale: map.scale, offset: map.offset, wrap_u: wrap, wrap_v: wrap, ..texture };
+            self.list.push(placed);
+            self.list.len() as u32 - 1
+        });
+        self.known.insert(key, index);
+        Ok(index)
+    }
+}
+
+/// File names from Windows have backslashes.
+fn portable(file: &str) -> String {
+    file.replace('\\', "/")
+}
+
+fn scalar(keyword: &[u8], words: &mut Words<'_>) -> Placeless<f32> {
+    let value = words.number::<f32>().filter(|v| v.is_finite());
+    value.ok_or_else(|| format!("{} needs a finite number", quoted(keyword)))
+}
+
+/// One number for a grey, or three.
+fn color(keyword: &[u8], words: &mut Words<'_>) -> Placeless<Vec3> {
+    let problem = || format!("{} needs 3 numbers from 0 up, r g b", quoted(keyword));
+    let r: f32 = words.number().ok_or_else(problem)?;
+    let color = match words.next() {
+        None => Vec3::splat(r),
+        Some(g) => Vec3::new(r, number(g).ok_or_else(problem)?, words.number().ok_or_else(problem)?),
+    };
+    if color.is_finite() && color.min_element() >= 0.0 { Ok(color) } else { Err(problem()) }
+}

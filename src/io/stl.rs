@@ -1,0 +1,129 @@
+//! STL, text and binary (3D Systems 1989, *StereoLithography interface specification*).
+//!
+//! A file is a list of loose triangles. Corners that are equal to the bit become one vertex, so that the mesh is
+//! connected as it was before it was written. The facets' own normals are left unread: they only repeat the corners'
+//! order, or contradict it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::text::{Words, quoted};
+use super::weld::Weld;
+use crate::error::{Error, Result, Warning};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Geometry, Material, Mesh, Scene};
+
+const HEADER: usize = 84;
+const FACET: usize = 50;
+
+/// Reads an STL file.
+pub(super) fn load(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Scene> {
+    let mesh = if is_text(bytes) { text(path, bytes)? } else { binary(path, bytes, warnings)? };
+    Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]))
+}
+
+/// Whether it is a text file. Binary files may begin with `solid` too, so their length is asked first; one whose length
+/// is wrong is told by the word that must follow in a text.
+fn is_text(bytes: &[u8]) -> bool {
+    let fits = promised(bytes).is_some_and(|count| HEADER as u64 + count * FACET as u64 == bytes.len() as u64);
+    let head = &bytes[..bytes.len().min(1024)];
+    let has = |word: &[u8]| head.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word));
+    let begins = head.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    !fits && begins && (has(b"facet") || has(b"endsolid"))
+}
+
+/// The number of triangles that a binary header promises.
+fn promised(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(HEADER - 4..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*count).into())
+}
+
+fn binary(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Mesh> {
+    let Some(count) = promised(bytes) else {
+        let message = format!("is no STL file: neither text that begins with \"solid\" nor {HEADER} bytes long");
+        return Err(Error::input(path, "byte 0", message));
+    };
+    let there = (bytes.len() - HEADER) / FACET;
+    if count > there as u64 {
+        let message = format!("promises {count} triangles of {FACET} bytes, but the file has room for {there}");
+        return Err(Error::input(path, "byte 80", message));
+    }
+    let (facets, rest) = bytes[HEADER..].split_at(count as usize * FACET);
+    if !rest.is_empty() {
+        let message = format!("{} bytes after the last triangle are ignored", rest.len());
+        warnings.push(Warning::new(path, format!("byte {}", bytes.len() - rest.len()), message));
+    }
+    let mut weld = Weld::new();
+    let corner = |weld: &mut Weld<_>, at: &[u8]| {
+        // Adding 0 makes one zero of the two.
+        let float = |k: usize| f32::from_le_bytes([at[k], at[k + 1], at[k + 2], at[k + 3]]) + 0.0;
+        weld.index([float(0).to_bits(), float(4).to_bits(), float(8).to_bits()])
+    };
+    let triangles =
+        facets.chunks_exact(FACET).map(|f| [12, 24, 36].map(|at| corner(&mut weld, &f[at..at + 12]))).collect();
+    let positions = weld.into_keys().into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect();
+    Ok(Mesh::new(positions, triangles))
+}
+
+fn text(path: &Path, bytes: &[u8]) -> Result<Mesh> {
+    let mut words = Words::new(bytes, 1);
+    let mut weld = Weld::new();
+    let mut triangles = Vec::new();
+    let mut name = String::new();
+    while let Some(word) = words.next() {
+        match word.to_ascii_lowercase().as_slice() {
+            b"solid" => {
+                let before = words.remaining();
+                let text = &bytes[bytes.len() - before..];
+                words.skip_line();
+                if name.is_empty() {
+                    name = super::text::name(&text[..before - words.remaining()]);
+                }
+            }
+            b"endsolid" => words.skip_line(),
+            b"facet" => {
+                expect(path, &mut words, "normal")?;
+                for _ in 0..3 {
+                    number(path, &mut words)?;
+                }
+                expect(path, &mut words, "outer")?;
+                expect(path, &mut words, "loop")?;
+                let mut triangle = [0; 3];
+                for corner in &mut triangle {
+                    expect(path, &mut words, "vertex")?;
+                    let mut bits = [0; 3];
+                    for b in &mut bits {
+                        *b = (number(path, &mut words)? + 0.0).to_bits();
+                    }
+                    *corner = weld.index(bits);
+                }
+                expect(path, &mut words, "endloop")?;
+                expect(path, &mut words, "endfacet")?;
+                triangles.push(triangle);
+            }
+            _ => return Err(unexpected(path, &words, Some(word), "facet, solid or endsolid")),
+        }
+    }
+    let positions: Vec<_> = weld.into_keys().into_iter().map(|bits| DVec3::from(bits.map(f64::from_bits))).collect();
+    let mut mesh = Mesh { name, triangles: Arc::new(triangles), ..Mesh::default() };
+    mesh.set_positions(&positions);
+    Ok(mesh)
+}
+
+fn expect(path: &Path, words: &mut Words<'_>, wanted: &str) -> Result<()> {
+    let word = words.next();
+    if word.is_some_and(|w| w.eq_ignore_ascii_case(wanted.as_bytes())) {
+        return Ok(());
+    }
+    Err(unexpected(path, words, word, wanted))
+}
+
+fn number(path: &Path, words: &mut Words<'_>) -> Result<f64> {
+    let word = words.next();
+    word.and_then(super::text::number).ok_or_else(|| unexpected(path, words, word, "a number"))
+}
+
+fn unexpected(path: &Path, words: &Words<'_>, word: Option<&[u8]>, wanted: &str) -> Error {
+    let found = word.map_or("the file ends".to_string(), |w| format!("found {}", quoted(w)));
+    Error::input(path, format!("line {}", words.line), format!("{found} where {wanted} belongs"))
+}

@@ -1,0 +1,81 @@
+//! Pictures for textures: PNG and JPEG, from files or from bytes within another file.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::error::ImageError;
+use image::{ImageReader, Limits};
+
+use super::mapped::Mapped;
+use crate::error::{Error, Result};
+use crate::io::Placeless;
+use crate::math::Vec2;
+use crate::scene::Texture;
+
+/// Longest side, in pixels.
+const LONGEST_SIDE: u32 = 16_384;
+/// Most pixels of one texture.
+const MOST_PIXELS: u64 = 1 << 26;
+/// Most memory the decoder may use besides the pixels.
+const MOST_MEMORY: u64 = 1 << 29;
+
+/// Reads a picture file. None where there is no such file.
+///
+/// # Errors
+/// [`Error::Input`] that names the picture where it cannot be read, is broken or is too large.
+pub(super) fn open(path: &Path) -> Result<Option<Texture>> {
+    let bytes = match Mapped::open(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(Error::input(path, "", super::system_message(&e))),
+    };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    decode(&bytes, &name).map(Some).map_err(|message| Error::input(path, "", message))
+}
+
+/// Decodes a picture. The format is told by the first bytes, since suffixes and MIME types lie.
+///
+/// # Errors
+/// A message about what is wrong.
+pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
+    let reader = || {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        reader.limits(limits());
+        if reader.format().is_none() { Err("is not a PNG or JPEG picture".to_string()) } else { Ok(reader) }
+    };
+    // The size first, and without limits of the library's, whose message would not say it.
+    let mut sizing = reader()?;
+    sizing.no_limits();
+    let (width, height) = sizing.into_dimensions().map_err(|e| broken(&e))?;
+    let pixels = u64::from(width) * u64::from(height);
+    if width.max(height) > LONGEST_SIDE || pixels > MOST_PIXELS {
+        return Err(format!(
+            "claims {width} x {height} pixels; at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all are read"
+        ));
+    }
+    let image = reader()?.decode().map_err(|e| broken(&e))?.into_rgba8();
+    let (width, height) = image.dimensions();
+    Ok(Texture {
+        name: name.to_string(),
+        width,
+        height,
+        pixels: bytemuck::cast_slice(image.as_raw()).to_vec(),
+        scale: Vec2::ONE,
+        ..Texture::default()
+    })
+}
+
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(LONGEST_SIDE);
+    limits.max_image_height = Some(LONGEST_SIDE);
+    limits.max_alloc = Some(MOST_MEMORY);
+    limits
+}
+
+fn broken(error: &ImageError) -> String {
+    match error {
+        ImageError::Unsupported(_) => format!("is not a PNG or JPEG picture that can be read: {error}"),
+        _ => format!("is a broken picture: {error}"),
+    }
+}

@@ -1,0 +1,146 @@
+//! Which part of the picture is rendered when.
+
+/// Edge of a tile in pixels, a multiple of [`BLOCK`]. 1024 rays fill packets of any width and fit into the cache.
+pub(super) const TILE: u32 = 32;
+
+/// Edge of the blocks that a tile's rays are ordered by: 16 neighbours make the widest packet.
+const BLOCK: u32 = 4;
+
+/// The order in which tiles are begun. Never changes a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TileOrder {
+    /// Row by row from the top.
+    Scanline,
+    /// Along Hilbert's curve (1891, *Über die stetige Abbildung einer Linie auf ein Flächenstück*): the next tile is a
+    /// neighbour, so that it finds the scene's nodes in the cache.
+    #[default]
+    Hilbert,
+    /// From the middle outwards, so that what matters is seen first.
+    Spiral,
+}
+
+/// A rectangle of pixels, not empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Tile {
+    pub(super) x: u32,
+    pub(super) y: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+impl Tile {
+    /// Its pixels, by blocks of 4 x 4.
+    pub(super) fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let Self { x, y, width, height } = *self;
+        let blocks = (0..height)
+            .step_by(BLOCK as usize)
+            .flat_map(move |by| (0..width).step_by(BLOCK as usize).map(move |bx| (bx, by)));
+        blocks.flat_map(move |(bx, by)| {
+            let (right, bottom) = ((bx + BLOCK).min(width), (by + BLOCK).min(height));
+            (by..bottom).flat_map(move |py| (bx..right).map(move |px| (x + px, y + py)))
+        })
+    }
+
+    /// How many pixels.
+    pub(super) fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+/// All tiles of a picture, in the given order.
+pub(super) fn tiles(width: u32, height: u32, order: TileOrder) -> Vec<Tile> {
+    let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
+    let mut places: Vec<_> = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).collect();
+    match order {
+        TileOrder::Scanline => {}
+        TileOrder::Hilbert => {
+            let side = columns.max(rows).next_power_of_two();
+            places.sort_by_key(|&(x, y)| hilbert(side, x, y));
+        }
+        TileOrder::Spiral => places.sort_by_key(|&place| spiral(columns, rows, place)),
+    }
+    let tile = |(cx, cy): (u32, u32)| {
+        let (x, y) = (cx * TILE, cy * TILE);
+        Tile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) }
+    };
+    places.into_iter().map(tile).collect()
+}
+
+/// The distance along Hilbert's curve through a square of `side` cells (a power of two).
+fn hilbert(side: u32, mut x: u32, mut y: u32) -> u64 {
+    let mut distance = 0;
+    let mut s = side / 2;
+    while s > 0 {
+        let (right, up) = (u32::from(x & s > 0), u32::from(y & s > 0));
+        distance += u64::from(s) * u64::from(s) * u64::from((3 * right) ^ up);
+        // Turn the quadrant so that its curve starts at its own origin.
+        if up == 0 {
+            if right == 1 {
+                (x, y) = (side - 1 - x, side - 1 - y);
+            }
+            (x, y) = (y, x);
+        }
+        s /= 2;
+    }
+    distance
+}
+
+/// The ring around the middle, and the place on it.
+fn spiral(columns: u32, rows: u32, (x, y): (u32, u32)) -> (i64, i64) {
+    // Twice the offset from the middle, so that even sizes have a middle too.
+    let dx = 2 * i64::from(x) + 1 - i64::from(columns);
+    let dy = 2 * i64::from(y) + 1 - i64::from(rows);
+    let ring = dx.abs().max(dy.abs());
+    let along = if dy == -ring {
+        dx + ring
+    } else if dx == ring {
+        2 * ring + dy + ring
+    } else if dy == ring {
+        4 * ring + ring - dx
+    } else {
+        6 * ring + ring - dy
+    };
+    (ring, along)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_order_covers_every_pixel_once() {
+        for (width, height) in [(1, 1), (31, 33), (200, 100), (64, 7)] {
+            for order in [TileOrder::Scanline, TileOrder::Hilbert, TileOrder::Spiral] {
+                let tiles = tiles(width, height, order);
+                let mut pixels: Vec<_> = tiles.iter().flat_map(Tile::pixels).collect();
+                assert_eq!(pixels.len(), tiles.iter().map(Tile::len).sum::<usize>());
+                pixels.sort_unstable();
+                let all: Vec<_> = (0..width).flat_map(|x| (0..height).map(move |y| (x, y))).collect();
+                assert_eq!(pixels, all, "{width}x{height} {order:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn hilberts_curve_steps_to_neighbours() {
+        let tiles = tiles(8 * TILE, 8 * TILE, TileOrder::Hilbert);
+        for pair in tiles.windows(2) {
+            assert_eq!(pair[0].x.abs_diff(pair[1].x) + pair[0].y.abs_diff(pair[1].y), TILE, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn spirals_begin_in_the_middle_and_end_at_the_rim() {
+        let tiles = tiles(5 * TILE, 3 * TILE, TileOrder::Spiral);
+        assert_eq!((tiles[0].x, tiles[0].y), (2 * TILE, TILE));
+        let last = tiles.last().unwrap();
+        assert!(last.x == 0 || last.x == 4 * TILE);
+    }
+
+    #[test]
+    fn sixteen_pixels_in_a_row_are_a_square() {
+        let tile = Tile { x: 32, y: 0, width: 32, height: 32 };
+        let first: Vec<_> = tile.pixels().take(16).collect();
+        assert!(first.iter().all(|&(x, y)| (32..36).contains(&x) && y < 4));
+    }
+}

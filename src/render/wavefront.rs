@@ -1,0 +1,118 @@
+//! The samples of one tile, stage by stage: all camera rays, all surfaces, then light by light all shadow rays.
+//!
+//! Taking a tile through each stage at once keeps packets full and their rays alike; following one pixel to its end
+//! before the next would trace shadow rays one by one. What a pixel adds up, and in which order, does not depend on
+//! its neighbours: camera ray by sample, then lights in the scene's order.
+
+use crate::math::{DVec3, Vec3, Vec4};
+use crate::ray::{Hit, Ray};
+use crate::shade::SurfacePoint;
+use crate::shade::light::LightSource;
+use crate::shade::phong::Shading;
+use crate::trace::Tracer;
+
+use super::{Renderer, tiles::Tile};
+
+/// Room for one tile, used again for each sample.
+#[derive(Default)]
+struct Buffers {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    radiance: Vec<Vec4>,
+    lit: Vec<Lit>,
+    shadow_rays: Vec<Ray>,
+    shadow_light: Vec<(usize, Vec3)>,
+    occluded: Vec<bool>,
+}
+
+/// A camera ray that hit something.
+struct Lit {
+    /// Index of the ray in its tile.
+    ray: usize,
+    point: SurfacePoint,
+    shading: Shading,
+}
+
+impl Renderer<'_> {
+    /// The pixels of a tile, in the order of [`Tile::pixels`].
+    pub(super) fn tile<T: Tracer>(&self, tracer: &T, tile: &Tile) -> Vec<Vec4> {
+        let mut sums = vec![Vec4::ZERO; tile.len()];
+        let mut buffers = Buffers::default();
+        for sample in 0..self.settings.spp {
+            buffers.rays.clear();
+            buffers.rays.extend(tile.pixels().map(|(x, y)| self.camera_ray(x, y, sample)));
+            self.radiance(tracer, &mut buffers);
+            for (sum, radiance) in sums.iter_mut().zip(&buffers.radiance) {
+                *sum += *radiance;
+            }
+        }
+        // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples.
+        sums.iter().map(|sum| *sum / self.settings.spp as f32).collect()
+    }
+
+    /// What each camera ray sees, into `radiance`: linear RGB and coverage.
+    fn radiance<T: Tracer>(&self, tracer: &T, buffers: &mut Buffers) {
+        let Buffers { rays, hits, radiance, lit, .. } = buffers;
+        hits.clear();
+        hits.resize(rays.len(), None);
+        tracer.closest_batch(rays, hits, self.settings.batch);
+
+        let behind = self.plan.background.map_or(Vec4::ZERO, |color| color.extend(1.0));
+        radiance.clear();
+        lit.clear();
+        for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+            let Some(hit) = hit else {
+                radiance.push(behind);
+                continue;
+            };
+            let point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
+            let material = self.scene.materials.get(point.material as usize).unwrap_or(&self.fallback);
+            let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
+            radiance.push(shading.base.extend(1.0));
+            lit.push(Lit { ray: i, point, shading });
+        }
+        for light in &self.lights {
+            self.add_light(tracer, light, buffers);
+        }
+    }
+
+    fn add_light<T: Tracer>(&self, tracer: &T, light: &LightSource, buffers: &mut Buffers) {
+        let Buffers { radiance, lit, shadow_rays, shadow_light, occluded, .. } = buffers;
+        shadow_rays.clear();
+        shadow_light.clear();
+        for Lit { ray, point, shading } in lit.iter() {
+            let Some(arriving) = light.illuminate(point.position) else { continue };
+            if !shading.faces(arriving.to_light) {
+                continue;
+            }
+            let reflected = shading.reflect(&arriving);
+            if light.casts_shadows {
+                shadow_rays.push(light.shadow_ray(point, arriving.to_light));
+                shadow_light.push((*ray, reflected));
+            } else {
+                radiance[*ray] += reflected.extend(0.0);
+            }
+        }
+        if shadow_rays.is_empty() {
+            return;
+        }
+        occluded.clear();
+        occluded.resize(shadow_rays.len(), false);
+        tracer.occluded_batch(shadow_rays, occluded, self.settings.batch);
+        for ((ray, reflected), _) in shadow_light.iter().zip(occluded).filter(|(_, occluded)| !**occluded) {
+            radiance[*ray] += reflected.extend(0.0);
+        }
+    }
+
+    /// The planned lights in world coordinates.
+    pub(super) fn light_sources(&self, eye: DVec3) -> Vec<LightSource> {
+        use crate::plan::Lighting;
+        match &self.plan.lighting {
+            Lighting::None => Vec::new(),
+            Lighting::Headlight => vec![LightSource::headlight(eye)],
+            Lighting::Lights(lights) => {
+                lights.iter().map(|&i| LightSource::new(&self.scene.lights[i], self.world.centre)).collect()
+            }
+        }
+    }
+}

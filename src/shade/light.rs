@@ -1,0 +1,150 @@
+//! How much light arrives, and from where.
+//!
+//! Falloff follows the glTF extension [KHR_lights_punctual](https://github.com/KhronosGroup/glTF/blob/main/extensions/2.0/Khronos/KHR_lights_punctual/README.md):
+//! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
+
+use super::SurfacePoint;
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::ray::Ray;
+use crate::scene::{Attenuation, Light};
+
+/// A light as the renderer uses it, in world coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightSource {
+    light: Light,
+    /// Whether anything can stand between it and what the camera sees.
+    pub casts_shadows: bool,
+}
+
+/// Light that arrives at a point, before any shadow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Illumination {
+    /// Unit vector towards the light.
+    pub to_light: DVec3,
+    /// Linear RGB that a white matte surface facing the light would reflect.
+    pub color: Vec3,
+}
+
+impl LightSource {
+    /// A light of the scene in a world whose centre is at `centre`.
+    pub fn new(light: &Light, centre: DVec3) -> Self {
+        let mut light = light.clone();
+        light.transform(&DAffine3::from_translation(-centre));
+        Self { light, casts_shadows: true }
+    }
+
+    /// A white light at the viewer's `eye` (world coordinates), the same at any distance. Its shadows lie where the
+    /// viewer cannot see them, so that none are traced.
+    pub fn headlight(eye: DVec3) -> Self {
+        let light =
+            Light::Point { position: eye, color: Vec3::ONE, attenuation: Attenuation::NONE, range: f64::INFINITY };
+        Self { light, casts_shadows: false }
+    }
+
+    /// What arrives at `point` if nothing is in between; none where the light does not reach.
+    pub fn illuminate(&self, point: DVec3) -> Option<Illumination> {
+        match &self.light {
+            Light::Directional { direction, color } => Some(Illumination { to_light: -*direction, color: *color }),
+            Light::Point { position, color, attenuation, range } => {
+                from_point(point, *position, *color, attenuation, *range)
+            }
+            Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
+                let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
+                arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
+                (arriving.color != Vec3::ZERO).then_some(arriving)
+            }
+        }
+    }
+
+    /// The ray that must be free for the light to reach `surface`, which it does along `to_light`.
+    pub fn shadow_ray(&self, surface: &SurfacePoint, to_light: DVec3) -> Ray {
+        match &self.light {
+            Light::Directional { .. } => surface.spawn(to_light.as_vec3(), f32::INFINITY),
+            Light::Point { position, .. } | Light::Spot { position, .. } => surface.spawn_to(*position),
+        }
+    }
+}
+
+fn from_point(
+    point: DVec3,
+    position: DVec3,
+    color: Vec3,
+    attenuation: &Attenuation,
+    range: f64,
+) -> Option<Illumination> {
+    let offset = position - point;
+    let distance = offset.length();
+    let color = color * (attenuation.factor(distance as f32) * window(distance, range));
+    // At the light itself there is neither a direction nor, with 1 / d^2, a finite colour.
+    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO)
+        .then(|| Illumination { to_light: offset / distance, color })
+}
+
+/// 1 near the light, 0 from `range` on.
+fn window(distance: f64, range: f64) -> f32 {
+    let share = distance / range;
+    (1.0 - share * share * share * share).clamp(0.0, 1.0) as f32
+}
+
+/// 1 within the inner angle, 0 outside the outer one, by the cosine of the angle to the axis.
+fn cone(cosine: f64, inner_angle: f32, outer_angle: f32) -> f32 {
+    let (inner, outer) = (libm::cos(f64::from(inner_angle)), libm::cos(f64::from(outer_angle)));
+    let ramp = ((cosine - outer) / (inner - outer).max(0.001)).clamp(0.0, 1.0);
+    (ramp * ramp) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spot(range: f64) -> LightSource {
+        let light = Light::Spot {
+            position: DVec3::new(10.0, 3.0, 0.0),
+            direction: DVec3::NEG_Y,
+            color: Vec3::new(2.0, 4.0, 8.0),
+            attenuation: Attenuation { constant: 1.0, linear: 0.5, quadratic: 0.25 },
+            range,
+            inner_angle: 30f32.to_radians(),
+            outer_angle: 60f32.to_radians(),
+        };
+        LightSource::new(&light, DVec3::new(10.0, 0.0, 0.0))
+    }
+
+    #[test]
+    fn attenuates_by_the_polynomial() {
+        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap();
+        // At distance 2: 1 / (1 + 0.5 * 2 + 0.25 * 4) = 1/3.
+        assert!((arriving.color - Vec3::new(2.0, 4.0, 8.0) / 3.0).length() < 1e-6);
+        assert_eq!(arriving.to_light, DVec3::Y);
+    }
+
+    #[test]
+    fn the_range_window_is_gltfs() {
+        let full = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap().color;
+        let half = spot(4.0).illuminate(DVec3::Y).unwrap().color;
+        assert!((half - full * (1.0 - 0.5f32.powi(4))).length() < 1e-6);
+        assert_eq!(spot(2.0).illuminate(DVec3::Y), None);
+    }
+
+    #[test]
+    fn the_cone_falls_off_between_its_angles() {
+        let (inner, outer) = (30f32.to_radians(), 60f32.to_radians());
+        let at = |degrees: f64| cone(degrees.to_radians().cos(), inner, outer);
+        assert_eq!([at(0.0), at(29.9), at(60.1), at(120.0)], [1.0, 1.0, 0.0, 0.0]);
+        // KHR_lights_punctual: ((cos 45 - cos 60) / (cos 30 - cos 60))^2.
+        let ramp = (0.5f64.sqrt() - 0.5) / (0.75f64.sqrt() - 0.5);
+        assert!((f64::from(at(45.0)) - ramp * ramp).abs() < 1e-6);
+        assert_eq!(cone(1.0, 0.5, 0.5), 1.0, "a cone without a soft edge is a number");
+    }
+
+    #[test]
+    fn at_the_light_itself_nothing_arrives() {
+        let light = Light::Point {
+            position: DVec3::ZERO,
+            color: Vec3::ONE,
+            attenuation: Attenuation::INVERSE_SQUARE,
+            range: 1.0,
+        };
+        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO), None);
+    }
+}

@@ -1,0 +1,256 @@
+//! What stands where a ray hit: position, normals, parameters.
+//!
+//! A [`Hit`] is trusted for its ids alone. Position and parameters are computed again from the primitive, in f64 and by
+//! one piece of code, so where two engines name the same primitive they give the same [`SurfacePoint`] to the bit. The
+//! simpler way, `origin + t * direction` from the engine's t, would carry every engine's own rounding into the picture
+//! and put the point off the surface by an error that grows with the distance travelled.
+
+use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, gamma};
+use crate::ray::{Hit, Ray};
+use crate::scene::{Geometry, Mesh, Scene};
+use crate::shape::{Shape, ShapeHit};
+use crate::trace::{Placement, Primitives, World};
+
+/// Chained roundings of an f32 ray-triangle test, in both its forms (Möller and Trumbore 1997; Woop, Benthin and Wald
+/// 2013): differences from the ray's origin or a corner, a cross product, a dot product; doubled for the sums over
+/// three axes and rounded up.
+const TEST_ROUNDINGS: u32 = 32;
+
+/// What of a surface is wanted besides its position and its geometric normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Attributes {
+    /// Interpolated shading normals.
+    pub normals: bool,
+    /// Texture coordinates.
+    pub uvs: bool,
+    /// Vertex colours.
+    pub colors: bool,
+}
+
+impl Attributes {
+    /// Everything that the scene has.
+    pub const ALL: Self = Self { normals: true, uvs: true, colors: true };
+}
+
+/// A point on a surface, as seen along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Distance from the ray's origin in units of its direction.
+    pub t: f64,
+    /// The hit's parameters: weights of a triangle's second and third corner; a shape's own.
+    pub parameters: [f64; 2],
+    /// Where, in world coordinates (recentred scene units).
+    pub position: DVec3,
+    /// How far along the normal the surface may seem to be from `position` to an f32 intersection test.
+    pub error: f64,
+    /// Unit geometric normal, turned towards the viewer.
+    pub normal: DVec3,
+    /// Unit shading normal, on the same side; the geometric normal where the mesh has none or it is zero.
+    pub shading_normal: DVec3,
+    /// Whether the viewer sees the front: triangles wind counter-clockwise (clockwise under a mirroring transform),
+    /// shapes are seen from outside.
+    pub front: bool,
+    /// Texture coordinates, v up; zero where there are none.
+    pub uv: Vec2,
+    /// Linear RGBA of the vertices; white where there is none.
+    pub color: Vec4,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+}
+
+impl SurfacePoint {
+    /// The point that `hit` names on `ray`.
+    pub fn new(scene: &Scene, world: &World, ray: &Ray, hit: &Hit, attributes: Attributes) -> Self {
+        let (part, placement) = world.locate(hit);
+        let geometry = &scene.geometries[hit.geometry as usize];
+        let transform = &scene.instances[hit.instance as usize].transform;
+        let mut point = match &part.primitives {
+            Primitives::Triangles { positions, triangles } => {
+                let corners = triangles[hit.primitive as usize].map(|i| positions[i as usize].as_dvec3());
+                let mut point = on_triangle(ray, placement, corners);
+                if transform.matrix3.determinant() < 0.0 {
+                    point.front = !point.front;
+                }
+                if let Geometry::Mesh(mesh) = geometry {
+                    point.interpolate(mesh, hit.primitive, &transform.matrix3, attributes);
+                }
+                point
+            }
+            Primitives::Shapes(shapes) => on_shape(ray, placement, &shapes[hit.primitive as usize], hit.t),
+        };
+        point.material = geometry.material();
+        point
+    }
+
+    /// A point with everything that follows from where it is and which way it faces.
+    fn facing(ray: &Ray, position: DVec3, outwards: DVec3, error: f64) -> Self {
+        let direction = ray.direction.as_dvec3();
+        let front = outwards.dot(direction) <= 0.0;
+        let normal = if front { outwards } else { -outwards };
+        Self {
+            t: (position - ray.origin.as_dvec3()).dot(direction) / direction.length_squared(),
+            parameters: [0.0; 2],
+            position,
+            error,
+            normal,
+            shading_normal: normal,
+            front,
+            uv: Vec2::ZERO,
+            color: Vec4::ONE,
+            material: 0,
+        }
+    }
+
+    /// Fills in what the mesh gives at its vertices. `linear` is the linear part of its transform.
+    fn interpolate(&mut self, mesh: &Mesh, triangle: u32, linear: &DMat3, attributes: Attributes) {
+        let corners = mesh.triangles[triangle as usize].map(|i| i as usize);
+        let [u, v] = self.parameters;
+        let weights = [1.0 - u - v, u, v];
+        if attributes.normals && !mesh.normals.is_empty() {
+            let normal = (0..3).map(|k| mesh.normals[corners[k]].as_dvec3() * weights[k]).sum::<DVec3>();
+            if let Some(normal) = (cofactor(linear) * normal).try_normalize() {
+                self.shading_normal = if normal.dot(self.normal) < 0.0 { -normal } else { normal };
+            }
+        }
+        if attributes.uvs && !mesh.uvs.is_empty() {
+            let uv = (0..3).map(|k| mesh.uvs[corners[k]].as_dvec2() * weights[k]).sum::<glam::DVec2>();
+            self.uv = uv.as_vec2();
+        }
+        if attributes.colors && !mesh.colors.is_empty() {
+            let color = (0..3).map(|k| mesh.colors[corners[k]].as_dvec4() * weights[k]).sum::<glam::DVec4>();
+            self.color = color.as_vec4();
+        }
+    }
+
+    /// A ray that leaves the surface and does not meet it again at once.
+    ///
+    /// It starts beside `position` by the error bound, on the side `direction` points to, and every coordinate is
+    /// rounded away from the surface (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 3.9; Wächter and
+    /// Binder 2019, *A fast and robust method for avoiding self-intersection*). A fixed epsilon would be too small for
+    /// large scenes and would lose the shadows of small ones.
+    pub fn spawn(&self, direction: Vec3, tmax: f32) -> Ray {
+        Ray { origin: self.start(direction.as_dvec3()), direction, tmin: 0.0, tmax }
+    }
+
+    /// A ray that leaves the surface and ends just short of `target` (world coordinates), at t = 1.
+    pub fn spawn_to(&self, target: DVec3) -> Ray {
+        let origin = self.start(target - self.position);
+        let direction = (target - origin.as_dvec3()).as_vec3();
+        Ray { origin, direction, tmin: 0.0, tmax: 1.0 - gamma(TEST_ROUNDINGS) }
+    }
+
+    fn start(&self, direction: DVec3) -> Vec3 {
+        let away = if direction.dot(self.normal) >= 0.0 { self.normal } else { -self.normal };
+        let exact = self.position + away * self.error;
+        Vec3::from_array([0, 1, 2].map(|axis| round_towards(exact[axis], away[axis])))
+    }
+}
+
+/// The nearest f32 that is not on the other side of `x` than `side` points to.
+fn round_towards(x: f64, side: f64) -> f32 {
+    let rounded = x as f32;
+    if side > 0.0 && f64::from(rounded) < x {
+        rounded.next_up()
+    } else if side < 0.0 && f64::from(rounded) > x {
+        rounded.next_down()
+    } else {
+        rounded
+    }
+}
+
+fn on_triangle(ray: &Ray, placement: Option<&Placement>, local: [DVec3; 3]) -> SurfacePoint {
+    let to_world = placement.map(|p| p.to_world.as_daffine3());
+    let [a, b, c] = to_world.map_or(local, |m| local.map(|p| m.transform_point3(p)));
+    let (e1, e2) = (b - a, c - a);
+    let [u, v] = barycentrics(ray, a, e1, e2);
+    let position = a + e1 * u + e2 * v;
+    let cross = e1.cross(e2);
+    // Without an area the triangle faces the viewer.
+    let outwards = cross.try_normalize().unwrap_or_else(|| -ray.direction.as_dvec3().normalize());
+
+    // An f32 test takes the distance from the plane as a triple product of edges and origin - corner. Its rounding
+    // error is proportional to the longest edge cubed, over twice the area: for slivers, more than the edge. Where
+    // that leaves no sensible offset, an eighth of the edge is the most that is spent.
+    let longest = e1.length().max(e2.length()).max((c - b).length());
+    let condition = longest * longest / cross.length();
+    let relative = (f64::from(gamma(TEST_ROUNDINGS)) * condition).min(0.125);
+    let error = relative * longest + rounding_error(position, outwards, placement);
+    SurfacePoint { parameters: [u, v], ..SurfacePoint::facing(ray, position, outwards, error) }
+}
+
+/// Weights of the second and the third corner where the ray meets the triangle's plane (Möller and Trumbore 1997,
+/// *Fast, minimum storage ray/triangle intersection*), clamped to the triangle: an f32 engine may name a triangle that
+/// the ray misses by a rounding error.
+fn barycentrics(ray: &Ray, a: DVec3, e1: DVec3, e2: DVec3) -> [f64; 2] {
+    let (from_a, direction) = (ray.origin.as_dvec3() - a, ray.direction.as_dvec3());
+    let p = direction.cross(e2);
+    let determinant = e1.dot(p);
+    let (u, v) = (from_a.dot(p) / determinant, direction.dot(from_a.cross(e1)) / determinant);
+    if !(u.is_finite() && v.is_finite()) {
+        // The ray lies in the plane: any point of the triangle is as good.
+        return [1.0 / 3.0; 2];
+    }
+    let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
+    let sum = (u + v).max(1.0);
+    [u / sum, v / sum]
+}
+
+fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> SurfacePoint {
+    let to_object = placement.map_or(DAffine3::IDENTITY, |p| p.to_object);
+    let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let local = Ray {
+        origin: to_object.transform_point3(origin).as_vec3(),
+        direction: to_object.transform_vector3(direction).as_vec3(),
+        ..*ray
+    };
+    // A named shape that f64 says is missed is met where the ray comes closest to what the engine said.
+    let root = select_root(shape, &local, t).unwrap_or(ShapeHit { t: f64::from(t), uv: Vec2::ZERO });
+    let on_shape = local.origin.as_dvec3() + local.direction.as_dvec3() * root.t;
+    let position = to_world.transform_point3(on_shape);
+    let normal = cofactor(&to_world.matrix3) * shape.normal(on_shape);
+    let outwards = normal.try_normalize().unwrap_or_else(|| -direction.normalize());
+    let extent = to_world.matrix3 * shape.bounds().size().as_dvec3();
+    let error = f64::from(gamma(TEST_ROUNDINGS)) * extent.length() + rounding_error(position, outwards, placement);
+    SurfacePoint {
+        parameters: [f64::from(root.uv.x), f64::from(root.uv.y)],
+        uv: root.uv,
+        ..SurfacePoint::facing(ray, position, outwards, error)
+    }
+}
+
+/// Of the first two intersections the one nearest to `t`.
+fn select_root(shape: &Shape, ray: &Ray, t: f32) -> Option<ShapeHit> {
+    let whole = Ray { tmax: f32::INFINITY, ..*ray };
+    let first = shape.intersect(&whole)?;
+    let beyond = Ray { tmin: (first.t as f32).next_up(), ..whole };
+    let distance = |hit: &ShapeHit| (hit.t - f64::from(t)).abs();
+    match shape.intersect(&beyond) {
+        Some(second) if distance(&second) < distance(&first) => Some(second),
+        _ => Some(first),
+    }
+}
+
+/// How far along `normal` f32 rounding may move a ray's origin at `position` on its way to the primitive: by the
+/// rounding of its coordinates and, for a placed primitive, by the transform to the object and back.
+fn rounding_error(position: DVec3, normal: DVec3, placement: Option<&Placement>) -> f64 {
+    let mut error = DVec3::splat(position.abs().max_element());
+    if let Some(placement) = placement {
+        let to_world = placement.to_world.as_daffine3();
+        let inverse = &placement.to_object;
+        let local = inverse.matrix3.abs() * position.abs() + inverse.translation.abs();
+        error += to_world.matrix3.abs() * local + to_world.translation.abs();
+    }
+    f64::from(gamma(TEST_ROUNDINGS)) * error.dot(normal.abs())
+}
+
+/// The matrix that turns normals as `m` turns surfaces: the inverse transpose times the determinant's magnitude. Needs
+/// no division, and keeps outward normals outward under a mirroring.
+fn cofactor(m: &DMat3) -> DMat3 {
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { -cofactors } else { cofactors }
+}
+
+#[cfg(test)]
+#[path = "surface_tests.rs"]
+mod tests;

@@ -1,0 +1,116 @@
+//! Looking a colour up in an image.
+//!
+//! Texels are decoded to linear light before they are mixed: mixing sRGB codes would darken every edge between light
+//! and dark.
+
+use crate::image::srgb::srgb_to_linear;
+use crate::math::{Vec2, Vec4};
+use crate::scene::{Filter, Texture, Wrap};
+
+/// The linear RGBA colour at `uv` (v up). White for an image without pixels and for coordinates that are not finite.
+pub fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
+    let st = uv * texture.scale + texture.offset;
+    if texture.pixels.is_empty() || !st.is_finite() {
+        return Vec4::ONE;
+    }
+    // Texel centres lie at half-integers; the first row is at the top, v = 1.
+    let x = st.x * texture.width as f32;
+    let y = (1.0 - st.y) * texture.height as f32;
+    match texture.filter {
+        Filter::Nearest => texel(texture, index(x), index(y)),
+        Filter::Linear => {
+            let (x, y) = (x - 0.5, y - 0.5);
+            let (left, top) = (index(x), index(y));
+            let (fx, fy) = (x - x.floor(), y - y.floor());
+            let row = |y| texel(texture, left, y) * (1.0 - fx) + texel(texture, left + 1, y) * fx;
+            row(top) * (1.0 - fy) + row(top + 1) * fy
+        }
+    }
+}
+
+/// The texel that holds a coordinate. Far outside any image every f32 is an integer, and which one no longer matters.
+fn index(x: f32) -> i64 {
+    x.floor().clamp(-1e15, 1e15) as i64
+}
+
+fn texel(texture: &Texture, x: i64, y: i64) -> Vec4 {
+    let x = wrap(texture.wrap_u, x, i64::from(texture.width));
+    let y = wrap(texture.wrap_v, y, i64::from(texture.height));
+    let [r, g, b, a] = texture.pixels[(y * i64::from(texture.width) + x) as usize];
+    Vec4::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), f32::from(a) / 255.0)
+}
+
+/// Brings an index into `0..size`.
+fn wrap(wrap: Wrap, i: i64, size: i64) -> i64 {
+    match wrap {
+        Wrap::Repeat => i.rem_euclid(size),
+        Wrap::Mirror => {
+            let i = i.rem_euclid(2 * size);
+            if i < size { i } else { 2 * size - 1 - i }
+        }
+        Wrap::Clamp => i.clamp(0, size - 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2 x 2: black, white / red, half-transparent sRGB 188.
+    fn checker(wrap: Wrap, filter: Filter) -> Texture {
+        Texture {
+            width: 2,
+            height: 2,
+            pixels: vec![[0, 0, 0, 255], [255; 4], [255, 0, 0, 255], [188, 188, 188, 51]],
+            wrap_u: wrap,
+            wrap_v: wrap,
+            filter,
+            scale: Vec2::ONE,
+            ..Texture::default()
+        }
+    }
+
+    #[test]
+    fn texel_centres_give_their_own_colour_with_both_filters() {
+        for filter in [Filter::Nearest, Filter::Linear] {
+            let texture = checker(Wrap::Repeat, filter);
+            assert_eq!(sample(&texture, Vec2::new(0.25, 0.75)), Vec4::new(0.0, 0.0, 0.0, 1.0));
+            assert_eq!(sample(&texture, Vec2::new(0.75, 0.75)), Vec4::ONE);
+            assert_eq!(sample(&texture, Vec2::new(0.25, 0.25)), Vec4::new(1.0, 0.0, 0.0, 1.0));
+            let grey = sample(&texture, Vec2::new(0.75, 0.25));
+            // sRGB 188 is close to half the light, as everybody's table says.
+            assert!((grey.x - 0.502_886_5).abs() < 1e-6, "{grey}");
+            assert_eq!(grey.w, 0.2);
+        }
+    }
+
+    #[test]
+    fn filtering_mixes_light_not_codes() {
+        let texture = checker(Wrap::Clamp, Filter::Linear);
+        assert_eq!(sample(&texture, Vec2::new(0.5, 0.75)), Vec4::new(0.5, 0.5, 0.5, 1.0));
+    }
+
+    #[test]
+    fn wraps() {
+        let at = |wrap, u| sample(&checker(wrap, Filter::Nearest), Vec2::new(u, 0.75)).x;
+        for (wrap, expected) in [
+            (Wrap::Repeat, [0.0, 1.0, 0.0, 1.0]),
+            (Wrap::Mirror, [1.0, 0.0, 1.0, 0.0]),
+            (Wrap::Clamp, [0.0, 0.0, 1.0, 1.0]),
+        ] {
+            assert_eq!([-0.75, -0.25, 1.25, 1.75].map(|u| at(wrap, u)), expected, "{wrap:?}");
+        }
+    }
+
+    #[test]
+    fn extreme_coordinates_do_not_panic() {
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for filter in [Filter::Nearest, Filter::Linear] {
+                for x in [f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 1e30, -0.0] {
+                    sample(&checker(wrap, filter), Vec2::new(x, -x));
+                }
+            }
+        }
+        assert_eq!(sample(&Texture::default(), Vec2::ZERO), Vec4::ONE);
+    }
+}

@@ -1,0 +1,267 @@
+//! The command line, as a user meets it: the binary is run.
+
+use std::process::{Command, Output};
+
+use clap::CommandFactory;
+use twincast::cli::Cli;
+
+fn twincast(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// Exit code and stderr.
+fn fails(args: &[&str]) -> (i32, String) {
+    let output = twincast(args);
+    (output.status.code().expect("no signal"), text(&output.stderr))
+}
+
+#[test]
+fn the_definition_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn help_names_every_command_and_flag() {
+    let help = twincast(&["--help"]);
+    assert!(help.status.success());
+    let help = text(&help.stdout);
+    for word in ["render", "completions", "man", "Exit codes:", "--version"] {
+        assert!(help.contains(word), "{word} in {help}");
+    }
+    let help = text(&twincast(&["render", "--help"]).stdout);
+    for flag in [
+        "--output",
+        "--backend",
+        "--size",
+        "--spp",
+        "--camera",
+        "--eye",
+        "--look-at",
+        "--up",
+        "--fov",
+        "--up-axis",
+        "--unit",
+        "--normals",
+        "--print-camera",
+        "--reference",
+        "--threshold",
+        "--threads",
+        "--seed",
+        "--stats",
+        "--packet",
+        "--tile-order",
+        "--background",
+        "--verbose",
+        "--quiet",
+        "Examples:",
+    ] {
+        assert!(help.contains(flag), "{flag} in {help}");
+    }
+    assert!(help.lines().all(|line| line.chars().count() <= 110), "{help}");
+}
+
+#[test]
+fn bad_usage_ends_with_2() {
+    for args in [
+        &["frobnicate"][..],
+        &["render"],
+        &["render", "x.glb"],
+        &["render", "x.glb", "-o", "x.png", "--size", "0x5"],
+        &["render", "x.glb", "-o", "x.png", "--size", "5"],
+        &["render", "x.glb", "-o", "x.png", "--spp", "0"],
+        &["render", "x.glb", "-o", "x.png", "--packet", "3"],
+        &["render", "x.glb", "-o", "x.png", "--backend", "cuda"],
+        &["render", "x.glb", "-o", "x.png", "--eye", "1,2"],
+        &["render", "x.glb", "-o", "x.png", "--fov", "40"],
+        &["render", "x.glb", "-o", "x.png", "--eye", "1,2,3", "--fov", "180"],
+        &["render", "x.glb", "-o", "x.png", "--camera", "front", "--eye", "1,2,3"],
+        &["render", "x.glb", "-o", "x.png", "--threshold", "0.1"],
+        &["render", "x.glb", "-o", "x.png", "--background", "-1,0,0"],
+        &["render", "x.glb", "-o", "x.png", "-v", "-q"],
+        &["completions", "dos"],
+    ] {
+        let (code, message) = fails(args);
+        assert!(code == 2 && message.starts_with("error: "), "{args:?}: {code} {message}");
+    }
+}
+
+#[test]
+fn a_missing_scene_ends_with_3_and_touches_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("out.png");
+    std::fs::write(&picture, "old").unwrap();
+    let scene = folder.path().join("missing.glb");
+    let (code, message) = fails(&["render", scene.to_str().unwrap(), "-o", picture.to_str().unwrap()]);
+    assert_eq!(code, 3, "{message}");
+    assert!(message.starts_with("error: ") && message.contains("missing.glb"), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    assert_eq!(std::fs::read_to_string(&picture).unwrap(), "old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left behind");
+}
+
+#[test]
+fn outputs_are_checked_before_the_scene_is_read() {
+    for place in ["/no/such/folder/out.png", "/tmp"] {
+        let (code, message) = fails(&["render", "missing.glb", "-o", place]);
+        assert!(code == 4 && message.contains(place), "{code} {message}");
+    }
+}
+
+#[cfg(not(feature = "embree"))]
+#[test]
+fn a_backend_that_is_not_built_ends_with_5() {
+    for backend in ["embree", "both"] {
+        let (code, message) = fails(&["render", "missing.glb", "-o", "out.png", "--backend", backend]);
+        assert!(code == 5 && message.contains("--features embree"), "{code} {message}");
+    }
+}
+
+#[test]
+fn completions_and_manual_come_from_the_same_definition() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = text(&twincast(&["completions", shell]).stdout);
+        assert!(script.contains("tile-order") && script.contains("print-camera"), "{shell}");
+    }
+    let page = text(&twincast(&["man"]).stdout);
+    assert!(page.starts_with(".ie") && page.contains(".TH twincast 1"), "{page}");
+    let folder = tempfile::tempdir().unwrap();
+    assert!(twincast(&["man", "--out", folder.path().to_str().unwrap()]).status.success());
+    let render = std::fs::read_to_string(folder.path().join("twincast-render.1")).unwrap();
+    assert!(render.contains("tile\\-order"), "{render}");
+    assert!(folder.path().join("twincast.1").is_file());
+    assert_eq!(fails(&["man", "--out", "/no/such/folder"]).0, 4);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let binary = env!("CARGO_BIN_EXE_twincast");
+    let script = format!("set -o pipefail; '{binary}' completions bash | true; exit ${{PIPESTATUS[0]}}");
+    let output = Command::new("bash").args(["-c", &script]).output().expect("bash runs");
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+}
+
+/// A folder with a small scene, and paths in it.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().expect("a folder for temporary files"));
+        let pyramid =
+            "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 1.5 0\nf 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
+        std::fs::write(folder.path("scene.obj"), pyramid).expect("a file in it");
+        folder
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    /// Renders the scene small, to the file of that name.
+    fn render(&self, output: &str, more: &[&str]) -> Output {
+        let (scene, output) = (self.path("scene.obj"), self.path(output));
+        let mut args = vec!["render", &scene, "-o", &output];
+        if !more.contains(&"--size") {
+            args.extend(["--size", "60x40"]);
+        }
+        args.extend(more);
+        twincast(&args)
+    }
+
+    fn picture(&self, name: &str) -> twincast::Image {
+        twincast::image::read(self.path(name).as_ref()).expect("a picture")
+    }
+}
+
+#[test]
+fn a_render_writes_pictures_and_statistics_and_says_so() {
+    let folder = Folder::new();
+    let (png, stats) = (folder.path("out.png"), folder.path("stats.json"));
+    let output = folder.render("out.exr", &["-o", &png, "--stats", &stats, "-v", "-t", "1", "--spp", "3"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(output.stderr.is_empty(), "no bar where there is no terminal: {}", text(&output.stderr));
+    let summary = text(&output.stdout);
+    for words in ["6 triangles", "native", "60x40, 3 samples a pixel, 1 thread\n", "7,200 camera + 0 shadow", "out.png"]
+    {
+        assert!(summary.contains(words), "{words} in {summary}");
+    }
+    let (linear, codes) = (folder.picture("out.exr"), folder.picture("out.png"));
+    assert_eq!((linear.width, linear.height), (60, 40));
+    assert!(linear.pixels.iter().any(|p| p.w == 1.0) && linear.pixels.iter().any(|p| p.w == 0.0));
+    assert!(linear.difference(&codes).expect("one size").rmse < 0.01);
+
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(stats).unwrap()).expect("JSON");
+    assert_eq!((&stats["triangles"], &stats["threads"], &stats["spp"]), (&6.into(), &1.into(), &3.into()));
+    assert_eq!(stats["engines"][0]["rays"]["camera"], 7200);
+    for number in ["load_seconds", "write_seconds", "peak_memory"] {
+        assert!(stats[number].as_f64().is_some_and(|x| x > 0.0), "{number}: {stats}");
+    }
+    assert!(stats["engines"][0]["bytes_per_triangle"].as_f64().is_some_and(|x| x > 12.0), "{stats}");
+}
+
+#[test]
+fn threads_tile_orders_and_packets_give_the_same_file() {
+    let folder = Folder::new();
+    folder.render("a.exr", &["-t", "1", "--tile-order", "scanline"]);
+    for flags in [&["-t", "2"][..], &["-t", "3", "--tile-order", "spiral"], &["--packet", "16", "-q"]] {
+        assert!(folder.render("b.exr", flags).status.success());
+        assert_eq!(folder.picture("a.exr"), folder.picture("b.exr"), "{flags:?}");
+    }
+    assert!(folder.render("c.exr", &["--seed", "1", "-q"]).stdout.is_empty(), "-q says nothing");
+    assert_ne!(folder.picture("a.exr"), folder.picture("c.exr"));
+}
+
+#[test]
+fn a_printed_camera_gives_the_picture_again() {
+    let folder = Folder::new();
+    let scene = folder.path("scene.obj");
+    let output = twincast(&["render", &scene, "--print-camera", "--size", "60x40"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let flags = text(&output.stdout);
+    let flags: Vec<_> = flags.split_whitespace().collect();
+    assert_eq!(flags.len(), 8, "nothing but the flags: {flags:?}");
+    folder.render("framed.exr", &[]);
+    assert!(folder.render("again.exr", &flags).status.success());
+    assert_eq!(folder.picture("framed.exr").difference(&folder.picture("again.exr")).unwrap().differing, 0);
+}
+
+#[test]
+fn a_reference_that_differs_ends_with_1_and_the_picture_is_written() {
+    let folder = Folder::new();
+    assert!(folder.render("reference.exr", &[]).status.success());
+    let reference = folder.path("reference.exr");
+    let same = folder.render("same.exr", &["--reference", &reference, "--threshold", "0.001"]);
+    assert!(same.status.success() && text(&same.stdout).contains("within 0.001"), "{}", text(&same.stderr));
+    let other = folder.render("other.exr", &["--reference", &reference, "--eye", "0,3,4"]);
+    assert_eq!(other.status.code(), Some(1));
+    assert!(text(&other.stderr).contains("above 0.01"), "{}", text(&other.stderr));
+    assert_eq!(folder.picture("other.exr").width, 60);
+    let larger = folder.render("larger.exr", &["--reference", &reference, "--size", "61x40"]);
+    assert_eq!(larger.status.code(), Some(2), "two sizes in one command");
+    let missing = folder.render("missing.exr", &["--reference", "no-such.exr"]);
+    assert_eq!(missing.status.code(), Some(3));
+}
+
+#[test]
+fn cameras_that_do_not_exist_are_named() {
+    let folder = Folder::new();
+    let output = folder.render("out.exr", &["--camera", "front"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("no camera \"front\""), "{}", text(&output.stderr));
+    assert!(!std::fs::exists(folder.path("out.exr")).unwrap());
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn both_engines_render_and_agree() {
+    let folder = Folder::new();
+    let output = folder.render("both.exr", &["--backend", "both"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let summary = text(&output.stdout);
+    assert!(summary.contains("native") && summary.contains("embree") && summary.contains("check"), "{summary}");
+    assert!(folder.render("native.exr", &[]).status.success());
+    assert_eq!(folder.picture("both.exr"), folder.picture("native.exr"));
+}

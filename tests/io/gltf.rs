@@ -1,0 +1,305 @@
+//! glTF and GLB.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use serde_json::{Value, json};
+use twincast::math::{DVec3, Vec2, Vec3};
+use twincast::scene::{Attenuation, Filter, Light, Wrap};
+
+use super::{Files, corners, meshes, obj, refused};
+
+/// Three positions (36 bytes), three 16-bit indices and padding (8), three normals (36), three uvs (24).
+pub fn triangle_bytes() -> Vec<u8> {
+    let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
+    bytes.extend([0, 0, 1, 0, 2, 0, 0, 0]);
+    bytes.extend(floats(&[0., 0., 1., 0., 0., 1., 0., 0., 2.]));
+    bytes.extend(floats(&[0., 0., 1., 0., 0., 0.25]));
+    bytes
+}
+
+fn data_uri(kind: &str, bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digit = |group: &[u8], k: usize| {
+        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        if k > group.len() { '=' } else { char::from(DIGITS[(bits >> (18 - 6 * k) & 63) as usize]) }
+    };
+    let text: String = bytes.chunks(3).flat_map(|group| (0..4).map(move |k| digit(group, k))).collect();
+    format!("data:{kind};base64,{text}")
+}
+
+/// A good file with most of what is read.
+fn document() -> Value {
+    json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "directional", "intensity": 3.0},
+            {"type": "point", "color": [1.0, 0.5, 0.0], "intensity": 2.0, "range": 7.0},
+            {"type": "spot", "spot": {"innerConeAngle": 0.25, "outerConeAngle": 0.5}},
+        ]}},
+        "scene": 1,
+        "scenes": [{}, {"nodes": [0, 3]}],
+        "nodes": [
+            {"name": "root", "translation": [10000000.25, 0.0, 0.0], "children": [1, 2]},
+            {"name": "turned", "rotation": [0.0, FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2], "scale": [1.0, -2.0, 1.0], "mesh": 0},
+            {"name": "lamp", "matrix": [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 5, 0, 1],
+             "extensions": {"KHR_lights_punctual": {"light": 2}}},
+            {"name": "eye", "translation": [0.0, 0.0, 4.0], "camera": 0, "children": [4, 5]},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}],
+        "meshes": [{"name": "patch", "primitives": [
+            {"attributes": {"POSITION": 0, "NORMAL": 2, "TEXCOORD_0": 3}, "indices": 1, "material": 0},
+            {"attributes": {"POSITION": 0}, "mode": 5},
+        ]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 3, "componentType": 5126, "count": 3, "type": "VEC2"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 6},
+            {"buffer": 0, "byteOffset": 44, "byteLength": 36, "byteStride": 12},
+            {"buffer": 0, "byteOffset": 80, "byteLength": 24},
+        ],
+        "buffers": [{"byteLength": 104, "uri": data_uri("application/octet-stream", &triangle_bytes())}],
+        "materials": [{
+            "name": "gold",
+            "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.5, 0.25, 1.0], "metallicFactor": 0.5,
+                "roughnessFactor": 0.5, "baseColorTexture": {"index": 0}},
+            "emissiveFactor": [0.0, 0.5, 0.0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        }],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}],
+        "images": [{"name": "two", "uri": data_uri("image/png", &obj::picture())}],
+    })
+}
+
+/// The good file as text.
+pub fn rich() -> String {
+    document().to_string()
+}
+
+/// The same for a GLB.
+pub fn rich_with_binary() -> String {
+    let mut document = document();
+    document["buffers"] = json!([{"byteLength": 104}]);
+    document.to_string()
+}
+
+/// A GLB file.
+pub fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let mut bytes = b"glTF".to_vec();
+    bytes.extend([word(2), word(28 + json.len() + binary.len()), word(json.len())].concat());
+    bytes.extend(b"JSON");
+    bytes.extend(&json);
+    bytes.extend(word(binary.len()));
+    bytes.extend(b"BIN\0");
+    bytes.extend(binary);
+    bytes
+}
+
+/// The good file, changed: each pointer's value is replaced.
+fn changed(changes: &[(&str, Value)]) -> Files {
+    let mut document = document();
+    for (pointer, value) in changes {
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        let parent = document.pointer_mut(parent).unwrap_or_else(|| panic!("no {pointer}"));
+        match key.parse::<usize>() {
+            Ok(index) => parent[index] = value.clone(),
+            Err(_) => parent[key] = value.clone(),
+        }
+    }
+    Files::one("a.gltf", document.to_string())
+}
+
+#[test]
+fn everything_is_where_it_belongs() {
+    let text = Files::one("a.gltf", rich()).scene("a.gltf");
+    let binary = Files::one("a.glb", glb(&rich_with_binary(), &triangle_bytes())).scene("a.glb");
+    for scene in [text, binary] {
+        let triangle = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+        let shapes = meshes(&scene);
+        assert!(shapes.len() == 2 && shapes.iter().all(|m| corners(m) == triangle && m.name == "patch"));
+        assert_eq!(shapes[0].normals, [Vec3::Z; 3]);
+        assert_eq!(shapes[0].uvs, [Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(0.0, 0.75)], "v points up");
+        assert_eq!((scene.groups.len(), scene.groups[0].geometries.clone(), scene.instances.len()), (1, 0..2, 1));
+        // x is turned to -z, y is mirrored and doubled, and f32 would have lost the quarter.
+        let place = |p| scene.instances[0].transform.transform_point3(p);
+        assert!(place(DVec3::X).abs_diff_eq(DVec3::new(10_000_000.25, 0.0, -1.0), 1e-9), "{}", place(DVec3::X));
+        assert!(place(DVec3::Y).abs_diff_eq(DVec3::new(10_000_000.25, -2.0, 0.0), 1e-9));
+
+        let gold = &scene.materials[0];
+        assert_eq!((gold.name.as_str(), gold.diffuse), ("gold", Vec3::new(0.5, 0.25, 0.125)));
+        assert!(gold.specular.abs_diff_eq(Vec3::new(0.52, 0.27, 0.145), 1e-6), "{}", gold.specular);
+        assert_eq!((gold.shininess, gold.emission), (30.0, Vec3::new(0.0, 2.0, 0.0)));
+        let texture = &scene.textures[gold.diffuse_texture.unwrap() as usize];
+        assert_eq!((texture.wrap_u, texture.wrap_v, texture.filter), (Wrap::Clamp, Wrap::Mirror, Filter::Nearest));
+        assert_eq!((texture.name.as_str(), &texture.pixels[..]), ("two", &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
+
+        let eye = &scene.cameras[0];
+        assert_eq!((eye.name.as_str(), eye.eye, eye.fov_y), ("eye", DVec3::new(0.0, 0.0, 4.0), 0.5));
+        assert_eq!(eye.frame, twincast::math::DMat3::IDENTITY);
+        let pi = std::f32::consts::PI;
+        let [Light::Spot { position, direction, color, inner_angle, outer_angle, .. }, sun, bulb] = &scene.lights[..]
+        else {
+            panic!("{:?}", scene.lights)
+        };
+        assert_eq!((*position, *direction), (DVec3::new(10_000_000.25, 5.0, 0.0), DVec3::Y));
+        assert!((color.x - 1.0 / pi).abs() < 1e-7 && (*inner_angle, *outer_angle) == (0.25, 0.5));
+        let Light::Directional { direction, color } = sun else { panic!("{sun:?}") };
+        assert!(*direction == DVec3::NEG_Z && color.abs_diff_eq(Vec3::splat(3.0 / pi), 1e-6));
+        let Light::Point { position, color, attenuation, range } = bulb else { panic!("{bulb:?}") };
+        assert!(color.abs_diff_eq(Vec3::new(2.0, 1.0, 0.0) / pi, 1e-6));
+        let expected = (DVec3::new(0.0, 0.0, 4.0), Attenuation::INVERSE_SQUARE, 7.0);
+        assert_eq!((*position, *attenuation, *range), expected);
+    }
+}
+
+#[test]
+fn files_beside_it() {
+    let uris = [("/buffers/0/uri", json!("my%20data.bin")), ("/images/0/uri", json!("pic%2Epng"))];
+    let files = changed(&uris).and("my data.bin", triangle_bytes()).and("pic.png", obj::picture());
+    assert_eq!(files.scene("a.gltf").textures.len(), 1);
+    std::fs::remove_file(files.path("pic.png")).unwrap();
+    let (scene, warnings) = files.load("a.gltf");
+    assert_eq!((scene.materials[0].diffuse_texture, warnings.len()), (None, 1));
+    assert!(warnings[0].place == "/images/0/uri" && warnings[0].message.contains("pic.png"), "{}", warnings[0]);
+    std::fs::remove_file(files.path("my data.bin")).unwrap();
+    refused(&files, "a.gltf", "/buffers/0/uri", "my data.bin");
+}
+
+#[test]
+fn sparse_accessors() {
+    // Two of three positions of an accessor without a view are replaced: from the index bytes 1, 2.
+    let sparse = json!({"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {"count": 2,
+        "indices": {"bufferView": 4, "componentType": 5123}, "values": {"bufferView": 0, "byteOffset": 12}}});
+    let mut document = document();
+    document["accessors"][0] = sparse;
+    document["bufferViews"][4] = Value::Null;
+    document["bufferViews"] = Value::Array(
+        document["bufferViews"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|v| !v.is_null())
+            .cloned()
+            .chain([json!({"buffer": 0, "byteOffset": 38, "byteLength": 4})])
+            .collect(),
+    );
+    let files = Files::one("a.gltf", document.to_string());
+    assert_eq!(corners(meshes(&files.scene("a.gltf"))[0]), [[Vec3::ZERO, Vec3::X, Vec3::Y]]);
+    document["accessors"][0]["sparse"]["count"] = json!(4);
+    refused(&Files::one("a.gltf", document.to_string()), "a.gltf", "/accessors/0/sparse/count", "4 of only 3");
+    document["accessors"][0]["sparse"]["count"] = json!(3);
+    refused(&Files::one("a.gltf", document.to_string()), "a.gltf", "/accessors/0/sparse/indices", "past the view's 4");
+}
+
+#[test]
+fn deep_hierarchies() {
+    let mut nodes: Vec<Value> =
+        (1..100_000).map(|child| json!({"children": [child], "translation": [1, 0, 0]})).collect();
+    nodes.push(json!({"mesh": 0}));
+    let files = changed(&[("/nodes", json!(nodes)), ("/scenes/1/nodes", json!([0]))]);
+    assert_eq!(files.scene("a.gltf").instances[0].transform.translation.x, 99_999.0);
+}
+
+#[test]
+fn what_is_not_rendered_is_a_warning() {
+    let say = |changes: &[(&str, Value)], place: &str, words: &str| {
+        let (_, warnings) = changed(changes).load("a.gltf");
+        assert!(warnings.len() == 1, "{warnings:?}");
+        assert!(warnings[0].place == place && warnings[0].message.contains(words), "{}", warnings[0]);
+    };
+    say(&[("/materials/0/alphaMode", json!("BLEND"))], "/materials", "gold");
+    say(&[("/meshes/0/primitives/1/mode", json!(1))], "/meshes", "1 primitives are points or lines");
+    say(&[("/meshes/0/primitives/1/targets", json!([{}]))], "/meshes", "morph");
+    say(&[("/nodes/1/skin", json!(0))], "/skins", "skins");
+    say(&[("/extensionsUsed", json!(["EXT_new", "KHR_lights_punctual"]))], "/extensionsUsed", "EXT_new");
+    say(&[("/cameras/0", json!({"type": "orthographic"}))], "/cameras/0", "orthographic");
+    let two = json!([{"attributes": {"POSITION": 0}}]);
+    let nodes = json!([{"mesh": 0}, {"mesh": 0, "scale": [1, 0, 1], "name": "flat"}, {}, {}]);
+    say(
+        &[("/nodes", nodes), ("/scenes/1/nodes", json!([0, 1])), ("/meshes/0/primitives", two)],
+        "/nodes/1",
+        "\"flat\" is scaled by zero",
+    );
+}
+
+#[test]
+fn faults_are_told_with_their_pointer() {
+    let fault = |pointer: &str, value: Value, place: &str, words: &str| {
+        refused(&changed(&[(pointer, value)]), "a.gltf", place, words);
+    };
+    fault("/extensionsRequired", json!(["KHR_lights_punctual", "EXT_new"]), "/extensionsRequired/1", "\"EXT_new\"");
+    fault("/asset/version", json!("1.0"), "/asset/version", "2.x");
+    fault("/bufferViews/0/byteLength", json!(105), "/accessors/0/bufferView", "past its buffer's 104");
+    fault("/bufferViews/0/byteOffset", json!(u64::MAX), "/accessors/0/bufferView", "past its buffer's 104");
+    fault("/bufferViews/0/buffer", json!(1), "/accessors/0/bufferView", "buffer 1");
+    fault("/bufferViews/2/byteStride", json!(3), "/accessors/2/bufferView", "multiple of 4");
+    fault("/bufferViews/2/byteStride", json!(8), "/accessors/2/bufferView", "less than an element's 12");
+    fault("/accessors/0/count", json!(4), "/accessors/0/count", "past the view's 36");
+    fault("/accessors/0/count", json!(4_000_000_000u32), "/accessors/0/count", "past the view's 36");
+    fault("/accessors/0/byteOffset", json!(2), "/accessors/0/byteOffset", "no multiple");
+    fault("/accessors/0/type", json!("VEC2"), "/accessors/0/type", "VEC3 belongs");
+    fault("/accessors/0/componentType", json!(5127), "/accessors/0/componentType", "5127");
+    fault("/accessors/1/componentType", json!(5122), "/accessors/1/componentType", "unsigned");
+    fault("/accessors/2/count", json!(2), "/accessors/2/count", "2 elements for 3 positions");
+    fault("/bufferViews/1/byteOffset", json!(8), "/accessors/1", "is past the 3 vertices");
+    fault(
+        "/accessors/0",
+        json!({"componentType": 5126, "count": 100_000_000, "type": "VEC3"}),
+        "/accessors/0/count",
+        "without data",
+    );
+    fault("/meshes/0/primitives/0/attributes/POSITION", json!(9), "/accessors", "no accessor 9");
+    fault("/meshes/0/primitives/0/attributes", json!({}), "/meshes/0/primitives/0/attributes", "POSITION is missing");
+    fault("/meshes/0/primitives/0/mode", json!(7), "/meshes/0/primitives/0/mode", "mode 7");
+    fault("/meshes/0/primitives/0/material", json!(1), "/meshes/0/primitives/0/material", "no material 1");
+    fault("/nodes/1/children", json!([0]), "/nodes/1/children/0", "child of itself");
+    fault("/nodes/3/children", json!([1]), "/nodes/3/children/0", "two nodes");
+    fault("/nodes/0/children", json!([6]), "/nodes/0/children/0", "no node 6; there are 6");
+    fault("/nodes/1/mesh", json!(1), "/nodes/1/mesh", "no mesh 1");
+    fault("/nodes/1/rotation", json!([0, 0, 0, 0]), "/nodes/1/rotation", "unit quaternion");
+    fault("/nodes/2/matrix/15", json!(2), "/nodes/2/matrix", "0 0 0 1");
+    fault("/nodes/3/camera", json!(1), "/nodes/3/camera", "no camera 1");
+    fault("/cameras/0/perspective/yfov", json!(4), "/cameras/0/perspective/yfov", "between 0 and pi");
+    fault("/scene", json!(2), "/scene", "no scene 2");
+    fault("/materials/0/pbrMetallicRoughness/metallicFactor", json!(2), "/materials/0", "from 0 to 1");
+    fault("/textures/0/source", json!(1), "/textures/0/source", "no image 1");
+    fault(
+        "/images/0/uri",
+        json!(data_uri("image/png", &obj::huge_picture())),
+        "/images/0",
+        "\"two\" claims 100000 x 100000",
+    );
+    fault("/images/0/uri", json!("http://example.org/a.png"), "/images/0", "relative path");
+    fault("/buffers/0/byteLength", json!(105), "/buffers/0/byteLength", "promises 105 bytes, but has 104");
+    fault("/buffers/0", json!({"byteLength": 104}), "/buffers/0/uri", "neither");
+    fault("/scenes", json!([]), "/scenes", "nothing to render");
+    let files = Files::one("a.gltf", "{\n \"asset\": 3}");
+    refused(&files, "a.gltf", "line 2, column 11", "not valid glTF: invalid type");
+}
+
+#[test]
+fn truncated_containers() {
+    let whole = glb(&rich_with_binary(), &triangle_bytes());
+    let refused = |bytes: &[u8], place: &str, words: &str| super::refused_bytes("a.glb", bytes, place, words);
+    refused(&whole[..whole.len() - 1], "byte 8", "truncated GLB");
+    refused(&whole[..6], "byte 4", "truncated GLB");
+    let mut long = whole.clone();
+    long[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
+    refused(&long, "byte 12", "promises 4294967295 bytes");
+    let mut old = whole;
+    old[4] = 1;
+    refused(&old, "byte 4", "version 1");
+}

@@ -1,0 +1,166 @@
+//! Scene files: what is in the scene, and what is said about files that are wrong.
+
+pub mod gltf;
+mod models;
+pub mod obj;
+pub mod ply;
+pub mod stl;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+use twincast::io::{LoadOptions, Normals, Unit, UpAxis, load};
+use twincast::math::{DVec3, Vec3};
+use twincast::scene::{Geometry, Mesh};
+use twincast::{Error, Scene, Warning};
+
+/// A folder with files, which goes away with it.
+pub struct Files(TempDir);
+
+impl Files {
+    /// A folder with one file.
+    pub fn one(name: &str, bytes: impl AsRef<[u8]>) -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder")).and(name, bytes)
+    }
+
+    /// With one more file.
+    pub fn and(self, name: &str, bytes: impl AsRef<[u8]>) -> Self {
+        fs::write(self.path(name), bytes).expect("a file in a temporary folder");
+        self
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Loads a file that is expected to be good.
+    pub fn load(&self, name: &str) -> (Scene, Vec<Warning>) {
+        load(&self.path(name), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// Loads a file that is expected to be good, and to give no warnings.
+    pub fn scene(&self, name: &str) -> Scene {
+        let (scene, warnings) = self.load(name);
+        assert_eq!(warnings, []);
+        scene
+    }
+}
+
+/// Loads a file that is expected to be bad: an input error about the file itself, at the place, whose message has the
+/// words. Its exit code is 3 and it takes one line.
+#[track_caller]
+pub fn refused(files: &Files, name: &str, place: &str, words: &str) {
+    let error = load(&files.path(name), &LoadOptions::default()).map(|_| ()).expect_err("an error");
+    assert_eq!(error.exit_code(), 3);
+    assert_eq!(error.to_string().lines().count(), 1, "{error}");
+    let Error::Input { path, place: found, message } = &error else { panic!("{error}") };
+    assert_eq!((path, found.as_str()), (&files.path(name), place), "{error}");
+    assert!(message.contains(words), "{message:?} has no {words:?}");
+}
+
+/// The same for a file that is given as its bytes.
+#[track_caller]
+pub fn refused_bytes(name: &str, bytes: impl AsRef<[u8]>, place: &str, words: &str) {
+    refused(&Files::one(name, bytes), name, place, words);
+}
+
+pub fn meshes(scene: &Scene) -> Vec<&Mesh> {
+    let mesh = |geometry| match geometry {
+        &Geometry::Mesh(ref mesh) => mesh,
+        Geometry::Shapes { .. } => panic!("a mesh is expected"),
+    };
+    scene.geometries.iter().map(mesh).collect()
+}
+
+/// The corners of a mesh's triangles.
+pub fn corners(mesh: &Mesh) -> Vec<[Vec3; 3]> {
+    mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect()
+}
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+#[test]
+fn files_that_are_no_scenes() {
+    let files = Files::one("empty.obj", "").and("scene.xyz", "x").and("none", "x");
+    fs::create_dir(files.path("folder.obj")).unwrap();
+    refused(&files, "folder.obj", "", "directory");
+    refused(&files, "empty.obj", "", "empty");
+    refused(&files, "absent.obj", "", "No such file");
+    refused(&files, "scene.xyz", "", "glb, gltf, obj, ply, stl");
+    refused(&files, "none", "", "glb, gltf, obj, ply, stl");
+    for name in ["empty.ply", "empty.stl", "empty.gltf", "empty.glb"] {
+        refused_bytes(name, "", "", "empty");
+    }
+    for suffix in ["obj", "ply", "stl", "glb", "gltf"] {
+        let files = Files::one(&format!("noise.{suffix}"), [0x9e, 0, 0xff, b'\n', 7, 0x80, 0]);
+        assert!(load(&files.path(&format!("noise.{suffix}")), &LoadOptions::default()).is_err(), "{suffix}");
+    }
+}
+
+#[test]
+fn suffixes_are_known_in_any_case() {
+    assert_eq!(Files::one("a.OBJ", TRIANGLE).scene("a.OBJ").primitive_count(), 1);
+}
+
+#[test]
+fn a_scene_without_triangles_is_refused() {
+    refused_bytes("a.obj", "v 0 0 0\n", "", "nothing to render");
+    refused_bytes("a.stl", "solid a\nendsolid a\n", "", "nothing to render");
+}
+
+#[test]
+fn axes_and_units() {
+    let files = Files::one("a.obj", "v 0 0 0\nv 1 2 3\nv 0 1 0\nf 1 2 3\n");
+    let bounds = |up_axis, unit| {
+        let options = LoadOptions { up_axis, unit, ..LoadOptions::default() };
+        let bounds = load(&files.path("a.obj"), &options).unwrap().0.bounds();
+        (bounds.min, bounds.max)
+    };
+    assert_eq!(bounds(UpAxis::Y, Unit::Metre), (DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)));
+    assert_eq!(bounds(UpAxis::Z, Unit::Metre), (DVec3::new(0.0, 0.0, -2.0), DVec3::new(1.0, 3.0, 0.0)));
+    assert_eq!(bounds(UpAxis::Y, Unit::Inch).1, DVec3::new(0.0254, 0.0508, 3.0 * 0.0254));
+    assert_eq!(bounds(UpAxis::Z, Unit::Millimetre).1, DVec3::new(0.001, 0.003, 0.0));
+}
+
+#[test]
+fn normals_on_request() {
+    // A roof whose halves share no vertices: texture coordinates differ.
+    let roof =
+        "v 0 0 0\nv 0 0 1\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 1\nvn 1 0 0\nf 1/1/1 2/1/1 3/1/1\nf 2/2/1 1/2/1 4/2/1\n";
+    let files = Files::one("a.obj", roof);
+    let normals = |normals| {
+        let options = LoadOptions { normals, ..LoadOptions::default() };
+        meshes(&load(&files.path("a.obj"), &options).unwrap().0)[0].normals.clone()
+    };
+    assert_eq!(normals(Normals::File), [Vec3::X; 6]);
+    assert_eq!(normals(Normals::Flat), []);
+    let smooth = normals(Normals::Smooth);
+    let (left, right) = (Vec3::new(-1.0, 1.0, 0.0).normalize(), Vec3::new(1.0, 1.0, 0.0).normalize());
+    // Both halves meet at the first two vertices, where the mean points down or up, as their order has it.
+    let mean = smooth[0];
+    assert!((mean.x.abs() < 1e-6) && (mean.y.abs() - 1.0).abs() < 1e-6, "{smooth:?}");
+    assert_eq!(smooth[0], smooth[4]);
+    let along = |n: Vec3, side: Vec3| (n.dot(side).abs() - 1.0).abs() < 1e-6;
+    assert!(along(smooth[2], left) && along(smooth[5], right), "{smooth:?}");
+}
+
+#[test]
+fn triangles_with_corners_that_are_not_finite_are_counted() {
+    let obj = format!("{TRIANGLE}v nan 0 0\nv inf 0 0\nf 1 2 4\nf 1 2 5\nf 1 4 5\n");
+    let (scene, warnings) = Files::one("a.obj", obj).load("a.obj");
+    assert_eq!(scene.primitive_count(), 4);
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].message.contains("3 triangles"), "{}", warnings[0]);
+    assert!(scene.bounds().max == DVec3::new(1.0, 1.0, 0.0));
+}
+
+/// Models of others, kept beside the project. None, and a message, where they are missing.
+pub fn model(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models").join(name);
+    if !path.is_file() {
+        eprintln!("skipped: {} is missing", path.display());
+        return None;
+    }
+    Some(path)
+}

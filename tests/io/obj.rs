@@ -1,0 +1,217 @@
+//! OBJ and MTL.
+
+use twincast::math::{DVec3, Vec2, Vec3};
+use twincast::scene::{Specular, Wrap};
+
+use super::{Files, corners, meshes, refused, refused_bytes};
+
+const VERTICES: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+
+/// A picture of 2 x 1 pixels, red and half-transparent blue.
+pub fn picture() -> Vec<u8> {
+    let pixels = image::RgbaImage::from_raw(2, 1, vec![255, 0, 0, 255, 0, 0, 255, 128]).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    pixels.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn every_form_of_index() {
+    let expected = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+    let attributes = "vt 0.25 0.75\nvt 1\nvn 0 0 2\n";
+    for face in ["1 2 3", "1/1 2/2 3/1", "1//1 2//1 3//-1", "1/1/1 2/2/1 3/-2/1", "-4 -3 -2", "1 2 \\\n 3 # c"] {
+        let scene = Files::one("a.obj", format!("{VERTICES}{attributes}f {face}\n")).scene("a.obj");
+        let mesh = meshes(&scene)[0];
+        assert_eq!(corners(mesh), expected, "{face}");
+        assert_eq!(mesh.positions.len(), 3, "only what is used");
+        let slashes = face.split(' ').next().unwrap().split('/').collect::<Vec<_>>();
+        let has = |k: usize| slashes.get(k).is_some_and(|s| !s.is_empty());
+        assert_eq!(mesh.uvs.len(), if has(1) { 3 } else { 0 }, "{face}");
+        assert_eq!(mesh.normals, if has(2) { vec![Vec3::Z; 3] } else { vec![] }, "{face}");
+        if has(1) {
+            assert_eq!(mesh.uvs, [Vec2::new(0.25, 0.75), Vec2::new(1.0, 0.0), Vec2::new(0.25, 0.75)]);
+        }
+    }
+    // A face before its vertices.
+    assert_eq!(corners(meshes(&Files::one("a.obj", format!("f 1 2 3\n{VERTICES}")).scene("a.obj"))[0]), expected);
+}
+
+#[test]
+fn polygons_concave_ones_too() {
+    // An arrow head whose fan from the first corner would cover area outside it.
+    let files = Files::one("a.obj", "v 2 1 0\nv 0 2 0\nv 0.5 1 0\nv 0 0 0\nf 2 3 4 1\n");
+    let scene = files.scene("a.obj");
+    let area: f32 = corners(meshes(&scene)[0]).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length() / 2.0).sum();
+    assert_eq!((scene.primitive_count(), area), (2, 1.5));
+}
+
+#[test]
+fn smoothing_groups() {
+    // Two triangles at a right angle over the edge 1-2.
+    let fold = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    let normals = |faces: &str| {
+        let scene = Files::one("a.obj", format!("{fold}{faces}")).scene("a.obj");
+        meshes(&scene)[0].normals.clone()
+    };
+    assert_eq!(normals("f 1 2 3\nf 2 1 4\n"), []);
+    assert_eq!(normals("s off\nf 1 2 3\nf 2 1 4\n"), []);
+    let joined = normals("s 1\nf 1 2 3\nf 2 1 4\n");
+    assert_eq!(joined.len(), 4);
+    // The faces' normals are +z and +y; both have the same angle at vertex 1.
+    assert!(joined[0].abs_diff_eq(Vec3::new(0.0, 1.0, 1.0).normalize(), 1e-6), "{joined:?}");
+    assert_eq!((joined[2], joined[3]), (Vec3::Z, Vec3::Y));
+    let apart = normals("s 1\nf 1 2 3\ns 2\nf 2 1 4\n");
+    assert_eq!(apart, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::Y, Vec3::Y, Vec3::Y]);
+    let mixed = normals("s 1\nf 1 2 3\ns off\nf 2 1 4\n");
+    assert_eq!(mixed, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO]);
+}
+
+#[test]
+fn materials_and_textures() {
+    let obj = format!(
+        "mtllib a b.mtl\n{VERTICES}vt 0 0\no left\nusemtl red\nf 1 2 3\ng right\nusemtl shiny\nf 2 3 4\nusemtl red\nf 1 2 4\n"
+    );
+    let mtl = "newmtl red\nKd 1 0.5 0.25\nKa 0.1 0.2 0.3\nKs 1 1 1\nNs 50\nillum 1\nKe 0 0 2\n\
+        newmtl shiny\nKs 0.5 0.5 0.5\nNs 100\nillum 2\nNi 1.5\nmap_Kd -s 2 3 1 -o 0.5 -clamp on my pic.png\n";
+    let files = Files::one("a.obj", obj).and("a b.mtl", mtl).and("my pic.png", picture());
+    let scene = files.scene("a.obj");
+    let [red, shiny] = &scene.materials[..] else { panic!("{:?}", scene.materials) };
+    assert_eq!(
+        (red.name.as_str(), red.diffuse, red.ambient),
+        ("red", Vec3::new(1.0, 0.5, 0.25), Vec3::new(0.1, 0.2, 0.3))
+    );
+    assert_eq!((red.specular, red.emission, red.diffuse_texture), (Vec3::ZERO, Vec3::new(0.0, 0.0, 2.0), None));
+    assert_eq!((shiny.specular, shiny.shininess, shiny.model), (Vec3::splat(0.5), 100.0, Specular::BlinnPhong));
+    assert_eq!((shiny.diffuse, shiny.diffuse_texture), (Vec3::ONE, Some(0)));
+    let texture = &scene.textures[0];
+    assert_eq!((texture.width, texture.height, &texture.pixels[..]), (2, 1, &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
+    assert_eq!((texture.scale, texture.offset), (Vec2::new(2.0, 3.0), Vec2::new(0.5, 0.0)));
+    assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::Clamp, Wrap::Clamp));
+    let shapes: Vec<_> = meshes(&scene).iter().map(|m| (m.name.as_str(), m.material, m.triangles.len())).collect();
+    assert_eq!(shapes, [("left", 0, 2), ("right", 1, 1)]);
+}
+
+#[test]
+fn what_is_missing_is_a_warning() {
+    let obj = format!("mtllib none.mtl\n{VERTICES}usemtl a\nf 1 2 3\np 1\nl 1 2\nf 1 2\ncurv 0 1 2\n");
+    let (scene, warnings) = Files::one("a.obj", obj).load("a.obj");
+    assert_eq!(scene.primitive_count(), 1);
+    let said: Vec<_> = warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
+    assert_eq!(said.len(), 4, "{said:?}");
+    for ((place, message), (at, words)) in said.iter().zip([
+        ("line 8", "2 points or lines"),
+        ("line 10", "fewer than 3"),
+        ("line 11", "curv"),
+        ("line 1", "none.mtl"),
+    ]) {
+        assert!(*place == at && message.contains(words), "{place}: {message}");
+    }
+    let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
+    let files = Files::one("a.obj", obj).and("a.mtl", "newmtl a\nd 0.5\nmap_Kd sub\\none.png\nmap_Bump b.png\n");
+    let (scene, warnings) = files.load("a.obj");
+    assert_eq!((scene.materials[0].diffuse_texture, scene.materials[0].diffuse), (None, Vec3::splat(0.8)));
+    let said: Vec<_> = warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
+    for ((place, message), (at, words)) in
+        said.iter().zip([("line 4", "map_Bump"), ("line 3", "sub/none.png"), ("line 2", "opaque")])
+    {
+        assert!(*place == at && message.contains(words), "{place}: {message}");
+    }
+    assert_eq!(said.len(), 3);
+}
+
+#[test]
+fn vertex_colours_are_srgb() {
+    let files = Files::one("a.obj", "v 0 0 0 1 0 0.5\nv 1 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
+    let scene = files.scene("a.obj");
+    let colors = &meshes(&scene)[0].colors;
+    assert!(colors[0].abs_diff_eq(twincast::math::Vec4::new(1.0, 0.0, 0.214_041, 1.0), 1e-5), "{colors:?}");
+    assert_eq!(colors[1].to_array(), [1.0; 4]);
+    assert_eq!(scene.materials[0].diffuse, Vec3::ONE);
+}
+
+#[test]
+fn a_mesh_far_away_keeps_its_shape() {
+    let obj = "v 10000000.001 5 0\nv 10000000.002 5 0\nv 10000000.001 5.001 0\nusemtl b\nf 1 2 3\nusemtl a\nf 3 2 1\n";
+    let scene = Files::one("a.obj", obj).scene("a.obj");
+    let list = meshes(&scene);
+    let edge = list[0].positions[1] - list[0].positions[0];
+    assert!((f64::from(edge.x) - 0.001).abs() < 1e-8, "{edge}");
+    assert_eq!(list[0].origin, list[1].origin);
+    assert!((list[0].origin + list[0].positions[2].as_dvec3()).abs_diff_eq(DVec3::new(1e7 + 0.001, 5.001, 0.0), 1e-8));
+}
+
+#[test]
+fn faults_are_told_with_their_line() {
+    let faults = [
+        ("f 0 1 2", "index 0; OBJ counts from 1"),
+        ("f 1 2 5", "index 5 is past the last vertex, 4"),
+        ("f 1 2 -5", "before the first"),
+        ("f 1/1 2/1 3/1", "past the last texture coordinate, 0"),
+        ("f 1//2 2//2 3//2", "past the last normal, 0"),
+        ("f 1 2 x", "whole number"),
+        ("f 1 2 99999999999", "past the last"),
+        ("f /1 2 3", "not of the form"),
+        ("f 1/2/3/4 2 3", "past the last"),
+        ("v 1 2", "needs 3 numbers"),
+        ("v 1 2 x", "needs 3 numbers"),
+        ("vt", "needs a number"),
+        ("vn 1 0", "needs 3 numbers"),
+        ("s soft", "smoothing group"),
+    ];
+    for (statement, words) in faults {
+        let words = if statement == "f 1/2/3/4 2 3" { "not of the form" } else { words };
+        refused_bytes("a.obj", format!("{VERTICES}f 1 2 3\n{statement}\n"), "line 6", words);
+    }
+}
+
+#[test]
+fn faults_in_what_it_refers_to_name_that() {
+    let check = |mtl: &str, picture: &[u8], file: &str, place: &str, words: &str| {
+        let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
+        let files = Files::one("a.obj", obj).and("a.mtl", mtl).and("a.png", picture);
+        let error = twincast::io::load(&files.path("a.obj"), &Default::default()).map(|_| ()).unwrap_err();
+        let twincast::Error::Input { path, place: at, message } = &error else { panic!("{error}") };
+        assert_eq!((path, at.as_str()), (&files.path(file), place), "{error}");
+        assert!(message.contains(words), "{error}");
+    };
+    check("newmtl a\nKd 1 x 1\n", b"x", "a.mtl", "line 2", "3 numbers");
+    check("newmtl a\nKd 1 -1 1\n", b"x", "a.mtl", "line 2", "from 0 up");
+    check("Kd 1 1 1\n", b"x", "a.mtl", "line 1", "newmtl");
+    check("newmtl a\nmap_Kd\n", b"x", "a.mtl", "line 2", "file name");
+    check("newmtl a\nmap_Kd a.png\n", b"x", "a.png", "", "not a PNG");
+    let whole = picture();
+    check("newmtl a\nmap_Kd a.png\n", &whole[..whole.len() - 20], "a.png", "", "broken");
+    check("newmtl a\nmap_Kd a.png\n", &huge_picture(), "a.png", "", "100000 x 100000");
+}
+
+/// A PNG of some 60 bytes that claims 100,000 x 100,000 pixels.
+pub fn huge_picture() -> Vec<u8> {
+    let mut header = b"IHDR".to_vec();
+    header.extend(100_000u32.to_be_bytes());
+    header.extend(100_000u32.to_be_bytes());
+    header.extend([8, 6, 0, 0, 0]);
+    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+    for chunk in [&header[..], b"IDATx", b"IEND"] {
+        bytes.extend((chunk.len() as u32 - 4).to_be_bytes());
+        bytes.extend(chunk);
+        bytes.extend(crc(chunk).to_be_bytes());
+    }
+    bytes
+}
+
+/// PNG's checksum (ISO/IEC 15948, annex D).
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc, b| {
+        (0..8).fold(crc ^ u32::from(*b), |c, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 })
+    })
+}
+
+#[test]
+fn a_folder_as_a_library_is_refused() {
+    let files = Files::one("a.obj", format!("mtllib b.mtl\n{VERTICES}f 1 2 3\n"));
+    std::fs::create_dir(files.path("b.mtl")).unwrap();
+    let error = twincast::io::load(&files.path("a.obj"), &Default::default()).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("directory"), "{error}");
+    let files = Files::one("a.obj", "f 1 2 3\n");
+    refused(&files, "a.obj", "line 1", "past the last vertex, 0");
+}

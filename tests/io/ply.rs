@@ -1,0 +1,116 @@
+//! PLY, in its three encodings.
+
+use twincast::math::{DVec3, Vec2, Vec3, Vec4};
+
+use super::{Files, corners, meshes, refused_bytes};
+
+const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+fn header(format: &str, vertices: u64, faces: u64) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment made by hand\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+}
+
+fn ascii() -> String {
+    let vertices: String = SQUARE.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    format!("{}{vertices}3 0 1 2\n3 0 2 3\n", header("ascii", 4, 2))
+}
+
+pub fn binary(big: bool) -> Vec<u8> {
+    let mut bytes = header(if big { "binary_big_endian" } else { "binary_little_endian" }, 4, 2).into_bytes();
+    let word = |w: u32| if big { w.to_be_bytes() } else { w.to_le_bytes() };
+    bytes.extend(SQUARE.iter().flatten().flat_map(|x| word(x.to_bits())));
+    for face in [[0, 1, 2], [0, 2, 3]] {
+        bytes.push(3);
+        bytes.extend(face.iter().flat_map(|&i| word(i)));
+    }
+    bytes
+}
+
+#[test]
+fn all_encodings_hold_the_same() {
+    let [a, b, c, d] = SQUARE.map(Vec3::from);
+    for bytes in [ascii().into_bytes(), ascii().replace('\n', "\r\n").into_bytes(), binary(false), binary(true)] {
+        let scene = Files::one("a.ply", bytes).scene("a.ply");
+        assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [a, c, d]]);
+        assert_eq!(meshes(&scene)[0].positions.len(), 4);
+    }
+}
+
+#[test]
+fn attributes_and_what_is_skipped() {
+    let text = "ply\nformat ascii 1.0\nelement camera 1\nproperty list int float extra\nproperty uchar q\n\
+        element vertex 3\nproperty float z\nproperty double x\nproperty float y\nproperty float nx\nproperty float ny\n\
+        property float nz\nproperty list uchar int junk\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+        property uchar alpha\nproperty float s\nproperty float t\nelement edge 1\nproperty int a\nproperty int b\n\
+        element face 1\nproperty int flags\nproperty list uint ushort vertex_index\nend_header\n\
+        2 0.5 0.5 9\n\
+        0 0 0 0 0 2 1 7 255 0 119 51 0.25 0.5\n0 1 0 0 0 1 0 0 0 0 255 0 0\n0 0 1 0 0 1 0 0 0 0 255 1 1\n5 6\n7 3 0 1 2\n";
+    let scene = Files::one("a.ply", text).scene("a.ply");
+    let mesh = meshes(&scene)[0];
+    assert_eq!(corners(mesh), [[Vec3::ZERO, Vec3::X, Vec3::Y]]);
+    assert_eq!((&mesh.normals[..], mesh.uvs[0]), (&[Vec3::Z; 3][..], Vec2::new(0.25, 0.5)));
+    assert!(mesh.colors[0].abs_diff_eq(Vec4::new(1.0, 0.0, 0.1845, 0.2), 1e-3), "{}", mesh.colors[0]);
+    assert_eq!(scene.materials[0].diffuse, Vec3::ONE);
+}
+
+#[test]
+fn polygons_and_strips() {
+    let vertices = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    let text = format!("{}{vertices}4 0 1 2 3\n2 0 1\n", header("ascii", 4, 2));
+    let (scene, warnings) = Files::one("a.ply", text).load("a.ply");
+    assert_eq!(scene.primitive_count(), 2);
+    assert!(warnings.len() == 1 && warnings[0].message.contains("1 faces"), "{warnings:?}");
+    let strips = header("ascii", 4, 1).replace("element face", "element tristrips");
+    let scene = Files::one("a.ply", format!("{strips}{vertices}7 0 1 2 3 -1 0 1\n")).scene("a.ply");
+    let [a, b, c, d] = SQUARE.map(Vec3::from);
+    assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [c, b, d]]);
+    // Triangles, a quadrilateral, then a triangle: from the fast path to the slow one.
+    let mut bytes = header("binary_little_endian", 4, 3).into_bytes();
+    bytes.extend(SQUARE.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for face in [&[0i32, 1, 2][..], &[0, 1, 2, 3], &[1, 2, 3]] {
+        bytes.push(face.len() as u8);
+        bytes.extend(face.iter().flat_map(|i| i.to_le_bytes()));
+    }
+    let scene = Files::one("a.ply", bytes).scene("a.ply");
+    assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [a, b, c], [a, c, d], [b, c, d]]);
+}
+
+#[test]
+fn doubles_far_away_keep_the_shape() {
+    let text = header("ascii", 3, 1).replace("property float", "property double");
+    let text = format!("{text}10000000.001 0 0\n10000000.002 0 0\n10000000.001 0.001 0\n3 0 1 2\n");
+    let scene = Files::one("a.ply", text).scene("a.ply");
+    let mesh = meshes(&scene)[0];
+    assert!(mesh.origin.abs_diff_eq(DVec3::new(1e7, 0.0, 0.0), 1.0));
+    assert!(((mesh.positions[1] - mesh.positions[0]).x - 0.001).abs() < 1e-8);
+}
+
+#[test]
+fn faults_are_told_with_their_place() {
+    let fault = |bytes: Vec<u8>, place: &str, words: &str| refused_bytes("a.ply", bytes, place, words);
+    let start = header("binary_little_endian", 4, 2).len();
+    fault(header("binary_little_endian", 4_000_000_000, 2).into(), "line 4", "promises 4000000000 items");
+    fault(header("ascii", 4_000_000_000, 2).into(), "line 4", "promises 4000000000 items");
+    fault(header("binary_big_endian", u64::MAX, 2).into(), "line 4", "promises");
+    let mut truncated = binary(false);
+    truncated.truncate(truncated.len() - 13);
+    fault(truncated, &format!("byte {}", start + 4 * 12 + 13), "ends before its last element");
+    let mut far = binary(false);
+    far[start + 48 + 1] = 200;
+    fault(far, &format!("byte {}", start + 48 + 26), "index 200 is not one of the 4 vertices");
+    fault(ascii().replace("3 0 2 3", "3 0 2 4").into(), "line 16", "index 4");
+    fault(ascii().replace("3 0 2 3", "3 0 2 -1").into(), "line 16", "index -1");
+    fault(ascii().replace("3 0 2 3", "3 0 2").into(), "line 16", "ends before");
+    fault(ascii().replace("3 0 2 3", "300000 0 2 3").into(), "line 16", "300000 entries");
+    fault(ascii().replace("3 0 2 3", "3 0 two 3").into(), "line 16", "\"two\" is not a number");
+    fault(ascii().replace("format ascii", "format text").into(), "line 2", "binary_big_endian");
+    fault(ascii().replace("float x", "real x").into(), "line 5", "\"real\" is no type");
+    fault(ascii().replace("float x", "float q").into(), "line 4", "x, y and z");
+    fault(ascii().replace("vertex_indices", "corners").into(), "line 8", "vertex_indices");
+    fault(ascii().replace("end_header", "end_heather").into(), "line 10", "end_heather");
+    fault(b"ply\nformat ascii 1.0\n".to_vec(), "line 2", "end_header is missing");
+    fault(b"plywood".to_vec(), "line 1", "\"ply\" belongs");
+}
