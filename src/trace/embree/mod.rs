@@ -207,8 +207,8 @@ impl Tracer for Embree {
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        // Embree's coherent traversal of 16 shadow rays was seen to loop for ever among instances (3.13.5 and 4.3.3, on
-        // AVX-512). The hint is only a hint, so it is not given there.
+        // Embree's coherent traversal of 16 shadow rays among instances was seen to loop for ever (3.13.5, AVX-512, on
+        // valid rays; the cause is not known). The hint is only a hint, so it is not given there.
         let may_hang = batch.width == Width::Sixteen && !self.placements.is_empty();
         let mode = &mut Mode::new(batch.coherent && !may_hang);
         match batch.width {
