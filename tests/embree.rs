@@ -101,10 +101,9 @@ fn triangles(world: &World) -> Vec<Triangle> {
 fn check(triangles: &[Triangle], ray: &Ray, hit: Option<Hit>) {
     let mut nearest_clear = f64::INFINITY;
     for triangle in triangles {
-        if let Some(crossing) = triangle.cross(ray) {
-            if crossing.cosine > MARGIN && Triangle::inside(ray, &crossing) > MARGIN {
-                nearest_clear = nearest_clear.min(crossing.t);
-            }
+        let clear = |c: &Crossing| c.cosine > MARGIN && Triangle::inside(ray, c) > MARGIN;
+        if let Some(crossing) = triangle.cross(ray).filter(clear) {
+            nearest_clear = nearest_clear.min(crossing.t);
         }
     }
     let Some(hit) = hit else {
