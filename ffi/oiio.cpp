@@ -125,11 +125,11 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
 
     const std::string name = text(path);
     auto file              = writer(name);
-    // Where its JPEG writer cannot write, OpenImageIO ends the process (libjpeg's default): it gets memory instead.
+    // These writers get memory, and the file is written here. On a full disk OpenImageIO's EXR writer hangs and its JPEG
+    // writer ends the process. Not all writers: that of TIFF takes memory, too, but leaves its directory out.
     OIIO::Filesystem::IOVecOutput memory;
-    const bool in_memory = std::string(file->format_name()) == "jpeg";
-    if (in_memory && !file->set_ioproxy(&memory))
-        throw std::runtime_error("this OpenImageIO cannot write JPEG to memory");
+    const std::set<std::string> to_memory { "openexr", "jpeg", "png" };
+    const bool in_memory = to_memory.count(file->format_name()) && file->set_ioproxy(&memory);
     if (!file->open(name, spec))
         fail(file, "cannot be opened for writing");
     if (!file->write_image(type, samples.data()))

@@ -135,3 +135,11 @@ fn every_writable_suffix_works() {
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
+
+#[test]
+fn openimageio_writes_what_we_write_without_it() {
+    let more = oiio::writable_suffixes().unwrap();
+    for suffix in pure::writable_suffixes().unwrap() {
+        assert!(more.contains(&suffix), "{suffix}");
+    }
+}
