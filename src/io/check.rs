@@ -23,7 +23,8 @@ pub(super) fn check(scene: &Scene) -> Placeless<()> {
     for material in &scene.materials {
         let finite = |color: Vec3| color.is_finite() && color.min_element() >= 0.0;
         let colors = [material.ambient, material.diffuse, material.specular, material.emission];
-        if !colors.into_iter().all(finite) || !(material.shininess.is_finite() && material.shininess >= 0.0) {
+        let shininess = Vec3::splat(material.shininess);
+        if !colors.into_iter().chain([shininess]).all(finite) {
             return Err(format!("material {:?} has values that are negative or not finite", material.name));
         }
         if material.diffuse_texture.is_some_and(|t| t as usize >= scene.textures.len()) {

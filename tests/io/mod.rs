@@ -66,10 +66,12 @@ pub fn refused_bytes(name: &str, bytes: impl AsRef<[u8]>, place: &str, words: &s
 }
 
 pub fn meshes(scene: &Scene) -> Vec<&Mesh> {
-    let mesh = |geometry| match geometry {
-        &Geometry::Mesh(ref mesh) => mesh,
-        Geometry::Shapes { .. } => panic!("a mesh is expected"),
-    };
+    fn mesh(geometry: &Geometry) -> &Mesh {
+        match geometry {
+            Geometry::Mesh(mesh) => mesh,
+            Geometry::Shapes { .. } => panic!("a mesh is expected"),
+        }
+    }
     scene.geometries.iter().map(mesh).collect()
 }
 

@@ -112,5 +112,6 @@ fn faults_are_told_with_their_place() {
     fault(ascii().replace("vertex_indices", "corners").into(), "line 8", "vertex_indices");
     fault(ascii().replace("end_header", "end_heather").into(), "line 10", "end_heather");
     fault(b"ply\nformat ascii 1.0\n".to_vec(), "line 2", "end_header is missing");
+    fault(ascii().replace("comment made by hand", "element face 0").into(), "line 8", "declared twice");
     fault(b"plywood".to_vec(), "line 1", "\"ply\" belongs");
 }

@@ -191,7 +191,7 @@ fn range(
     size: usize,
     component: Component,
 ) -> Result<&[u8], Fault> {
-    if offset % component.size() as u64 != 0 || !stride.is_multiple_of(component.size()) {
+    if !offset.is_multiple_of(component.size() as u64) || !stride.is_multiple_of(component.size()) {
         let message =
             format!("offset {offset} or stride {stride} is no multiple of the component's {}", component.size());
         return Err(("/byteOffset", message));

@@ -161,7 +161,7 @@ fn lights(document: &Document<'_>) -> Result<Vec<Light>> {
             "point" => Ok(Light::Point { position, color, attenuation, range }),
             "spot" => {
                 let (inner_angle, outer_angle) = (light.spot.inner_cone_angle, light.spot.outer_cone_angle);
-                if !(inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= 1.5708) {
+                if !(inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2) {
                     return Err(fail("cone angles have to be 0 <= inner < outer <= pi / 2".into()));
                 }
                 Ok(Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle })

@@ -1,5 +1,6 @@
 //! The header of a PLY file: which elements, how many of each, with which properties.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -137,6 +138,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
                 let encoding = encoding.ok_or_else(|| fail(line, "the header has no format line".into()))?;
                 if !elements.iter().any(|element| element.name == "vertex") {
                     return Err(fail(line, "the header has no element vertex".into()));
+                }
+                let mut seen = HashSet::new();
+                if let Some(twice) = elements.iter().find(|element| !seen.insert(&element.name)) {
+                    return Err(fail(twice.line, format!("element {:?} is declared twice", twice.name)));
                 }
                 return Ok(Header { encoding, elements, length, lines: line });
             }

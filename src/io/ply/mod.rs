@@ -71,7 +71,7 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
             "face" => faces.read(element, &mut items, &vertices.positions),
             "tristrips" => faces.read_strips(element, &mut items, &vertices.positions),
             _ if least == 0 => Ok(()),
-            _ => (0..element.count).try_for_each(|_| skip(element, &mut items, |_| false, |_, _| ())),
+            _ => (0..element.count).try_for_each(|_| read_item(element, &mut items, |_| false, |_, _| ())),
         };
         result.map_err(|message| Error::input(path, items.place(), message))?;
     }
@@ -90,7 +90,7 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
 }
 
 /// Reads one item. Lists for which `wanted` holds are kept, and `each` gets the values of the other properties.
-fn skip(
+fn read_item(
     element: &Element,
     items: &mut impl Items,
     wanted: impl Fn(usize) -> bool,
@@ -153,7 +153,7 @@ impl Vertices {
         self.uvs.reserve_exact(if has_uvs { count } else { 0 });
         self.colors.reserve_exact(if has_colors { count } else { 0 });
         let table = color::srgb_table();
-        // The place of each property among the ten values of a vertex; unused ones go to the eleventh.
+        // The place of each property among the twelve values of a vertex; unused ones go to the thirteenth.
         let mut slots = vec![12usize; element.properties.len()];
         let roles = position.iter().chain(&normal).chain(&uv).chain(&rgb).chain([&alpha]);
         for (slot, index) in roles.enumerate() {
@@ -164,7 +164,7 @@ impl Vertices {
         let mut v = [0.0f64; 13];
         for _ in 0..count {
             v[11] = 1.0;
-            skip(element, items, |_| false, |index, value| v[slots[index]] = value)?;
+            read_item(element, items, |_| false, |index, value| v[slots[index]] = value)?;
             self.positions.push(DVec3::new(v[0], v[1], v[2]));
             if has_normals {
                 self.normals.push(DVec3::new(v[3], v[4], v[5]).normalize_or_zero().as_vec3());
@@ -216,7 +216,7 @@ impl Faces {
         let (mut around, mut parts) = (Vec::new(), Vec::new());
         for _ in self.triangles.len()..count {
             corners.clear();
-            skip(
+            read_item(
                 element,
                 items,
                 |i| i == list,
@@ -249,7 +249,7 @@ impl Faces {
         let mut values = Vec::new();
         for _ in 0..element.count {
             values.clear();
-            skip(
+            read_item(
                 element,
                 items,
                 |i| i == list,
