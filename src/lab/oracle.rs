@@ -292,7 +292,8 @@ mod tests {
     #[test]
     fn a_placed_triangle_is_the_moved_triangle() {
         // Powers of two: the moved corners are f32.
-        let m = Affine3 { matrix3: Mat3::from_diagonal(Vec3::new(2.0, 4.0, -1.0)), translation: Vec3::new(8.0, 0.0, 2.0) };
+        let m =
+            Affine3 { matrix3: Mat3::from_diagonal(Vec3::new(2.0, 4.0, -1.0)), translation: Vec3::new(8.0, 0.0, 2.0) };
         let placed = Primitive { body: Body::Triangle(UNIT), to_world: Some(&m) };
         let moved = triangle(UNIT.map(|p| m.transform_point3(p)));
         for (x, y) in [(8.5, 0.5), (9.0, 2.0), (9.0, 2.1), (8.0, 0.0), (7.9, 1.0)] {
@@ -304,7 +305,8 @@ mod tests {
 
     #[test]
     fn spheres_in_closed_form() {
-        let ball = Primitive { body: Body::Shape(Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 })), to_world: None };
+        let ball =
+            Primitive { body: Body::Shape(Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 })), to_world: None };
         let at = |y: f32| Ray::new(Vec3::new(-3.0, y, 0.0), Vec3::X);
         assert_eq!(meet(&at(0.0), &ball).unwrap().t.to_f64(), 2.0);
         assert!(meet(&at(1.0), &ball).unwrap().touches);
@@ -334,7 +336,10 @@ mod tests {
 
     #[test]
     fn closest_names_all_that_tie() {
-        let mesh = crate::scene::Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NEG_Z], vec![[0, 1, 2], [1, 2, 0], [3, 1, 2]]);
+        let mesh = crate::scene::Mesh::new(
+            vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::NEG_Z],
+            vec![[0, 1, 2], [1, 2, 0], [3, 1, 2]],
+        );
         let scene = crate::Scene::from_geometries(vec![crate::scene::Geometry::Mesh(mesh)], vec![Default::default()]);
         let world = World::new(&scene).unwrap();
         let ids: Vec<Id> = closest(&world, &down(0.25, 0.25)).into_iter().map(|(id, _)| id).collect();

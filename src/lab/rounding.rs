@@ -216,7 +216,8 @@ fn triangle(
     let farthest = size[0].max(size[1]).max(size[2]);
     let corners_rounded: f64 = (0..3).map(|k| u * size[k].dot(d.cross(sides[k]).abs())).sum();
     let computed = g * permanent(d.abs(), longest, longest);
-    let sum_error = corners_rounded + computed + n.dot(d_error) + g * u * permanent(d.abs(), farthest, farthest) + sum_own;
+    let sum_error =
+        corners_rounded + computed + n.dot(d_error) + g * u * permanent(d.abs(), farthest, farthest) + sum_own;
     let slack = sum.abs() - sum_error;
     let grazing = !(slack > 0.0);
     let root = if grazing {
@@ -308,23 +309,8 @@ fn permanent(x: DVec3, y: DVec3, z: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::lab::oracle::meet;
+    use crate::lab::rays::Random;
     use crate::math::Mat3;
-
-    /// A small generator for the tests: SplitMix64 (Steele, Lea, Flood 2014).
-    struct Random(u64);
-
-    impl Random {
-        fn unit(&mut self) -> f32 {
-            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-            ((z ^ z >> 31) >> 40) as f32 / (1u32 << 24) as f32
-        }
-
-        fn vector(&mut self) -> Vec3 {
-            Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-        }
-    }
 
     /// Embree's robust test, in f32.
     fn pluecker(ray: &Ray, corners: [Vec3; 3]) -> Option<f32> {
@@ -342,7 +328,7 @@ mod tests {
 
     #[test]
     fn f32_answers_stay_within_the_outcome() {
-        let mut random = Random(1);
+        let mut random = Random::new(1, 0);
         let (mut unsure, mut hits) = (0, 0);
         for case in 0..200_000 {
             let corners = [random.vector(), random.vector(), random.vector()];
@@ -377,7 +363,7 @@ mod tests {
 
     #[test]
     fn a_ray_moved_in_f32_stays_within_the_outcome() {
-        let mut random = Random(2);
+        let mut random = Random::new(2, 0);
         let mut unsure = 0;
         for case in 0..100_000 {
             let m = Affine3 {
@@ -392,8 +378,7 @@ mod tests {
             let primitive = Primitive { body: Body::Triangle(corners), to_world: Some(&m) };
             let allowed = outcome(&ray, &primitive, Precision::Single);
             let inverse = m.inverse();
-            let local =
-                Ray::new(inverse.transform_point3(ray.origin), inverse.transform_vector3(ray.direction));
+            let local = Ray::new(inverse.transform_point3(ray.origin), inverse.transform_vector3(ray.direction));
             match pluecker(&local, corners) {
                 Some(t) => {
                     let (low, high) = allowed.span(&ray);
@@ -426,7 +411,7 @@ mod tests {
     #[test]
     fn spheres_are_unsure_only_at_the_silhouette() {
         let ball = Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 });
-        let mut random = Random(3);
+        let mut random = Random::new(3, 0);
         for _ in 0..20_000 {
             let origin = random.vector() * 4.0;
             let ray = Ray::new(origin, random.vector());
