@@ -21,9 +21,7 @@ pub const BRUTE_LIMIT: u64 = 20_000;
 pub struct Setup<'a, A, B> {
     /// The scene's name in the report.
     pub scene: &'a str,
-    /// What both engines were built from.
-    pub world: &'a World,
-    /// Makes the pictures, and with them the camera and shadow rays.
+    /// Makes the pictures, and with them the camera and shadow rays; of the world that the engines were built from.
     pub renderer: &'a Renderer<'a>,
     /// The native engine.
     pub native: &'a A,
@@ -98,13 +96,14 @@ impl<A: Tracer, B: Tracer> Setup<'_, A, B> {
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set.
     pub fn run(&self, control: Control<'_>) -> Result<Comparison> {
+        let world = self.renderer.world();
         let native_image = self.renderer.render(self.native, control)?;
         let embree_image = self.renderer.render(self.embree, control)?;
-        let paired = Paired::new(self.world, self.native, self.embree, self.brute);
+        let paired = Paired::new(world, self.native, self.embree, self.brute);
         self.renderer.render(&paired, control)?;
-        shoot(&paired, self.world, self.random, self.seed, control)?;
-        let pixels = explain_pixels(self.renderer, self.world, self.native, self.embree, &native_image, &embree_image);
-        let report = Report::new(self.scene, self.world, paired.tally(), &pixels);
+        shoot(&paired, world, self.random, self.seed, control)?;
+        let pixels = explain_pixels(self.renderer, self.native, self.embree, &native_image, &embree_image);
+        let report = Report::new(self.scene, world, paired.tally(), &pixels);
         Ok(Comparison { report, native_image, embree_image })
     }
 }

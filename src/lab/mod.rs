@@ -8,6 +8,7 @@
 mod classify;
 pub mod compare;
 pub mod exact;
+pub mod inspect;
 pub mod oracle;
 mod paired;
 mod pixels;

@@ -41,14 +41,13 @@ pub struct PixelReport {
 /// Where the pictures are not of one size.
 pub fn explain_pixels<A: Tracer, B: Tracer>(
     renderer: &Renderer<'_>,
-    world: &World,
     native: &A,
     embree: &B,
     native_image: &Image,
     embree_image: &Image,
 ) -> PixelReport {
     explain_with(native_image, embree_image, |x, y| {
-        let witness = Witness { world, native, embree, seen: Mutex::default() };
+        let witness = Witness { world: renderer.world(), native, embree, seen: Mutex::default() };
         renderer.pixel(&witness, x, y);
         witness.verdict()
     })

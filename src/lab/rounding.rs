@@ -16,7 +16,7 @@
 //! - **Instances**: engines move the ray, not the triangle. The inverse matrix is the adjugate over the determinant;
 //!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an edge,
 //!   |n| . |o'| and t |n| . |d'| in the numerator of t.
-//! - **Shapes** are intersected in f64 by every engine; only the ray that they are given is rounded.
+//! - **Shapes** are intersected in f64 by every engine; only the ray that they are given, which is f32, is rounded.
 //!
 //! The counts are rounded up to [`Precision::operations`]. Measuring the error instead, by evaluating each engine's
 //! formula again, would need the engine's own formula, and Embree has one for each instruction set.
@@ -113,7 +113,7 @@ pub fn outcome(ray: &Ray, primitive: &Primitive, precision: Precision) -> Outcom
     match primitive.body {
         Body::Triangle(corners) if !corners.into_iter().all(is_traceable) => Outcome::MISS,
         Body::Triangle(corners) => triangle(ray, corners, primitive.to_world, &local, precision),
-        Body::Shape(Shape::Sphere(sphere)) => quadric(&sphere, &local),
+        Body::Shape(Shape::Sphere(sphere)) => quadric(&sphere, &local.rounded(primitive.to_world.is_some())),
     }
 }
 
@@ -167,6 +167,16 @@ impl LocalRay {
             determinant: determinant.value,
         };
         (local.origin.is_finite() && local.direction.is_finite()).then_some(local)
+    }
+
+    /// As a shape is given it: in f32, once it was moved.
+    fn rounded(self, moved: bool) -> Self {
+        let u = if moved { f64::from(UNIT_ROUNDOFF) } else { 0.0 };
+        Self {
+            origin_error: self.origin_error + (self.origin.abs() + self.origin_error) * u,
+            direction_error: self.direction_error + (self.direction.abs() + self.direction_error) * u,
+            ..self
+        }
     }
 }
 

@@ -50,6 +50,11 @@ impl<'a> Renderer<'a> {
         Ok(Self { scene, world, camera, settings })
     }
 
+    /// What is rendered, as the engines hold it.
+    pub const fn world(&self) -> &'a World {
+        self.world
+    }
+
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors
