@@ -1,1 +1,4 @@
-//! One test binary.
+//! One test binary: what crosses modules, file by file.
+
+mod compare;
+mod layering;
