@@ -140,6 +140,12 @@ pub fn is_boundary(world: &World, ray: &Ray, hit: &Hit) -> bool {
     })
 }
 
+/// Whether the ray starts on the primitive that `hit` names, up to f32 rounding: its t is then nothing but rounding.
+pub fn starts_on(world: &World, ray: &Ray, hit: &Hit) -> bool {
+    oracle::primitive(world, hit)
+        .is_some_and(|primitive| outcome(ray, &primitive, Precision::Single).span(ray).0 <= 0.0)
+}
+
 /// Whether the t of a native hit is within its bound.
 fn t_fits(world: &World, ray: &Ray, hit: &Hit) -> bool {
     oracle::primitive(world, hit).is_some_and(|primitive| {

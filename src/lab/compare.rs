@@ -64,7 +64,7 @@ pub struct Report {
     pub native_wrong: u64,
     /// [`Class::EmbreeWrong`].
     pub embree_wrong: u64,
-    /// Largest distance between the two t of one primitive, in steps of f32.
+    /// Largest distance between the two t of one primitive that the ray does not start on, in steps of f32.
     pub max_t_ulp: u32,
     /// The pictures.
     pub image: ImageReport,

@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-use super::classify::{Answers, Class, classify_closest, classify_occluded, ulps};
+use super::classify::{Answers, Class, classify_closest, classify_occluded, starts_on, ulps};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Tracer, World};
@@ -40,7 +40,10 @@ impl<'a, A: Tracer, B: Tracer> Paired<'a, A, B> {
         let answers = Answers { native, embree, brute: self.brute.map(|b| b.closest(ray)) };
         let class = classify_closest(self.world, ray, &answers);
         if let Some((a, b)) = native.zip(embree).filter(|(a, b)| a.id() == b.id()) {
-            self.tally.max_t_ulp.fetch_max(ulps(a.t, b.t), Relaxed);
+            let steps = ulps(a.t, b.t);
+            if steps > self.tally.max_t_ulp() && !starts_on(self.world, ray, &a) {
+                self.tally.max_t_ulp.fetch_max(steps, Relaxed);
+            }
         }
         self.tally.record(class, ray, || Asked::Closest(answers));
     }
@@ -111,7 +114,8 @@ impl Tally {
         Class::ALL.iter().map(|&class| self.count(class)).sum()
     }
 
-    /// The largest distance between the two t of one primitive, in steps of f32.
+    /// The largest distance between the two t of one primitive, in steps of f32. Rays that start on that primitive are
+    /// left out: their t is nothing but rounding, and steps near zero are tiny.
     pub fn max_t_ulp(&self) -> u32 {
         self.max_t_ulp.load(Relaxed)
     }
