@@ -20,6 +20,7 @@
 //!
 //! The counts are rounded up to [`Precision::operations`]. Measuring the error instead, by evaluating each engine's
 //! formula again, would need the engine's own formula, and Embree has one for each instruction set.
+#![allow(clippy::neg_cmp_op_on_partial_ord)] // Negated comparisons, so that NaN from an overflow leaves doubt.
 
 use super::exact::{Approx, Ring, cross, det, dot, vector, zip};
 use super::oracle::{Body, Primitive, place};
