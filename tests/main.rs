@@ -2,10 +2,12 @@
 
 mod allocation;
 mod cli;
+mod compare;
 #[cfg(feature = "embree")]
 mod embree;
 mod image;
 mod io;
+mod layering;
 mod mutation;
 mod parity;
 mod render;

@@ -1,1 +1,21 @@
 //! What judges the rest.
+//!
+//! [`oracle`] answers exactly, slowly, and alone: it shares no code with any tracer. [`rounding`] says how far an
+//! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that differ on a
+//! ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be difficult.
+//! [`inspect`] looks for what is suspicious in a scene before anything is traced.
+
+mod classify;
+pub mod compare;
+pub mod exact;
+pub mod inspect;
+pub mod oracle;
+mod paired;
+mod pixels;
+pub mod rays;
+pub mod rounding;
+
+pub use classify::{Answers, Class, classify_closest, classify_occluded, is_boundary, ulps};
+pub use compare::{Comparison, Report, Setup};
+pub use paired::{Asked, Difference, Paired, Tally};
+pub use pixels::{PixelReport, explain_pixels};

@@ -136,6 +136,11 @@ impl<'a> Renderer<'a> {
         &self.plan
     }
 
+    /// What is rendered, as the engines hold it.
+    pub const fn world(&self) -> &'a World {
+        self.world
+    }
+
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors

@@ -1,0 +1,122 @@
+//! `twincast compare`: both engines on the rays of a picture and on difficult ones, every difference judged.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::{CameraArgs, SceneArgs, Size};
+use super::engine::BackendArg;
+use crate::error::Result;
+
+/// Compare native with Embree on every ray of a picture and on difficult rays
+///
+/// Where they differ, exact arithmetic decides: agree, tie (two primitives at an equal t), boundary (within f32 rounding
+/// of an edge, a silhouette or an end of the ray's range), native_wrong, embree_wrong. Under 20,000 primitives brute
+/// force is asked as well. Exit code 1 if native is wrong anywhere, or if a pixel differs and no ray explains it.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  twincast compare bunny.glb
+  twincast compare scan.ply --up-axis z --size 1920x1080 --random 1000000 --json
+  twincast compare part.stl --diff difference.png")]
+pub(super) struct CompareArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+
+    /// Pixels of the picture whose rays are compared
+    #[arg(long, value_name = "WxH", default_value = "640x480")]
+    size: Size,
+
+    /// Samples a pixel; 1 is the pixel's centre
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    spp: u32,
+
+    #[command(flatten)]
+    camera: CameraArgs,
+
+    /// Difficult rays: at corners and edges, along axes, from far away, between surfaces
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    random: u64,
+
+    /// Chooses the difficult rays, and among equally good sample patterns
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Print the counts as one JSON document, and nothing else
+    #[arg(long)]
+    json: bool,
+
+    /// Write a picture of the absolute differences; the suffix decides the format
+    #[arg(long, value_name = "FILE")]
+    diff: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &CompareArgs) -> Result<()> {
+    BackendArg::Both.check_available()?;
+    compare(args)
+}
+
+#[cfg(not(feature = "embree"))]
+fn compare(_: &CompareArgs) -> Result<()> {
+    unreachable!("check_available refused it")
+}
+
+#[cfg(feature = "embree")]
+fn compare(args: &CompareArgs) -> Result<()> {
+    use super::{interrupt, outputs, progress, say, warn};
+    use crate::error::Error;
+    use crate::image::Metadata;
+    use crate::lab::Setup;
+    use crate::lab::compare::BRUTE_LIMIT;
+    use crate::render::{Control, Renderer, Settings};
+    use crate::trace::brute::Brute;
+    use crate::trace::bvh::Bvh;
+    use crate::trace::embree::{Embree, Options};
+    use crate::trace::{Tracer, World};
+
+    let diff = args.diff.as_slice();
+    outputs::check(diff, None)?;
+    let cancel = interrupt::install()?;
+    let (scene, warnings) = args.scene.load()?;
+    warn(&warnings);
+    interrupt::check()?;
+
+    let Size { width, height } = args.size;
+    let (camera, _) = args.camera.choose(&scene, f64::from(width) / f64::from(height))?;
+    let world = World::new(&scene)?;
+    let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
+    let renderer = Renderer::new(&scene, &world, camera, settings)?;
+    let native = Bvh::build(&world);
+    let embree = Embree::new(&world, &Options::default())?;
+    let brute = (world.primitive_count() < BRUTE_LIMIT).then(|| Brute::new(&world));
+    interrupt::check()?;
+
+    let name = args.scene.scene.display().to_string();
+    let setup = Setup {
+        scene: &name,
+        renderer: &renderer,
+        native: &native,
+        embree: &embree,
+        brute: brute.as_ref().map(|brute| brute as &dyn Tracer),
+        random: args.random,
+        seed: args.seed,
+    };
+    // The picture is traced three times: by each engine, and by both.
+    let bar = progress::bar(3 * u64::from(width) * u64::from(height), "comparing", args.json);
+    let on_tile = |pixels| bar.inc(pixels);
+    let comparison = setup.run(Control { cancel: Some(cancel), on_tile: Some(&on_tile) })?;
+    bar.finish_and_clear();
+
+    let (a, b) = (&comparison.native_image, &comparison.embree_image);
+    if !diff.is_empty() {
+        outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default())?;
+    }
+    let report = &comparison.report;
+    if args.json {
+        let document = serde_json::to_string(report);
+        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
+    } else {
+        say(report.to_string().trim_end())?;
+    }
+    report.check()
+}

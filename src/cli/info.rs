@@ -1,0 +1,39 @@
+//! `twincast info`: what a scene holds, and what about it looks like a mistake.
+
+use clap::Args;
+
+use super::common::SceneArgs;
+use super::{say, warn};
+use crate::error::{Error, Result};
+use crate::lab::inspect::Inspection;
+
+/// Say what a scene holds, and what about it looks like a mistake
+///
+/// Counts, bounds, materials, textures, lights, cameras and memory; and for each mesh the triangles without an area,
+/// with NaN or infinite corners, or stored twice, the open and the non-manifold edges, and those across which the
+/// winding flips.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  twincast info bunny.glb
+  twincast info scan.ply --json")]
+pub(super) struct InfoArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+
+    /// Print one JSON document, and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &InfoArgs) -> Result<()> {
+    let (scene, warnings) = args.scene.load()?;
+    warn(&warnings);
+    let inspection = Inspection::new(&scene);
+    if args.json {
+        let document = serde_json::to_string(&inspection);
+        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
+    } else {
+        say(inspection.to_string().trim_end())
+    }
+}

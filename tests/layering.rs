@@ -1,0 +1,187 @@
+//! Holds the source to the layers of the architecture: imports only ever point down, and `unsafe` stays where it may be.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The layers, from the bottom up. A module may use those in the layers below its own, and itself. `main` is the program.
+const LAYERS: &[&[&str]] = &[
+    &["error"],
+    &["output"],
+    &["math"],
+    &["ray"],
+    &["shape", "image"],
+    &["scene"],
+    &["io", "trace"],
+    &["shade"],
+    &["plan"],
+    &["render"],
+    &["lab"],
+    &["cli"],
+    &["main"],
+];
+
+/// Files and folders that may say `unsafe`.
+const UNSAFE: &[&str] = &["trace/embree/", "trace/bvh/isa.rs", "trace/bvh/simd.rs", "image/oiio.rs", "io/mapped.rs"];
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// Every source file, by its path below `src`, without comments.
+fn files() -> Vec<(String, String)> {
+    fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(folder).expect("a readable folder") {
+            let path = entry.expect("a readable entry").path();
+            if path.is_dir() {
+                walk(&path, files);
+            } else if path.extension().is_some_and(|suffix| suffix == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    let mut paths = Vec::new();
+    walk(&source(), &mut paths);
+    paths.sort();
+    let relative = |path: &Path| {
+        let parts = path.strip_prefix(source()).expect("below src").components();
+        parts.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
+    };
+    paths
+        .iter()
+        .map(|path| (relative(path), without_comments(&fs::read_to_string(path).expect("readable text"))))
+        .collect()
+}
+
+fn without_comments(text: &str) -> String {
+    text.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+/// Without its tests, which may look up: they compare with the oracle and render whole scenes.
+fn without_tests(text: &str) -> &str {
+    text.find("#[cfg(test)]\nmod ").map_or(text, |start| &text[..start])
+}
+
+/// The modules of a file's path: `trace/bvh/mod.rs` is `trace::bvh`.
+fn module_path(file: &str) -> Vec<&str> {
+    file.trim_end_matches(".rs").split('/').filter(|part| !matches!(*part, "mod" | "lib")).collect()
+}
+
+/// The first names in what follows `crate::`: one, or all those in braces.
+fn heads(rest: &str) -> Vec<&str> {
+    let name = |text: &str| text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
+    let Some(list) = rest.strip_prefix('{') else { return vec![&rest[..name(rest)]] };
+    let (mut depth, mut start, mut names) = (0, 0, Vec::new());
+    for (i, c) in list.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' | ',' if depth == 0 => {
+                let item = list[start..i].trim();
+                names.push(&item[..name(item)]);
+                start = i + 1;
+                if c == '}' {
+                    break;
+                }
+            }
+            '}' => depth -= 1,
+            _ => {}
+        }
+    }
+    names
+}
+
+/// Every name directly below the crate's root that `text`, in the module `path`, refers to.
+fn uses<'t>(text: &'t str, path: &[&str]) -> Vec<&'t str> {
+    let mut found = Vec::new();
+    for (i, _) in text.match_indices("crate::") {
+        // Not `$crate::` and not another crate's name.
+        if !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
+            found.extend(heads(&text[i + "crate::".len()..]));
+        }
+    }
+    let climb = "super::".repeat(path.len());
+    if !path.is_empty() {
+        for (i, _) in text.match_indices(&climb) {
+            if !text[..i].ends_with("super::") {
+                found.extend(heads(&text[i + climb.len()..]));
+            }
+        }
+    }
+    found
+}
+
+/// From each name that `lib.rs` re-exports to its module.
+fn reexports(lib: &str) -> BTreeMap<&str, &str> {
+    let mut map = BTreeMap::new();
+    for (i, _) in lib.match_indices("pub use ") {
+        let (module, names) = lib[i + "pub use ".len()..].split_once("::").expect("pub use module::names");
+        for name in heads(names) {
+            map.insert(name, module);
+        }
+    }
+    map
+}
+
+fn layer(module: &str) -> Option<usize> {
+    LAYERS.iter().position(|layer| layer.contains(&module))
+}
+
+/// What is wrong with the imports of one file.
+fn violations(file: &str, text: &str, exports: &BTreeMap<&str, &str>) -> Vec<String> {
+    let path = module_path(file);
+    let Some(&module) = path.first() else { return Vec::new() };
+    let Some(own) = layer(module) else { return vec![format!("{file}: module {module} is in no layer")] };
+    let mut wrong = Vec::new();
+    for name in uses(without_tests(text), &path) {
+        let target = exports.get(name).copied().unwrap_or(name);
+        match layer(target) {
+            Some(other) if target == module || other < own => {}
+            Some(_) => wrong.push(format!("{file}: {module} must not use {target} ({name})")),
+            // A macro or a name of the crate's root, where nothing is defined: not resolvable by this test.
+            None => wrong.push(format!("{file}: {name} is in no layer")),
+        }
+    }
+    wrong
+}
+
+#[test]
+fn imports_point_down() {
+    let files = files();
+    let lib = &files.iter().find(|(file, _)| file == "lib.rs").expect("lib.rs").1;
+    let exports = reexports(lib);
+    // Test modules in files of their own are named so.
+    let judged = files.iter().filter(|(file, _)| !file.ends_with("tests.rs"));
+    let wrong: Vec<_> = judged.flat_map(|(file, text)| violations(file, text, &exports)).collect();
+    assert!(wrong.is_empty(), "imports only ever point down:\n{}", wrong.join("\n"));
+    assert!(files.len() > 20 && exports.get("Ray") == Some(&"ray"), "the scan found the source");
+}
+
+#[test]
+fn unsafe_stays_where_it_may_be() {
+    let is_word = |text: &str, i: usize| {
+        let (before, after) = (&text[..i], &text[i + "unsafe".len()..]);
+        let inside = |c: char| c.is_alphanumeric() || c == '_';
+        !before.ends_with(inside) && !after.starts_with(inside)
+    };
+    for (file, text) in files() {
+        let allowed = UNSAFE.iter().any(|place| file.starts_with(place));
+        let says_unsafe = text.match_indices("unsafe").any(|(i, _)| is_word(&text, i));
+        let may = text.contains("allow(unsafe_code)") || text.contains("expect(unsafe_code)");
+        assert!(allowed || !(says_unsafe || may), "{file}: unsafe code has no place here");
+    }
+}
+
+#[test]
+fn the_scan_itself_finds_what_it_should() {
+    let exports = BTreeMap::from([("Renderer", "render"), ("Ray", "ray")]);
+    let wrong = |file: &str, text: &str| violations(file, &without_comments(text), &exports).len();
+    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::math::Vec3; use crate::{Ray, scene::{Scene, Mesh}};"), 0);
+    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::io::load;"), 1);
+    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::{math, Renderer, lab::{a, b}, ray};"), 2);
+    assert_eq!(wrong("trace/bvh/mod.rs", "use super::super::shade::x; use super::World;"), 1);
+    assert_eq!(wrong("trace/bvh/walk.rs", "use super::super::super::shade::x; use super::super::World;"), 1);
+    assert_eq!(wrong("trace/mod.rs", "// crate::render\nlet x = crate::render::y();"), 1);
+    assert_eq!(wrong("math/mod.rs", "fn f() {}\n#[cfg(test)]\nmod tests { use crate::lab; }"), 0);
+    assert_eq!(wrong("novel.rs", ""), 1);
+    assert_eq!(wrong("ray.rs", "use crate::novel::x;"), 1);
+}
