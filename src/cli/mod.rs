@@ -4,8 +4,10 @@
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
 mod common;
+mod compare;
 mod completions;
 mod engine;
+mod info;
 mod interrupt;
 mod man;
 mod metadata;
@@ -34,6 +36,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
+    Compare(compare::CompareArgs),
+    Info(info::InfoArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -42,6 +46,8 @@ impl Command {
     fn run(&self) -> Result<()> {
         match self {
             Self::Render(args) => render::run(args),
+            Self::Compare(args) => compare::run(args),
+            Self::Info(args) => info::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

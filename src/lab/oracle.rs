@@ -280,7 +280,7 @@ mod tests {
         for scale in [1e-44f32, 1e-38, 1e-20, 1.0, 1e10, 9e17] {
             let corners = [Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale];
             let ray = |x: f32, d: f32| Ray::new(Vec3::new(x, scale / 4.0, scale), Vec3::NEG_Z * d);
-            for d in [1e-45, 1.0, f32::MAX] {
+            for d in [f32::MIN_POSITIVE, 1.0, f32::MAX] {
                 let m = meet(&ray(scale / 4.0, d), &triangle(corners)).unwrap();
                 assert!(!m.touches);
                 assert_eq!(m.t.to_f64(), f64::from(scale) / f64::from(d));

@@ -136,11 +136,6 @@ impl<'a> Renderer<'a> {
         &self.plan
     }
 
-    /// What is rendered, as the engines hold it.
-    pub const fn world(&self) -> &'a World {
-        self.world
-    }
-
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors
