@@ -12,24 +12,28 @@ use crate::scenes::{self, Random};
 #[track_caller]
 fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
     let world = World::new(scene).expect("the scene is sound");
-    let brute = Brute::new(&world);
+    assert_parity_of(&world, &Brute::new(&world), rays)
+}
+
+#[track_caller]
+fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
     for isa in [Isa::Portable, Isa::Avx2] {
         if !isa.is_available() {
             continue;
         }
-        let bvh = Bvh::build_for(&world, isa);
-        for width in Width::ALL {
-            let batch = Batch { width, coherent: false };
+        let bvh = Bvh::build_for(world, isa);
+        let packets = Width::ALL.map(|width| Batch { width, coherent: false });
+        for batch in packets.into_iter().chain([Batch { width: Width::One, coherent: true }]) {
             let mut hits = vec![None; rays.len()];
             bvh.closest_batch(rays, &mut hits, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(hits[i], expected[i], "{isa:?} {width:?} {ray:?}");
+                assert_eq!(hits[i], expected[i], "{isa:?} {batch:?} {ray:?}");
             }
             let mut occluded = vec![false; rays.len()];
             bvh.occluded_batch(rays, &mut occluded, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(occluded[i], expected[i].is_some(), "occluded {isa:?} {width:?} {ray:?}");
+                assert_eq!(occluded[i], expected[i].is_some(), "occluded {isa:?} {batch:?} {ray:?}");
             }
         }
         for (ray, expected) in rays.iter().zip(&expected).take(100) {
@@ -200,4 +204,37 @@ fn the_tree_does_not_depend_on_threads() {
         })
     };
     assert_eq!(trace(1), trace(2));
+}
+
+/// Bundles: rays that start in one point, and shadow rays that end in one.
+#[test]
+fn bundles() {
+    let instanced = scenes::instanced(5);
+    let floor = Mesh::new(
+        vec![Vec3::new(-9.0, -1.0, -9.0), Vec3::new(9.0, -1.0, -9.0), Vec3::new(0.0, -1.0, 9.0)],
+        vec![[0, 1, 2]],
+    );
+    let meshes = [scenes::soup(3000, 0.1, 3), scenes::soup(300, 2.0, 4), scenes::bumpy_sphere(40, 0.2, 5), floor];
+    for (i, scene) in meshes.into_iter().map(scenes::of_mesh).chain([instanced]).enumerate() {
+        let world = World::new(&scene).expect("sound");
+        let brute = Brute::new(&world);
+        let mut random = Random::new(i as u64);
+        for view in 0..6 {
+            let eye = random.vec3() * [0.3, 3.0, 30.0, 3.0, 3000.0, 2.5][view];
+            let corner = -eye / eye.length() + random.vec3() * 0.2;
+            let (across, down) = (random.vec3() * 0.02, random.vec3() * 0.02);
+            let spread = 1.0 / eye.length().max(1.0) * 3.0;
+            let pixel = |k: usize| {
+                corner + (across * (k % 8 + k / 64 % 6 * 8) as f32 + down * (k % 64 / 8 + k / 384 * 8) as f32) * spread
+            };
+            let rays: Vec<Ray> = (0..2304).map(|k| Ray::new(eye, pixel(k))).collect();
+            assert_parity_of(&world, &brute, &rays);
+            let hits = rays.iter().filter_map(|ray| Some((ray, brute.closest(ray)?)));
+            let shadow = hits.map(|(ray, hit)| {
+                let point = ray.origin + ray.direction * (hit.t * 0.9999);
+                Ray { tmax: 0.999, ..Ray::new(point, eye * 1.5 + Vec3::ONE - point) }
+            });
+            assert_parity_of(&world, &brute, &shadow.collect::<Vec<_>>());
+        }
+    }
 }

@@ -17,12 +17,15 @@
 //! instruction set.
 
 mod build;
+mod bundle;
+mod edges;
 mod isa;
 mod node;
 mod placements;
 mod shapes;
 mod simd;
 mod slab;
+mod tile;
 mod triangles;
 mod walk;
 
@@ -175,13 +178,39 @@ impl Bvh {
             answer(i, self.trace::<S, ANY>(ray, &mut stacks));
         }
     }
+
+    /// Many rays in bundles of 64 where they are bundles, else ray by ray.
+    #[inline(always)]
+    fn trace_bundles<S: Simd, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+        let mut scratch = tile::Scratch::new();
+        let (bundles, rest) = rays.as_chunks::<{ bundle::RAYS }>();
+        let has_triangles = !self.fixed.triangles.tree().is_empty();
+        for (i, rays) in bundles.iter().enumerate() {
+            let is_bundle = has_triangles && tile::trace::<S, ANY>(&mut scratch, &self.fixed.triangles, rays);
+            for (k, ray) in rays.iter().enumerate() {
+                let hit = if is_bundle {
+                    let nearest = scratch.nearest(k);
+                    self.fixed.trace_shapes::<S, ANY>(ray, None, 1.0, &mut stacks.level, nearest);
+                    self.enter_placements::<S, ANY>(ray, &mut stacks, nearest);
+                    nearest.hit()
+                } else {
+                    self.trace::<S, ANY>(ray, &mut stacks)
+                };
+                answer(i * bundle::RAYS + k, hit);
+            }
+        }
+        for (k, ray) in rest.iter().enumerate() {
+            answer(rays.len() - rest.len() + k, self.trace::<S, ANY>(ray, &mut stacks));
+        }
+    }
 }
 
 /// A batch, for one instruction set at a time.
 struct BatchKernel<'a, F, const ANY: bool> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
-    width: Width,
+    batch: Batch,
     answer: F,
 }
 
@@ -190,8 +219,11 @@ impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, rays, width, answer } = self;
-        match width {
+        let Self { bvh, rays, batch, answer } = self;
+        if batch.coherent {
+            return bvh.trace_bundles::<S, ANY>(rays, answer);
+        }
+        match batch.width {
             Width::One => bvh.trace_batch::<S, 1, ANY>(rays, answer),
             Width::Four => bvh.trace_batch::<S, 4, ANY>(rays, answer),
             Width::Eight => bvh.trace_batch::<S, 8, ANY>(rays, answer),
@@ -237,6 +269,18 @@ impl Level {
                 },
             );
         }
+        self.trace_shapes::<S, ANY>(local, through, blur, stack, nearest);
+    }
+
+    #[inline(always)]
+    fn trace_shapes<S: Simd, const ANY: bool>(
+        &self,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        blur: f32,
+        stack: &mut Stack,
+        nearest: &mut Nearest,
+    ) {
         let is_done = ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
@@ -298,31 +342,31 @@ impl Level {
 }
 
 impl Bvh {
-    fn run_batch<const ANY: bool>(&self, rays: &[Ray], width: Width, answer: impl FnMut(usize, Option<Hit>)) {
-        isa::dispatch(self.isa, BatchKernel::<_, ANY> { bvh: self, rays, width, answer });
+    fn run_batch<const ANY: bool>(&self, rays: &[Ray], batch: Batch, answer: impl FnMut(usize, Option<Hit>)) {
+        isa::dispatch(self.isa, BatchKernel::<_, ANY> { bvh: self, rays, batch, answer });
     }
 }
 
 impl Tracer for Bvh {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut found = None;
-        self.run_batch::<false>(std::slice::from_ref(ray), Width::One, |_, hit| found = hit);
+        self.run_batch::<false>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit);
         found
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
         let mut found = false;
-        self.run_batch::<true>(std::slice::from_ref(ray), Width::One, |_, hit| found = hit.is_some());
+        self.run_batch::<true>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit.is_some());
         found
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        self.run_batch::<false>(rays, batch.width, |i, hit| hits[i] = hit);
+        self.run_batch::<false>(rays, batch, |i, hit| hits[i] = hit);
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        self.run_batch::<true>(rays, batch.width, |i, hit| occluded[i] = hit.is_some());
+        self.run_batch::<true>(rays, batch, |i, hit| occluded[i] = hit.is_some());
     }
 }

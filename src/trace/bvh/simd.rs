@@ -19,6 +19,7 @@ pub(super) trait Vector<const N: usize>: Copy {
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
     /// self * factor + summand, rounded once or twice.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
     fn max(self, other: Self) -> Self;
@@ -96,6 +97,15 @@ impl<const N: usize> Vector<N> for [f32; N] {
         )
     }
     #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        zip(
+            self,
+            other,
+            #[inline(always)]
+            |a, b| a / b,
+        )
+    }
+    #[inline(always)]
     fn mul_add(self, factor: Self, summand: Self) -> Self {
         // Not f32::mul_add: without the instruction that is a call.
         self.mul(factor).add(summand)
@@ -169,7 +179,7 @@ mod x86 {
 
     /// The operations of one vector type by its intrinsics.
     macro_rules! vector {
-        ($vector:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
+        ($vector:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident, $div:ident,
          $fmadd:ident, $max:ident, $min:ident, $andnot:ident, $cmp:ident, $movemask:ident) => {
             impl Vector<$n> for $vector {
                 #[inline(always)]
@@ -197,6 +207,10 @@ mod x86 {
                 #[inline(always)]
                 fn mul(self, other: Self) -> Self {
                     Self(unsafe { $mul(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn div(self, other: Self) -> Self {
+                    Self(unsafe { $div(self.0, other.0) })
                 }
                 #[inline(always)]
                 fn mul_add(self, factor: Self, summand: Self) -> Self {
@@ -235,6 +249,7 @@ mod x86 {
         _mm_add_ps,
         _mm_sub_ps,
         _mm_mul_ps,
+        _mm_div_ps,
         _mm_fmadd_ps,
         _mm_max_ps,
         _mm_min_ps,
@@ -251,6 +266,7 @@ mod x86 {
         _mm256_add_ps,
         _mm256_sub_ps,
         _mm256_mul_ps,
+        _mm256_div_ps,
         _mm256_fmadd_ps,
         _mm256_max_ps,
         _mm256_min_ps,

@@ -6,6 +6,8 @@
 //! rounding error. What remains goes to the exact test.
 
 use super::build::{self, Item};
+use super::bundle::Bundle;
+use super::edges::Edges;
 use super::node::Tree;
 use super::simd::{Simd, Vector};
 use super::{PartId, Through};
@@ -89,6 +91,20 @@ impl TriangleTree {
                 self.offer(block, lane, ray, through, nearest);
             }
         }
+    }
+
+    /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.
+    #[inline]
+    pub fn offer_one(&self, id: u32, ray: &Ray, nearest: &mut Nearest) {
+        self.offer(&self.blocks[id as usize / LANES], id as usize % LANES, ray, None, nearest);
+    }
+
+    /// The triangles of a block that some ray of the bundle may hit up to `most`, as a bit mask, and their edges.
+    #[inline(always)]
+    pub fn edges<S: Simd>(&self, block: u32, bundle: &Bundle, most: f32) -> (u32, Edges) {
+        let block = &self.blocks[block as usize];
+        let (lanes, edges) = Edges::new::<S>(&block.corners, bundle, most);
+        (lanes & block.lanes, edges)
     }
 
     #[inline]
