@@ -87,42 +87,88 @@ impl Corners for Placed<'_> {
 #[inline]
 pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
     let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-    let [a, b, c] = corners.rounded().map(|p| p - origin);
-    let slack = corners.slack();
-    let [ma, mb, mc] = [a.abs() + slack[0], b.abs() + slack[1], c.abs() + slack[2]];
+    let seen = Seen::new(origin, d, corners.rounded());
+    let [sa, sb, sc] = corners.slack();
+    let [a, b, c] = [seen.corners[0].abs() + sa, seen.corners[1].abs() + sb, seen.corners[2].abs() + sc];
+    let [ea, eb, ec] = [seen.edges[0].abs() + sb + sc, seen.edges[1].abs() + sc + sa, seen.edges[2].abs() + sa + sb];
 
-    let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
-    let volumes = [d.dot(bc), d.dot(ca), d.dot(ab)];
-    // Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), twice; 2 in the cross product, 3 in the dot
-    // product; and the bound's own rounding.
-    const K: f64 = gamma64(32);
     let absolute = d.abs();
     let bounds = [
-        K * absolute.dot(permanent_cross(mb, mc)),
-        K * absolute.dot(permanent_cross(mc, ma)),
-        K * absolute.dot(permanent_cross(ma, mb)),
+        K * absolute.dot(permanent_cross(b, ea)),
+        K * absolute.dot(permanent_cross(c, eb)),
+        K * absolute.dot(permanent_cross(a, ec)),
     ];
-    let positive = (0..3).any(|k| volumes[k] > bounds[k]);
-    let negative = (0..3).any(|k| volumes[k] < -bounds[k]);
+    let positive = (0..3).any(|k| seen.volumes[k] > bounds[k]);
+    let negative = (0..3).any(|k| seen.volumes[k] < -bounds[k]);
     if positive && negative {
         return None;
     }
-    let undecided = (0..3).any(|k| volumes[k].abs() <= bounds[k]);
+    let undecided = (0..3).any(|k| seen.volumes[k].abs() <= bounds[k]);
 
-    let determinant = volumes[0] + volumes[1] + volumes[2];
-    let height = a.dot(bc);
-    let height_bound = K * ma.dot(permanent_cross(mb, mc));
-    // |t| (relative error of both) against a quarter of f32's precision.
-    let t_error = height_bound + (bounds[0] + bounds[1] + bounds[2]) * (height / determinant).abs();
-    // False for NaN too.
-    let is_precise = t_error <= height.abs() * T_PRECISION;
-    let hit = if is_precise && !undecided {
-        TriangleHit { t: height / determinant, u: volumes[1] / determinant, v: volumes[2] / determinant }
-    } else {
-        intersect_exactly(origin, d, corners)?
-    };
+    let normal = permanent_cross(eb, ec);
+    // |t| (relative error of both) against an eighth of f32's precision; false for NaN too.
+    let t_error = K * (a.dot(normal) + absolute.dot(normal) * (seen.height / seen.slope).abs());
+    let is_precise = t_error <= seen.height.abs() * T_PRECISION;
+    let hit = if is_precise && !undecided { seen.hit() } else { intersect_exactly(origin, d, corners)? };
     let t = hit.t as f32;
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
+}
+
+/// The same, to the bit, for a ray that is known to pass inside and to hit within its range: only t, u and v are
+/// computed.
+#[inline]
+pub(crate) fn intersect_inside(ray: &Ray, corners: &[Vec3; 3]) -> Option<TriangleHit> {
+    let d = ray.direction.as_dvec3();
+    let seen = Seen::new(ray.origin.as_dvec3(), d, corners.rounded());
+    let [a, b, c] = seen.edges;
+    let long = a.abs().max(b.abs()).max(c.abs()).max_element();
+    // The bound of `intersect`, from above.
+    let sizes = seen.corners[0].abs().max_element() * seen.slope.abs() + d.abs().max_element() * seen.height.abs();
+    if 6.0 * K * long * long * sizes <= (seen.height * seen.slope).abs() * T_PRECISION {
+        Some(seen.hit())
+    } else {
+        intersect(ray, corners)
+    }
+}
+
+/// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
+/// the dot product; and the bound's own rounding.
+const K: f64 = gamma64(32);
+
+/// A triangle as seen from the origin of a ray, in f64.
+struct Seen {
+    corners: [DVec3; 3],
+    /// Opposite to each corner.
+    edges: [DVec3; 3],
+    /// The signed volumes of the module's documentation, opposite to each corner. With the edge in place of its second
+    /// corner, their terms are as small as the triangle, however far it is.
+    volumes: [f64; 3],
+    /// The sum of the volumes: the product of direction and normal.
+    slope: f64,
+    /// t times the slope.
+    height: f64,
+}
+
+impl Seen {
+    #[inline(always)]
+    fn new(origin: DVec3, d: DVec3, [pa, pb, pc]: [DVec3; 3]) -> Self {
+        let [a, b, c] = [pa - origin, pb - origin, pc - origin];
+        let [ea, eb, ec] = [pc - pb, pa - pc, pb - pa];
+        let normal = eb.cross(ec);
+        Self {
+            corners: [a, b, c],
+            edges: [ea, eb, ec],
+            volumes: [d.dot(b.cross(ea)), d.dot(c.cross(eb)), d.dot(a.cross(ec))],
+            slope: d.dot(normal),
+            height: a.dot(normal),
+        }
+    }
+
+    #[inline(always)]
+    fn hit(&self) -> TriangleHit {
+        let &Self { volumes, slope, height, .. } = self;
+        TriangleHit { t: height / slope, u: volumes[1] / slope, v: volumes[2] / slope }
+    }
 }
 
 /// The relative error of t that is let pass: 2^-27, an eighth of an f32 step.

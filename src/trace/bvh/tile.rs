@@ -324,8 +324,11 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
             self.computed |= 1 << ray;
         }
         if id != NONE {
-            self.tree.offer_one(id, &self.rays[ray], &mut self.nearest[ray]);
-            debug_assert!(self.nearest[ray].hit().is_some(), "what is noted is hit without doubt");
+            let hit = self.tree.hit_one(id, &self.rays[ray]);
+            debug_assert!(hit.is_some(), "what is noted is hit without doubt");
+            if let Some((t, hit)) = hit {
+                self.nearest[ray].offer(t, hit);
+            }
         }
     }
 

@@ -11,7 +11,7 @@ use super::edges::Edges;
 use super::node::Tree;
 use super::simd::{Simd, Vector};
 use super::{PartId, Through};
-use crate::math::{Aabb, UNIT_ROUNDOFF, is_traceable};
+use crate::math::{Aabb, UNIT_ROUNDOFF, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Placed};
 use crate::trace::nearest::Nearest;
@@ -99,6 +99,16 @@ impl TriangleTree {
         self.offer(&self.blocks[id as usize / LANES], id as usize % LANES, ray, None, nearest);
     }
 
+    /// The hit of `ray` with a triangle that it is known to hit, numbered as in [`Self::offer_one`].
+    #[inline(always)]
+    pub fn hit_one(&self, id: u32, ray: &Ray) -> Option<(f64, Hit)> {
+        let (block, lane) = (&self.blocks[id as usize / LANES], id as usize % LANES);
+        let hit = triangle::intersect_inside(ray, &block.triangle(lane))?;
+        let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
+        let (t, u, v) = (hit.t as f32, hit.u as f32, hit.v as f32);
+        Some((hit.t, Hit { t, u, v, primitive: block.primitive[lane], geometry, instance }))
+    }
+
     /// The triangles of a block that some ray of the bundle may hit up to `most`, as a bit mask, and their edges.
     #[inline(always)]
     pub fn edges<S: Simd>(&self, block: u32, bundle: &Bundle, most: f32) -> (u32, Edges) {
@@ -142,9 +152,14 @@ impl Block {
         block
     }
 
-    #[inline]
-    fn triangle(&self, lane: usize) -> [crate::math::Vec3; 3] {
-        [0, 3, 6].map(|k| [self.corners[k][lane], self.corners[k + 1][lane], self.corners[k + 2][lane]].into())
+    #[inline(always)]
+    fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] = &self.corners;
+        [
+            Vec3::new(ax[lane], ay[lane], az[lane]),
+            Vec3::new(bx[lane], by[lane], bz[lane]),
+            Vec3::new(cx[lane], cy[lane], cz[lane]),
+        ]
     }
 }
 
