@@ -14,7 +14,7 @@ TWINCAST = target/release/twincast
 .PHONY: help render test check test-embree4 install packages build
 
 help: ## list these targets
-	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/^([a-z0-9-]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 
 packages:
 	@scripts/install-packages.sh
