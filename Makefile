@@ -40,13 +40,13 @@ check: packages ## formatting, lints, documentation, and everything once more wi
 test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5
 	@scripts/test-embree4.sh
 
-install: build ## put binary, man page and completions under PREFIX (/usr/local); honours DESTDIR
+install: build ## put binary, man pages and completions under PREFIX (/usr/local); honours DESTDIR
 	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'
 	install -d '$(DESTDIR)$(PREFIX)/share/man/man1' \
 	    '$(DESTDIR)$(PREFIX)/share/bash-completion/completions' \
 	    '$(DESTDIR)$(PREFIX)/share/zsh/site-functions' \
 	    '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d'
-	$(TWINCAST) man > '$(DESTDIR)$(PREFIX)/share/man/man1/twincast.1'
+	$(TWINCAST) man --out '$(DESTDIR)$(PREFIX)/share/man/man1'
 	$(TWINCAST) completions bash > '$(DESTDIR)$(PREFIX)/share/bash-completion/completions/twincast'
 	$(TWINCAST) completions zsh > '$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_twincast'
 	$(TWINCAST) completions fish > '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/twincast.fish'
