@@ -65,7 +65,7 @@ make_root() {
     local from proxy settings
     from=$(mirror)
     [ -n "$from" ] || fail "apt's sources name no Debian mirror: set TWINCAST_DEBIAN_MIRROR to the URL of one"
-    if ! /usr/lib/apt/apt-helper download-file "${from%/}/dists/$suite/InRelease" "$cache/InRelease" > /dev/null; then
+    if ! /usr/lib/apt/apt-helper -o APT::Sandbox::User=root download-file "${from%/}/dists/$suite/InRelease" "$cache/InRelease" > /dev/null; then
         say "SKIPPED: the Debian mirror $from cannot be reached"
         exit 0
     fi
