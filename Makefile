@@ -14,7 +14,7 @@ TWINCAST = target/release/twincast
 .PHONY: help render test check test-embree4 install packages build
 
 help: ## list these targets
-	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/^([a-z0-9-]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 
 packages:
 	@scripts/install-packages.sh
@@ -35,19 +35,18 @@ check: packages ## formatting, lints, documentation, and everything once more wi
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
-	$(CARGO) build --locked --no-default-features
 	$(CARGO) test --locked --no-default-features
 
 test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5
 	@scripts/test-embree4.sh
 
-install: build ## put binary, man page and completions under PREFIX (/usr/local); honours DESTDIR
+install: build ## put binary, man pages and completions under PREFIX (/usr/local); honours DESTDIR
 	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'
 	install -d '$(DESTDIR)$(PREFIX)/share/man/man1' \
 	    '$(DESTDIR)$(PREFIX)/share/bash-completion/completions' \
 	    '$(DESTDIR)$(PREFIX)/share/zsh/site-functions' \
 	    '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d'
-	$(TWINCAST) man > '$(DESTDIR)$(PREFIX)/share/man/man1/twincast.1'
+	$(TWINCAST) man --out '$(DESTDIR)$(PREFIX)/share/man/man1'
 	$(TWINCAST) completions bash > '$(DESTDIR)$(PREFIX)/share/bash-completion/completions/twincast'
 	$(TWINCAST) completions zsh > '$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_twincast'
 	$(TWINCAST) completions fish > '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/twincast.fish'

@@ -5,14 +5,16 @@
 # into it is mounted in a mount namespace of this script's own, so nothing stays mounted however the script ends. The
 # source tree is read-only in there; what cargo builds goes to the cache folder.
 #
-#   TWINCAST_DEBIAN_MIRROR   where packages come from; by default the mirror that this machine's apt uses
+#   TWINCAST_DEBIAN_MIRROR   URL that packages come from; by default the Debian mirror in this machine's apt sources
 #   TWINCAST_CACHE           the cache folder; by default $XDG_CACHE_HOME/twincast or ~/.cache/twincast
 #
 # Arguments go to `cargo test`. Where no mirror can be reached it says that it skipped and exits 0.
 set -euo pipefail
 
-source_tree=$(cd "$(dirname "$0")/.." && pwd)
+script=$(realpath "$0")
+source_tree=$(dirname "$(dirname "$script")")
 cd "$source_tree"
+PATH=$PATH:/usr/sbin:/sbin # chroot and debootstrap, which `su` may leave out
 suite=trixie
 cache=${TWINCAST_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/twincast}
 root=$cache/$suite
@@ -35,7 +37,7 @@ if [ -z "${TWINCAST_IN_NAMESPACE:-}" ]; then
     fi
     exec "${as_root[@]}" env TWINCAST_IN_NAMESPACE=1 TWINCAST_CACHE="$cache" CARGO_HOME="$cargo_home" \
         TWINCAST_DEBIAN_MIRROR="${TWINCAST_DEBIAN_MIRROR:-}" SYSROOT="$sysroot" OWNER="$(id -u):$(id -g)" \
-        unshare --mount --propagation private "$0" "$@"
+        unshare --mount --propagation private "$script" "$@"
 fi
 
 # The user's mirror and whatever apt settings it takes to reach it.
@@ -62,8 +64,8 @@ make_root() {
     command -v apt-get > /dev/null || fail "needs apt-get: it runs on Debian and its kin only"
     local from proxy settings
     from=$(mirror)
-    from=${from:-http://deb.debian.org/debian}
-    if ! /usr/lib/apt/apt-helper download-file "${from%/}/dists/$suite/InRelease" "$cache/InRelease" > /dev/null; then
+    [ -n "$from" ] || fail "apt's sources name no Debian mirror: set TWINCAST_DEBIAN_MIRROR to the URL of one"
+    if ! /usr/lib/apt/apt-helper -o APT::Sandbox::User=root download-file "${from%/}/dists/$suite/InRelease" "$cache/InRelease" > /dev/null; then
         say "SKIPPED: the Debian mirror $from cannot be reached"
         exit 0
     fi
@@ -108,15 +110,15 @@ fi
 mount --rbind /dev "$root/dev"
 mount_into_root "$SYSROOT" "$SYSROOT" ro
 mount_into_root "$cargo_home" "$cargo_home"
-mount_into_root "$source_tree" /work/twincast ro
-mount_into_root "$target" /work/target
+mount_into_root "$source_tree" /src/twincast ro
+mount_into_root "$target" /src/target
 if [ -d ../shared ]; then
-    mount_into_root "$(cd ../shared && pwd)" /work/shared ro
+    mount_into_root "$(cd ../shared && pwd)" /src/shared ro
 fi
 
 say "testing with $(chroot "$root" dpkg-query --show --showformat '${Package} ${Version}, ' libembree-dev libopenimageio-dev)in $root"
 # As the owner of the tree, so that nothing in cargo's home or in the cache ends up as root's.
 exec chroot --userspec="$OWNER" "$root" env -i \
-    HOME=/tmp PATH="$SYSROOT/bin:/usr/local/bin:/usr/bin:/bin" CARGO_HOME="$cargo_home" CARGO_TARGET_DIR=/work/target \
+    HOME=/tmp PATH="$SYSROOT/bin:/usr/local/bin:/usr/bin:/bin" CARGO_HOME="$cargo_home" CARGO_TARGET_DIR=/src/target \
     CARGO_NET_OFFLINE=true RUST_BACKTRACE=1 \
-    sh -c 'cd /work/twincast && exec cargo test --locked "$@"' sh "$@"
+    sh -c 'cd /src/twincast && exec cargo test --locked "$@"' sh "$@"

@@ -68,7 +68,7 @@ impl Default for Settings {
 /// How a running render is watched and stopped.
 #[derive(Clone, Copy, Default)]
 pub struct Control<'a> {
-    /// Set to stop: the render then returns [`Error::Interrupted`](crate::Error::Interrupted).
+    /// Set to stop: the render then returns [`Error::Interrupted`].
     pub cancel: Option<&'a AtomicBool>,
     /// Called after each tile, from any thread, with the number of its pixels.
     pub on_tile: Option<&'a (dyn Fn(u64) + Sync)>,
@@ -93,7 +93,7 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
     /// angle of view outside (0, 180) degrees.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, .. } = settings;
@@ -139,8 +139,8 @@ impl<'a> Renderer<'a> {
     /// Renders the whole picture on rayon's current thread pool.
     ///
     /// # Errors
-    /// [`Error::Interrupted`](crate::Error::Interrupted) once `control.cancel` is set, and
-    /// [`Error::Usage`](crate::Error::Usage) for a picture that does not fit into memory.
+    /// [`Error::Interrupted`] once `control.cancel` is set, and
+    /// [`Error::Usage`] for a picture that does not fit into memory.
     pub fn render<T: Tracer>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let film = Film::new(self.settings.width, self.settings.height)?;

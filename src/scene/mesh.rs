@@ -32,7 +32,7 @@ impl Mesh {
         Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
     }
 
-    /// Stores f64 positions as f32 offsets from an origin, chosen by [`choose_origin`].
+    /// Stores f64 positions as f32 offsets from an origin, chosen by `choose_origin`.
     pub fn set_positions(&mut self, positions: &[DVec3]) {
         let bounds = positions.iter().filter(|p| p.is_finite()).fold(DAabb::EMPTY, |all, &p| all.include(p));
         self.origin = choose_origin(&bounds);

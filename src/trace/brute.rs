@@ -1,7 +1,7 @@
 //! Every primitive for every ray: the yardstick the accelerators are held against.
 //!
 //! Nothing is skipped but by a plain f64 sign test, eight triangles at a time, that leaves anything doubtful to
-//! [`triangle::intersect`].
+//! `triangle::intersect`.
 
 use std::sync::Arc;
 

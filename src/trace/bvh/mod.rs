@@ -12,7 +12,7 @@
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
 //! instances has none of the second and third.
 //!
-//! Boxes only ever reject what cannot be hit, and [`triangle::intersect`](crate::shape::triangle::intersect) depends on
+//! Boxes only ever reject what cannot be hit, and `shape::triangle::intersect` depends on
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
