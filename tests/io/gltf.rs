@@ -140,9 +140,8 @@ fn everything_is_where_it_belongs() {
 
         let gold = &scene.materials[0];
         assert_eq!((gold.name.as_str(), gold.diffuse), ("gold", Vec3::new(0.75, 0.375, 0.1875)));
-        // Half of what a mirror of plastic reflects, half of gold's: its colour times the picture's mean, half red and
-        // half blue.
-        assert!(gold.specular.abs_diff_eq(Vec3::new(0.27, 0.02, 0.0825), 1e-6), "{}", gold.specular);
+        // The mean of plastic's 0.04 and of half of gold's colour, times the picture's mean: half red and half blue.
+        assert!(gold.specular.abs_diff_eq(Vec3::new(0.145, 0.02, 0.05125), 1e-6), "{}", gold.specular);
         assert_eq!((gold.shininess, gold.emission), (30.0, Vec3::new(0.0, 2.0, 0.0)));
         let texture = &scene.textures[gold.diffuse_texture.unwrap() as usize];
         assert_eq!((texture.wrap_u, texture.wrap_v, texture.filter), (Wrap::Clamp, Wrap::Mirror, Filter::Nearest));

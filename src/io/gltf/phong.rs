@@ -2,15 +2,14 @@
 //!
 //! With base colour b, metalness m and roughness r:
 //!
-//! - F = lerp(0.04, b, m) is what a mirror of the material reflects.
+//! - Kd = lerp(b, b / 2, m). A real metal has no diffuse part; but what it mirrors are its surroundings, and here there
+//!   are none: it would be black but for its highlights. The diffuse half stands for even surroundings.
+//! - F = lerp(0.04, b / 2, m) is left for the highlight, so that no more light is sent out than arrives.
 //! - The exponent n = 2 / alpha^2 - 2 with alpha = r^2 gives the highlight of Blinn-Phong the width of the microfacets'
 //!   (Walter et al. 2007, *Microfacet models for refraction through rough surfaces*).
 //! - Ks = F min(1, (n + 2) / 8): (n + 2) / 8 keeps the energy of a highlight while it widens (Akenine-Moller et al. 2018,
 //!   *Real-Time Rendering*, section 9.8). With F alone, a rough metal (n = 0) is white all over. Sharp highlights stop at
 //!   F, as Phong's do; their true peak is hundreds of times brighter than the light's own colour.
-//! - Kd = b (1 - m) + b m / 2. A real metal has no diffuse part; but what it mirrors are its surroundings, and here
-//!   there are none: it would be black but for its highlights. The half stands for even surroundings, dimmed so that Kd
-//!   and the widest highlight (half of b again, over the hemisphere) send out no more than arrives.
 //!
 //! Phong has one exponent and one Ks a material, so textures of metalness and roughness count by their mean, and so does
 //! the base colour's in F. Looking them up at every point would keep the pattern, and make every material of every
@@ -24,7 +23,7 @@ use crate::scene::{Material, Texture};
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Share of a metal's colour that is diffuse, for the surroundings that it does not mirror.
 const MATTE_METAL: f32 = 0.5;
-/// What a mirror of anything but metal reflects.
+/// What anything but metal mirrors, seen from the front.
 const DIELECTRIC: f32 = 0.04;
 
 /// A material of glTF with one value for each texture.
@@ -44,8 +43,8 @@ impl MetallicRoughness {
         let Self { base, texture, metal, roughness } = *self;
         let alpha = roughness.max(LEAST_ROUGHNESS).powi(2);
         let shininess = (2.0 / (alpha * alpha) - 2.0).max(0.0);
-        let mirrored = Vec3::splat(DIELECTRIC).lerp(base * texture, metal);
-        let diffuse = base * (1.0 - metal + metal * MATTE_METAL);
+        let mirrored = Vec3::splat(DIELECTRIC).lerp(base * texture * (1.0 - MATTE_METAL), metal);
+        let diffuse = base.lerp(base * MATTE_METAL, metal);
         Material {
             ambient: diffuse,
             diffuse,
@@ -106,9 +105,9 @@ mod tests {
     #[test]
     fn metals_keep_their_colour() {
         let smooth = material(1.0, 0.5);
-        assert_eq!((smooth.diffuse, smooth.specular), (BASE / 2.0, BASE));
+        assert_eq!((smooth.diffuse, smooth.specular), (BASE / 2.0, BASE / 2.0));
         let textured = MetallicRoughness { base: BASE, texture: Vec3::X, metal: 1.0, roughness: 0.5 }.phong();
-        assert_eq!((textured.diffuse, textured.specular), (BASE / 2.0, BASE * Vec3::X));
+        assert_eq!((textured.diffuse, textured.specular), (BASE / 2.0, BASE / 2.0 * Vec3::X));
     }
 
     /// Light from the hemisphere's every direction, seen from above, must not come back brighter than white: the sum of
