@@ -2,6 +2,27 @@
 //!
 //! Data flows one way: [`io`] reads a file into a [`Scene`], [`World`] makes it ready for tracing, a
 //! [`Tracer`] answers [`Hit`]s, [`Renderer`] turns them into an [`Image`].
+//!
+//! ```
+//! use twincast::math::{DVec3, Vec3};
+//! use twincast::scene::{Camera, Geometry, Material, Mesh};
+//! use twincast::trace::bvh::Bvh;
+//! use twincast::{Ray, Renderer, Scene, Settings, Tracer, World};
+//!
+//! let triangle = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+//! let scene = Scene::from_geometries(vec![Geometry::Mesh(triangle)], vec![Material::default()]);
+//! let world = World::new(&scene)?;
+//! let bvh = Bvh::build(&world);
+//!
+//! let hit = bvh.closest(&Ray::new(Vec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z)).expect("it passes inside");
+//! assert_eq!((hit.t, hit.u, hit.v), (2.0, 0.25, 0.5));
+//!
+//! let camera = Camera::look_at(DVec3::new(0.3, 0.3, 2.0), DVec3::new(0.3, 0.3, 0.0), DVec3::Y, 1.0).expect("not upwards");
+//! let settings = Settings { width: 64, height: 64, ..Settings::default() };
+//! let image = Renderer::new(&scene, &world, camera, settings)?.render(&bvh, Default::default())?;
+//! assert_eq!(image.pixels[32 * 64 + 32].w, 1.0, "the middle is covered");
+//! # Ok::<(), twincast::Error>(())
+//! ```
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -27,4 +48,9 @@ pub use ray::{Hit, Ray};
 pub use render::{Renderer, Settings};
 pub use scene::Scene;
 pub use shape::{Shape, ShapeHit, Sphere};
-pub use trace::{Backend, Batch, Tracer, Width, World};
+pub use trace::{Batch, Tracer, Width, World};
+
+/// The README's example runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -10,5 +10,6 @@ mod io;
 mod layering;
 mod mutation;
 mod parity;
+mod references;
 mod render;
 mod scenes;

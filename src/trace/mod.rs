@@ -80,15 +80,3 @@ impl Width {
         }
     }
 }
-
-/// Which engine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Backend {
-    /// The BVH of this library.
-    #[default]
-    Native,
-    /// Intel's Embree.
-    Embree,
-    /// Every primitive for every ray: the yardstick.
-    Brute,
-}

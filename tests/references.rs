@@ -1,0 +1,74 @@
+//! Every scene of `scenes/` looks as its reference picture does, on every engine.
+//!
+//! `TWINCAST_REFRESH=1` writes the references anew; look at them before you commit them.
+
+use std::path::{Path, PathBuf};
+
+use twincast::io::{LoadOptions, load};
+use twincast::render::Control;
+use twincast::trace::bvh::Bvh;
+use twincast::{Image, Renderer, Settings, World, image};
+
+const WIDTH: u32 = 320;
+const HEIGHT: u32 = 180;
+
+/// Scene file and reference of each folder.
+fn pairs() -> Vec<(PathBuf, PathBuf)> {
+    let folders = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes")).expect("the project has scenes");
+    let folders = folders.map(|entry| entry.expect("readable").path()).filter(|path| path.is_dir());
+    let scene = |folder: &Path| {
+        let files = std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").path());
+        let is_scene = |path: &PathBuf| {
+            path.extension().is_some_and(|suffix| twincast::io::SUFFIXES.contains(&suffix.to_str().unwrap_or_default()))
+        };
+        files.filter(is_scene).min().unwrap_or_else(|| panic!("{} has no scene", folder.display()))
+    };
+    folders.map(|folder| (scene(&folder), folder.join("reference.png"))).collect()
+}
+
+fn pictures(path: &Path) -> Vec<(&'static str, Image)> {
+    let (scene, warnings) = load(path, &LoadOptions::default()).expect("the project's scenes load");
+    assert_eq!(warnings, []);
+    let world = World::new(&scene).expect("sound");
+    let camera = scene.cameras.first().expect("a camera").clone();
+    let settings = Settings { width: WIDTH, height: HEIGHT, ..Settings::default() };
+    let renderer = Renderer::new(&scene, &world, camera, settings).expect("sound settings");
+    let control = Control::default();
+    let native = renderer.render(&Bvh::build(&world), control).expect("rendered");
+    #[cfg(feature = "embree")]
+    {
+        let embree = twincast::trace::embree::Embree::new(&world, &Default::default()).expect("built");
+        vec![("native", native), ("embree", renderer.render(&embree, control).expect("rendered"))]
+    }
+    #[cfg(not(feature = "embree"))]
+    vec![("native", native)]
+}
+
+#[test]
+fn scenes_look_like_their_references() {
+    let pairs = pairs();
+    assert!(!pairs.is_empty());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("references");
+    std::fs::create_dir_all(&folder).expect("writable");
+    for (scene, reference) in pairs {
+        let name = reference.parent().and_then(Path::file_name).expect("a folder").to_string_lossy().into_owned();
+        for (engine, picture) in pictures(&scene) {
+            let written = folder.join(format!("{name}-{engine}.png"));
+            image::write(&written, &picture, &Default::default(), &Default::default()).expect("written");
+            if engine == "native" && std::env::var_os("TWINCAST_REFRESH").is_some() {
+                std::fs::copy(&written, &reference).expect("copied");
+            }
+            // Both through 8 bits: native's picture is the same on every system, to the last of them. Embree's answer may
+            // be another on a tie or a boundary ray, one pixel in a thousand at the very most.
+            let [is, expected] = [&written, &reference].map(|path| image::read(path).expect("a picture"));
+            let difference = is.difference(&expected).expect("of one size");
+            let allowed = if engine == "native" { 0 } else { difference.pixels / 1000 };
+            if difference.differing > allowed {
+                let apart = folder.join(format!("{name}-{engine}-difference.png"));
+                let picture = is.difference_image(&expected).expect("of one size");
+                image::write(&apart, &picture, &Default::default(), &Default::default()).expect("written");
+                panic!("{name} on {engine}: {difference:?}; see {} and {}", written.display(), apart.display());
+            }
+        }
+    }
+}
