@@ -139,8 +139,9 @@ fn everything_is_where_it_belongs() {
         assert!(place(DVec3::Y).abs_diff_eq(DVec3::new(10_000_000.25, -2.0, 0.0), 1e-9));
 
         let gold = &scene.materials[0];
-        assert_eq!((gold.name.as_str(), gold.diffuse), ("gold", Vec3::new(0.5, 0.25, 0.125)));
-        assert!(gold.specular.abs_diff_eq(Vec3::new(0.52, 0.27, 0.145), 1e-6), "{}", gold.specular);
+        assert_eq!((gold.name.as_str(), gold.diffuse), ("gold", Vec3::new(0.75, 0.375, 0.1875)));
+        // The mean of plastic's 0.04 and of half of gold's colour, times the picture's mean: half red and half blue.
+        assert!(gold.specular.abs_diff_eq(Vec3::new(0.145, 0.02, 0.05125), 1e-6), "{}", gold.specular);
         assert_eq!((gold.shininess, gold.emission), (30.0, Vec3::new(0.0, 2.0, 0.0)));
         let texture = &scene.textures[gold.diffuse_texture.unwrap() as usize];
         assert_eq!((texture.wrap_u, texture.wrap_v, texture.filter), (Wrap::Clamp, Wrap::Mirror, Filter::Nearest));
@@ -163,6 +164,24 @@ fn everything_is_where_it_belongs() {
         let expected = (DVec3::new(0.0, 0.0, 4.0), Attenuation::INVERSE_SQUARE, 7.0);
         assert_eq!((*position, *attenuation, *range), expected);
     }
+}
+
+#[test]
+fn metalness_and_roughness_are_the_means_of_their_texture() {
+    // Red and blue on average: all of the metalness in one half, no roughness.
+    let texture = json!({"index": 0});
+    let scene =
+        changed(&[("/materials/0/pbrMetallicRoughness/metallicRoughnessTexture", texture.clone())]).scene("a.gltf");
+    let gold = &scene.materials[0];
+    assert_eq!(gold.diffuse, Vec3::new(1.0, 0.5, 0.25) * 0.875, "metalness 1/4");
+    assert!((gold.shininess - 19_998.0).abs() < 1.0, "{}", gold.shininess);
+
+    let missing = [
+        ("/materials/0/pbrMetallicRoughness", json!({"metallicFactor": 0.0, "metallicRoughnessTexture": texture})),
+        ("/images/0/uri", json!("none.png")),
+    ];
+    let (scene, warnings) = changed(&missing).load("a.gltf");
+    assert_eq!((scene.materials[0].shininess, warnings.len()), (0.0, 1));
 }
 
 #[test]
@@ -267,6 +286,12 @@ fn faults_are_told_with_their_pointer() {
     fault("/cameras/0/perspective/yfov", json!(4), "/cameras/0/perspective/yfov", "between 0 and pi");
     fault("/scene", json!(2), "/scene", "no scene 2");
     fault("/materials/0/pbrMetallicRoughness/metallicFactor", json!(2), "/materials/0", "from 0 to 1");
+    fault(
+        "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture",
+        json!({"index": 7}),
+        "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture/index",
+        "no texture 7",
+    );
     fault("/textures/0/source", json!(1), "/textures/0/source", "no image 1");
     fault(
         "/images/0/uri",

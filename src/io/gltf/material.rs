@@ -1,21 +1,18 @@
-//! Materials: Phong's from metallic-roughness, with the base colour's texture.
+//! Materials and the pictures they name.
 //!
-//! Kd = base (1 - metal), Ks = lerp(0.04, base, metal), and the exponent 2 / alpha^2 - 2 with alpha = roughness^2, which
-//! gives the highlight of Blinn-Phong the width of the microfacets' (Walter et al. 2007, *Microfacet models for
-//! refraction through rough surfaces*). Metals would be black without what they mirror: Ks is all that they have.
+//! What becomes of the numbers is [`phong`](super::phong)'s. Pictures are decoded once each, when a material first needs
+//! them.
 
 use std::collections::HashMap;
 
 use super::Document;
-use super::schema::{self, MetallicRoughness};
+use super::phong::{self, MetallicRoughness};
+use super::schema::{self, MetallicRoughness as Source};
 use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::texture;
 use crate::math::{Vec2, Vec3};
 use crate::scene::{Filter, Material, Scene, Texture, Wrap};
-
-/// Smallest roughness, so that the exponent stays below about 20,000.
-const LEAST_ROUGHNESS: f32 = 0.1;
 
 /// The materials of a document, converted when a primitive first uses them.
 pub(super) struct Materials<'a> {
@@ -26,6 +23,8 @@ pub(super) struct Materials<'a> {
     /// By glTF's texture; None where the file is missing.
     known_textures: HashMap<usize, Option<u32>>,
     textures: Vec<Texture>,
+    /// Mean metalness and roughness by glTF's image; None where the file is missing.
+    known_means: HashMap<usize, Option<(f32, f32)>>,
     transparent: Vec<String>,
     warnings: Vec<Warning>,
 }
@@ -38,6 +37,7 @@ impl<'a> Materials<'a> {
             list: Vec::new(),
             known_textures: HashMap::new(),
             textures: Vec::new(),
+            known_means: HashMap::new(),
             transparent: Vec::new(),
             warnings: Vec::new(),
         }
@@ -58,7 +58,7 @@ impl<'a> Materials<'a> {
         }
         let material = match (index, source) {
             (Some(index), Some(source)) => self.convert(index, source)?,
-            _ => phong(&MetallicRoughness::default()),
+            _ => self.phong(&Source::default(), None, "")?,
         };
         self.list.push(material);
         let new = self.list.len() as u32 - 1;
@@ -102,25 +102,54 @@ impl<'a> Materials<'a> {
         if !(emission.is_finite() && emission.min_element() >= 0.0) {
             return Err(self.document.error(pointer, "the emissive strength has to be finite and from 0 up"));
         }
-        Ok(Material { name: source.name.clone(), emission, diffuse_texture: texture, ..phong(pbr) })
+        let phong = self.phong(pbr, texture, &pointer)?;
+        Ok(Material { name: source.name.clone(), emission, diffuse_texture: texture, ..phong })
+    }
+
+    /// The material with one value for each texture.
+    fn phong(&mut self, source: &Source, texture: Option<u32>, pointer: &str) -> Result<Material> {
+        let [r, g, b, _] = source.base_color_factor;
+        let (metal, roughness) = match &source.metallic_roughness_texture {
+            Some(info) => {
+                let pointer = format!("{pointer}/pbrMetallicRoughness/metallicRoughnessTexture/index");
+                self.mean_metal_roughness(info.index, &pointer)?
+            }
+            None => (1.0, 1.0),
+        };
+        let values = MetallicRoughness {
+            base: Vec3::new(r, g, b),
+            texture: texture.map_or(Vec3::ONE, |t| phong::mean_color(&self.textures[t as usize])),
+            metal: source.metallic_factor * metal,
+            roughness: source.roughness_factor * roughness,
+        };
+        Ok(values.phong())
+    }
+
+    /// Metalness and roughness of a texture; 1 and 1 where it is missing, as without one.
+    fn mean_metal_roughness(&mut self, index: usize, pointer: &str) -> Result<(f32, f32)> {
+        let Some(image) = self.image_of(index, pointer)? else { return Ok((1.0, 1.0)) };
+        let means = match self.known_means.get(&image) {
+            Some(known) => *known,
+            None => {
+                let means = self.image(image)?.map(|picture| phong::mean_metal_roughness(&picture));
+                self.known_means.insert(image, means);
+                means
+            }
+        };
+        Ok(means.unwrap_or((1.0, 1.0)))
     }
 
     fn texture(&mut self, index: usize, pointer: &str) -> Result<Option<u32>> {
         let document = self.document;
         let root = &document.root;
-        document.check_index(pointer, index, root.textures.len(), "texture")?;
         if let Some(known) = self.known_textures.get(&index) {
             return Ok(*known);
         }
-        let source = &root.textures[index];
-        let Some(image) = source.source else {
-            let message = "the texture has no image that can be read; the material is rendered without it";
-            self.warnings.push(document.warning(format!("/textures/{index}"), message));
+        let Some(image) = self.image_of(index, pointer)? else {
             self.known_textures.insert(index, None);
             return Ok(None);
         };
-        document.check_index(&format!("/textures/{index}/source"), image, root.images.len(), "image")?;
-        let sampler = match source.sampler {
+        let sampler = match root.textures[index].sampler {
             Some(s) => {
                 document.check_index(&format!("/textures/{index}/sampler"), s, root.samplers.len(), "sampler")?;
                 Some(&root.samplers[s])
@@ -146,6 +175,24 @@ impl<'a> Materials<'a> {
         });
         self.known_textures.insert(index, made);
         Ok(made)
+    }
+
+    /// The image of a texture. None, and a warning, where it has none.
+    fn image_of(&mut self, index: usize, pointer: &str) -> Result<Option<usize>> {
+        let document = self.document;
+        let root = &document.root;
+        document.check_index(pointer, index, root.textures.len(), "texture")?;
+        let image = root.textures[index].source;
+        match image {
+            Some(image) => {
+                document.check_index(&format!("/textures/{index}/source"), image, root.images.len(), "image")?;
+            }
+            None => {
+                let message = "the texture has no image that can be read; the material is rendered without it";
+                self.warnings.push(document.warning(format!("/textures/{index}"), message));
+            }
+        }
+        Ok(image)
     }
 
     /// Decodes an image. None, and a warning, where its file is missing.
@@ -187,41 +234,5 @@ impl<'a> Materials<'a> {
             }
             other => other,
         }
-    }
-}
-
-/// The conversion that the module documents.
-fn phong(pbr: &MetallicRoughness) -> Material {
-    let [r, g, b, _] = pbr.base_color_factor;
-    let (base, metal) = (Vec3::new(r, g, b), pbr.metallic_factor);
-    let alpha = pbr.roughness_factor.max(LEAST_ROUGHNESS).powi(2);
-    let diffuse = base * (1.0 - metal);
-    Material {
-        ambient: diffuse,
-        diffuse,
-        specular: Vec3::splat(0.04).lerp(base, metal),
-        shininess: (2.0 / (alpha * alpha) - 2.0).max(0.0),
-        ..Material::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn metallic_roughness_becomes_phong() {
-        let base_color_factor = [0.5, 0.25, 1.0, 1.0];
-        let rough = MetallicRoughness { base_color_factor, metallic_factor: 0.0, ..Default::default() };
-        let material = phong(&rough);
-        assert_eq!(material.diffuse, Vec3::new(0.5, 0.25, 1.0));
-        assert_eq!((material.specular, material.shininess), (Vec3::splat(0.04), 0.0));
-        let metal = MetallicRoughness { base_color_factor, roughness_factor: 0.5, ..Default::default() };
-        let material = phong(&metal);
-        assert_eq!((material.diffuse, material.specular), (Vec3::ZERO, Vec3::new(0.5, 0.25, 1.0)));
-        // alpha = 1/4: 2 * 16 - 2.
-        assert_eq!(material.shininess, 30.0);
-        let mirror = MetallicRoughness { roughness_factor: 0.0, ..Default::default() };
-        assert!((phong(&mirror).shininess - 19_998.0).abs() < 1.0);
     }
 }

@@ -13,6 +13,7 @@ mod container;
 mod material;
 mod mesh;
 mod node;
+mod phong;
 mod schema;
 mod uri;
 

@@ -158,11 +158,18 @@ pub(super) struct MetallicRoughness {
     pub(super) base_color_texture: Option<TextureInfo>,
     pub(super) metallic_factor: f32,
     pub(super) roughness_factor: f32,
+    pub(super) metallic_roughness_texture: Option<TextureInfo>,
 }
 
 impl Default for MetallicRoughness {
     fn default() -> Self {
-        Self { base_color_factor: [1.0; 4], base_color_texture: None, metallic_factor: 1.0, roughness_factor: 1.0 }
+        Self {
+            base_color_factor: [1.0; 4],
+            base_color_texture: None,
+            metallic_factor: 1.0,
+            roughness_factor: 1.0,
+            metallic_roughness_texture: None,
+        }
     }
 }
 
