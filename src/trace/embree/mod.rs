@@ -19,6 +19,7 @@ mod scene;
 mod sys;
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
@@ -69,6 +70,8 @@ pub struct Embree {
     parts: Vec<PartIds>,
     fixed: usize,
     placements: Vec<PlacementIds>,
+    commit_time: Duration,
+    mesh_bytes: usize,
     device: Arc<Device>,
 }
 
@@ -101,7 +104,14 @@ impl Embree {
             }
             Ok(builder)
         };
-        let objects = world.objects.iter().map(|parts| Ok(Arc::new(build(&world.parts[parts.clone()])?.commit()?)));
+        let mut commit_time = Duration::ZERO;
+        let mut commit = |builder: SceneBuilder| {
+            let start = Instant::now();
+            let scene = builder.commit();
+            commit_time += start.elapsed();
+            scene
+        };
+        let objects = world.objects.iter().map(|parts| Ok(Arc::new(commit(build(&world.parts[parts.clone()])?)?)));
         let objects = objects.collect::<Result<Vec<_>>>()?;
         let fixed = &world.parts[world.fixed.clone()];
         let mut builder = build(fixed)?;
@@ -114,10 +124,12 @@ impl Embree {
             instance: placement.instance,
         });
         Ok(Self {
-            scene: builder.commit()?,
+            scene: commit(builder)?,
             parts: world.parts.iter().map(part_ids).collect(),
             fixed: fixed.len(),
             placements: placements.collect(),
+            commit_time,
+            mesh_bytes: world.parts.iter().map(|part| mesh_bytes(&part.primitives)).sum(),
             device,
         })
     }
@@ -125,6 +137,16 @@ impl Embree {
     /// Bytes that Embree holds for this world: trees and copies of the triangles.
     pub fn bytes(&self) -> usize {
         self.device.bytes()
+    }
+
+    /// Bytes of the trees alone, without the copies of vertices and indices.
+    pub fn tree_bytes(&self) -> usize {
+        self.bytes().saturating_sub(self.mesh_bytes)
+    }
+
+    /// How long Embree built: its trees alone, without the copies of the triangles made for it.
+    pub fn commit_time(&self) -> Duration {
+        self.commit_time
     }
 
     /// The version of the library that was loaded, as in `4.3.0`.
@@ -233,6 +255,17 @@ fn add_part(builder: &mut SceneBuilder, index: usize, part: &Part) -> Result<()>
         }
         e => e,
     })
+}
+
+/// Bytes of the buffers that a part's triangles are copied to.
+fn mesh_bytes(primitives: &Primitives) -> usize {
+    match primitives {
+        Primitives::Triangles { triangles, .. } if triangles.is_empty() => 0,
+        Primitives::Triangles { positions, triangles } => {
+            size_of_val(positions.as_slice()) + size_of_val(triangles.as_slice())
+        }
+        Primitives::Shapes(_) => 0,
+    }
 }
 
 /// `count` as Embree counts; its largest number means "none".
