@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use super::common::UpAxis;
 use super::engine::BackendArg;
 use crate::error::Result;
-use crate::lab::bench::Kind;
+use crate::lab::bench::{Kind, SIDE};
 
 /// Measure builds and rays of native and Embree, in turn
 ///
@@ -43,6 +43,10 @@ pub(super) struct BenchArgs {
         default_value = "default,fast,robust,compact,high"
     )]
     modes: Vec<ModeArg>,
+
+    /// Camera rays to a side, in whole blocks of 4 x 4; every other ray starts where they hit
+    #[arg(long, value_name = "N", default_value_t = SIDE as u32, value_parser = clap::value_parser!(u32).range(4..=16_384))]
+    size: u32,
 
     /// Threads that build and trace; 0 is one for each core
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
@@ -138,6 +142,7 @@ mod with_embree {
                 subject: &subject,
                 contenders: &contenders,
                 kinds: &kinds,
+                side: args.size as usize,
                 threads,
                 repeat: args.repeat as usize,
                 cancel: Some(cancel),

@@ -7,6 +7,9 @@ use rayon::prelude::*;
 use super::Mesh;
 use crate::math::{Mat3, Vec3};
 
+/// What the terrain takes for a full turn.
+const TURN: f32 = 628.0 / 100.0;
+
 /// A terrain of 2 n^2 triangles over the unit square in x and z: eight octaves of sin(x) cos(z), +y up.
 ///
 /// Evaluated in f32 throughout, so that it is the mesh of `benches/embree_ref.cpp` up to the last bits of the sines.
@@ -16,8 +19,8 @@ pub fn terrain(n: u32) -> Mesh {
         for octave in 0..8u8 {
             let phase = f32::from(octave);
             height += amplitude
-                * libm::sinf(frequency * x * 6.28 + phase * 1.3)
-                * libm::cosf(frequency * z * 6.28 + phase * 2.1);
+                * libm::sinf(frequency * x * TURN + phase * 1.3)
+                * libm::cosf(frequency * z * TURN + phase * 2.1);
             amplitude *= 0.5;
             frequency *= 2.03;
         }
@@ -127,7 +130,7 @@ mod tests {
             // The same sum in f64: rounding apart, the sines' arguments reach 4 * 2.03^7 * 6.28 = 3569.
             let (x, z) = (f64::from(p.x), f64::from(p.z));
             let octave = |o: i32| {
-                let (f, phase) = (4.0 * 2.03f64.powi(o) * 6.28, f64::from(o));
+                let (f, phase) = (4.0 * 2.03f64.powi(o) * f64::from(TURN), f64::from(o));
                 0.15 * 0.5f64.powi(o) * (f * x + phase * 1.3).sin() * (f * z + phase * 2.1).cos()
             };
             let exact: f64 = (0..8).map(octave).sum();

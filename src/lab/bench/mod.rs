@@ -19,7 +19,7 @@ mod report;
 mod run;
 mod subject;
 
-pub use rays::{Kind, RaySet, View};
+pub use rays::{BLOCK, Kind, RaySet, SIDE, View};
 pub use report::{BuildRow, Ratio, Report, Spread, TraversalRow};
-pub use run::{Built, Contender, Setup, WIDTHS};
-pub use subject::{Subject, is_procedural};
+pub use run::{AnyTracer, Build, Built, Contender, Setup, WIDTHS};
+pub use subject::Subject;

@@ -11,10 +11,10 @@ use crate::math::{DAabb, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Primitives, Tracer, Width, World};
 
-/// Camera rays to a side.
-const SIDE: usize = 1024;
+/// Camera rays to a side, where figures are to be compared with those of `embree_ref`.
+pub const SIDE: usize = 1024;
 /// Rays to a side of a block.
-const BLOCK: usize = 4;
+pub const BLOCK: usize = 4;
 /// Tangent of half the camera's angle.
 const TANGENT: f32 = 0.45;
 /// Where a ray without an end ends.
@@ -103,9 +103,10 @@ impl View {
             .map(|(x, z)| self.centre + self.frame(Vec3::new(x, 0.0, z) * (4.0 * self.radius)) + bottom)
     }
 
-    /// Rays of each kind of `kinds`; `tracer` finds where secondary rays start.
-    pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind]) -> Vec<RaySet> {
-        let primary = self.primary();
+    /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole blocks; `tracer` finds where the others
+    /// start.
+    pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
+        let primary = self.primary(side.next_multiple_of(BLOCK));
         let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
         if kinds.iter().any(|&kind| kind != Kind::Primary) {
             let mut hits = vec![None; primary.len()];
@@ -127,14 +128,14 @@ impl View {
         kinds.iter().filter_map(set).collect()
     }
 
-    fn primary(&self) -> Vec<Ray> {
+    fn primary(&self, side: usize) -> Vec<Ray> {
         let eye = self.centre + self.eye;
         let forward = (self.centre - eye).normalize();
         let right = forward.cross(self.frame(Vec3::Y)).normalize();
         let up = right.cross(forward);
-        let of = |pixel: usize| (pixel as f32 + 0.5) / SIDE as f32 * 2.0;
-        let mut rays = Vec::with_capacity(SIDE * SIDE);
-        for (block_y, block_x) in (0..SIDE).step_by(BLOCK).flat_map(|y| (0..SIDE).step_by(BLOCK).map(move |x| (y, x))) {
+        let of = |pixel: usize| (pixel as f32 + 0.5) / side as f32 * 2.0;
+        let mut rays = Vec::with_capacity(side * side);
+        for (block_y, block_x) in (0..side).step_by(BLOCK).flat_map(|y| (0..side).step_by(BLOCK).map(move |x| (y, x))) {
             for (y, x) in (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (y, x))) {
                 let (a, b) = ((of(block_x + x) - 1.0) * TANGENT, (1.0 - of(block_y + y)) * TANGENT);
                 let direction = (forward + right * a + up * b).normalize();

@@ -28,13 +28,19 @@ pub struct Contender {
     /// As it is set up: `default`, `fast`, `robust` ...
     pub mode: &'static str,
     /// Builds it, on rayon's current pool or as many threads.
-    pub build: Box<dyn Fn(&World) -> Result<Built> + Send + Sync>,
+    pub build: Box<Build>,
 }
+
+/// Builds an engine for a world.
+pub type Build = dyn Fn(&World) -> Result<Built> + Send + Sync;
+
+/// A built engine of any kind.
+pub type AnyTracer = Box<dyn Tracer + Send>;
 
 /// A built engine.
 pub struct Built {
     /// The engine.
-    pub tracer: Box<dyn Tracer + Send>,
+    pub tracer: AnyTracer,
     /// Seconds from triangles in memory to a finished tree.
     pub seconds: f64,
     /// Bytes of the tree, without the mesh.
@@ -49,6 +55,8 @@ pub struct Setup<'a> {
     pub contenders: &'a [Contender],
     /// Kinds of rays, each once.
     pub kinds: &'a [Kind],
+    /// Camera rays to a side: [`SIDE`](super::SIDE), or fewer to be quick.
+    pub side: usize,
     /// Threads that build and trace, at least 1.
     pub threads: usize,
     /// How often everything is measured, at least 1.
@@ -79,7 +87,7 @@ impl Setup<'_> {
             let Some(first) = self.position("native", None).or(self.contenders.first().map(|_| 0)) else {
                 return Err(Error::Usage("no engine to measure".to_owned()));
             };
-            let sets = self.subject.view.rays(&self.subject.world, &*tracers[first], self.kinds);
+            let sets = self.subject.view.rays(&self.subject.world, &*tracers[first], self.kinds, self.side);
             let (mut traversal, mut verdicts) = (Vec::new(), Vec::new());
             for set in &sets {
                 let (hits, verdict) = self.compare(set, &tracers, first)?;
@@ -99,7 +107,7 @@ impl Setup<'_> {
     }
 
     /// Builds every engine in turn, `repeat` times, and keeps the last of each.
-    fn build(&self) -> Result<(Vec<Box<dyn Tracer + Send>>, Vec<BuildRow>)> {
+    fn build(&self) -> Result<(Vec<AnyTracer>, Vec<BuildRow>)> {
         let mut built: Vec<Option<Built>> = self.contenders.iter().map(|_| None).collect();
         let mut rates = vec![Vec::new(); built.len()];
         let triangles = self.subject.stored_triangles() as f64;
@@ -128,7 +136,7 @@ impl Setup<'_> {
     fn compare(
         &self,
         set: &RaySet,
-        tracers: &[Box<dyn Tracer + Send>],
+        tracers: &[AnyTracer],
         first: usize,
     ) -> Result<(Vec<[u64; WIDTHS.len()]>, Option<Verdict>)> {
         let name = &self.subject.name;
@@ -168,12 +176,7 @@ impl Setup<'_> {
     }
 
     /// Times every engine at every width, in turn, `repeat` times.
-    fn trace(
-        &self,
-        set: &RaySet,
-        tracers: &[Box<dyn Tracer + Send>],
-        hits: &[[u64; WIDTHS.len()]],
-    ) -> Result<Vec<TraversalRow>> {
+    fn trace(&self, set: &RaySet, tracers: &[AnyTracer], hits: &[[u64; WIDTHS.len()]]) -> Result<Vec<TraversalRow>> {
         let mut turns = vec![[const { Vec::new() }; WIDTHS.len()]; tracers.len()];
         for turn in 0..self.repeat {
             for (w, width) in WIDTHS.into_iter().enumerate() {

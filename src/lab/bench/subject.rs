@@ -54,11 +54,6 @@ impl Procedural {
     }
 }
 
-/// Whether `name` is that of a scene made by rule, not a file's.
-pub fn is_procedural(name: &str) -> bool {
-    Procedural::parse(name).is_some()
-}
-
 impl Subject {
     /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), or a file.
     /// All but terrains stand on a floor, two triangles at the bottom of their bounds.
@@ -79,7 +74,7 @@ impl Subject {
             }
         };
         let bounds = scene.bounds();
-        if !(bounds.radius() > 0.0) {
+        if bounds.radius() == 0.0 {
             return Err(Error::input(name, "", "has nothing to look at: no triangle with an area"));
         }
         if !is_terrain {

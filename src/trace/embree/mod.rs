@@ -18,6 +18,7 @@ mod query;
 mod scene;
 mod sys;
 
+use std::slice;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -25,7 +26,7 @@ use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
-use packet::{Answer, RayHits, Rays};
+use packet::{Active, Answer, Packet, RayHits, Rays, SingleRay, SingleRayHit};
 use query::{Mode, PacketQuery, Packets};
 use scene::{Scene, SceneBuilder};
 
@@ -155,7 +156,7 @@ impl Embree {
     }
 
     /// Embree's ids turned into the scene's.
-    #[inline]
+    #[inline(always)]
     fn hit(&self, answer: Answer) -> Hit {
         let Answer { t, u, v, primitive, geometry, instance } = answer;
         let (part, instance) = match instance {
@@ -171,25 +172,46 @@ impl Embree {
         Hit { t, u, v, primitive, geometry: part.geometry, instance }
     }
 
-    fn closest_one(&self, ray: &Ray, mode: &mut Mode) -> Option<Hit> {
-        ray.is_valid().then(|| query::intersect(&self.scene, mode, ray)).flatten().map(|answer| self.hit(answer))
+    fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
+        let mut query = SingleRayHit::new();
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = None;
+            if query.load(ray) {
+                query::intersect(&mut query, &self.scene, mode);
+                *hit = query.answer().map(|answer| self.hit(answer));
+            }
+        }
     }
 
-    fn occluded_one(&self, ray: &Ray, mode: &mut Mode) -> bool {
-        ray.is_valid() && query::occluded(&self.scene, mode, ray)
+    fn occluded_singles(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode) {
+        let mut query = SingleRay::new();
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = false;
+            if query.load(ray) {
+                query::occluded(&mut query, &self.scene, mode);
+                *occluded = query.tfar() < 0.0;
+            }
+        }
     }
 
     fn closest_packets<const G: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode)
     where
         Packets: PacketQuery<G>,
     {
-        for (rays, hits) in rays.chunks(4 * G).zip(hits.chunks_mut(4 * G)) {
-            let (rays, active) = Rays::<G>::load(rays);
-            let mut packet = RayHits::new(rays);
+        let (mut packet, mut active) = (RayHits::new(), Active::new());
+        let mut trace = |rays: &Packet<G>, hits: &mut [Option<Hit>]| {
+            packet.load(rays, &mut active);
             Packets::intersect(&mut packet, &active, &self.scene, mode);
             for (lane, hit) in hits.iter_mut().enumerate() {
                 *hit = packet.answer(lane).map(|answer| self.hit(answer));
             }
+        };
+        let full = rays.as_chunks::<4>().0.as_chunks::<G>().0;
+        let mut places = hits.chunks_exact_mut(4 * G);
+        full.iter().zip(&mut places).for_each(|(rays, hits)| trace(rays, hits));
+        let rest = places.into_remainder();
+        if !rest.is_empty() {
+            trace(&packet::padded(&rays[full.len() * 4 * G..]), rest);
         }
     }
 
@@ -197,34 +219,47 @@ impl Embree {
     where
         Packets: PacketQuery<G>,
     {
-        for (rays, occluded) in rays.chunks(4 * G).zip(occluded.chunks_mut(4 * G)) {
-            let (mut packet, active) = Rays::<G>::load(rays);
+        let (mut packet, mut active) = (Rays::new(), Active::new());
+        let mut trace = |rays: &Packet<G>, occluded: &mut [bool]| {
+            packet.load(rays, &mut active);
             Packets::occluded(&mut packet, &active, &self.scene, mode);
             for (lane, occluded) in occluded.iter_mut().enumerate() {
                 *occluded = packet.is_occluded(lane);
             }
+        };
+        let full = rays.as_chunks::<4>().0.as_chunks::<G>().0;
+        let mut places = occluded.chunks_exact_mut(4 * G);
+        full.iter().zip(&mut places).for_each(|(rays, occluded)| trace(rays, occluded));
+        let rest = places.into_remainder();
+        if !rest.is_empty() {
+            trace(&packet::padded(&rays[full.len() * 4 * G..]), rest);
         }
     }
 }
 
 impl Tracer for Embree {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_one(ray, &mut Mode::new(false))
+        let mut hit = None;
+        self.closest_batch(slice::from_ref(ray), slice::from_mut(&mut hit), Batch::default());
+        hit
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_one(ray, &mut Mode::new(false))
+        let mut occluded = false;
+        self.occluded_batch(slice::from_ref(ray), slice::from_mut(&mut occluded), Batch::default());
+        occluded
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
         let mode = &mut Mode::new(batch.coherent);
         match batch.width {
-            Width::One => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.closest_one(ray, mode)),
+            Width::One => self.closest_singles(rays, hits, mode),
             Width::Four => self.closest_packets::<1>(rays, hits, mode),
             Width::Eight => self.closest_packets::<2>(rays, hits, mode),
             Width::Sixteen => self.closest_packets::<4>(rays, hits, mode),
         }
+        self.scene.check_panic();
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
@@ -234,11 +269,12 @@ impl Tracer for Embree {
         let may_hang = batch.width == Width::Sixteen && !self.placements.is_empty();
         let mode = &mut Mode::new(batch.coherent && !may_hang);
         match batch.width {
-            Width::One => rays.iter().zip(occluded).for_each(|(ray, o)| *o = self.occluded_one(ray, mode)),
+            Width::One => self.occluded_singles(rays, occluded, mode),
             Width::Four => self.occluded_packets::<1>(rays, occluded, mode),
             Width::Eight => self.occluded_packets::<2>(rays, occluded, mode),
             Width::Sixteen => self.occluded_packets::<4>(rays, occluded, mode),
         }
+        self.scene.check_panic();
     }
 }
 
