@@ -159,17 +159,18 @@ impl Embree {
     #[inline(always)]
     fn hit(&self, answer: Answer) -> Hit {
         let Answer { t, u, v, primitive, geometry, instance } = answer;
-        let (part, instance) = match instance {
-            None => {
-                let part = self.parts[geometry as usize];
-                (part, part.instance)
-            }
-            Some(instance) => {
-                let placement = self.placements[instance as usize - self.fixed];
-                (self.parts[placement.first_part + geometry as usize], placement.instance)
-            }
+        let PartIds { geometry, instance } = match instance {
+            None => self.parts[geometry as usize],
+            Some(instance) => self.placed(geometry, instance),
         };
-        Hit { t, u, v, primitive, geometry: part.geometry, instance }
+        Hit { t, u, v, primitive, geometry, instance }
+    }
+
+    /// The ids of a geometry in a placed object; a call, so that scenes without any keep their registers.
+    #[inline(never)]
+    fn placed(&self, geometry: u32, instance: u32) -> PartIds {
+        let placement = self.placements[instance as usize - self.fixed];
+        PartIds { instance: placement.instance, ..self.parts[placement.first_part + geometry as usize] }
     }
 
     fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
@@ -199,20 +200,19 @@ impl Embree {
         Packets: PacketQuery<G>,
     {
         let (mut packet, mut active) = (RayHits::new(), Active::new());
-        let mut trace = |rays: &Packet<G>, hits: &mut [Option<Hit>]| {
+        packet::each(rays, hits, |rays: &Packet<Ray, G>, hits: &mut Packet<Option<Hit>, G>| {
             packet.load(rays, &mut active);
             Packets::intersect(&mut packet, &active, &self.scene, mode);
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = packet.answer(lane).map(|answer| self.hit(answer));
+            for (group, hits) in hits.iter_mut().enumerate() {
+                for (lane, hit) in hits.iter_mut().enumerate() {
+                    // Not `map`: a miss writes no more than that it is one.
+                    match packet.answer(group, lane) {
+                        Some(answer) => *hit = Some(self.hit(answer)),
+                        None => *hit = None,
+                    }
+                }
             }
-        };
-        let full = rays.as_chunks::<4>().0.as_chunks::<G>().0;
-        let mut places = hits.chunks_exact_mut(4 * G);
-        full.iter().zip(&mut places).for_each(|(rays, hits)| trace(rays, hits));
-        let rest = places.into_remainder();
-        if !rest.is_empty() {
-            trace(&packet::padded(&rays[full.len() * 4 * G..]), rest);
-        }
+        });
     }
 
     fn occluded_packets<const G: usize>(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode)
@@ -220,20 +220,13 @@ impl Embree {
         Packets: PacketQuery<G>,
     {
         let (mut packet, mut active) = (Rays::new(), Active::new());
-        let mut trace = |rays: &Packet<G>, occluded: &mut [bool]| {
+        packet::each(rays, occluded, |rays: &Packet<Ray, G>, occluded: &mut Packet<bool, G>| {
             packet.load(rays, &mut active);
             Packets::occluded(&mut packet, &active, &self.scene, mode);
-            for (lane, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = packet.is_occluded(lane);
+            for (group, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = packet.occluded(group);
             }
-        };
-        let full = rays.as_chunks::<4>().0.as_chunks::<G>().0;
-        let mut places = occluded.chunks_exact_mut(4 * G);
-        full.iter().zip(&mut places).for_each(|(rays, occluded)| trace(rays, occluded));
-        let rest = places.into_remainder();
-        if !rest.is_empty() {
-            trace(&packet::padded(&rays[full.len() * 4 * G..]), rest);
-        }
+        });
     }
 }
 

@@ -12,7 +12,6 @@
 //! the rows of a hit, of which some versions have one more than others, behind all that are read. Assertions below hold
 //! this to the header.
 
-use std::array::from_fn;
 use std::mem::offset_of;
 
 use super::sys;
@@ -134,13 +133,33 @@ const ALL_BITS: f32 = f32::from_bits(u32::MAX);
 /// Stands in for rays that are not traced: even if it were, it would hit nothing.
 const NOWHERE: Ray = Ray { tmin: f32::INFINITY, tmax: 0.0, ..Ray::new(crate::math::Vec3::ZERO, crate::math::Vec3::Z) };
 
-/// The rays of a packet, `4 * G` of them.
-pub(super) type Packet<const G: usize> = [[Ray; 4]; G];
+/// One thing for each ray of a packet, in groups of four.
+pub(super) type Packet<T, const G: usize> = [[T; 4]; G];
 
-/// A packet of fewer rays than it has room for.
-#[inline]
-pub(super) fn padded<const G: usize>(rays: &[Ray]) -> Packet<G> {
-    from_fn(|g| from_fn(|k| rays.get(4 * g + k).copied().unwrap_or(NOWHERE)))
+/// Calls `trace` for each packet of `rays` and the places of its answers; what is missing of the last packet is made up
+/// of rays that are not valid.
+#[inline(always)]
+pub(super) fn each<T: Copy + Default, const G: usize>(
+    rays: &[Ray],
+    answers: &mut [T],
+    mut trace: impl FnMut(&Packet<Ray, G>, &mut Packet<T, G>),
+) {
+    let (ray_fours, last_rays) = rays.as_chunks::<4>();
+    let (answer_fours, last_answers) = answers.as_chunks_mut::<4>();
+    let (ray_packets, more_rays) = ray_fours.as_chunks::<G>();
+    let (answer_packets, more_answers) = answer_fours.as_chunks_mut::<G>();
+    for (rays, answers) in ray_packets.iter().zip(answer_packets) {
+        trace(rays, answers);
+    }
+    let rest = more_rays.as_flattened().iter().chain(last_rays);
+    let mut packet = [[NOWHERE; 4]; G];
+    packet.as_flattened_mut().iter_mut().zip(rest).for_each(|(place, ray)| *place = *ray);
+    let rest = more_answers.as_flattened_mut().iter_mut().chain(last_answers);
+    if rest.size_hint().0 > 0 {
+        let mut answered = [[T::default(); 4]; G];
+        trace(&packet, &mut answered);
+        rest.zip(answered.as_flattened()).for_each(|(place, answer)| *place = *answer);
+    }
 }
 
 impl<const G: usize> Active<G> {
@@ -168,7 +187,7 @@ impl<const G: usize> Rays<G> {
 
     /// Takes new rays; those that are not valid are inactive.
     #[inline(always)]
-    pub fn load(&mut self, rays: &Packet<G>, active: &mut Active<G>) {
+    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
         for (g, four) in rays.iter().enumerate() {
             let mut lanes = Lanes::new(four);
             let valid = lanes.valid();
@@ -185,15 +204,15 @@ impl<const G: usize> Rays<G> {
         }
     }
 
+    /// Whether Embree found the rays of a group occluded: their ends are then negative infinity.
     #[inline(always)]
-    fn tfar(&self, lane: usize) -> f32 {
-        self.0[ray_row::TFAR][lane / 4][lane % 4]
+    pub fn occluded(&self, group: usize) -> [bool; 4] {
+        self.tfar(group).map(|tfar| tfar < 0.0)
     }
 
-    /// Whether Embree found the ray occluded: its end is then negative infinity.
     #[inline(always)]
-    pub fn is_occluded(&self, lane: usize) -> bool {
-        self.tfar(lane) < 0.0
+    fn tfar(&self, group: usize) -> &[f32; 4] {
+        self.0[ray_row::TFAR][group].as_ref()
     }
 }
 
@@ -249,16 +268,16 @@ impl<const G: usize> RayHits<G> {
 
     /// Takes new rays, which have hit nothing yet; those that are not valid are inactive.
     #[inline(always)]
-    pub fn load(&mut self, rays: &Packet<G>, active: &mut Active<G>) {
+    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
         self.rays.load(rays, active);
         self.hits[hit_row::GEOMETRY] = [[sys::INVALID_ID; 4]; G];
         self.hits[hit_row::INSTANCE] = [[sys::INVALID_ID; 4]; G];
     }
 
-    /// What the ray hit.
+    /// What ray `lane` of a group hit.
     #[inline(always)]
-    pub fn answer(&self, lane: usize) -> Option<Answer> {
-        answer(self.rays.tfar(lane), |row| self.hits[row][lane / 4][lane % 4])
+    pub fn answer(&self, group: usize, lane: usize) -> Option<Answer> {
+        answer(self.rays.tfar(group)[lane], |row| self.hits[row][group][lane])
     }
 }
 
@@ -325,7 +344,12 @@ mod tests {
             .collect();
         rays[2].direction = Vec3::ZERO;
         let (mut packet, mut active) = (Rays::<2>::new(), Active::new());
-        packet.load(&padded(&rays), &mut active);
+        let mut answers = [0; 7];
+        each(&rays, &mut answers, |rays, answers| {
+            packet.load(rays, &mut active);
+            *answers = [[1, 2, 3, 4], [5, 6, 7, 8]];
+        });
+        assert_eq!(answers, [1, 2, 3, 4, 5, 6, 7]);
         let bits = active.0.map(|four| four.to_array().map(|lane| lane.to_bits() as i32));
         assert_eq!(bits, [[-1, -1, 0, -1], [-1, -1, -1, 0]]);
         for lane in [0, 1, 3, 4, 5, 6] {
@@ -335,7 +359,7 @@ mod tests {
             assert_eq!([get(4), get(5), get(6), get(7)], [ray.direction.x, ray.direction.y, ray.direction.z, 0.0]);
             assert_eq!((get(8), get(9).to_bits()), (ray.tmax, u32::MAX));
         }
-        assert!((0..8).all(|lane| !packet.is_occluded(lane)));
+        assert_eq!([packet.occluded(0), packet.occluded(1)], [[false; 4]; 2]);
     }
 
     #[test]
