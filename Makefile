@@ -50,3 +50,7 @@ install: build ## put binary, man pages and completions under PREFIX (/usr/local
 	$(TWINCAST) completions bash > '$(DESTDIR)$(PREFIX)/share/bash-completion/completions/twincast'
 	$(TWINCAST) completions zsh > '$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_twincast'
 	$(TWINCAST) completions fish > '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/twincast.fish'
+
+.PHONY: bench-fair
+bench-fair: build ## whether Twincast gets out of Embree what a plain C++ client does: at least 95 %
+	@scripts/bench-fair.sh

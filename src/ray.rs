@@ -3,6 +3,9 @@
 use crate::math::Vec3;
 
 /// A half-line with a valid range. A hit counts for `tmin <= t <= tmax`.
+///
+/// Eight f32 in the order of the fields, which is that of memory so that rays can be loaded as two vectors of four.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start, in world coordinates (recentred scene units).

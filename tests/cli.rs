@@ -29,7 +29,7 @@ fn help_names_every_command_and_flag() {
     let help = twincast(&["--help"]);
     assert!(help.status.success());
     let help = text(&help.stdout);
-    for word in ["render", "completions", "man", "Exit codes:", "--version"] {
+    for word in ["render", "bench", "completions", "man", "Exit codes:", "--version"] {
         assert!(help.contains(word), "{word} in {help}");
     }
     let help = text(&twincast(&["render", "--help"]).stdout);
@@ -82,6 +82,10 @@ fn bad_usage_ends_with_2() {
         &["render", "x.glb", "-o", "x.png", "--threshold", "0.1"],
         &["render", "x.glb", "-o", "x.png", "--background", "-1,0,0"],
         &["render", "x.glb", "-o", "x.png", "-v", "-q"],
+        &["bench", "--repeat", "0"],
+        &["bench", "--size", "2"],
+        &["bench", "--rays", "cosmic"],
+        &["bench", "--modes", "default,slow"],
         &["completions", "dos"],
     ] {
         let (code, message) = fails(args);
@@ -252,6 +256,36 @@ fn cameras_that_do_not_exist_are_named() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("no camera \"front\""), "{}", text(&output.stderr));
     assert!(!std::fs::exists(folder.path("out.exr")).unwrap());
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn a_benchmark_prints_a_table_or_one_document() {
+    let folder = Folder::new();
+    let scene = folder.path("scene.obj");
+    let quick = ["--size", "64", "--repeat", "1", "--threads", "2"];
+    let output = twincast(&[&["bench", &scene, "--rays", "shadow,primary"][..], &quick].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    let words =
+        ["scene.obj: 8 triangles, 2 threads", "native default", "embree compact", "embree high", "over embree robust"];
+    for words in words.iter().chain(&["primary, Mray/s", "shadow, Mray/s", "0 native_wrong"]) {
+        assert!(table.contains(words), "{words} in {table}");
+    }
+    assert!(!table.contains("diffuse"), "{table}");
+
+    let output = twincast(
+        &[&["bench", "terrain20", "architecture1", "--json", "--modes", "default,robust"][..], &quick].concat(),
+    );
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+    assert_eq!((&document[0]["triangles"], &document[1]["triangles"]), (&800.into(), &4142.into()));
+    for report in document.as_array().expect("one of each scene") {
+        assert_eq!(report["traversal"].as_array().map(Vec::len), Some(2 * 3 * 3), "engines, widths, kinds");
+        assert!(report["ratios"][2]["over_embree_robust"].as_f64().is_some_and(|ratio| ratio > 0.0), "{report}");
+        assert!(report["ratios"][2]["over_embree_fast"].is_null(), "{report}");
+    }
+    assert_eq!(twincast(&["bench", "terrain0"]).status.code(), Some(3), "neither a terrain nor a file");
 }
 
 #[cfg(feature = "embree")]

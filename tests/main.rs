@@ -1,6 +1,7 @@
 //! One test binary: what crosses modules, file by file.
 
 mod allocation;
+mod bench;
 mod cli;
 mod compare;
 #[cfg(feature = "embree")]

@@ -35,10 +35,20 @@ pub(crate) struct SceneArgs {
 }
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum UpAxis {
+pub(crate) enum UpAxis {
     #[default]
     Y,
     Z,
+}
+
+impl UpAxis {
+    /// As the loaders have it.
+    pub(crate) const fn axis(self) -> io::UpAxis {
+        match self {
+            Self::Y => io::UpAxis::Y,
+            Self::Z => io::UpAxis::Z,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
@@ -67,10 +77,7 @@ impl SceneArgs {
     /// How the file is understood.
     pub(crate) fn options(&self) -> LoadOptions {
         LoadOptions {
-            up_axis: match self.up_axis {
-                UpAxis::Y => io::UpAxis::Y,
-                UpAxis::Z => io::UpAxis::Z,
-            },
+            up_axis: self.up_axis.axis(),
             unit: match self.unit {
                 Unit::M => io::Unit::Metre,
                 Unit::Cm => io::Unit::Centimetre,

@@ -3,6 +3,7 @@
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
+mod bench;
 mod common;
 mod compare;
 mod completions;
@@ -37,6 +38,7 @@ pub struct Cli {
 enum Command {
     Render(Box<render::RenderArgs>),
     Compare(compare::CompareArgs),
+    Bench(bench::BenchArgs),
     Info(info::InfoArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
@@ -47,6 +49,7 @@ impl Command {
         match self {
             Self::Render(args) => render::run(args),
             Self::Compare(args) => compare::run(args),
+            Self::Bench(args) => bench::run(args),
             Self::Info(args) => info::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),

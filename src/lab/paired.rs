@@ -17,7 +17,7 @@ use crate::trace::{Batch, Tracer, World};
 const KEPT: usize = 3;
 
 /// Asks native and Embree (and brute force, where given) everything, judges, counts, and answers as native does.
-pub struct Paired<'a, A, B> {
+pub struct Paired<'a, A: ?Sized, B: ?Sized> {
     world: &'a World,
     native: &'a A,
     embree: &'a B,
@@ -25,7 +25,7 @@ pub struct Paired<'a, A, B> {
     tally: Tally,
 }
 
-impl<'a, A: Tracer, B: Tracer> Paired<'a, A, B> {
+impl<'a, A: Tracer + ?Sized, B: Tracer + ?Sized> Paired<'a, A, B> {
     /// Engines that were built from `world`.
     pub fn new(world: &'a World, native: &'a A, embree: &'a B, brute: Option<&'a dyn Tracer>) -> Self {
         Self { world, native, embree, brute, tally: Tally::default() }
@@ -60,7 +60,7 @@ impl<'a, A: Tracer, B: Tracer> Paired<'a, A, B> {
     }
 }
 
-impl<A: Tracer, B: Tracer> Tracer for Paired<'_, A, B> {
+impl<A: Tracer + ?Sized, B: Tracer + ?Sized> Tracer for Paired<'_, A, B> {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let native = self.native.closest(ray);
         self.judge_closest(ray, native, self.embree.closest(ray));

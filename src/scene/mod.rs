@@ -8,6 +8,7 @@ mod instance;
 mod light;
 mod material;
 mod mesh;
+mod procedural;
 mod texture;
 
 pub use camera::Camera;
@@ -16,6 +17,7 @@ pub use light::{Attenuation, Light};
 pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
+pub use procedural::{architecture, terrain};
 pub use texture::{Filter, Texture, Wrap};
 
 use crate::math::{DAabb, DAffine3, Vec3};

@@ -18,13 +18,15 @@ mod query;
 mod scene;
 mod sys;
 
+use std::slice;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
-use packet::{Answer, RayHits, Rays};
+use packet::{Active, Answer, Packet, RayHits, Rays, SingleRay, SingleRayHit};
 use query::{Mode, PacketQuery, Packets};
 use scene::{Scene, SceneBuilder};
 
@@ -69,6 +71,8 @@ pub struct Embree {
     parts: Vec<PartIds>,
     fixed: usize,
     placements: Vec<PlacementIds>,
+    commit_time: Duration,
+    mesh_bytes: usize,
     device: Arc<Device>,
 }
 
@@ -101,7 +105,14 @@ impl Embree {
             }
             Ok(builder)
         };
-        let objects = world.objects.iter().map(|parts| Ok(Arc::new(build(&world.parts[parts.clone()])?.commit()?)));
+        let mut commit_time = Duration::ZERO;
+        let mut commit = |builder: SceneBuilder| {
+            let start = Instant::now();
+            let scene = builder.commit();
+            commit_time += start.elapsed();
+            scene
+        };
+        let objects = world.objects.iter().map(|parts| Ok(Arc::new(commit(build(&world.parts[parts.clone()])?)?)));
         let objects = objects.collect::<Result<Vec<_>>>()?;
         let fixed = &world.parts[world.fixed.clone()];
         let mut builder = build(fixed)?;
@@ -114,10 +125,12 @@ impl Embree {
             instance: placement.instance,
         });
         Ok(Self {
-            scene: builder.commit()?,
+            scene: commit(builder)?,
             parts: world.parts.iter().map(part_ids).collect(),
             fixed: fixed.len(),
             placements: placements.collect(),
+            commit_time,
+            mesh_bytes: world.parts.iter().map(|part| mesh_bytes(&part.primitives)).sum(),
             device,
         })
     }
@@ -127,82 +140,119 @@ impl Embree {
         self.device.bytes()
     }
 
+    /// Bytes of the trees alone, without the copies of vertices and indices.
+    pub fn tree_bytes(&self) -> usize {
+        self.bytes().saturating_sub(self.mesh_bytes)
+    }
+
+    /// How long Embree built: its trees alone, without the copies of the triangles made for it.
+    pub fn commit_time(&self) -> Duration {
+        self.commit_time
+    }
+
     /// The version of the library that was loaded, as in `4.3.0`.
     pub fn version(&self) -> String {
         self.device.version()
     }
 
     /// Embree's ids turned into the scene's.
-    #[inline]
+    #[inline(always)]
     fn hit(&self, answer: Answer) -> Hit {
         let Answer { t, u, v, primitive, geometry, instance } = answer;
-        let (part, instance) = match instance {
-            None => {
-                let part = self.parts[geometry as usize];
-                (part, part.instance)
-            }
-            Some(instance) => {
-                let placement = self.placements[instance as usize - self.fixed];
-                (self.parts[placement.first_part + geometry as usize], placement.instance)
-            }
+        let PartIds { geometry, instance } = match instance {
+            None => self.parts[geometry as usize],
+            Some(instance) => self.placed(geometry, instance),
         };
-        Hit { t, u, v, primitive, geometry: part.geometry, instance }
+        Hit { t, u, v, primitive, geometry, instance }
     }
 
-    fn closest_one(&self, ray: &Ray, mode: &mut Mode) -> Option<Hit> {
-        ray.is_valid().then(|| query::intersect(&self.scene, mode, ray)).flatten().map(|answer| self.hit(answer))
+    /// The ids of a geometry in a placed object; a call, so that scenes without any keep their registers.
+    #[inline(never)]
+    fn placed(&self, geometry: u32, instance: u32) -> PartIds {
+        let placement = self.placements[instance as usize - self.fixed];
+        PartIds { instance: placement.instance, ..self.parts[placement.first_part + geometry as usize] }
     }
 
-    fn occluded_one(&self, ray: &Ray, mode: &mut Mode) -> bool {
-        ray.is_valid() && query::occluded(&self.scene, mode, ray)
+    fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
+        let mut query = SingleRayHit::new();
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = None;
+            if query.load(ray) {
+                query::intersect(&mut query, &self.scene, mode);
+                *hit = query.answer().map(|answer| self.hit(answer));
+            }
+        }
+    }
+
+    fn occluded_singles(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode) {
+        let mut query = SingleRay::new();
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = false;
+            if query.load(ray) {
+                query::occluded(&mut query, &self.scene, mode);
+                *occluded = query.tfar() < 0.0;
+            }
+        }
     }
 
     fn closest_packets<const G: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode)
     where
         Packets: PacketQuery<G>,
     {
-        for (rays, hits) in rays.chunks(4 * G).zip(hits.chunks_mut(4 * G)) {
-            let (rays, active) = Rays::<G>::load(rays);
-            let mut packet = RayHits::new(rays);
+        let (mut packet, mut active) = (RayHits::new(), Active::new());
+        packet::each(rays, hits, |rays: &Packet<Ray, G>, hits: &mut Packet<Option<Hit>, G>| {
+            packet.load(rays, &mut active);
             Packets::intersect(&mut packet, &active, &self.scene, mode);
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = packet.answer(lane).map(|answer| self.hit(answer));
+            for (group, hits) in hits.iter_mut().enumerate() {
+                for (lane, hit) in hits.iter_mut().enumerate() {
+                    // Not `map`: a miss writes no more than that it is one.
+                    match packet.answer(group, lane) {
+                        Some(answer) => *hit = Some(self.hit(answer)),
+                        None => *hit = None,
+                    }
+                }
             }
-        }
+        });
     }
 
     fn occluded_packets<const G: usize>(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode)
     where
         Packets: PacketQuery<G>,
     {
-        for (rays, occluded) in rays.chunks(4 * G).zip(occluded.chunks_mut(4 * G)) {
-            let (mut packet, active) = Rays::<G>::load(rays);
+        let (mut packet, mut active) = (Rays::new(), Active::new());
+        packet::each(rays, occluded, |rays: &Packet<Ray, G>, occluded: &mut Packet<bool, G>| {
+            packet.load(rays, &mut active);
             Packets::occluded(&mut packet, &active, &self.scene, mode);
-            for (lane, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = packet.is_occluded(lane);
+            for (group, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = packet.occluded(group);
             }
-        }
+        });
     }
 }
 
 impl Tracer for Embree {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_one(ray, &mut Mode::new(false))
+        let mut hit = None;
+        self.closest_batch(slice::from_ref(ray), slice::from_mut(&mut hit), Batch::default());
+        hit
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_one(ray, &mut Mode::new(false))
+        let mut occluded = false;
+        self.occluded_batch(slice::from_ref(ray), slice::from_mut(&mut occluded), Batch::default());
+        occluded
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
         let mode = &mut Mode::new(batch.coherent);
         match batch.width {
-            Width::One => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.closest_one(ray, mode)),
+            Width::One => self.closest_singles(rays, hits, mode),
             Width::Four => self.closest_packets::<1>(rays, hits, mode),
             Width::Eight => self.closest_packets::<2>(rays, hits, mode),
             Width::Sixteen => self.closest_packets::<4>(rays, hits, mode),
         }
+        self.scene.check_panic();
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
@@ -212,11 +262,12 @@ impl Tracer for Embree {
         let may_hang = batch.width == Width::Sixteen && !self.placements.is_empty();
         let mode = &mut Mode::new(batch.coherent && !may_hang);
         match batch.width {
-            Width::One => rays.iter().zip(occluded).for_each(|(ray, o)| *o = self.occluded_one(ray, mode)),
+            Width::One => self.occluded_singles(rays, occluded, mode),
             Width::Four => self.occluded_packets::<1>(rays, occluded, mode),
             Width::Eight => self.occluded_packets::<2>(rays, occluded, mode),
             Width::Sixteen => self.occluded_packets::<4>(rays, occluded, mode),
         }
+        self.scene.check_panic();
     }
 }
 
@@ -233,6 +284,17 @@ fn add_part(builder: &mut SceneBuilder, index: usize, part: &Part) -> Result<()>
         }
         e => e,
     })
+}
+
+/// Bytes of the buffers that a part's triangles are copied to.
+fn mesh_bytes(primitives: &Primitives) -> usize {
+    match primitives {
+        Primitives::Triangles { triangles, .. } if triangles.is_empty() => 0,
+        Primitives::Triangles { positions, triangles } => {
+            size_of_val(positions.as_slice()) + size_of_val(triangles.as_slice())
+        }
+        Primitives::Shapes(_) => 0,
+    }
 }
 
 /// `count` as Embree counts; its largest number means "none".

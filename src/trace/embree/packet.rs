@@ -4,15 +4,18 @@
 //! left the store buffer, so rays are transposed in registers, four at a time, and stored as whole vectors. Filling
 //! bindgen's structs field by field would be simpler, and leaves it to the optimiser which stores come out.
 //!
+//! A packet is made once a batch and filled again and again: rows that Embree does not change keep their constants, and
+//! nothing is moved. With a fresh packet for each query, packing and unpacking took a third of Embree's own time on
+//! coherent rays.
+//!
 //! The layouts are stated here once for every version and width: a packet of `4 * G` rays is 12 rows of a ray and then
 //! the rows of a hit, of which some versions have one more than others, behind all that are read. Assertions below hold
 //! this to the header.
 
-use std::array::from_fn;
 use std::mem::offset_of;
 
 use super::sys;
-use crate::math::{Mat4, Vec4};
+use crate::math::{BVec4A, Mat4, Vec4};
 use crate::ray::Ray;
 
 /// Rows of a ray, or fields of a single one.
@@ -60,27 +63,50 @@ pub(super) struct SingleRayHit {
 }
 
 impl SingleRay {
+    /// Room for a ray.
     #[inline]
-    pub fn new(ray: &Ray) -> Self {
+    pub const fn new() -> Self {
+        // Time 0, every bit of the mask; id and flags 0.
+        Self([Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, ALL_BITS, 0.0, 0.0)])
+    }
+
+    /// Takes a ray; false, and nothing else, where it is not valid.
+    #[inline(always)]
+    pub fn load(&mut self, ray: &Ray) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
         let time = 0.0;
-        let (mask, id, flags) = (f32::from_bits(u32::MAX), 0.0, 0.0);
-        Self([ray.origin.extend(ray.tmin), ray.direction.extend(time), Vec4::new(ray.tmax, mask, id, flags)])
+        self.0[0] = ray.origin.extend(ray.tmin);
+        self.0[1] = ray.direction.extend(time);
+        self.0[2] = Vec4::new(ray.tmax, ALL_BITS, 0.0, 0.0);
+        true
     }
 
     /// The end of the ray; negative infinity once it is occluded.
-    #[inline]
+    #[inline(always)]
     pub fn tfar(&self) -> f32 {
         self.0[2].x
     }
 }
 
 impl SingleRayHit {
+    /// Room for a ray and its hit.
     #[inline]
-    pub fn new(ray: &Ray) -> Self {
-        Self { ray: SingleRay::new(ray), hit: [sys::INVALID_ID; _] }
+    pub const fn new() -> Self {
+        Self { ray: SingleRay::new(), hit: [sys::INVALID_ID; _] }
     }
 
-    #[inline]
+    /// Takes a ray, which has hit nothing yet; false, and nothing else, where it is not valid.
+    #[inline(always)]
+    pub fn load(&mut self, ray: &Ray) -> bool {
+        self.hit[hit_row::GEOMETRY] = sys::INVALID_ID;
+        self.hit[hit_row::INSTANCE] = sys::INVALID_ID;
+        self.ray.load(ray)
+    }
+
+    /// What the ray hit.
+    #[inline(always)]
     pub fn answer(&self) -> Option<Answer> {
         answer(self.ray.tfar(), |row| self.hit[row])
     }
@@ -97,69 +123,165 @@ pub(super) struct RayHits<const G: usize> {
     hits: [[[u32; 4]; G]; hit_row::COUNT],
 }
 
-/// Which rays of a packet Embree is to trace: -1, or 0 for those to leave alone.
+/// Which rays of a packet Embree is to trace: in bits -1, or 0 for those to leave alone.
 #[repr(C, align(64))]
-pub(super) struct Active<const G: usize>(pub [[i32; 4]; G]);
+pub(super) struct Active<const G: usize>([Vec4; G]);
+
+/// The f32 of all bits set.
+const ALL_BITS: f32 = f32::from_bits(u32::MAX);
 
 /// Stands in for rays that are not traced: even if it were, it would hit nothing.
 const NOWHERE: Ray = Ray { tmin: f32::INFINITY, tmax: 0.0, ..Ray::new(crate::math::Vec3::ZERO, crate::math::Vec3::Z) };
 
+/// One thing for each ray of a packet, in groups of four.
+pub(super) type Packet<T, const G: usize> = [[T; 4]; G];
+
+/// Calls `trace` for each packet of `rays` and the places of its answers; what is missing of the last packet is made up
+/// of rays that are not valid.
+#[inline(always)]
+pub(super) fn each<T: Copy + Default, const G: usize>(
+    rays: &[Ray],
+    answers: &mut [T],
+    mut trace: impl FnMut(&Packet<Ray, G>, &mut Packet<T, G>),
+) {
+    let (ray_fours, last_rays) = rays.as_chunks::<4>();
+    let (answer_fours, last_answers) = answers.as_chunks_mut::<4>();
+    let (ray_packets, more_rays) = ray_fours.as_chunks::<G>();
+    let (answer_packets, more_answers) = answer_fours.as_chunks_mut::<G>();
+    for (rays, answers) in ray_packets.iter().zip(answer_packets) {
+        trace(rays, answers);
+    }
+    let rest = more_rays.as_flattened().iter().chain(last_rays);
+    let mut packet = [[NOWHERE; 4]; G];
+    packet.as_flattened_mut().iter_mut().zip(rest).for_each(|(place, ray)| *place = *ray);
+    let rest = more_answers.as_flattened_mut().iter_mut().chain(last_answers);
+    if rest.size_hint().0 > 0 {
+        let mut answered = [[T::default(); 4]; G];
+        trace(&packet, &mut answered);
+        rest.zip(answered.as_flattened()).for_each(|(place, answer)| *place = *answer);
+    }
+}
+
+impl<const G: usize> Active<G> {
+    /// None.
+    #[inline]
+    pub const fn new() -> Self {
+        Self([Vec4::ZERO; G])
+    }
+
+    /// As Embree takes it.
+    #[inline]
+    pub const fn as_ptr(&self) -> *const i32 {
+        self.0.as_ptr().cast()
+    }
+}
+
 impl<const G: usize> Rays<G> {
-    /// Up to `4 * G` rays; those that are missing or not valid are inactive.
+    /// Room for rays.
     #[inline]
-    pub fn load(rays: &[Ray]) -> (Self, Active<G>) {
-        let mut active = Active([[-1; 4]; G]);
+    pub const fn new() -> Self {
         let mut rows = [[Vec4::ZERO; G]; ray_row::COUNT];
-        rows[ray_row::MASK] = [Vec4::splat(f32::from_bits(u32::MAX)); G];
-        for (g, active) in active.0.iter_mut().enumerate() {
-            let four: [Ray; 4] = from_fn(|k| match rays.get(4 * g + k) {
-                Some(ray) if ray.is_valid() => *ray,
-                _ => {
-                    active[k] = 0;
-                    NOWHERE
-                }
-            });
-            let [a, b, c, d] = four.map(|ray| ray.origin.extend(ray.tmin));
-            let starts = Mat4::from_cols(a, b, c, d).transpose();
-            let [a, b, c, d] = four.map(|ray| ray.direction.extend(ray.tmax));
-            let ways = Mat4::from_cols(a, b, c, d).transpose();
-            for axis in 0..3 {
-                rows[ray_row::ORIGIN + axis][g] = starts.col(axis);
-                rows[ray_row::DIRECTION + axis][g] = ways.col(axis);
+        rows[ray_row::MASK] = [Vec4::splat(ALL_BITS); G];
+        Self(rows)
+    }
+
+    /// Takes new rays; those that are not valid are inactive.
+    #[inline(always)]
+    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+        for (g, four) in rays.iter().enumerate() {
+            let mut lanes = Lanes::new(four);
+            let valid = lanes.valid();
+            if !valid.all() {
+                lanes = Lanes::without_invalid(four);
             }
-            rows[ray_row::TNEAR][g] = starts.w_axis;
-            rows[ray_row::TFAR][g] = ways.w_axis;
+            active.0[g] = Vec4::select(valid, Vec4::splat(ALL_BITS), Vec4::ZERO);
+            for axis in 0..3 {
+                self.0[ray_row::ORIGIN + axis][g] = lanes.origin[axis];
+                self.0[ray_row::DIRECTION + axis][g] = lanes.direction[axis];
+            }
+            self.0[ray_row::TNEAR][g] = lanes.tmin;
+            self.0[ray_row::TFAR][g] = lanes.tmax;
         }
-        (Self(rows), active)
     }
 
-    #[inline]
-    fn tfar(&self, lane: usize) -> f32 {
-        self.0[ray_row::TFAR][lane / 4][lane % 4]
+    /// Whether Embree found the rays of a group occluded: their ends are then negative infinity.
+    #[inline(always)]
+    pub fn occluded(&self, group: usize) -> [bool; 4] {
+        self.tfar(group).map(|tfar| tfar < 0.0)
     }
 
-    /// Whether Embree found the ray occluded: its end is then negative infinity.
-    #[inline]
-    pub fn is_occluded(&self, lane: usize) -> bool {
-        self.tfar(lane) < 0.0
+    #[inline(always)]
+    fn tfar(&self, group: usize) -> &[f32; 4] {
+        self.0[ray_row::TFAR][group].as_ref()
+    }
+}
+
+/// Four rays, component by component.
+struct Lanes {
+    origin: [Vec4; 3],
+    direction: [Vec4; 3],
+    tmin: Vec4,
+    tmax: Vec4,
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn new(rays: &[Ray; 4]) -> Self {
+        // In the order of memory, so that each column is one load.
+        let [a, b, c, d] = rays.each_ref().map(|r| Vec4::new(r.origin.x, r.origin.y, r.origin.z, r.direction.x));
+        let starts = Mat4::from_cols(a, b, c, d).transpose();
+        let [a, b, c, d] = rays.each_ref().map(|r| Vec4::new(r.direction.y, r.direction.z, r.tmin, r.tmax));
+        let ends = Mat4::from_cols(a, b, c, d).transpose();
+        Self {
+            origin: [starts.x_axis, starts.y_axis, starts.z_axis],
+            direction: [starts.w_axis, ends.x_axis, ends.y_axis],
+            tmin: ends.z_axis,
+            tmax: ends.w_axis,
+        }
+    }
+
+    #[cold]
+    fn without_invalid(rays: &[Ray; 4]) -> Self {
+        Self::new(&rays.map(|ray| if ray.is_valid() { ray } else { NOWHERE }))
+    }
+
+    /// [`Ray::is_valid`] of each.
+    #[inline(always)]
+    fn valid(&self) -> BVec4A {
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
+        // NaN for NaN and infinities, else a zero.
+        let nothing = (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0);
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        nothing.cmpeq(Vec4::ZERO)
+            & largest.cmpge(Vec4::splat(f32::MIN_POSITIVE))
+            & self.tmin.cmpge(Vec4::ZERO)
+            & self.tmin.cmple(self.tmax)
     }
 }
 
 impl<const G: usize> RayHits<G> {
-    /// The rays, which have hit nothing yet.
+    /// Room for rays and their hits.
     #[inline]
-    pub const fn new(rays: Rays<G>) -> Self {
-        Self { rays, hits: [[[sys::INVALID_ID; 4]; G]; hit_row::COUNT] }
+    pub const fn new() -> Self {
+        Self { rays: Rays::new(), hits: [[[sys::INVALID_ID; 4]; G]; hit_row::COUNT] }
     }
 
-    /// What the ray hit.
-    #[inline]
-    pub fn answer(&self, lane: usize) -> Option<Answer> {
-        answer(self.rays.tfar(lane), |row| self.hits[row][lane / 4][lane % 4])
+    /// Takes new rays, which have hit nothing yet; those that are not valid are inactive.
+    #[inline(always)]
+    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+        self.rays.load(rays, active);
+        self.hits[hit_row::GEOMETRY] = [[sys::INVALID_ID; 4]; G];
+        self.hits[hit_row::INSTANCE] = [[sys::INVALID_ID; 4]; G];
+    }
+
+    /// What ray `lane` of a group hit.
+    #[inline(always)]
+    pub fn answer(&self, group: usize, lane: usize) -> Option<Answer> {
+        answer(self.rays.tfar(group)[lane], |row| self.hits[row][group][lane])
     }
 }
 
-#[inline]
+#[inline(always)]
 fn answer(t: f32, hit: impl Fn(usize) -> u32) -> Option<Answer> {
     let geometry = hit(hit_row::GEOMETRY);
     (geometry != sys::INVALID_ID).then(|| Answer {
@@ -221,8 +343,15 @@ mod tests {
             })
             .collect();
         rays[2].direction = Vec3::ZERO;
-        let (packet, active) = Rays::<2>::load(&rays);
-        assert_eq!(active.0, [[-1, -1, 0, -1], [-1, -1, -1, 0]]);
+        let (mut packet, mut active) = (Rays::<2>::new(), Active::new());
+        let mut answers = [0; 7];
+        each(&rays, &mut answers, |rays, answers| {
+            packet.load(rays, &mut active);
+            *answers = [[1, 2, 3, 4], [5, 6, 7, 8]];
+        });
+        assert_eq!(answers, [1, 2, 3, 4, 5, 6, 7]);
+        let bits = active.0.map(|four| four.to_array().map(|lane| lane.to_bits() as i32));
+        assert_eq!(bits, [[-1, -1, 0, -1], [-1, -1, -1, 0]]);
         for lane in [0, 1, 3, 4, 5, 6] {
             let get = |row: usize| packet.0[row][lane / 4][lane % 4];
             let ray = rays[lane];
@@ -230,6 +359,38 @@ mod tests {
             assert_eq!([get(4), get(5), get(6), get(7)], [ray.direction.x, ray.direction.y, ray.direction.z, 0.0]);
             assert_eq!((get(8), get(9).to_bits()), (ray.tmax, u32::MAX));
         }
-        assert!((0..8).all(|lane| !packet.is_occluded(lane)));
+        assert_eq!([packet.occluded(0), packet.occluded(1)], [[false; 4]; 2]);
+    }
+
+    #[test]
+    fn four_rays_are_valid_as_each_of_them_is() {
+        const ODD: [f32; 9] =
+            [0.0, -0.0, 1.0, f32::MAX, f32::MIN, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, f32::MIN_POSITIVE / 2.0];
+        let good = Ray { tmin: 0.5, ..Ray::new(Vec3::ONE, Vec3::Y) };
+        let mut rays = Vec::new();
+        for x in ODD {
+            for axis in 0..3 {
+                let mut ray = good;
+                ray.origin[axis] = x;
+                rays.push(ray);
+                let mut ray = good;
+                ray.direction[axis] = x;
+                rays.push(ray);
+                let mut ray = Ray { direction: Vec3::ZERO, ..good };
+                ray.direction[axis] = x;
+                rays.push(ray);
+            }
+            rays.extend([Ray { tmin: x, ..good }, Ray { tmax: x, ..good }]);
+        }
+        let good_ones = rays.iter().filter(|ray| ray.is_valid()).count();
+        assert!(good_ones > 30 && good_ones < rays.len() - 30, "{good_ones} of {}", rays.len());
+        for ray in rays {
+            for lane in 0..4 {
+                let mut four = [good; 4];
+                four[lane] = ray;
+                let expected = 0b1111 & !(u32::from(!ray.is_valid()) << lane);
+                assert_eq!(Lanes::new(&four).valid().bitmask(), expected, "{ray:?}");
+            }
+        }
     }
 }

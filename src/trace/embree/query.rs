@@ -49,36 +49,30 @@ impl Mode {
     }
 }
 
-/// The nearest hit of a valid ray.
-#[inline]
-pub(super) fn intersect(scene: &Scene, mode: &mut Mode, ray: &Ray) -> Option<super::Answer> {
-    let mut query = SingleRayHit::new(ray);
-    let query_ptr = (&raw mut query).cast::<sys::RTCRayHit>();
+/// Finds the nearest hit of the ray that `query` holds.
+#[inline(always)]
+pub(super) fn intersect(query: &mut SingleRayHit, scene: &Scene, mode: &mut Mode) {
+    let query = (&raw mut *query).cast::<sys::RTCRayHit>();
     // SAFETY: the scene is committed; `packet` asserts that the query has the size and alignment of RTCRayHit.
     unsafe {
         #[cfg(not(embree4))]
-        sys::rtcIntersect1(scene.raw(), &mut mode.0, query_ptr);
+        sys::rtcIntersect1(scene.raw(), &mut mode.0, query);
         #[cfg(embree4)]
-        sys::rtcIntersect1(scene.raw(), query_ptr, &mut mode.intersect);
+        sys::rtcIntersect1(scene.raw(), query, &mut mode.intersect);
     }
-    scene.check_panic();
-    query.answer()
 }
 
-/// Whether a valid ray hits anything.
-#[inline]
-pub(super) fn occluded(scene: &Scene, mode: &mut Mode, ray: &Ray) -> bool {
-    let mut query = SingleRay::new(ray);
-    let query_ptr = (&raw mut query).cast::<sys::RTCRay>();
+/// Finds whether the ray that `query` holds hits anything.
+#[inline(always)]
+pub(super) fn occluded(query: &mut SingleRay, scene: &Scene, mode: &mut Mode) {
+    let query = (&raw mut *query).cast::<sys::RTCRay>();
     // SAFETY: the scene is committed; `packet` asserts that the query has the size and alignment of RTCRay.
     unsafe {
         #[cfg(not(embree4))]
-        sys::rtcOccluded1(scene.raw(), &mut mode.0, query_ptr);
+        sys::rtcOccluded1(scene.raw(), &mut mode.0, query);
         #[cfg(embree4)]
-        sys::rtcOccluded1(scene.raw(), query_ptr, &mut mode.occluded);
+        sys::rtcOccluded1(scene.raw(), query, &mut mode.occluded);
     }
-    scene.check_panic();
-    query.tfar() < 0.0
 }
 
 /// Stands for Embree's functions over packets of `4 * G` rays, of which there are three.
@@ -95,9 +89,9 @@ pub(super) trait PacketQuery<const G: usize> {
 macro_rules! packet_query {
     ($groups:literal, $intersect:ident, $occluded:ident) => {
         impl PacketQuery<$groups> for Packets {
-            #[inline]
+            #[inline(always)]
             fn intersect(packet: &mut RayHits<$groups>, active: &Active<$groups>, scene: &Scene, mode: &mut Mode) {
-                let (active, packet) = (active.0.as_ptr().cast(), (&raw mut *packet).cast());
+                let (active, packet) = (active.as_ptr(), (&raw mut *packet).cast());
                 // SAFETY: the scene is committed; `packet` asserts size and alignment, the mask is 64-byte aligned.
                 unsafe {
                     #[cfg(not(embree4))]
@@ -105,12 +99,11 @@ macro_rules! packet_query {
                     #[cfg(embree4)]
                     sys::$intersect(active, scene.raw(), packet, &mut mode.intersect);
                 }
-                scene.check_panic();
             }
 
-            #[inline]
+            #[inline(always)]
             fn occluded(rays: &mut Rays<$groups>, active: &Active<$groups>, scene: &Scene, mode: &mut Mode) {
-                let (active, rays) = (active.0.as_ptr().cast(), (&raw mut *rays).cast());
+                let (active, rays) = (active.as_ptr(), (&raw mut *rays).cast());
                 // SAFETY: as above.
                 unsafe {
                     #[cfg(not(embree4))]
@@ -118,7 +111,6 @@ macro_rules! packet_query {
                     #[cfg(embree4)]
                     sys::$occluded(active, scene.raw(), rays, &mut mode.occluded);
                 }
-                scene.check_panic();
             }
         }
     };

@@ -1,0 +1,202 @@
+//! `twincast bench`: native and Embree against the clock, in turn.
+
+use clap::{Args, ValueEnum};
+
+use super::common::UpAxis;
+use super::engine::BackendArg;
+use crate::error::Result;
+use crate::lab::bench::{Kind, SIDE};
+
+/// Measure builds and rays of native and Embree, in turn
+///
+/// For each scene: builds (millions of triangles a second, bytes of the tree for each triangle) and rays (millions a
+/// second) of every engine and mode, ray by ray and in packets of 8 and 16, and for each kind of ray native's rate over
+/// Embree's, each at its best width: the median of the ratios within a turn. Rates move with whatever else the machine
+/// does; only these ratios can be compared between runs. The answers are compared as well: exit code 1 if native is
+/// wrong on a ray.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  twincast bench bunny.obj
+  twincast bench scan.obj --up-axis z --rays primary,shadow --repeat 9
+  twincast bench terrain1000 architecture --json
+  twincast bench terrain3162 --modes default,fast,robust --threads 2")]
+pub(super) struct BenchArgs {
+    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys)
+    #[arg(value_name = "SCENE", default_value = "terrain1000")]
+    scenes: Vec<String>,
+
+    /// Axis of the files that points up
+    #[arg(long, value_enum, default_value_t)]
+    up_axis: UpAxis,
+
+    /// Kinds of rays
+    #[arg(long, value_name = "KIND,...", value_enum, value_delimiter = ',', default_value = "primary,diffuse,shadow")]
+    rays: Vec<RaysArg>,
+
+    /// Modes: native's default; Embree's fast, robust, compact, and high (quality, fast otherwise)
+    #[arg(
+        long,
+        value_name = "MODE,...",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "default,fast,robust,compact,high"
+    )]
+    modes: Vec<ModeArg>,
+
+    /// Camera rays to a side, in whole blocks of 4 x 4; every other ray starts where they hit
+    #[arg(long, value_name = "N", default_value_t = SIDE as u32, value_parser = clap::value_parser!(u32).range(4..=16_384))]
+    size: u32,
+
+    /// Threads that build and trace; 0 is one for each core
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
+    threads: usize,
+
+    /// How often everything is measured
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    repeat: u32,
+
+    /// Print the figures as one JSON document, and nothing else; of several scenes, a list
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RaysArg {
+    Primary,
+    Diffuse,
+    Shadow,
+}
+
+impl RaysArg {
+    const fn kind(self) -> Kind {
+        match self {
+            Self::Primary => Kind::Primary,
+            Self::Diffuse => Kind::Diffuse,
+            Self::Shadow => Kind::Shadow,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ModeArg {
+    /// Native, as it renders
+    Default,
+    /// Embree, medium quality, rays may slip between triangles
+    Fast,
+    /// Embree, medium quality, robust
+    Robust,
+    /// Embree, medium quality, compact
+    Compact,
+    /// Embree, high quality: spatial splits
+    High,
+}
+
+pub(super) fn run(args: &BenchArgs) -> Result<()> {
+    BackendArg::Both.check_available()?;
+    bench(args)
+}
+
+#[cfg(not(feature = "embree"))]
+fn bench(_: &BenchArgs) -> Result<()> {
+    unreachable!("check_available refused it")
+}
+
+#[cfg(feature = "embree")]
+use with_embree::bench;
+
+#[cfg(feature = "embree")]
+mod with_embree {
+    use std::time::Instant;
+
+    use serde::Serialize;
+
+    use super::{BenchArgs, ModeArg};
+    use crate::cli::{interrupt, progress, say, warn};
+    use crate::error::{Error, Result};
+    use crate::lab::bench::{Built, Contender, Setup, Subject};
+    use crate::trace::World;
+    use crate::trace::bvh::Bvh;
+    use crate::trace::embree::{Embree, Options, Quality};
+
+    /// Every mode, native first.
+    const MODES: [ModeArg; 5] = [ModeArg::Default, ModeArg::Fast, ModeArg::Robust, ModeArg::Compact, ModeArg::High];
+
+    pub(super) fn bench(args: &BenchArgs) -> Result<()> {
+        let cancel = interrupt::install()?;
+        let threads = match args.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            threads => threads,
+        };
+        let contenders: Vec<_> =
+            MODES.into_iter().filter(|mode| args.modes.contains(mode)).map(|mode| contender(mode, threads)).collect();
+        let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
+        kinds.sort_by_key(|&kind| kind as u8);
+        kinds.dedup();
+        let mut reports = Vec::new();
+        for name in &args.scenes {
+            let (subject, warnings) = Subject::new(name, args.up_axis.axis())?;
+            warn(&warnings);
+            interrupt::check()?;
+            let setup = Setup {
+                subject: &subject,
+                contenders: &contenders,
+                kinds: &kinds,
+                side: args.size as usize,
+                threads,
+                repeat: args.repeat as usize,
+                cancel: Some(cancel),
+                on_step: None,
+            };
+            let bar = progress::bar(setup.steps(), name, args.json);
+            let report = Setup { on_step: Some(&|| bar.inc(1)), ..setup }.run();
+            bar.finish_and_clear();
+            let report = report?;
+            if !args.json {
+                say(&report)?;
+            }
+            reports.push(report);
+        }
+        match &reports[..] {
+            _ if !args.json => Ok(()),
+            [report] => say_json(report),
+            reports => say_json(&reports),
+        }
+    }
+
+    fn say_json(document: &impl Serialize) -> Result<()> {
+        say(serde_json::to_string(document).map_err(|error| Error::output("<stdout>", error.to_string()))?)
+    }
+
+    /// An engine as it is set up in `mode`.
+    fn contender(mode: ModeArg, threads: usize) -> Contender {
+        let medium = Options { robust: false, threads: Some(threads), ..Options::default() };
+        let embree = |mode, options: Options| Contender {
+            backend: "embree",
+            mode,
+            build: Box::new(move |world| build_embree(world, &options)),
+        };
+        match mode {
+            ModeArg::Default => {
+                Contender { backend: "native", mode: "default", build: Box::new(|world| Ok(build_native(world))) }
+            }
+            ModeArg::Fast => embree("fast", medium),
+            ModeArg::Robust => embree("robust", Options { robust: true, ..medium }),
+            ModeArg::Compact => embree("compact", Options { compact: true, ..medium }),
+            ModeArg::High => embree("high", Options { quality: Quality::High, ..medium }),
+        }
+    }
+
+    fn build_native(world: &World) -> Built {
+        let start = Instant::now();
+        let bvh = Bvh::build(world);
+        Built { seconds: start.elapsed().as_secs_f64(), bytes: bvh.bytes(), tracer: Box::new(bvh) }
+    }
+
+    /// Only what Embree itself does is charged to it: neither our copies of the triangles for it, nor their bytes.
+    fn build_embree(world: &World, options: &Options) -> Result<Built> {
+        let embree = Embree::new(world, options)?;
+        let (seconds, bytes) = (embree.commit_time().as_secs_f64(), embree.tree_bytes());
+        Ok(Built { seconds, bytes, tracer: Box::new(embree) })
+    }
+}

@@ -1,0 +1,25 @@
+//! Engines timed against each other: the same rays, in one process, in turn.
+//!
+//! | file | idea |
+//! | --- | --- |
+//! | `subject` | the scenes: a file on a floor, or a mesh made by rule |
+//! | `rays` | camera, diffuse and shadow rays, as `benches/embree_ref.cpp` makes them |
+//! | `run` | builds and passes over the rays, in turn; answers compared first |
+//! | `report` | rates, ratios, the table |
+//!
+//! Rates move by 15 % from run to run on a shared machine, so only ratios within a run count: every engine is timed
+//! within the same second as its rivals, again and again, and a ratio is the median of those of each turn. Timing one
+//! engine after the other would be simpler, and charges whatever else the machine does to one of them.
+//!
+//! What Embree reaches here is itself held to what a plain C++ client gets out of it (`make bench-fair`): beating a
+//! weakened Embree would prove nothing.
+
+mod rays;
+mod report;
+mod run;
+mod subject;
+
+pub use rays::{BLOCK, Kind, RaySet, SIDE, View};
+pub use report::{BuildRow, Ratio, Report, Spread, TraversalRow};
+pub use run::{AnyTracer, Build, Built, Contender, Setup, WIDTHS};
+pub use subject::Subject;

@@ -1,0 +1,190 @@
+//! The rays that are timed: those of `benches/embree_ref.cpp`, formula by formula, in f32.
+//!
+//! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet. From each point they hit one
+//! diffuse ray, cosine-distributed about the normal, and one shadow ray towards a point light. Rays are made before any
+//! clock starts.
+
+use serde::Serialize;
+
+use crate::io::UpAxis;
+use crate::math::{DAabb, DVec3, Vec3};
+use crate::ray::{Hit, Ray};
+use crate::trace::{Batch, Primitives, Tracer, Width, World};
+
+/// Camera rays to a side, where figures are to be compared with those of `embree_ref`.
+pub const SIDE: usize = 1024;
+/// Rays to a side of a block.
+pub const BLOCK: usize = 4;
+/// Tangent of half the camera's angle.
+const TANGENT: f32 = 0.45;
+/// Where a ray without an end ends.
+const FAR: f32 = 1e30;
+
+/// What rays are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// From the camera.
+    Primary,
+    /// From a surface, in a random direction.
+    Diffuse,
+    /// From a surface to the light; whether anything is hit, not what.
+    Shadow,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Primary, Self::Diffuse, Self::Shadow];
+
+    /// As in the reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Diffuse => "diffuse",
+            Self::Shadow => "shadow",
+        }
+    }
+
+    /// How such rays are traced at a width: single rays know no neighbours, and diffuse ones have none alike.
+    pub fn batch(self, width: Width) -> Batch {
+        Batch { width, coherent: self != Self::Diffuse && width != Width::One }
+    }
+}
+
+/// Rays of one kind.
+pub struct RaySet {
+    /// What they are for.
+    pub kind: Kind,
+    /// The rays.
+    pub rays: Vec<Ray>,
+}
+
+/// Camera, light and floor, by the bounds of what is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    centre: Vec3,
+    /// Half the diagonal of the bounds.
+    radius: f32,
+    /// The height of the floor below the centre, negative.
+    bottom: f32,
+    up: UpAxis,
+    /// From the centre.
+    eye: Vec3,
+}
+
+impl View {
+    /// A view of `bounds`, in coordinates whose zero is at `zero`: from above at the corner if `near` (for terrains of
+    /// unit size), else from a distance.
+    pub fn new(bounds: &DAabb, zero: DVec3, up: UpAxis, near: bool) -> Self {
+        let (lo, hi) = ((bounds.min - zero).as_vec3(), (bounds.max - zero).as_vec3());
+        let centre = (lo + hi) * 0.5;
+        let radius = 0.5 * (hi - lo).length();
+        let bottom = match up {
+            UpAxis::Y => lo.y - centre.y,
+            UpAxis::Z => lo.z - centre.z,
+        };
+        let view = Self { centre, radius, bottom, up, eye: Vec3::ZERO };
+        let eye = if near { Vec3::new(0.3, 0.35, 0.9) } else { view.frame(Vec3::new(0.6, 0.5, 1.6)) * radius };
+        Self { eye, ..view }
+    }
+
+    /// (right, up, front) in the scene's coordinates.
+    fn frame(&self, v: Vec3) -> Vec3 {
+        match self.up {
+            UpAxis::Y => v,
+            UpAxis::Z => Vec3::new(v.x, -v.z, v.y),
+        }
+    }
+
+    /// The floor's corners; its triangles are 0 1 2 and 1 3 2.
+    pub fn floor(&self) -> [Vec3; 4] {
+        let bottom = self.frame(Vec3::new(0.0, self.bottom, 0.0));
+        [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+            .map(|(x, z)| self.centre + self.frame(Vec3::new(x, 0.0, z) * (4.0 * self.radius)) + bottom)
+    }
+
+    /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole blocks; `tracer` finds where the others
+    /// start.
+    pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
+        let primary = self.primary(side.next_multiple_of(BLOCK));
+        let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
+        if kinds.iter().any(|&kind| kind != Kind::Primary) {
+            let mut hits = vec![None; primary.len()];
+            tracer.closest_batch(&primary, &mut hits, Kind::Primary.batch(Width::One));
+            let light = self.centre + self.frame(Vec3::new(2.0, 3.0, 1.0)) * self.radius;
+            let mut random = Xorshift(12345);
+            for (ray, hit) in primary.iter().zip(&hits) {
+                let Some(hit) = hit else { continue };
+                let normal = normal(world, ray, hit);
+                let normal = if normal.dot(ray.direction) > 0.0 { normal * -1.0 } else { normal };
+                let point = ray.origin + ray.direction * hit.t + normal * (1e-4 * self.radius);
+                let direction = (random.in_ball().normalize() + normal * 1.001).normalize();
+                diffuse.push(Ray { tmax: FAR, ..Ray::new(point, direction) });
+                shadow.push(Ray { tmax: 0.999, ..Ray::new(point, light - point) });
+            }
+        }
+        let mut sets = [Some(primary), Some(diffuse), Some(shadow)];
+        let set = |&kind: &Kind| sets[kind as usize].take().map(|rays| RaySet { kind, rays });
+        kinds.iter().filter_map(set).collect()
+    }
+
+    fn primary(&self, side: usize) -> Vec<Ray> {
+        let eye = self.centre + self.eye;
+        let forward = (self.centre - eye).normalize();
+        let right = forward.cross(self.frame(Vec3::Y)).normalize();
+        let up = right.cross(forward);
+        let of = |pixel: usize| (pixel as f32 + 0.5) / side as f32 * 2.0;
+        let mut rays = Vec::with_capacity(side * side);
+        for (block_y, block_x) in (0..side).step_by(BLOCK).flat_map(|y| (0..side).step_by(BLOCK).map(move |x| (y, x))) {
+            for (y, x) in (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (y, x))) {
+                let (a, b) = ((of(block_x + x) - 1.0) * TANGENT, (1.0 - of(block_y + y)) * TANGENT);
+                let direction = (forward + right * a + up * b).normalize();
+                rays.push(Ray { tmax: FAR, ..Ray::new(eye, direction) });
+            }
+        }
+        rays
+    }
+}
+
+/// The unit normal of what was hit, of either sign.
+fn normal(world: &World, ray: &Ray, hit: &Hit) -> Vec3 {
+    let (part, placement) = world.locate(hit);
+    match &part.primitives {
+        Primitives::Triangles { positions, triangles } => {
+            let corners = triangles[hit.primitive as usize].map(|i| positions[i as usize]);
+            let [a, b, c] = corners.map(|p| placement.map_or(p, |at| at.to_world.transform_point3(p)));
+            (b - a).cross(c - a).normalize()
+        }
+        Primitives::Shapes(shapes) => {
+            let shape = &shapes[hit.primitive as usize];
+            let point = (ray.origin + ray.direction * hit.t).as_dvec3();
+            let Some(at) = placement else { return shape.normal(point).as_vec3() };
+            let normal = shape.normal(at.to_object.transform_point3(point));
+            (at.to_object.matrix3.transpose() * normal).normalize().as_vec3()
+        }
+    }
+}
+
+/// Marsaglia 2003, *Xorshift RNGs*, with 32 bits.
+struct Xorshift(u32);
+
+impl Xorshift {
+    /// In [0, 1).
+    fn unit(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        (self.0 >> 8) as f32 * (1.0 / 16_777_216.0)
+    }
+
+    /// Uniform in the unit ball, but not at its centre.
+    fn in_ball(&mut self) -> Vec3 {
+        loop {
+            let [x, y, z] = [(); 3].map(|()| self.unit() * 2.0 - 1.0);
+            let v = Vec3::new(x, y, z);
+            if (1e-4..=1.0).contains(&v.length_squared()) {
+                return v;
+            }
+        }
+    }
+}

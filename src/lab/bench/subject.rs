@@ -1,0 +1,109 @@
+//! What is measured: a scene from a file, on a floor, or one made by rule.
+
+use std::path::Path;
+
+use super::rays::View;
+use crate::error::{Error, Result, Warning};
+use crate::io::{self, LoadOptions, UpAxis};
+use crate::math::DAffine3;
+use crate::scene::{self, Geometry, Group, Instance, Material, Mesh, Scene, choose_origin};
+use crate::trace::{Primitives, World};
+
+/// Triangles of the largest terrain: 2 n^2 at this n are 800 million.
+const LARGEST_TERRAIN: u32 = 20_000;
+/// Storeys of the largest building: 414 million triangles.
+const LARGEST_BUILDING: u32 = 100_000;
+/// Storeys where none are given: 198,720 triangles.
+const STOREYS: u32 = 48;
+
+/// A scene ready to be traced, and where it is looked at from.
+pub struct Subject {
+    /// As it was asked for.
+    pub name: String,
+    /// The scene, floor and all.
+    pub world: World,
+    /// The camera.
+    pub view: View,
+}
+
+/// A scene that no file holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Procedural {
+    Terrain(u32),
+    Architecture(u32),
+}
+
+impl Procedural {
+    /// By its name: `terrain1000`, `architecture`, `architecture500`.
+    fn parse(name: &str) -> Option<Self> {
+        let number = |digits: &str, largest: u32| digits.parse().ok().filter(|n| (1..=largest).contains(n));
+        if let Some(digits) = name.strip_prefix("terrain") {
+            return number(digits, LARGEST_TERRAIN).map(Self::Terrain);
+        }
+        match name.strip_prefix("architecture")? {
+            "" => Some(Self::Architecture(STOREYS)),
+            digits => number(digits, LARGEST_BUILDING).map(Self::Architecture),
+        }
+    }
+
+    fn mesh(self) -> Mesh {
+        match self {
+            Self::Terrain(n) => scene::terrain(n),
+            Self::Architecture(n) => scene::architecture(n),
+        }
+    }
+}
+
+impl Subject {
+    /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), or a file.
+    /// All but terrains stand on a floor, two triangles at the bottom of their bounds.
+    ///
+    /// `up` says which axis of a *file* points up; nothing is turned, the camera stands accordingly.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that cannot be used or has nothing to look at, and those of [`World::new`].
+    pub fn new(name: &str, up: UpAxis) -> Result<(Self, Vec<Warning>)> {
+        let (mut scene, warnings, up, is_terrain) = match Procedural::parse(name) {
+            Some(rule) => {
+                let scene = Scene::from_geometries(vec![Geometry::Mesh(rule.mesh())], vec![Material::default()]);
+                (scene, Vec::new(), UpAxis::Y, matches!(rule, Procedural::Terrain(_)))
+            }
+            None => {
+                let (scene, warnings) = io::load(Path::new(name), &LoadOptions::default())?;
+                (scene, warnings, up, false)
+            }
+        };
+        let bounds = scene.bounds();
+        if bounds.radius() == 0.0 {
+            return Err(Error::input(name, "", "has nothing to look at: no triangle with an area"));
+        }
+        if !is_terrain {
+            let origin = choose_origin(&bounds);
+            let floor = Mesh::new(View::new(&bounds, origin, up, false).floor().to_vec(), vec![[0, 1, 2], [1, 3, 2]]);
+            add_mesh(&mut scene, Mesh { name: "floor".to_owned(), origin, ..floor });
+        }
+        let world = World::new(&scene)?;
+        let view = View::new(&bounds, world.centre, up, is_terrain);
+        Ok((Self { name: name.to_owned(), world, view }, warnings))
+    }
+
+    /// Triangles as stored: those of an object that is placed twice count once.
+    pub fn stored_triangles(&self) -> u64 {
+        let triangles = self.world.parts.iter().map(|part| match &part.primitives {
+            Primitives::Triangles { triangles, .. } => triangles.len() as u64,
+            Primitives::Shapes(_) => 0,
+        });
+        triangles.sum()
+    }
+}
+
+/// Adds a mesh in a group of its own, placed once.
+fn add_mesh(scene: &mut Scene, mesh: Mesh) {
+    let geometry = scene.geometries.len() as u32;
+    scene.geometries.push(Geometry::Mesh(Mesh { material: scene.materials.len() as u32, ..mesh }));
+    scene.materials.push(Material::default());
+    let name = String::new();
+    scene.groups.push(Group { name: name.clone(), geometries: geometry..geometry + 1 });
+    let group = scene.groups.len() as u32 - 1;
+    scene.instances.push(Instance { name, group, transform: DAffine3::IDENTITY });
+}

@@ -1,0 +1,174 @@
+//! The benchmark: its rays are those of `benches/embree_ref.cpp`, its figures hang together, and it finds wrong answers.
+
+use std::path::Path;
+
+use twincast::io::UpAxis;
+use twincast::lab::bench::{Built, Contender, Kind, SIDE, Setup, Subject};
+use twincast::trace::bvh::{Bvh, Isa};
+use twincast::{Batch, Error, Hit, Ray, Tracer, World};
+
+/// How many rays of each kind hit something.
+fn hits(subject: &Subject) -> [usize; 3] {
+    let bvh = Bvh::build(&subject.world);
+    let sets = subject.view.rays(&subject.world, &bvh, &Kind::ALL, SIDE);
+    assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL);
+    let counts: Vec<usize> = sets
+        .iter()
+        .map(|set| {
+            if set.kind == Kind::Shadow {
+                let mut occluded = vec![false; set.rays.len()];
+                bvh.occluded_batch(&set.rays, &mut occluded, Batch::default());
+                return occluded.iter().filter(|occluded| **occluded).count();
+            }
+            let mut hits = vec![None; set.rays.len()];
+            bvh.closest_batch(&set.rays, &mut hits, Batch::default());
+            hits.iter().flatten().count()
+        })
+        .collect();
+    assert_eq!(sets[0].rays.len(), SIDE * SIDE);
+    assert_eq!((sets[1].rays.len(), sets[2].rays.len()), (counts[0], counts[0]), "one of each from every hit");
+    [counts[0], counts[1], counts[2]]
+}
+
+/// What `embree_ref` prints, robust, ray by ray. Secondary rays differ from it by the rounding of their origins, and a
+/// few by what they hit; a random number out of step would change tens of thousands.
+#[track_caller]
+fn assert_hits(subject: &Subject, embree_ref: [usize; 3]) {
+    let ours = hits(subject);
+    assert_eq!(ours[0], embree_ref[0], "primary");
+    for k in [1, 2] {
+        assert!(ours[k].abs_diff(embree_ref[k]) <= 10, "{ours:?}, embree_ref {embree_ref:?}");
+    }
+}
+
+#[test]
+fn the_rays_on_a_terrain_are_those_of_embree_ref() {
+    let (subject, _) = Subject::new("terrain300", UpAxis::Y).unwrap();
+    assert_hits(&subject, [716_788, 336_739, 297_638]);
+}
+
+#[test]
+fn the_rays_on_a_scan_with_z_up_are_those_of_embree_ref() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models/nefertiti.obj");
+    if !path.exists() {
+        eprintln!("skipped: {} is missing", path.display());
+        return;
+    }
+    let (subject, _) = Subject::new(path.to_str().expect("UTF-8"), UpAxis::Z).unwrap();
+    assert_eq!(subject.world.primitive_count(), 99_938 + 2, "with a floor");
+    assert_hits(&subject, [797_159, 161_277, 180_042]);
+}
+
+#[test]
+fn a_subject_is_a_rule_or_a_file() {
+    let triangles =
+        |name| Subject::new(name, UpAxis::Y).map(|(s, _)| (s.world.primitive_count(), s.stored_triangles()));
+    assert_eq!(triangles("terrain7").unwrap(), (98, 98));
+    assert_eq!(triangles("architecture3").unwrap(), (3 * 4140 + 2, 3 * 4140 + 2), "on a floor");
+    for name in ["terrain0", "terrain", "terrain999999999", "architecture-1", "no-such.obj"] {
+        assert_eq!(triangles(name).unwrap_err().exit_code(), 3, "{name}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let point = folder.path().join("point.obj");
+    std::fs::write(&point, "v 1 2 3\nf 1 1 1\n").unwrap();
+    let error = triangles(point.to_str().expect("UTF-8")).unwrap_err();
+    assert!(error.exit_code() == 3 && error.to_string().contains("nothing to look at"), "{error}");
+}
+
+/// A native tracer, and what becomes of each of its answers.
+struct Bent<F>(Bvh, F);
+
+impl<F: Fn(&Ray, Option<Hit>, Batch) -> Option<Hit> + Sync> Tracer for Bent<F> {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        (self.1)(ray, self.0.closest(ray), Batch::default())
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.closest(ray).is_some()
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = (self.1)(ray, self.0.closest(ray), batch);
+        }
+    }
+}
+
+fn contender(
+    backend: &'static str,
+    mode: &'static str,
+    bend: impl Fn(&Ray, Option<Hit>, Batch) -> Option<Hit> + Copy + Send + Sync + 'static,
+) -> Contender {
+    let build = move |world: &World| {
+        let bvh = Bvh::build_for(world, Isa::Portable);
+        Ok(Built { seconds: 0.5, bytes: 8000, tracer: Box::new(Bent(bvh, bend)) })
+    };
+    Contender { backend, mode, build: Box::new(build) }
+}
+
+fn setup<'a>(subject: &'a Subject, contenders: &'a [Contender], kinds: &'a [Kind]) -> Setup<'a> {
+    Setup { subject, contenders, kinds, side: 32, threads: 1, repeat: 2, cancel: None, on_step: None }
+}
+
+#[test]
+fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
+    let (subject, _) = Subject::new("terrain20", UpAxis::Y).unwrap();
+    let engines = [("native", "default"), ("embree", "robust"), ("embree", "fast")];
+    let contenders = engines.map(|(backend, mode)| contender(backend, mode, |_, hit, _| hit));
+    for threads in [1, 3] {
+        let steps = std::sync::atomic::AtomicU64::new(0);
+        let count = || _ = steps.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let setup = Setup { threads, on_step: Some(&count), ..setup(&subject, &contenders, &Kind::ALL) };
+        let report = setup.run().unwrap();
+        assert_eq!(steps.load(std::sync::atomic::Ordering::Relaxed), setup.steps());
+
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(
+            (&json["scene"], &json["triangles"], &json["threads"]),
+            (&"terrain20".into(), &800.into(), &threads.into())
+        );
+        let builds = json["builds"].as_array().unwrap();
+        assert_eq!(builds.len(), 3);
+        assert_eq!(builds[1]["mtris_per_s"]["median"], 0.0016, "800 in half a second");
+        assert_eq!(builds[2]["bytes_per_triangle"], 10.0);
+        let traversal = json["traversal"].as_array().unwrap();
+        assert_eq!(traversal.len(), 3 * 3 * 3);
+        for row in traversal {
+            let mut keys: Vec<_> = row.as_object().unwrap().keys().map(String::as_str).collect();
+            keys.sort_unstable();
+            assert_eq!(keys, ["backend", "hits", "kind", "mode", "mrays_per_s", "width"]);
+            let rate = |which: &str| row["mrays_per_s"][which].as_f64().unwrap();
+            assert!(0.0 < rate("min") && rate("min") <= rate("median") && rate("median") <= rate("max"), "{row}");
+            let same = traversal.iter().filter(|other| other["kind"] == row["kind"]);
+            assert!(same.clone().count() == 9 && same.clone().all(|other| other["hits"] == row["hits"]));
+        }
+        let ratios = json["ratios"].as_array().unwrap();
+        assert_eq!(ratios.iter().map(|ratio| &ratio["kind"]).collect::<Vec<_>>(), ["primary", "diffuse", "shadow"]);
+        assert!(ratios.iter().all(|r| r["over_embree_robust"].is_number() && r["over_embree_fast"].is_number()));
+        assert_eq!(json.as_object().unwrap().len(), 6, "and nothing else: {json}");
+        assert_eq!(report.verdicts.len(), 3);
+    }
+}
+
+#[test]
+fn wrong_answers_end_a_benchmark() {
+    let (subject, _) = Subject::new("terrain20", UpAxis::Y).unwrap();
+    let check = |native, embree| {
+        let contenders = [native, embree];
+        match setup(&subject, &contenders, &[Kind::Primary]).run() {
+            Err(Error::Check(message)) => message,
+            other => panic!("{:?}", other.map(|report| report.to_string())),
+        }
+    };
+    let honest = || contender("embree", "robust", |_, hit, _| hit);
+    // Never a hit far to the right.
+    let blind = contender("native", "default", |ray, hit, _| hit.filter(|_| ray.direction.x < 0.2));
+    assert!(check(blind, honest()).contains("the native engine is wrong on"));
+    let fickle = contender("native", "default", |_, hit, batch| hit.filter(|_| batch.width.rays() < 16));
+    assert!(check(fickle, honest()).contains("answers differently at width 16"));
+    // An engine that is not native may be wrong, for every ray.
+    let contenders = [contender("native", "default", |_, hit, _| hit), contender("embree", "robust", |_, _, _| None)];
+    let report = setup(&subject, &contenders, &[Kind::Primary]).run().unwrap();
+    assert_eq!(report.traversal[3].hits, 0);
+    assert!(report.verdicts[0].1.count(twincast::lab::Class::EmbreeWrong) > 100);
+}
