@@ -75,7 +75,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::trace::{Tracer, World};
 
     let diff = args.diff.as_slice();
-    outputs::check(diff, None)?;
+    outputs::check(diff, None, [&args.scene.scene])?;
     let cancel = interrupt::install()?;
     let (scene, warnings) = args.scene.load()?;
     warn(&warnings);

@@ -8,8 +8,31 @@ use crate::error::{Error, Result};
 use crate::image::{self, Image, Metadata, WriteOptions};
 use crate::output;
 
-/// Whether every picture and the other files can be written, before anything is done for them.
-pub(super) fn check<'a>(pictures: &[PathBuf], others: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+/// Whether every picture and the other files can be written, before anything is done for them; and whether none of them
+/// would replace another, nor one of the `inputs`.
+pub(super) fn check<'a>(
+    pictures: &'a [PathBuf],
+    others: impl IntoIterator<Item = &'a PathBuf>,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<()> {
+    let others: Vec<&PathBuf> = others.into_iter().collect();
+    // By where they really are; a file that does not exist yet has the place of its folder.
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let in_folder = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
+        path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
+    };
+    let mut taken: Vec<PathBuf> = inputs.into_iter().map(|path| place(path)).collect();
+    for path in pictures.iter().chain(others.iter().copied()) {
+        let place = place(path);
+        if taken.contains(&place) && !place.starts_with("/dev") {
+            let path = path.display();
+            return Err(Error::Usage(format!(
+                "{path} is named twice; an output must not replace another file of the run"
+            )));
+        }
+        taken.push(place);
+    }
     pictures.iter().try_for_each(|path| image::check_writable(path))?;
     others.into_iter().try_for_each(|path| output::check_writable(path))
 }
@@ -25,4 +48,24 @@ pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(document).map_err(|error| failed(&error))?;
     text.push('\n');
     output::write_atomically(path, |part| std::fs::write(part, &text).map_err(|error| failed(&error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_replaces_neither_an_input_nor_another_output() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [scene, picture, stats] = ["scene.obj", "picture.png", "stats.json"].map(|name| folder.path().join(name));
+        std::fs::write(&scene, "v 0 0 0").expect("written");
+        let pictures = std::slice::from_ref(&picture);
+        assert!(check(pictures, [&stats], [&scene]).is_ok());
+        let same = folder.path().join(".").join("scene.obj");
+        for (others, inputs) in [([&same], [&scene]), ([&picture], [&scene]), ([&stats], [&picture])] {
+            let refused = check(pictures, others, inputs).expect_err("one file has two parts");
+            assert!(matches!(refused, Error::Usage(_)), "{refused}");
+        }
+        assert_eq!(std::fs::read_to_string(&scene).expect("still there"), "v 0 0 0");
+    }
 }

@@ -120,7 +120,11 @@ enum Order {
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     let cancel = interrupt::install()?;
-    outputs::check(&args.output, &args.stats)?;
+    outputs::check(
+        &args.output,
+        &args.stats,
+        [Some(&args.scene.scene), args.reference.as_ref()].into_iter().flatten(),
+    )?;
     let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
