@@ -5,7 +5,9 @@ use clap::{Args, ValueEnum};
 use super::common::UpAxis;
 use super::engine::BackendArg;
 use crate::error::Result;
-use crate::lab::bench::{Kind, SIDE};
+#[cfg(feature = "embree")]
+use crate::lab::bench::Kind;
+use crate::lab::bench::SIDE;
 
 /// Measure builds and rays of native and Embree, in turn
 ///
@@ -68,6 +70,7 @@ enum RaysArg {
     Shadow,
 }
 
+#[cfg(feature = "embree")]
 impl RaysArg {
     const fn kind(self) -> Kind {
         match self {

@@ -3,7 +3,7 @@
 //! [`oracle`] answers exactly, slowly, and alone: it shares no code with any tracer. [`rounding`] says how far an
 //! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that differ on a
 //! ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be difficult.
-//! [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`bench`] times the engines against
+//! [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`mod@bench`] times the engines against
 //! each other.
 
 pub mod bench;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::nearest::Nearest;
 use super::{Part, Primitives, Tracer, World};
-use crate::math::{DVec3, Vec3, is_traceable};
+use crate::math::{Affine3, DVec3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
 use crate::shape::triangle::{self, Placed};
@@ -16,6 +16,8 @@ use crate::shape::triangle::{self, Placed};
 pub struct Brute {
     world: World,
     parts: Vec<Prepared>,
+    /// Of each placement, for each part of its object: the triangles where they stand.
+    placed: Vec<Vec<Vec<Lanes>>>,
 }
 
 /// A part's primitives, laid out for a linear scan.
@@ -24,13 +26,23 @@ enum Prepared {
     Shapes(Arc<Vec<Shape>>),
 }
 
-/// Eight triangles: component i of corner k is `0[3 * k + i]`.
-struct Lanes([[f64; 8]; 9]);
+/// Eight triangles in world coordinates.
+struct Lanes {
+    /// Component i of corner k is `corners[3 * k + i]`.
+    corners: [[f64; 8]; 9],
+    /// What the rounding of a corner is relative to, where a transform has rounded it.
+    slack: f64,
+}
 
 impl Brute {
     /// Takes the primitives of `world` as they are.
     pub fn new(world: &World) -> Self {
-        Self { world: world.clone(), parts: world.parts.iter().map(Prepared::new).collect() }
+        let parts: Vec<Prepared> = world.parts.iter().map(Prepared::new).collect();
+        let placed = world.placements.iter().map(|placement| {
+            let object = &parts[world.objects[placement.object as usize].clone()];
+            object.iter().map(|part| part.placed(&placement.to_world)).collect()
+        });
+        Self { world: world.clone(), placed: placed.collect(), parts }
     }
 
     /// Memory it holds, in bytes.
@@ -41,7 +53,8 @@ impl Brute {
             }
             Prepared::Shapes(shapes) => size_of_val(&shapes[..]),
         };
-        self.parts.iter().map(part).sum()
+        let placed = self.placed.iter().flatten().map(|lanes| size_of_val(&lanes[..]));
+        self.parts.iter().map(part).sum::<usize>() + placed.sum::<usize>()
     }
 
     /// Offers every intersection within the range to `nearest`; stops at the first one if `any`.
@@ -54,16 +67,10 @@ impl Brute {
             let part = &self.world.parts[i];
             match &self.parts[i] {
                 Prepared::Triangles { corners, lanes, primitives } => {
-                    for (chunk, lanes) in lanes.iter().enumerate() {
-                        let mut candidates = lanes.candidates(ray.origin.as_dvec3(), ray.direction.as_dvec3());
-                        while candidates != 0 {
-                            let k = chunk * 8 + candidates.trailing_zeros() as usize;
-                            candidates &= candidates - 1;
-                            let Some(corners) = corners.get(k) else { continue };
-                            let Some(hit) = triangle::intersect(ray, corners) else { continue };
-                            nearest.offer(hit.t, triangle_hit(&hit, part, part.instance, primitives[k]));
-                        }
-                    }
+                    each_candidate(lanes, corners.len(), ray, |k| {
+                        let Some(hit) = triangle::intersect(ray, &corners[k]) else { return };
+                        nearest.offer(hit.t, triangle_hit(&hit, part, part.instance, primitives[k]));
+                    });
                 }
                 Prepared::Shapes(shapes) => offer_shapes(&mut nearest, ray, shapes, part, part.instance),
             }
@@ -71,17 +78,17 @@ impl Brute {
                 return nearest;
             }
         }
-        for placement in &self.world.placements {
+        for (placement, placed) in self.world.placements.iter().zip(&self.placed) {
             let object_ray = placement.object_ray(ray);
-            for i in self.world.objects[placement.object as usize].clone() {
+            for (i, lanes) in self.world.objects[placement.object as usize].clone().zip(placed) {
                 let part = &self.world.parts[i];
                 match &self.parts[i] {
                     Prepared::Triangles { corners, primitives, .. } => {
-                        for (k, &corners) in corners.iter().enumerate() {
-                            let placed = Placed { corners, to_world: &placement.to_world };
-                            let Some(hit) = triangle::intersect(ray, &placed) else { continue };
+                        each_candidate(lanes, corners.len(), ray, |k| {
+                            let placed = Placed { corners: corners[k], to_world: &placement.to_world };
+                            let Some(hit) = triangle::intersect(ray, &placed) else { return };
                             nearest.offer(hit.t, triangle_hit(&hit, part, placement.instance, primitives[k]));
-                        }
+                        });
                     }
                     Prepared::Shapes(shapes) => {
                         offer_shapes(&mut nearest, &object_ray, shapes, part, placement.instance);
@@ -129,7 +136,7 @@ impl Prepared {
                         primitives.push(primitive as u32);
                     }
                 }
-                let lanes = corners.chunks(8).map(Lanes::new).collect();
+                let lanes = corners.chunks(8).map(|corners| Lanes::new(corners, |p| (p.as_dvec3(), 0.0))).collect();
                 Self::Triangles { corners, lanes, primitives }
             }
             Primitives::Shapes(shapes) => Self::Shapes(Arc::clone(shapes)),
@@ -137,17 +144,48 @@ impl Prepared {
     }
 }
 
+impl Prepared {
+    /// The triangles under `to_world`.
+    fn placed(&self, to_world: &Affine3) -> Vec<Lanes> {
+        let Self::Triangles { corners, .. } = self else { return Vec::new() };
+        let to_world = to_world.as_daffine3();
+        let magnitudes = to_world.matrix3.abs();
+        let place = |p: Vec3| {
+            let slack = magnitudes * p.as_dvec3().abs() + to_world.translation.abs();
+            (to_world.transform_point3(p.as_dvec3()), slack.max_element())
+        };
+        corners.chunks(8).map(|corners| Lanes::new(corners, place)).collect()
+    }
+}
+
+/// Calls `found` with the index of every triangle that the ray's line may pass.
+fn each_candidate(lanes: &[Lanes], count: usize, ray: &Ray, mut found: impl FnMut(usize)) {
+    for (chunk, lanes) in lanes.iter().enumerate() {
+        let mut candidates = lanes.candidates(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        while candidates != 0 {
+            let k = chunk * 8 + candidates.trailing_zeros() as usize;
+            candidates &= candidates - 1;
+            if k < count {
+                found(k);
+            }
+        }
+    }
+}
+
 impl Lanes {
-    fn new(corners: &[[Vec3; 3]]) -> Self {
-        let mut lanes = [[0.0; 8]; 9];
-        for (lane, triangle) in corners.iter().enumerate() {
-            for (k, corner) in triangle.iter().enumerate() {
+    /// `place` moves a corner into the world, and tells what the rounding of that is relative to.
+    fn new(triangles: &[[Vec3; 3]], place: impl Fn(Vec3) -> (DVec3, f64)) -> Self {
+        let mut lanes = Self { corners: [[0.0; 8]; 9], slack: 0.0 };
+        for (lane, triangle) in triangles.iter().enumerate() {
+            for (k, &corner) in triangle.iter().enumerate() {
+                let (corner, slack) = place(corner);
+                lanes.slack = lanes.slack.max(slack);
                 for axis in 0..3 {
-                    lanes[3 * k + axis][lane] = f64::from(corner[axis]);
+                    lanes.corners[3 * k + axis][lane] = corner[axis];
                 }
             }
         }
-        Self(lanes)
+        lanes
     }
 
     /// A bit for every triangle that the ray's line may pass.
@@ -156,11 +194,13 @@ impl Lanes {
     fn candidates(&self, origin: DVec3, d: DVec3) -> u32 {
         let mut mask = 0;
         for lane in 0..8 {
-            let p =
-                |k: usize| DVec3::new(self.0[3 * k][lane], self.0[3 * k + 1][lane], self.0[3 * k + 2][lane]) - origin;
+            let p = |k: usize| {
+                DVec3::new(self.corners[3 * k][lane], self.corners[3 * k + 1][lane], self.corners[3 * k + 2][lane])
+                    - origin
+            };
             let (a, b, c) = (p(0), p(1), p(2));
             let w = DVec3::new(d.dot(b.cross(c)), d.dot(c.cross(a)), d.dot(a.cross(b)));
-            let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
+            let reach = a.abs().max(b.abs()).max(c.abs()).max_element() + self.slack;
             let bound = 64.0 * f64::EPSILON * d.abs().max_element() * reach * reach;
             let outside = w.min_element() < -bound && w.max_element() > bound;
             mask |= u32::from(!outside) << lane;

@@ -134,8 +134,9 @@ fn size<V: Vector<LANES>>(p: [V; 3]) -> V {
 #[inline(always)]
 fn ends<S: Simd>(n: [S::V4; 3], bundle: &Bundle) -> (S::V4, S::V4) {
     let (mut least, mut most) = (S::V4::splat(0.0), S::V4::splat(0.0));
-    for axis in 0..3 {
-        let (p, q) = (n[axis].mul(S::V4::splat(bundle.low[axis])), n[axis].mul(S::V4::splat(bundle.high[axis])));
+    for (axis, component) in n.into_iter().enumerate() {
+        let p = component.mul(S::V4::splat(bundle.low[axis]));
+        let q = component.mul(S::V4::splat(bundle.high[axis]));
         least = least.add(p.min(q));
         most = most.add(p.max(q));
     }

@@ -230,8 +230,8 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
     fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, first: u8) -> bool {
         let splat = S::V8::splat;
         let mut normals = [splat(0.0); 12];
-        for k in 0..12 {
-            normals[k] = splat(edges.normals[k][lane]);
+        for (normal, lanes) in normals.iter_mut().zip(&edges.normals) {
+            *normal = splat(lanes[lane]);
         }
         let bound = splat(edges.edge_error[lane]);
         let below = splat(-edges.edge_error[lane]);
