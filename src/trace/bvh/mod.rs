@@ -6,6 +6,7 @@
 //! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `walk` | one ray, and packets of rays, from the root to the leaves |
+//! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: blocks of four triangles, shapes, placed objects |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
