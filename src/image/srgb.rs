@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 / 255.0) as f32));
 
 /// The linear light of an encoded value, both 0 to 1.
-pub(super) fn decode(encoded: f64) -> f64 {
+pub(crate) fn decode(encoded: f64) -> f64 {
     if encoded <= 0.04045 { encoded / 12.92 } else { libm::pow((encoded + 0.055) / 1.055, 2.4) }
 }
 

@@ -6,7 +6,6 @@
 //! normals on request, axes and units, and a last check of the whole scene.
 
 mod check;
-mod color;
 mod gltf;
 mod mapped;
 mod obj;

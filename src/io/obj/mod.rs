@@ -12,9 +12,9 @@ mod mtl;
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::color;
 use super::text::{Lines, Words, name, number, quoted};
 use crate::error::{Error, Result, Warning};
+use crate::image::srgb;
 use crate::io::Placeless;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::Scene;
@@ -176,7 +176,7 @@ impl Obj {
         }
         if count == 3 {
             self.colors.resize(self.positions.len() - 1, Vec3::ONE);
-            self.colors.push(color::linear(Vec3::from(rest).clamp(Vec3::ZERO, Vec3::ONE)));
+            self.colors.push(Vec3::from(rest.map(|c| srgb::decode(f64::from(c).clamp(0.0, 1.0)) as f32)));
         } else if !self.colors.is_empty() {
             self.colors.push(Vec3::ONE);
         }

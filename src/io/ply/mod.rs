@@ -12,8 +12,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use self::header::{Element, Encoding, Header, Scalar};
-use super::{color, polygon};
+use super::polygon;
 use crate::error::{Error, Result, Warning};
+use crate::image::srgb;
 use crate::io::Placeless;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Geometry, Material, Mesh, Scene};
@@ -89,6 +90,21 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
     Ok(mesh)
 }
 
+/// Reads one item and keeps the values of one of its lists, in place of what `values` held.
+fn read_list(element: &Element, items: &mut impl Items, list: usize, values: &mut Vec<f64>) -> Placeless<()> {
+    values.clear();
+    read_item(
+        element,
+        items,
+        |i| i == list,
+        |i, value| {
+            if i == list {
+                values.push(value)
+            }
+        },
+    )
+}
+
 /// Reads one item. Lists for which `wanted` holds are kept, and `each` gets the values of the other properties.
 fn read_item(
     element: &Element,
@@ -152,7 +168,6 @@ impl Vertices {
         self.normals.reserve_exact(if has_normals { count } else { 0 });
         self.uvs.reserve_exact(if has_uvs { count } else { 0 });
         self.colors.reserve_exact(if has_colors { count } else { 0 });
-        let table = color::srgb_table();
         // The place of each property among the twelve values of a vertex; unused ones go to the thirteenth.
         let mut slots = vec![12usize; element.properties.len()];
         let roles = position.iter().chain(&normal).chain(&uv).chain(&rgb).chain([&alpha]);
@@ -173,7 +188,7 @@ impl Vertices {
                 self.uvs.push(Vec2::new(v[6] as f32, v[7] as f32));
             }
             if has_colors {
-                let channel = |k: usize| channel(element, rgb[k], v[8 + k], &table);
+                let channel = |k: usize| channel(element, rgb[k], v[8 + k]);
                 let a = match alpha.map(|i| element.properties[i].scalar) {
                     Some(scalar) => v[11] / scalar.full(),
                     None => 1.0,
@@ -186,11 +201,11 @@ impl Vertices {
 }
 
 /// A colour channel as linear light: whole numbers are sRGB-encoded, floats linear already.
-fn channel(element: &Element, index: Option<usize>, value: f64, table: &[f32; 256]) -> f32 {
+fn channel(element: &Element, index: Option<usize>, value: f64) -> f32 {
     match index.map(|i| element.properties[i].scalar) {
-        Some(Scalar::U8) => table[value as usize & 255],
+        Some(Scalar::U8) => srgb::srgb_to_linear(value as u8),
         Some(scalar @ (Scalar::F32 | Scalar::F64)) => (value / scalar.full()).max(0.0) as f32,
-        Some(scalar) => color::srgb_to_linear((value / scalar.full()).clamp(0.0, 1.0) as f32),
+        Some(scalar) => srgb::decode((value / scalar.full()).clamp(0.0, 1.0)) as f32,
         None => 1.0,
     }
 }
@@ -215,17 +230,7 @@ impl Faces {
         let mut corners = Vec::new();
         let (mut around, mut parts) = (Vec::new(), Vec::new());
         for _ in self.triangles.len()..count {
-            corners.clear();
-            read_item(
-                element,
-                items,
-                |i| i == list,
-                |i, value| {
-                    if i == list {
-                        corners.push(value)
-                    }
-                },
-            )?;
+            read_list(element, items, list, &mut corners)?;
             let corners = whole(&corners, positions.len())?;
             match corners[..] {
                 [a, b, c] => self.triangles.push([a, b, c]),
@@ -248,17 +253,7 @@ impl Faces {
         let list = indices(element)?;
         let mut values = Vec::new();
         for _ in 0..element.count {
-            values.clear();
-            read_item(
-                element,
-                items,
-                |i| i == list,
-                |i, value| {
-                    if i == list {
-                        values.push(value)
-                    }
-                },
-            )?;
+            read_list(element, items, list, &mut values)?;
             for strip in values.split(|&i| i == -1.0) {
                 let strip = whole(strip, positions.len())?;
                 self.triangles.extend(strip.windows(3).enumerate().filter_map(|(k, w)| {
