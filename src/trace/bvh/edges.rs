@@ -11,12 +11,10 @@
 //! | slope d . N | 42 u D s^2 | 0 |
 //! | height A . N | 48 u L s^2 | 6 b s^2 |
 
+use super::block::LANES;
 use super::bundle::Bundle;
 use super::simd::{Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
-
-/// Triangles in a block.
-const LANES: usize = 4;
 
 /// Numbers of four triangles; the sign is such that the bundle sees each from its front (slope > 0).
 pub(super) struct Edges {

@@ -5,9 +5,10 @@
 //! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
 //! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `walk` | one ray, and packets of rays, from the root to the leaves |
+//! | `walk` | one ray, from the root to the leaves |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
-//! | `triangles`, `shapes`, `placements` | what leaves hold: blocks of four triangles, shapes, placed objects |
+//! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
@@ -17,9 +18,11 @@
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
+mod block;
 mod build;
 mod bundle;
 mod edges;
+mod filter;
 mod isa;
 mod node;
 mod placements;
@@ -33,14 +36,15 @@ mod walk;
 pub use isa::Isa;
 
 use super::nearest::Nearest;
-use super::{Batch, Tracer, Width, World};
+use super::{Batch, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
+use filter::Filter;
 use placements::PlacementTree;
 use shapes::ShapeTree;
 use simd::Simd;
 use slab::SlabRay;
-use triangles::{Filter, TriangleTree};
+use triangles::TriangleTree;
 use walk::{Stack, Visit};
 
 /// The native tracer.
@@ -146,36 +150,11 @@ impl Bvh {
         );
     }
 
-    /// Rays that walk the fixed trees together, and the placed objects one by one.
+    /// Many rays, one after the other.
     #[inline(always)]
-    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray; N],
-        stacks: &mut Stacks,
-    ) -> [Option<Hit>; N] {
-        let mut nearest = rays.map(|ray| Nearest::new(&ray));
-        self.fixed.trace_packet::<S, N, ANY>(rays, &mut stacks.level, &mut nearest);
-        for (ray, nearest) in rays.iter().zip(&mut nearest).filter(|(ray, _)| ray.is_valid()) {
-            self.enter_placements::<S, ANY>(ray, stacks, nearest);
-        }
-        nearest.map(|nearest| nearest.hit())
-    }
-
-    /// Many rays in packets of N; the rest, and N = 1, ray by ray.
-    #[inline(always)]
-    fn trace_batch<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray],
-        mut answer: impl FnMut(usize, Option<Hit>),
-    ) {
+    fn trace_rays<S: Simd, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
         let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        let packets = if N > 1 { rays.as_chunks::<N>().0 } else { &[] };
-        for (i, packet) in packets.iter().enumerate() {
-            for (k, hit) in self.trace_packet::<S, N, ANY>(packet, &mut stacks).into_iter().enumerate() {
-                answer(i * N + k, hit);
-            }
-        }
-        for (i, ray) in rays.iter().enumerate().skip(packets.len() * N) {
+        for (i, ray) in rays.iter().enumerate() {
             answer(i, self.trace::<S, ANY>(ray, &mut stacks));
         }
     }
@@ -222,13 +201,9 @@ impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<
     fn run<S: Simd>(self) {
         let Self { bvh, rays, batch, answer } = self;
         if batch.coherent {
-            return bvh.trace_bundles::<S, ANY>(rays, answer);
-        }
-        match batch.width {
-            Width::One => bvh.trace_batch::<S, 1, ANY>(rays, answer),
-            Width::Four => bvh.trace_batch::<S, 4, ANY>(rays, answer),
-            Width::Eight => bvh.trace_batch::<S, 8, ANY>(rays, answer),
-            Width::Sixteen => bvh.trace_batch::<S, 16, ANY>(rays, answer),
+            bvh.trace_bundles::<S, ANY>(rays, answer);
+        } else {
+            bvh.trace_rays::<S, ANY>(rays, answer);
         }
     }
 }
@@ -293,48 +268,6 @@ impl Level {
                 #[inline(always)]
                 |first, count| {
                     self.shapes.offer_leaf(first, count, local, through, nearest);
-                    Visit::after::<ANY>(nearest)
-                },
-            );
-        }
-    }
-
-    /// Rays in the world against a level in the world.
-    #[inline(always)]
-    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray; N],
-        stack: &mut Stack,
-        nearest: &mut [Nearest; N],
-    ) {
-        let live = rays.iter().enumerate().fold(0, |live, (k, ray)| live | u32::from(ray.is_valid()) << k);
-        if !self.triangles.tree().is_empty() {
-            let slabs = rays.map(|ray| SlabRay::new(&ray, self.triangles.tree().reach(), 1.0));
-            let filters = rays.map(|ray| Filter::new(&ray, 1.0));
-            walk::packet::<S, N>(
-                stack,
-                self.triangles.tree(),
-                &slabs,
-                live,
-                nearest,
-                #[inline(always)]
-                |first, count, k, nearest: &mut Nearest| {
-                    self.triangles.offer_leaf::<S>(first, count, &rays[k], &filters[k], None, nearest);
-                    Visit::after::<ANY>(nearest)
-                },
-            );
-        }
-        if !self.shapes.tree().is_empty() {
-            let slabs = rays.map(|ray| SlabRay::new(&ray, self.shapes.tree().reach(), 1.0));
-            walk::packet::<S, N>(
-                stack,
-                self.shapes.tree(),
-                &slabs,
-                live,
-                nearest,
-                #[inline(always)]
-                |first, count, k, nearest: &mut Nearest| {
-                    self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
                     Visit::after::<ANY>(nearest)
                 },
             );

@@ -1,4 +1,4 @@
-//! From the root to the leaves: one ray, or a packet of rays that share one stack.
+//! One ray from the root to the leaves.
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
@@ -28,16 +28,14 @@ impl Visit {
 /// A child to be visited.
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
-    /// Where the ray, or the first ray of the packet, enters it.
+    /// Where the ray enters it.
     near: f32,
     index: u32,
-    /// The rays of the packet that enter it.
-    rays: u32,
     count: u8,
 }
 
 impl Entry {
-    const ROOT: Self = Self { near: 0.0, index: 0, rays: 1, count: 0 };
+    const ROOT: Self = Self { near: 0.0, index: 0, count: 0 };
 }
 
 /// Every level of the tree leaves at most seven siblings waiting.
@@ -52,13 +50,6 @@ pub(super) struct Stack {
 impl Stack {
     pub fn new() -> Self {
         Self { entries: [Entry::default(); STACK], len: 0 }
-    }
-
-    /// Holds the root alone.
-    #[inline(always)]
-    fn start(&mut self, rays: u32) {
-        self.entries[0] = Entry { rays, ..Entry::ROOT };
-        self.len = 1;
     }
 
     #[inline(always)]
@@ -96,7 +87,7 @@ pub(super) fn single<S: Simd>(
             let node = tree.node(next.index);
             let (mut mask, near) = ray.enter::<S>(node, limit);
             if mask != 0 {
-                let child = |i: usize| Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] };
+                let child = |i: usize| Entry { near: near[i], index: node.index[i], count: node.count[i] };
                 let first = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
                 next = child(first);
@@ -126,55 +117,5 @@ pub(super) fn single<S: Simd>(
                 None => return,
             }
         };
-    }
-}
-
-/// Visits, for each ray of a packet, at least the leaves that it enters before its limit. `leaf` gets a leaf, the
-/// ray's place in the packet and its nearest hit. Only the rays in the bit mask `live` take part.
-#[inline(always)]
-pub(super) fn packet<S: Simd, const N: usize>(
-    stack: &mut Stack,
-    tree: &Tree,
-    rays: &[SlabRay; N],
-    mut live: u32,
-    nearest: &mut [Nearest; N],
-    mut leaf: impl FnMut(u32, u8, usize, &mut Nearest) -> Visit,
-) {
-    let mut limit = std::array::from_fn::<f32, N, _>(|k| nearest[k].limit());
-    stack.start(live);
-    while let Some(entry) = stack.pop() {
-        let mut waiting = entry.rays & live;
-        if entry.count != 0 {
-            while waiting != 0 {
-                let k = waiting.trailing_zeros() as usize;
-                waiting &= waiting - 1;
-                match leaf(entry.index, entry.count, k, &mut nearest[k]) {
-                    Visit::Until(t) => limit[k] = t,
-                    Visit::Stop => live &= !(1 << k),
-                }
-            }
-            continue;
-        }
-        let node = tree.node(entry.index);
-        let mut entering = [0u32; WIDTH];
-        let mut first = [f32::INFINITY; WIDTH];
-        while waiting != 0 {
-            let k = waiting.trailing_zeros() as usize;
-            waiting &= waiting - 1;
-            let (mask, near) = rays[k].enter::<S>(node, limit[k]);
-            for i in 0..WIDTH {
-                if mask >> i & 1 != 0 {
-                    entering[i] |= 1 << k;
-                    first[i] = if near[i] < first[i] { near[i] } else { first[i] };
-                }
-            }
-        }
-        let base = stack.len;
-        for i in 0..WIDTH {
-            if entering[i] != 0 {
-                let entry = Entry { near: first[i], index: node.index[i], rays: entering[i], count: node.count[i] };
-                stack.insert(base, entry);
-            }
-        }
     }
 }
