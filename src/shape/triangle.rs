@@ -39,7 +39,7 @@ pub trait Corners {
 impl Corners for [Vec3; 3] {
     #[inline]
     fn rounded(&self) -> [DVec3; 3] {
-        self.map(|p| p.as_dvec3())
+        [self[0].as_dvec3(), self[1].as_dvec3(), self[2].as_dvec3()]
     }
     #[inline]
     fn slack(&self) -> [DVec3; 3] {
@@ -114,21 +114,11 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
 }
 
-/// The same, to the bit, for a ray that is known to pass inside and to hit within its range: only t, u and v are
-/// computed.
-#[inline]
-pub(crate) fn intersect_inside(ray: &Ray, corners: &[Vec3; 3]) -> Option<TriangleHit> {
-    let d = ray.direction.as_dvec3();
-    let seen = Seen::new(ray.origin.as_dvec3(), d, corners.rounded());
-    let [a, b, c] = seen.edges;
-    let long = a.abs().max(b.abs()).max(c.abs()).max_element();
-    // The bound of `intersect`, from above.
-    let sizes = seen.corners[0].abs().max_element() * seen.slope.abs() + d.abs().max_element() * seen.height.abs();
-    if 6.0 * K * long * long * sizes <= (seen.height * seen.slope).abs() * T_PRECISION {
-        Some(seen.hit())
-    } else {
-        intersect(ray, corners)
-    }
+/// For a ray that is known to pass inside and to hit within its range: with L the largest edge component, A the first
+/// corner's relative to the origin and D the direction's, the f64 quotients are precise enough (and so what [`intersect`]
+/// answers) where the first of these numbers times L^2 (A |slope| + D |height|) is at most the second times |height slope|.
+pub(crate) const fn inside_precision() -> (f64, f64) {
+    (6.0 * K, T_PRECISION)
 }
 
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
