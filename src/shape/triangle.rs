@@ -114,13 +114,6 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
 }
 
-/// For a ray that is known to pass inside and to hit within its range: with L the largest edge component, A the first
-/// corner's relative to the origin and D the direction's, the f64 quotients are precise enough (and so what [`intersect`]
-/// answers) where the first of these numbers times L^2 (A |slope| + D |height|) is at most the second times |height slope|.
-pub(crate) const fn inside_precision() -> (f64, f64) {
-    (6.0 * K, T_PRECISION)
-}
-
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
 /// the dot product; and the bound's own rounding.
 const K: f64 = gamma64(32);
@@ -157,7 +150,8 @@ impl Seen {
     #[inline(always)]
     fn hit(&self) -> TriangleHit {
         let &Self { volumes, slope, height, .. } = self;
-        TriangleHit { t: height / slope, u: volumes[1] / slope, v: volumes[2] / slope }
+        let inverse = 1.0 / slope;
+        TriangleHit { t: height * inverse, u: volumes[1] * inverse, v: volumes[2] * inverse }
     }
 }
 

@@ -11,7 +11,7 @@
 
 use super::node::{Node, WIDTH};
 use super::query::Query;
-use super::simd::{Array, Group, Simd, Vector};
+use super::simd::{Array, Group, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -142,14 +142,14 @@ impl Bundle {
                     finite = origin[axis].mul_add(zero, finite);
                 }
             }
-            in_range &= zero.at_most(tmin) & tmin.at_most(tmax);
+            in_range &= zero.at_most(tmin).and(tmin.at_most(tmax)).bits();
             latest = latest.max(tmax);
             store::<S>(&mut self.begin, i, tmin);
             store::<S>(&mut self.end, i, tmax);
         }
-        let is_shared = spread.at_most(zero) == 0xff;
+        let is_shared = spread.at_most(zero).bits() == 0xff;
         (self.origin, self.blur, self.is_turned) = (rays[0].origin.to_array(), 0.0, !is_shared);
-        let is_valid = finite.at_most(zero) == 0xff && in_range & 0xff == 0xff;
+        let is_valid = finite.at_most(zero).bits() == 0xff && in_range & 0xff == 0xff;
         if is_shared {
             return if is_valid { Fit::Whole } else { Fit::Parts };
         }
@@ -319,6 +319,6 @@ impl BundleSlab {
             far = last.mul(a).max(last.mul(b)).min(far);
             (boxes.near[i], boxes.far[i]) = (first.to_array(), last.to_array());
         }
-        (near.at_most(far), near.to_array(), boxes)
+        (near.at_most(far).bits(), near.to_array(), boxes)
     }
 }

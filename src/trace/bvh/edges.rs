@@ -13,7 +13,7 @@
 
 use super::block::LANES;
 use super::bundle::{Bundle, axes};
-use super::simd::{Array, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
 
 /// Numbers of four triangles; the sign is such that the bundle sees each from its front (slope > 0).
@@ -21,13 +21,12 @@ pub(super) struct Edges {
     /// On the bundle's axes, the third turned forward: the scalar product with (p, q, 1) is the edge function, and with
     /// the fourth, the triangle's own normal, the slope.
     pub normals: [[[f32; LANES]; 3]; 4],
-    /// t' times the slope.
-    pub height: [f32; LANES],
+    /// t' times the slope, for the least and the most that t' may be in view of all rounding.
+    pub near_height: [f32; LANES],
+    pub far_height: [f32; LANES],
     pub edge_error: [f32; LANES],
-    pub slope_error: [f32; LANES],
-    pub height_error: [f32; LANES],
-    /// A bit for every triangle that rays of the bundle may see from both sides.
-    pub is_two_sided: u32,
+    /// A bit for every triangle that rays of the bundle may see from both sides, or too obliquely to bound t'.
+    pub is_vague: u32,
 }
 
 impl Edges {
@@ -64,54 +63,44 @@ impl Edges {
         let zero = splat(0.0);
         let front = slope_error.less(least_slope);
         let back = most_slope.less(zero.sub(slope_error));
-        let two_sided = !(front | back) & 0b1111;
+        let two_sided = !front.or(back).bits() & 0b1111;
         // Turned so that the slope is positive.
-        let sign = S::V4::load(&SIGNS[back as usize]);
+        let sign = S::V4::select(back, splat(-1.0), splat(1.0));
         for normal in &mut normals {
             *normal = [normal[0].mul(sign), normal[1].mul(sign), normal[2].mul(sign)];
         }
         let height = height.mul(sign);
-        let most_slope = most_slope.mul(sign).max(least_slope.mul(sign));
+        let (least_slope, most_slope) = (least_slope.mul(sign), most_slope.mul(sign));
+        let (least_slope, most_slope) = (least_slope.min(most_slope), least_slope.max(most_slope));
 
         let outside = zero.sub(edge_error);
-        let mut misses = 0;
-        for normal in &normals[..3] {
-            misses |= ends::<S>(normal, bundle).1.less(outside);
-        }
+        let misses = ends::<S>(&normals[0], bundle).1.less(outside);
+        let misses = misses.or(ends::<S>(&normals[1], bundle).1.less(outside));
+        let misses = misses.or(ends::<S>(&normals[2], bundle).1.less(outside));
         // t' at the least: height over the steepest slope. Behind the origin it is negative for all.
         let behind = height.add(height_error).less(zero);
         let nearest = height.sub(height_error);
         let beyond = most_slope.add(slope_error).mul(splat(most * (1.0 + 1e-6))).less(nearest);
-        let culled = (misses | behind | beyond) & !two_sided;
-
+        let culled = misses.or(behind).or(beyond).bits() & !two_sided;
+        // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few roundings.
+        let (x, y) = (height_error.div(height), slope_error.div(least_slope.sub(slope_error)));
+        let quarter = splat(0.25);
+        let tame = zero.less(x).and(x.at_most(quarter)).and(zero.less(y)).and(y.at_most(quarter));
+        let error = x.add(y).mul_add(splat(1.25), splat(16.0 * u));
         let mut stored = [[[0.0; LANES]; 3]; 4];
         for (stored, normal) in stored.iter_mut().zip(&normals) {
             *stored = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
         }
         let edges = Self {
             normals: stored,
-            height: height.to_array(),
+            near_height: height.sub(height.mul(error)).to_array(),
+            far_height: height.add(height.mul(error)).to_array(),
             edge_error: edge_error.to_array(),
-            slope_error: slope_error.to_array(),
-            height_error: height_error.to_array(),
-            is_two_sided: two_sided,
+            is_vague: two_sided | !tame.bits(),
         };
         (!culled & 0b1111, edges)
     }
 }
-
-/// -1 for every set bit, 1 for the others.
-const SIGNS: [[f32; LANES]; 16] = {
-    let mut signs = [[1.0; LANES]; 16];
-    let mut i = 0;
-    while i < 16 * LANES {
-        if (i / LANES) >> (i % LANES) & 1 != 0 {
-            signs[i / LANES][i % LANES] = -1.0;
-        }
-        i += 1;
-    }
-    signs
-};
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
 

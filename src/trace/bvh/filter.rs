@@ -6,7 +6,7 @@
 //! rounding error. What remains goes to the exact test.
 
 use super::block::Block;
-use super::simd::{Array, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
 use crate::ray::Ray;
 
@@ -81,8 +81,8 @@ impl Filter {
         let high = u.max(v).max(w).sub(bound);
         let zero = splat(0.0);
         // Whatever overflowed is not rejected.
-        let outside = low.less(zero) & zero.less(high);
-        !outside & block.lanes
+        let outside = low.less(zero).and(zero.less(high));
+        !outside.bits() & block.lanes
     }
 }
 

@@ -11,7 +11,7 @@
 //! lets everything pass.
 
 use super::node::{Node, WIDTH};
-use super::simd::{Array, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -79,6 +79,6 @@ impl SlabRay {
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);
             far = second.mul_add(reciprocal, S::V8::splat(self.far_offset[axis])).min(far);
         }
-        (near.at_most(far), near.to_array())
+        (near.at_most(far).bits(), near.to_array())
     }
 }

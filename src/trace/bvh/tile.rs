@@ -21,7 +21,7 @@ use super::edges::Edges;
 use super::inside::inside;
 use super::node::WIDTH;
 use super::query::Query;
-use super::simd::{Group, Simd, Vector};
+use super::simd::{Group, Mask, Simd, Vector};
 use super::triangles::TriangleTree;
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
@@ -180,7 +180,7 @@ fn whole<S: Simd, Q: Query>(
             *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
         }
     } else {
-        found.finish::<S, Q>(tree, rays, bundle, count, answers, t);
+        found.finish::<S, Q>(tree, bundle, count, answers, t);
     }
     true
 }
@@ -258,7 +258,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
             let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
             let limit = S::Wide::at(&self.found.limit, group).min(far[2]);
             let last = far[0].mul(p).min(far[1].mul(q)).min(limit);
-            if first.at_most(last) != 0 {
+            if first.at_most(last).bits() != 0 {
                 return Some(group as u8);
             }
         }
@@ -289,50 +289,39 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
         let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
         let bound = splat(edges.edge_error[lane]);
         let below = splat(-edges.edge_error[lane]);
-        let is_two_sided = edges.is_two_sided >> lane & 1 != 0;
-        let mut changed = false;
+        let is_vague = edges.is_vague >> lane & 1 != 0;
+        let (mut changed, first_t) = (false, splat(self.bundle.first));
         for group in usize::from(first)..self.groups {
             let p = S::Wide::at(&self.bundle.slope[0], group);
             let q = S::Wide::at(&self.bundle.slope[1], group);
             let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
             let least = u.min(v).min(w);
-            let mut candidates = below.at_most(least);
-            if is_two_sided {
-                // The bundle sees both sides: the signs must only agree.
-                candidates |= u.max(v).max(w).at_most(bound);
-            }
-            if candidates == 0 {
-                continue;
-            }
-            if !is_two_sided {
-                let slope = along(&normal::<S>(edges, 3, lane), p, q);
-                let inverse = splat(1.0).div(slope);
-                let t = splat(edges.height[lane]).mul(inverse);
-                // A slope that may be 0 bounds nothing; beyond twice its error its inverse is off by half at most.
-                let slope_error = splat(edges.slope_error[lane]);
-                let steep = slope_error.add(slope_error).less(slope);
-                let error = t.abs().mul_add(slope_error, splat(edges.height_error[lane])).mul(inverse.add(inverse));
-                // And the rounding of t and of the error itself.
-                let error = t.abs().mul_add(splat(1e-6), error);
-                let (low, high) = (t.sub(error), t.add(error));
+            let inside = below.at_most(least);
+            let mut open = inside.bits();
+            if is_vague {
+                // Where the bundle sees both sides, the signs must only agree.
+                open |= u.max(v).max(w).at_most(bound).bits();
+            } else if open != 0 {
+                let inverse = splat(1.0).div(along(&normal::<S>(edges, 3, lane), p, q));
+                let low = splat(edges.near_height[lane]).mul(inverse);
+                let high = splat(edges.far_height[lane]).mul(inverse);
                 let limit = S::Wide::at(&self.found.limit, group);
-                let beyond = limit.less(low) | high.less(splat(self.bundle.first));
-                candidates &= !(steep & beyond);
                 let before = S::Wide::at(&self.found.sure, group);
-                let in_range = high.less(before) & S::Wide::at(&self.bundle.begin, group).less(low);
-                let sure = candidates & steep & bound.less(least) & in_range;
-                if sure != 0 {
+                let in_range = high.less(before).and(S::Wide::at(&self.bundle.begin, group).less(low));
+                let sure = bound.less(least).and(in_range);
+                let outside = limit.less(low).or(high.less(first_t));
+                open = inside.without(sure).without(outside).bits();
+                if sure.bits() != 0 {
                     let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
                     S::Wide::select(sure, high, limit).put(&mut self.found.limit, group);
                     S::Wide::select(sure, low, before).put(&mut self.found.sure, group);
                     S::Wide::put_where(sure, id, &mut self.found.noted, group);
-                    candidates &= !sure;
                     changed = true;
                 }
             }
-            while candidates != 0 {
-                let i = candidates.trailing_zeros() as usize;
-                candidates &= candidates - 1;
+            while open != 0 {
+                let i = open.trailing_zeros() as usize;
+                open &= open - 1;
                 changed |= self.decide(group * S::Wide::LANES + i, id);
             }
         }
@@ -398,7 +387,6 @@ impl Found {
     fn finish<S: Simd, Q: Query>(
         &mut self,
         tree: &TriangleTree,
-        rays: &[Ray; RAYS],
         bundle: &Bundle,
         count: usize,
         answers: &mut [Q::Answer; RAYS],
@@ -409,7 +397,6 @@ impl Found {
             let ids: [u32; 4] = self.noted.as_chunks().0[chunk];
             let answers: &mut [Q::Answer; 4] = &mut answers.as_chunks_mut().0[chunk];
             let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
-            let mut open = 0b1111;
             // NONE is the largest number.
             let [a, b, c, d] = ids;
             let some = a.min(b).min(c.min(d));
@@ -425,23 +412,22 @@ impl Found {
                 let direction = [x.0.as_chunks().0[chunk], y.0.as_chunks().0[chunk], z.0.as_chunks().0[chunk]];
                 let inside = inside::<S>(bundle.origin, direction, &corners);
                 *t = inside.t;
-                let noted = (0..4).fold(0, |noted, lane| noted | u32::from(ids[lane] != NONE) << lane);
-                open &= !(noted & inside.is_precise);
                 for lane in 0..4 {
-                    if open >> lane & 1 == 0 {
+                    if ids[lane] != NONE {
                         let hit = tree.hit(ids[lane], inside.t32[lane], inside.u[lane], inside.v[lane]);
                         answers[lane] = Q::answer(Some(hit));
                     }
                 }
             }
-            while open != 0 {
-                let lane = open.trailing_zeros() as usize % 4;
-                open &= open - 1;
+            if a.max(b).max(c.max(d)) != NONE {
+                continue;
+            }
+            for lane in 0..4 {
                 let ray = 4 * chunk + lane;
-                answers[lane] = Q::MISS;
-                if ids[lane] != NONE || self.computed >> ray & 1 != 0 {
-                    self.compute(tree, rays, ray);
-                    (answers[lane], t[lane]) = (Q::answer(self.nearest[ray].hit()), self.nearest[ray].t());
+                if ids[lane] == NONE {
+                    let is_hit = self.computed >> ray & 1 != 0;
+                    answers[lane] = if is_hit { Q::answer(self.nearest[ray].hit()) } else { Q::MISS };
+                    t[lane] = self.nearest[ray].t();
                 }
             }
         }

@@ -22,15 +22,26 @@ pub(super) trait Simd {
     /// Eight f32.
     type V8: Vector + Array<8>;
     /// As many f32 as one instruction takes.
-    type Wide: Vector + Group;
+    type Wide: Group;
     /// Four f64.
     type D4: Doubles<F = Self::V4>;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
 }
 
+/// One truth a lane.
+pub(super) trait Mask: Copy {
+    fn and(self, other: Self) -> Self;
+    fn or(self, other: Self) -> Self;
+    /// Where self holds and other does not.
+    fn without(self, other: Self) -> Self;
+    /// Bit i is set where it holds in lane i.
+    fn bits(self) -> u32;
+}
+
 /// Values of f32. `max` and `min` return the second operand where one is NaN.
 pub(super) trait Vector: Copy {
+    type Mask: Mask;
     fn splat(value: f32) -> Self;
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
@@ -41,12 +52,12 @@ pub(super) trait Vector: Copy {
     fn max(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    /// Bit i is set where lane i of self is at most that of other; not for NaN.
-    fn at_most(self, other: Self) -> u32;
-    /// Bit i is set where lane i of self is less than that of other; not for NaN.
-    fn less(self, other: Self) -> u32;
-    /// Lane i of `yes` where bit i is set, else of `no`.
-    fn select(mask: u32, yes: Self, no: Self) -> Self;
+    /// Where self is at most other; not for NaN.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// Where self is less than other; not for NaN.
+    fn less(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The largest lane; NaN are passed over or not.
     fn largest(self) -> f32;
     /// The smallest lane; NaN are passed over or not.
@@ -60,13 +71,13 @@ pub(super) trait Array<const N: usize>: Sized {
 }
 
 /// The rays of a bundle, group by group.
-pub(super) trait Group: Sized {
+pub(super) trait Group: Vector {
     /// Rays in a group.
     const LANES: usize;
     fn at(values: &PerRay, group: usize) -> Self;
     fn put(self, values: &mut PerRay, group: usize);
-    /// Sets the group's values where the mask has a bit.
-    fn put_where(mask: u32, value: u32, values: &mut [u32; RAYS], group: usize);
+    /// Sets the group's values where the mask holds.
+    fn put_where(mask: Self::Mask, value: u32, values: &mut [u32; RAYS], group: usize);
 }
 
 /// Four values of f64.
@@ -83,8 +94,4 @@ pub(super) trait Doubles: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
-    fn max(self, other: Self) -> Self;
-    fn abs(self) -> Self;
-    /// Bit i is set where lane i of self is at most that of other; not for NaN.
-    fn at_most(self, other: Self) -> u32;
 }

@@ -1,6 +1,6 @@
 //! Plain arrays, for any processor.
 
-use super::{Array, Doubles, Group, Simd, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
 /// Plain arrays.
@@ -29,13 +29,36 @@ fn zip<T: Copy, const N: usize>(a: [T; N], b: [T; N], f: impl Fn(T, T) -> T) -> 
     )
 }
 
+/// A bit a lane.
+#[derive(Clone, Copy)]
+pub struct Bits(u32);
+
+impl Mask for Bits {
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0
+    }
+}
+
 #[inline(always)]
-fn mask<T: Copy, const N: usize>(a: [T; N], b: [T; N], f: impl Fn(T, T) -> bool) -> u32 {
-    (0..N).fold(
-        0,
-        #[inline(always)]
-        |mask, i| mask | u32::from(f(a[i], b[i])) << i,
-    )
+fn compare<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> bool) -> Bits {
+    let mut bits = 0;
+    for i in 0..N {
+        bits |= u32::from(f(a[i], b[i])) << i;
+    }
+    Bits(bits)
 }
 
 /// A function of two lanes, as a method of two arrays.
@@ -49,6 +72,7 @@ macro_rules! lanewise {
 }
 
 impl<const N: usize> Vector for [f32; N] {
+    type Mask = Bits;
     lanewise! {
         add: |a, b| a + b;
         sub: |a, b| a - b;
@@ -71,8 +95,8 @@ impl<const N: usize> Vector for [f32; N] {
         self.map(f32::abs)
     }
     #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        mask(
+    fn at_most(self, other: Self) -> Bits {
+        compare(
             self,
             other,
             #[inline(always)]
@@ -80,8 +104,8 @@ impl<const N: usize> Vector for [f32; N] {
         )
     }
     #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        mask(
+    fn less(self, other: Self) -> Bits {
+        compare(
             self,
             other,
             #[inline(always)]
@@ -89,7 +113,7 @@ impl<const N: usize> Vector for [f32; N] {
         )
     }
     #[inline(always)]
-    fn select(mask: u32, yes: Self, no: Self) -> Self {
+    fn select(Bits(mask): Bits, yes: Self, no: Self) -> Self {
         std::array::from_fn(
             #[inline(always)]
             |i| if mask >> i & 1 != 0 { yes[i] } else { no[i] },
@@ -127,7 +151,7 @@ impl Group for [f32; 8] {
         values.0.as_chunks_mut().0[group % (RAYS / 8)] = self;
     }
     #[inline(always)]
-    fn put_where(mask: u32, value: u32, values: &mut [u32; RAYS], group: usize) {
+    fn put_where(Bits(mask): Bits, value: u32, values: &mut [u32; RAYS], group: usize) {
         let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
         for (i, slot) in values.iter_mut().enumerate() {
             *slot = if mask >> i & 1 != 0 { value } else { *slot };
@@ -142,7 +166,6 @@ impl Doubles for [f64; 4] {
         sub: |a, b| a - b;
         mul: |a, b| a * b;
         div: |a, b| a / b;
-        max: |a, b| if a > b { a } else { b };
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -159,18 +182,5 @@ impl Doubles for [f64; 4] {
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {
         self
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.map(f64::abs)
-    }
-    #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        mask(
-            self,
-            other,
-            #[inline(always)]
-            |a, b| a <= b,
-        )
     }
 }

@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Array, Doubles, Group, Simd, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
 /// AVX2 and FMA.
@@ -66,7 +66,46 @@ macro_rules! lanewise {
     };
 }
 
+/// All bits of a lane of four, or none.
+#[derive(Clone, Copy)]
+pub struct M4(__m128);
+
+/// All bits of a lane of eight, or none.
+#[derive(Clone, Copy)]
+pub struct M8(__m256);
+
+impl Mask for M4 {
+    lanewise! {
+        and: _mm_and_ps;
+        or: _mm_or_ps;
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(unsafe { _mm_andnot_ps(other.0, self.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm_movemask_ps(self.0) as u32 }
+    }
+}
+
+impl Mask for M8 {
+    lanewise! {
+        and: _mm256_and_ps;
+        or: _mm256_or_ps;
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(other.0, self.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+}
+
 impl Vector for V4 {
+    type Mask = M4;
     lanewise! {
         add: _mm_add_ps;
         sub: _mm_sub_ps;
@@ -88,20 +127,16 @@ impl Vector for V4 {
         Self(unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self.0) })
     }
     #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        unsafe { _mm_movemask_ps(_mm_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+    fn at_most(self, other: Self) -> M4 {
+        M4(unsafe { _mm_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
     }
     #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        unsafe { _mm_movemask_ps(_mm_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    fn less(self, other: Self) -> M4 {
+        M4(unsafe { _mm_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
     }
     #[inline(always)]
-    fn select(mask: u32, yes: Self, no: Self) -> Self {
-        unsafe {
-            let bits = _mm_setr_epi32(1, 2, 4, 8);
-            let mask = _mm_cmpeq_epi32(_mm_and_si128(_mm_set1_epi32(mask as i32), bits), bits);
-            Self(_mm_blendv_ps(no.0, yes.0, _mm_castsi128_ps(mask)))
-        }
+    fn select(mask: M4, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm_blendv_ps(no.0, yes.0, mask.0) })
     }
     #[inline(always)]
     fn largest(self) -> f32 {
@@ -133,6 +168,7 @@ impl Array<4> for V4 {
 }
 
 impl Vector for V8 {
+    type Mask = M8;
     lanewise! {
         add: _mm256_add_ps;
         sub: _mm256_sub_ps;
@@ -154,16 +190,16 @@ impl Vector for V8 {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
     }
     #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+    fn at_most(self, other: Self) -> M8 {
+        M8(unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
     }
     #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    fn less(self, other: Self) -> M8 {
+        M8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
     }
     #[inline(always)]
-    fn select(mask: u32, yes: Self, no: Self) -> Self {
-        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, _mm256_castsi256_ps(lanes(mask))) })
+    fn select(mask: M8, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask.0) })
     }
     #[inline(always)]
     fn largest(self) -> f32 {
@@ -174,15 +210,6 @@ impl Vector for V8 {
     fn smallest(self) -> f32 {
         let [low, high] = self.halves();
         low.min(high).smallest()
-    }
-}
-
-/// All bits of the lanes that the mask names.
-#[inline(always)]
-fn lanes(mask: u32) -> __m256i {
-    unsafe {
-        let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits)
     }
 }
 
@@ -218,12 +245,12 @@ impl Group for V8 {
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
     }
     #[inline(always)]
-    fn put_where(mask: u32, value: u32, values: &mut [u32; RAYS], group: usize) {
+    fn put_where(mask: M8, value: u32, values: &mut [u32; RAYS], group: usize) {
         let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
         unsafe {
             let at = values.as_mut_ptr().cast();
             let value = _mm256_set1_epi32(value as i32);
-            _mm256_storeu_si256(at, _mm256_blendv_epi8(_mm256_loadu_si256(at), value, lanes(mask)));
+            _mm256_storeu_si256(at, _mm256_blendv_epi8(_mm256_loadu_si256(at), value, _mm256_castps_si256(mask.0)));
         }
     }
 }
@@ -235,7 +262,6 @@ impl Doubles for D4 {
         sub: _mm256_sub_pd;
         mul: _mm256_mul_pd;
         div: _mm256_div_pd;
-        max: _mm256_max_pd;
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -254,13 +280,5 @@ impl Doubles for D4 {
         let mut values = [0.0; 4];
         unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) };
         values
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
-    }
-    #[inline(always)]
-    fn at_most(self, other: Self) -> u32 {
-        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
     }
 }
