@@ -230,6 +230,11 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     }
                     stack[at] = child;
                     len += 1;
+                    if child.count == 0 {
+                        S::prefetch(tree.node(child.index));
+                    } else {
+                        S::prefetch(self.tree.block(child.index));
+                    }
                 }
             } else if self.visit::<S>(next) {
                 self.measure::<S>();
@@ -399,28 +404,16 @@ impl Found {
             let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
             // NONE is the largest number.
             let [a, b, c, d] = ids;
-            let some = a.min(b).min(c.min(d));
+            let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            if all != NONE {
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+                continue;
+            }
             if some != NONE {
                 // Lanes without a triangle compute something harmless.
-                let corners = gather(
-                    tree.corners(if a == NONE { some } else { a }),
-                    tree.corners(if b == NONE { some } else { b }),
-                    tree.corners(if c == NONE { some } else { c }),
-                    tree.corners(if d == NONE { some } else { d }),
-                );
-                let [x, y, z] = &bundle.direction;
-                let direction = [x.0.as_chunks().0[chunk], y.0.as_chunks().0[chunk], z.0.as_chunks().0[chunk]];
-                let inside = inside::<S>(bundle.origin, direction, &corners);
-                *t = inside.t;
-                for lane in 0..4 {
-                    if ids[lane] != NONE {
-                        let hit = tree.hit(ids[lane], inside.t32[lane], inside.u[lane], inside.v[lane]);
-                        answers[lane] = Q::answer(Some(hit));
-                    }
-                }
-            }
-            if a.max(b).max(c.max(d)) != NONE {
-                continue;
+                let or_some = |id: u32| if id == NONE { some } else { id };
+                let ids = [or_some(a), or_some(b), or_some(c), or_some(d)];
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
             }
             for lane in 0..4 {
                 let ray = 4 * chunk + lane;
@@ -431,6 +424,28 @@ impl Found {
                 }
             }
         }
+    }
+}
+
+/// Answers for the four rays of a chunk, each of which hits a triangle for sure.
+#[inline(always)]
+fn answer_noted<S: Simd, Q: Query>(
+    tree: &TriangleTree,
+    bundle: &Bundle,
+    chunk: usize,
+    ids: [u32; 4],
+    t: &mut [f64; 4],
+    answers: &mut [Q::Answer; 4],
+) {
+    let [a, b, c, d] = ids;
+    let corners = gather(tree.corners(a), tree.corners(b), tree.corners(c), tree.corners(d));
+    let [x, y, z] = &bundle.direction;
+    let direction = [x.0.as_chunks().0[chunk], y.0.as_chunks().0[chunk], z.0.as_chunks().0[chunk]];
+    let inside = inside::<S>(bundle.origin, direction, &corners);
+    *t = inside.t;
+    for lane in 0..4 {
+        let hit = tree.hit(ids[lane], inside.t32[lane], inside.u[lane], inside.v[lane]);
+        answers[lane] = Q::answer(Some(hit));
     }
 }
 

@@ -27,6 +27,8 @@ pub(super) trait Simd {
     type D4: Doubles<F = Self::V4>;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
+    /// Has a value loaded that will be needed soon.
+    fn prefetch<T>(value: &T);
 }
 
 /// One truth a lane.
