@@ -1,6 +1,6 @@
 //! Four triangles, laid out component by component for four-wide arithmetic.
 
-use super::build::Item;
+use super::build::Record;
 use crate::math::Vec3;
 use crate::trace::{Part, Primitives};
 
@@ -19,19 +19,19 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub fn new(parts: &[Part], items: &[Item]) -> Self {
+    pub fn new(parts: &[Part], items: &[Record]) -> Self {
         let mut block = Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], lanes: 0 };
         for (lane, item) in items.iter().enumerate() {
-            let Primitives::Triangles { positions, triangles } = &parts[item.part as usize].primitives else {
+            let Primitives::Triangles { positions, triangles } = &parts[item.part() as usize].primitives else {
                 unreachable!("items of a triangle tree come from meshes")
             };
-            for (k, &corner) in triangles[item.primitive as usize].iter().enumerate() {
+            for (k, &corner) in triangles[item.primitive() as usize].iter().enumerate() {
                 for axis in 0..3 {
                     block.corners[3 * k + axis][lane] = positions[corner as usize][axis];
                 }
             }
-            block.primitive[lane] = item.primitive;
-            block.part[lane] = item.part;
+            block.primitive[lane] = item.primitive();
+            block.part[lane] = item.part();
             block.lanes |= 1 << lane;
         }
         block

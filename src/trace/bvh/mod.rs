@@ -93,10 +93,10 @@ impl Bvh {
     /// Where this processor does not have `isa`.
     pub fn build_for(world: &World, isa: Isa) -> Self {
         assert!(isa.is_available(), "{isa:?} is not available on this processor");
-        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone())).collect();
+        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone(), isa)).collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds);
-        Self { fixed: Level::build(world, world.fixed.clone()), objects, placements, isa }
+        let placements = PlacementTree::build(&world.placements, &bounds, isa);
+        Self { fixed: Level::build(world, world.fixed.clone(), isa), objects, placements, isa }
     }
 
     /// Memory the trees hold, in bytes.
@@ -209,9 +209,9 @@ impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<
 }
 
 impl Level {
-    fn build(world: &World, parts: std::ops::Range<usize>) -> Self {
+    fn build(world: &World, parts: std::ops::Range<usize>, isa: Isa) -> Self {
         let parts = &world.parts[parts];
-        Self { triangles: TriangleTree::build(parts), shapes: ShapeTree::build(parts) }
+        Self { triangles: TriangleTree::build(parts, isa), shapes: ShapeTree::build(parts, isa) }
     }
 
     fn bounds(&self) -> Aabb {

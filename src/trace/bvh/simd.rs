@@ -5,10 +5,12 @@
 //! reject conservatively; what decides a hit is one piece of scalar code ([`crate::shape::triangle`]).
 #![allow(unsafe_code)] // Intrinsics; see `Avx2`.
 
+use super::build::lanes::Boxes;
+
 /// An instruction set, as a pair of vector types.
 pub(super) trait Simd {
     type V4: Vector<4>;
-    type V8: Vector<8>;
+    type V8: Vector<8> + Boxes;
 }
 
 /// N values of f32. `max` and `min` return the second operand where one is NaN.
@@ -153,7 +155,7 @@ impl<const N: usize> Vector<N> for [f32; N] {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(super) use x86::Avx2;
+pub(super) use x86::{Avx2, V8};
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -175,7 +177,7 @@ mod x86 {
     pub struct V4(__m128);
 
     #[derive(Clone, Copy)]
-    pub struct V8(__m256);
+    pub struct V8(pub __m256);
 
     /// The operations of one vector type by its intrinsics.
     macro_rules! vector {

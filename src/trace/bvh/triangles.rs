@@ -1,10 +1,13 @@
 //! Leaves of triangles: blocks of four, rejected together ([`Filter`], [`Edges`]), decided one by one.
 
 use super::block::{Block, LANES};
-use super::build::{self, Item};
+use rayon::prelude::*;
+
+use super::build::{self, Record};
 use super::bundle::Bundle;
 use super::edges::Edges;
 use super::filter::Filter;
+use super::isa::Isa;
 use super::node::Tree;
 use super::simd::Simd;
 use super::{PartId, Through};
@@ -23,18 +26,23 @@ pub(super) struct TriangleTree {
 
 impl TriangleTree {
     /// Over the traceable triangles of `parts`.
-    pub fn build(parts: &[Part]) -> Self {
+    pub fn build(parts: &[Part], isa: Isa) -> Self {
         let mut items = Vec::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
         for (p, part) in parts.iter().enumerate() {
             let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
-            for (i, corners) in triangles.iter().enumerate() {
+            items.par_extend(triangles.par_iter().enumerate().map(|(i, corners)| {
                 let corners = corners.map(|i| positions[i as usize]);
                 if corners.iter().all(|&corner| is_traceable(corner)) {
-                    items.push(Item { bounds: Aabb::around(corners), part: p as u32, primitive: i as u32 });
+                    Record::new(&Aabb::around(corners), p as u32, i as u32)
+                } else {
+                    Record::NOTHING
                 }
-            }
+            }));
         }
-        let mut tree = build::build(&mut items, LANES);
+        if items.par_iter().any(Record::is_nothing) {
+            items.retain(|item| !item.is_nothing());
+        }
+        let mut tree = build::build(&mut items, LANES as u32, isa);
         let mut blocks = Vec::with_capacity(items.len() / 3);
         tree.rename_leaves(|first, count| {
             let leaf = &items[first as usize..first as usize + count as usize];

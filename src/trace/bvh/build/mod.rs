@@ -1,0 +1,124 @@
+//! From a list of boxes to a tree: binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding
+//! volume hierarchies*), eight children at a time (Wald, Benthin, Boulos 2008, *Getting rid of packets*).
+//!
+//! | file | idea |
+//! | --- | --- |
+//! | `record`, `lanes` | a box in one register, as [-min, max] |
+//! | `split` | a range of items, and how it is divided in two |
+//! | `bins` | the best plane between bins, for large ranges |
+//! | `sweep` | the best of all divisions, for small ones |
+//! | `children` | from one range to the eight children of a node |
+//! | `subtree`, `top` | by one thread, by all threads |
+//!
+//! A node starts as one range of items; the child with the largest surface is split in two until there are eight or none is
+//! worth it. Leaves are charged by blocks, ceil(n / block), so that they fill. A binary tree collapsed afterwards, the
+//! simpler alternative, writes every box twice and chooses worse.
+//!
+//! The upper nodes are made one after the other, each by all threads; below them whole subtrees are tasks of one thread. The
+//! tree is the same for any number of threads and any instruction set: every decision depends on its range alone,
+//! chunks have a fixed size, and no arithmetic is fused.
+
+mod bins;
+mod children;
+pub(super) mod lanes;
+mod record;
+mod split;
+mod subtree;
+mod sweep;
+mod top;
+
+use rayon::prelude::*;
+
+use super::isa::{self, Isa};
+use super::node::{Node, Tree, WIDTH};
+use children::Children;
+pub(super) use record::Record;
+use split::Rule;
+use subtree::{Parent, SubtreeKernel, Task};
+use top::Shared;
+
+/// Levels a tree can have: the stack of a walk is made for it.
+pub(super) const MAX_DEPTH: usize = 40;
+
+/// From this level on ranges are cut into halves, a node into eighths: 12 more levels hold 2^36 items.
+const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;
+
+/// Ranges of at most this many items are tasks of one thread.
+const TASK: u32 = 1 << 14;
+
+/// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
+/// `block`, a power of two, is how many items are tested together.
+///
+/// # Panics
+/// With more than 2^32 - 1 items.
+pub(super) fn build(items: &mut [Record], block: u32, isa: Isa) -> Tree {
+    assert!(u32::try_from(items.len()).is_ok(), "more primitives than 32-bit indices can name");
+    if items.is_empty() {
+        return Tree::new(Vec::new());
+    }
+    let rule = Rule { block };
+    let (top, tasks) = upper_nodes(items, &rule, isa);
+    let mut rest = items;
+    let mut jobs = Vec::with_capacity(tasks.len());
+    let mut first = 0;
+    for (parent, task) in tasks {
+        // Between them are leaves of the upper nodes.
+        let (_, own) = rest.split_at_mut((task.range.first - first) as usize);
+        let (own, others) = own.split_at_mut(task.range.len as usize);
+        (rest, first) = (others, task.range.first + task.range.len);
+        jobs.push((parent, task, own));
+    }
+    let built: Vec<(Option<Parent>, Vec<Node>)> = jobs
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|(parent, task, items)| (parent, isa::dispatch(isa, SubtreeKernel { rule: &rule, items, task })))
+        .collect();
+    Tree::new(join(top, built))
+}
+
+/// The nodes over everything of more than [`TASK`] items, and what is below them, in the order of the items.
+fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(Option<Parent>, Task)>) {
+    let mut shared = Shared { rule, items, isa, halve: false };
+    let (mut nodes, mut tasks) = (Vec::new(), Vec::new());
+    let mut open = vec![(None, Task { range: shared.whole(), depth: 0, split: None })];
+    while let Some((parent, task)) = open.pop() {
+        if task.range.len <= TASK {
+            tasks.push((parent, task));
+            continue;
+        }
+        let index = nodes.len() as u32;
+        point(&mut nodes, parent, index);
+        shared.halve = task.depth >= CUT_DEPTH;
+        let children = Children::new(task.range, task.split, rule, &mut shared);
+        subtree::emit(&children, &mut nodes);
+        for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
+            let parent = Parent { node: index, slot: slot as u32 };
+            open.push((Some(parent), Task { range: child.range, depth: task.depth + 1, split: child.split }));
+        }
+    }
+    tasks.sort_by_key(|(_, task)| task.range.first);
+    (nodes, tasks)
+}
+
+/// Appends the subtrees' nodes to those above them.
+fn join(mut nodes: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<Node> {
+    nodes.reserve_exact(subtrees.iter().map(|(_, subtree)| subtree.len()).sum());
+    for (parent, subtree) in subtrees {
+        let base = nodes.len() as u32;
+        point(&mut nodes, parent, base);
+        nodes.extend(subtree.into_iter().map(|mut node| {
+            for slot in 0..WIDTH {
+                node.index[slot] += if node.count[slot] == 0 { base } else { 0 };
+            }
+            node
+        }));
+    }
+    nodes
+}
+
+/// Lets a child's slot name its node.
+fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
+    if let Some(Parent { node, slot }) = parent {
+        nodes[node as usize].index[slot as usize] = index;
+    }
+}
