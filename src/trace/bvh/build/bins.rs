@@ -3,7 +3,7 @@
 
 use super::lanes::Boxes;
 use super::record::{EMPTY, Record};
-use super::split::{Cut, Rule, Split};
+use super::split::{Cheapest, Cut, Rule, Split};
 use crate::trace::bvh::simd::{Simd, Vector};
 
 /// Bins an axis of a large range is divided into.
@@ -36,10 +36,10 @@ impl Grid {
         grid
     }
 
-    /// Origin and scale of an axis.
+    /// Where a bin begins, but for rounding.
     #[inline(always)]
-    pub fn axis(&self, axis: usize) -> (f32, f32) {
-        (self.origin[axis + 4], self.scale[axis + 4])
+    fn border(&self, axis: usize, bin: usize) -> f32 {
+        self.origin[axis + 4] + bin as f32 / self.scale[axis + 4]
     }
 }
 
@@ -58,7 +58,7 @@ impl<const N: usize> Bins<N> {
 
     /// Adds the items to their bins.
     #[inline(always)]
-    pub fn add<S: Simd>(&mut self, items: &[Record], grid: &Grid) {
+    pub fn add<'a, S: Simd>(&mut self, items: impl Iterator<Item = &'a Record>, grid: &Grid) {
         let (origin, scale) = (S::V8::load(&grid.origin), S::V8::load(&grid.scale));
         let last = S::V8::splat((N - 1) as f32);
         for item in items {
@@ -75,61 +75,35 @@ impl<const N: usize> Bins<N> {
         }
     }
 
-    /// Adds the bins of other items of the same range.
-    #[inline(always)]
-    pub fn merge<S: Simd>(&mut self, other: &Self) {
-        for bin in 0..N {
-            for axis in 0..3 {
-                let (a, b) = (S::V8::load(&self.boxes[bin][axis]), S::V8::load(&other.boxes[bin][axis]));
-                self.boxes[bin][axis] = a.max(b).to_array();
-                self.counts[bin][axis] += other.counts[bin][axis];
-            }
-        }
-    }
-
     /// The cheapest plane that leaves something on both sides; None where all centres coincide.
     #[inline(always)]
     pub fn best<S: Simd>(&self, grid: &Grid, rule: &Rule) -> Option<Split> {
         let load = |boxes: &[[f32; 8]; 3]| [S::V8::load(&boxes[0]), S::V8::load(&boxes[1]), S::V8::load(&boxes[2])];
         let join = |a: [S::V8; 3], b: [S::V8; 3]| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
-        let mut right_costs = [[0.0; 4]; N];
-        let (mut right, mut count) = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
-        for bin in (1..N).rev() {
-            right = join(right, load(&self.boxes[bin]));
-            for axis in 0..4 {
-                count[axis] += self.counts[bin][axis];
+        let add = |sum: &mut [u32; 4], counts: &[u32; 4]| {
+            for (sum, count) in sum.iter_mut().zip(counts) {
+                *sum += count;
             }
-            let areas = S::V4::load(&S::V8::half_areas(right));
-            right_costs[bin] = areas.mul(S::V4::load(&rule.blocks_of_four(&count))).to_array();
-        }
-        let mut least = S::V4::splat(f32::INFINITY);
-        let mut best = None;
-        let (mut left, mut count) = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
-        for bin in 1..N {
-            left = join(left, load(&self.boxes[bin - 1]));
-            for axis in 0..4 {
-                count[axis] += self.counts[bin - 1][axis];
-            }
-            let areas = S::V4::load(&S::V8::half_areas(left));
-            let cost = areas.mul(S::V4::load(&rule.blocks_of_four(&count))).add(S::V4::load(&right_costs[bin]));
-            // An empty side costs infinity times zero, which is less than nothing.
-            if cost.less(least) & 7 != 0 {
-                let cost = cost.to_array();
-                for axis in 0..3 {
-                    if cost[axis] < least.to_array()[0] {
-                        least = S::V4::splat(cost[axis]);
-                        best = Some((axis, bin, cost[axis]));
-                    }
-                }
-            }
-        }
-        let (axis, bin, cost) = best?;
-        let sum = |bins: &[[[f32; 8]; 3]]| {
-            let join = |sum: S::V8, bin: &[[f32; 8]; 3]| sum.max(S::V8::load(&bin[axis]));
-            bins.iter().fold(S::V8::splat(f32::NEG_INFINITY), join).to_array()
         };
-        let (origin, scale) = grid.axis(axis);
-        let cut = Cut::Plane { axis, origin, scale, bin: bin as f32 };
-        Some(Split { cut, cost, left: sum(&self.boxes[..bin]), right: sum(&self.boxes[bin..]) })
+        let cost = |boxes, counts: &[u32; 4]| {
+            S::V4::load(&S::V8::half_areas(boxes)).mul(S::V4::load(&rule.blocks_of_four(counts)))
+        };
+        let nothing = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
+        let mut right_costs = [[0.0; 4]; N];
+        let (mut right, mut count) = nothing;
+        for (bin, right_cost) in right_costs.iter_mut().enumerate().skip(1).rev() {
+            right = join(right, load(&self.boxes[bin]));
+            add(&mut count, &self.counts[bin]);
+            *right_cost = cost(right, &count).to_array();
+        }
+        let mut cheapest = Cheapest::<S>::new();
+        let (mut left, mut count) = nothing;
+        for (bin, right_cost) in right_costs.iter().enumerate().skip(1) {
+            left = join(left, load(&self.boxes[bin - 1]));
+            add(&mut count, &self.counts[bin - 1]);
+            cheapest.offer(bin, cost(left, &count).add(S::V4::load(right_cost)));
+        }
+        let (axis, bin, cost) = cheapest.found()?;
+        Some(Split { cut: Cut::Plane { axis, at: grid.border(axis, bin) }, cost })
     }
 }

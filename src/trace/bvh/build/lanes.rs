@@ -2,7 +2,8 @@
 //! the same for every instruction set: nothing is fused.
 #![allow(unsafe_code)] // Intrinsics; see `x86`.
 
-use super::record::{self, EMPTY};
+use super::record;
+use crate::trace::bvh::simd::Vector;
 
 /// Most items that [`Boxes::ranks`] sorts.
 pub(in crate::trace::bvh) const RANKED: usize = 32;
@@ -13,8 +14,9 @@ pub(in crate::trace::bvh) trait Boxes: Copy {
     fn swap_halves(self) -> Self;
     /// Each lane towards zero; anything for what does not fit.
     fn truncate(self) -> [i32; 8];
-    /// Itself, or the box of nothing.
-    fn keep_if(self, condition: bool) -> Self;
+    /// Joins this box to `sides[0]` where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to `sides[1]`; whether
+    /// it does.
+    fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool;
     /// Half the surface of three boxes; the last lane is anything.
     fn half_areas(boxes: [Self; 3]) -> [f32; 4];
     /// For each of the first `n` keys, none of them NaN, how many of these are less. The rest is anything.
@@ -34,8 +36,11 @@ impl Boxes for [f32; 8] {
     }
 
     #[inline(always)]
-    fn keep_if(self, condition: bool) -> Self {
-        if condition { self } else { EMPTY }
+    fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool {
+        let is_left = self[axis % 4 + 4] - self[axis % 4] < at;
+        let side = &mut sides[usize::from(!is_left)];
+        *side = self.max(*side);
+        is_left
     }
 
     #[inline(always)]
@@ -59,7 +64,7 @@ impl Boxes for [f32; 8] {
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Boxes, EMPTY, RANKED};
+    use super::{Boxes, RANKED};
     use crate::trace::bvh::simd::V8;
 
     /// SAFETY of every block below: these vectors are made only in kernels that `isa::dispatch` runs, which asks the
@@ -78,11 +83,16 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn keep_if(self, condition: bool) -> Self {
-            Self(unsafe {
-                let mask = _mm256_castsi256_ps(_mm256_set1_epi32(-i32::from(condition)));
-                _mm256_blendv_ps(_mm256_loadu_ps(EMPTY.as_ptr()), self.0, mask)
-            })
+        fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool {
+            unsafe {
+                let of = |lane: usize| _mm256_permutevar8x32_ps(self.0, _mm256_set1_epi32(lane as i32));
+                let is_left = _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_sub_ps(of(axis + 4), of(axis)), _mm256_set1_ps(at));
+                // Both sides and no branch, which would be guessed wrong every other time.
+                let nothing = _mm256_set1_ps(f32::NEG_INFINITY);
+                sides[0].0 = _mm256_max_ps(_mm256_blendv_ps(nothing, self.0, is_left), sides[0].0);
+                sides[1].0 = _mm256_max_ps(_mm256_blendv_ps(self.0, nothing, is_left), sides[1].0);
+                _mm256_movemask_ps(is_left) & 1 != 0
+            }
         }
 
         #[inline(always)]
@@ -141,13 +151,14 @@ mod tests {
         use crate::trace::bvh::simd::{Simd, Vector};
         struct All([[f32; 8]; 3], [f32; RANKED]);
         impl Kernel for All {
-            type Output = ([f32; 8], [i32; 8], [u32; 3], [u32; RANKED]);
+            type Output = (bool, [[f32; 8]; 2], [i32; 8], [u32; 3], [u32; RANKED]);
             #[inline(always)]
             fn run<S: Simd>(self) -> Self::Output {
                 let boxes = self.0.map(|b| S::V8::load(&b));
                 let [x, y, z, _] = S::V8::half_areas(boxes).map(f32::to_bits);
-                let swapped = boxes[0].swap_halves().keep_if(true).max(boxes[1].keep_if(false)).to_array();
-                (swapped, boxes[2].truncate(), [x, y, z], S::V8::ranks(&self.1, RANKED))
+                let mut sides = [boxes[0]; 2];
+                let is_left = boxes[1].swap_halves().join_side(1, 0.0, &mut sides);
+                (is_left, sides.map(S::V8::to_array), boxes[2].truncate(), [x, y, z], S::V8::ranks(&self.1, RANKED))
             }
         }
         if !Isa::Avx2.is_available() {

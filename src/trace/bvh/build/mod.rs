@@ -122,3 +122,75 @@ fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
         nodes[node as usize].index[slot as usize] = index;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::node::NO_CHILD;
+    use super::*;
+    use crate::math::{Aabb, Vec3};
+
+    /// Boxes of a size, scattered by a linear congruence; numbered in order.
+    fn items(count: u32, size: f32) -> Vec<Record> {
+        let mut state = count;
+        let mut unit = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut item = |i| {
+            let min = Vec3::new(unit(), unit() - 0.5, unit() * 0.1);
+            Record::new(&Aabb { min, max: min + Vec3::new(unit(), unit(), unit()) * size }, 7, i)
+        };
+        (0..count).map(&mut item).collect()
+    }
+
+    /// The box around a subtree, which every box above it must equal; marks its items.
+    fn check(tree: &Tree, items: &[Record], index: u32, block: u32, seen: &mut [bool]) -> Aabb {
+        let node = tree.node(index);
+        let mut all = Aabb::EMPTY;
+        for slot in (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD) {
+            let inside = if node.count[slot] == 0 {
+                check(tree, items, node.index[slot], block, seen)
+            } else {
+                assert!(u32::from(node.count[slot]) <= block * children::MAX_LEAF_BLOCKS);
+                let first = node.index[slot] as usize;
+                let leaf = &items[first..first + node.count[slot] as usize];
+                leaf.iter().fold(Aabb::EMPTY, |sum, item| {
+                    assert_eq!(item.part(), 7);
+                    assert!(!std::mem::replace(&mut seen[item.primitive() as usize], true), "in one leaf only");
+                    sum.union(record::aabb(&item.0))
+                })
+            };
+            assert_eq!(node.child_bounds(slot), inside);
+            all = all.union(inside);
+        }
+        all
+    }
+
+    #[test]
+    fn every_item_is_in_one_leaf_and_boxes_are_tight() {
+        for (count, size, block) in
+            [(1, 1.0, 4), (5, 1.0, 4), (33, 0.1, 1), (1000, 0.3, 4), (70_000, 0.01, 4), (200_000, 0.0, 1)]
+        {
+            let mut items = items(count, size);
+            let tree = build(&mut items, block, Isa::detect());
+            let mut seen = vec![false; items.len()];
+            check(&tree, &items, 0, block, &mut seen);
+            assert!(seen.iter().all(|&seen| seen), "{count} items");
+        }
+    }
+
+    #[test]
+    fn instruction_sets_and_threads_give_the_same_tree() {
+        let build = |isa, threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let mut items = items(60_000, 0.02);
+            let tree = pool.install(|| build(&mut items, 4, isa));
+            let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
+            (format!("{tree:?}"), numbers)
+        };
+        let expected = build(Isa::Portable, 1);
+        for threads in [1, 3] {
+            assert!(build(Isa::detect(), threads) == expected);
+        }
+    }
+}

@@ -33,7 +33,7 @@ pub(super) struct Range {
     pub len: u32,
     /// The box around them, as [-min, max].
     pub bounds: [f32; 8],
-    /// The box around their doubled centres, as [-min, max].
+    /// A box around their doubled centres, as [-min, max]; not always the smallest.
     pub centres: [f32; 8],
 }
 
@@ -53,6 +53,16 @@ impl Range {
         Self { first, len: items.len() as u32, bounds: bounds.to_array(), centres: centres.to_array() }
     }
 
+    /// A box around the doubled centres of those items whose boxes lie within `bounds`. To find the smallest one would
+    /// take another look at each of them.
+    #[inline(always)]
+    fn centres_within(&self, bounds: &[f32; 8]) -> [f32; 8] {
+        std::array::from_fn(
+            #[inline(always)]
+            |lane| self.centres[lane].min(2.0 * bounds[lane]),
+        )
+    }
+
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
         half_area(&self.bounds)
@@ -69,46 +79,75 @@ impl Range {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Split {
     pub cut: Cut,
-    /// Blocks times areas of the two sides.
+    /// Blocks times areas of the two sides; an estimate for large ranges.
     pub cost: f32,
-    /// The boxes of the two sides.
-    pub left: [f32; 8],
-    pub right: [f32; 8],
 }
 
 /// Which items go left.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Cut {
-    /// Those whose doubled centre lies before the border to a bin.
-    Plane { axis: usize, origin: f32, scale: f32, bin: f32 },
+    /// Those whose doubled centre lies before a plane.
+    Plane { axis: usize, at: f32 },
     /// Those with a bit, of at most 32.
     Mask(u32),
     /// The first half.
     Half,
 }
 
+/// The cheapest of many ways to divide, tried on three axes at a time.
+pub(super) struct Cheapest<S: Simd> {
+    least: S::V4,
+    /// Axis, place on it, cost.
+    found: Option<(usize, usize, f32)>,
+}
+
+impl<S: Simd> Cheapest<S> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { least: S::V4::splat(f32::INFINITY), found: None }
+    }
+
+    /// Tries a place with its cost on each axis, and a fourth number that is passed over. NaN is not cheap: an empty side
+    /// costs infinity times zero.
+    #[inline(always)]
+    pub fn offer(&mut self, place: usize, costs: S::V4) {
+        if costs.less(self.least) & 7 == 0 {
+            return;
+        }
+        let mut least = self.least.to_array()[0];
+        for (axis, cost) in costs.to_array().into_iter().enumerate().take(3) {
+            if cost < least {
+                least = cost;
+                self.found = Some((axis, place, cost));
+            }
+        }
+        self.least = S::V4::splat(least);
+    }
+
+    /// Axis, place and cost; None where everything costs infinity.
+    #[inline(always)]
+    pub fn found(&self) -> Option<(usize, usize, f32)> {
+        self.found
+    }
+}
+
 impl Split {
     /// Into halves, for items that no plane divides.
-    pub const HALF: Self = Self { cut: Cut::Half, cost: f32::INFINITY, left: EMPTY, right: EMPTY };
+    pub const HALF: Self = Self { cut: Cut::Half, cost: f32::INFINITY };
 
-    /// Puts the items of the left side first, and gives the two sides; `items` are those of `range`.
+    /// Puts the items of the left side first, and gives the two sides; `items` are those of `range`. A plane that leaves
+    /// nothing on one side gives an empty range.
     #[inline(always)]
     pub fn partition<S: Simd>(&self, items: &mut [Record], range: &Range) -> [Range; 2] {
-        let nothing = S::V8::splat(f32::NEG_INFINITY);
-        let mut centres = [nothing; 2];
+        let mut sides = [S::V8::splat(f32::NEG_INFINITY); 2];
         let mut split = 0;
         match self.cut {
-            Cut::Plane { axis, origin, scale, bin } => {
-                let axis = axis % 4;
+            Cut::Plane { axis, at } => {
                 for i in 0..items.len() {
                     let item = items[i];
-                    let bounds = S::V8::load(&item.0);
-                    let centre = bounds.sub(bounds.swap_halves());
-                    let is_left = (item.0[axis + 4] - item.0[axis] - origin) * scale < bin;
-                    centres[0] = centre.keep_if(is_left).max(centres[0]);
-                    centres[1] = centre.keep_if(!is_left).max(centres[1]);
-                    // Without a branch, which would be guessed wrong every other time: what lies between `split` and i
-                    // belongs to the right, and one of it changes place with the item.
+                    let is_left = S::V8::load(&item.0).join_side(axis, at, &mut sides);
+                    // Without a branch, too: what lies between `split` and i belongs to the right, and the first of it
+                    // changes place with the item.
                     items[i] = items[split];
                     items[split] = item;
                     split += usize::from(is_left);
@@ -116,37 +155,41 @@ impl Split {
             }
             Cut::Mask(mask) => {
                 let mut right = [Record::NOTHING; 32];
-                let mut kept = 0;
                 for i in 0..items.len() {
                     let item = items[i];
-                    let bounds = S::V8::load(&item.0);
-                    let centre = bounds.sub(bounds.swap_halves());
                     let is_left = mask >> (i % 32) & 1 != 0;
-                    centres[0] = centre.keep_if(is_left).max(centres[0]);
-                    centres[1] = centre.keep_if(!is_left).max(centres[1]);
+                    right[(i - split) % 32] = item;
                     items[split] = item;
-                    right[kept % 32] = item;
                     split += usize::from(is_left);
-                    kept += usize::from(!is_left);
                 }
-                items[split..].copy_from_slice(&right[..kept]);
+                let len = items.len() - split;
+                items[split..].copy_from_slice(&right[..len]);
+                let join = |sum: S::V8, item: &Record| S::V8::load(&item.0).max(sum);
+                sides = [items[..split].iter().fold(sides[0], join), items[split..].iter().fold(sides[1], join)];
             }
             Cut::Half => {
-                let (left, right) = items.split_at(items.len() / 2);
-                let first = range.first + left.len() as u32;
-                return [Range::new::<S>(left, range.first), Range::new::<S>(right, first)];
+                split = items.len() / 2;
+                let join = |sum: S::V8, item: &Record| S::V8::load(&item.0).max(sum);
+                sides = [items[..split].iter().fold(sides[0], join), items[split..].iter().fold(sides[1], join)];
             }
         }
-        self.sides(range, split, centres.map(S::V8::to_array))
+        self.sides(range, split, sides.map(S::V8::to_array))
     }
 
-    /// The two sides of `range`, the first of which has `left_len` items.
+    /// The two sides of `range`, by the number of items of the left one and by their boxes.
     #[inline(always)]
-    pub fn sides(&self, range: &Range, left_len: usize, [left, right]: [[f32; 8]; 2]) -> [Range; 2] {
+    pub fn sides(&self, range: &Range, left_len: usize, bounds: [[f32; 8]; 2]) -> [Range; 2] {
         let len = left_len as u32;
-        [
-            Range { first: range.first, len, bounds: self.left, centres: left },
-            Range { first: range.first + len, len: range.len - len, bounds: self.right, centres: right },
-        ]
+        let mut sides = bounds.map(
+            #[inline(always)]
+            |bounds| Range { first: range.first, len, bounds, centres: range.centres_within(&bounds) },
+        );
+        sides[1].first += len;
+        sides[1].len = range.len - len;
+        if let Cut::Plane { axis, at } = self.cut {
+            sides[0].centres[axis + 4] = at.min(sides[0].centres[axis + 4]);
+            sides[1].centres[axis] = (-at).min(sides[1].centres[axis]);
+        }
+        sides
     }
 }

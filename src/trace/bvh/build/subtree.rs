@@ -102,14 +102,39 @@ impl<S: Simd> Splitter for Local<'_, S> {
 
     #[inline(always)]
     fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
-        split.partition::<S>(&mut self.items[range.within(self.base)], range)
+        let items = &mut self.items[range.within(self.base)];
+        let sides = split.partition::<S>(items, range);
+        if sides[0].len > 0 && sides[1].len > 0 { sides } else { Split::HALF.partition::<S>(items, range) }
     }
 }
 
+/// The best plane between `N` bins.
 #[inline(always)]
-fn binned<S: Simd, const N: usize>(items: &[Record], range: &Range, rule: &Rule) -> Option<Split> {
+pub(super) fn binned<S: Simd, const N: usize>(items: &[Record], range: &Range, rule: &Rule) -> Option<Split> {
     let grid = Grid::new::<N>(&range.centres);
     let mut bins = Bins::<N>::empty();
-    bins.add::<S>(items, &grid);
+    if items.len() < 2 * SAMPLE {
+        bins.add::<S>(items.iter(), &grid);
+    } else {
+        bins.add::<S>(sample(items), &grid);
+    }
     bins.best::<S>(&grid, rule)
+}
+
+/// Items by which a large range is judged.
+pub(super) const SAMPLE: usize = 1 << 11;
+
+/// One item of each of [`SAMPLE`] equal stretches: not always the first, or a mesh of even rows would be judged by a few of its
+/// columns.
+#[inline(always)]
+pub(super) fn sample(items: &[Record]) -> impl Iterator<Item = &Record> {
+    let stride = items.len() / SAMPLE;
+    (0..SAMPLE).map(
+        #[inline(always)]
+        move |i| {
+            // Fibonacci hashing (Knuth, The art of computer programming 3, 6.4), scaled to the stride.
+            let hash = (i as u32).wrapping_mul(0x9e37_79b9);
+            &items[i * stride + ((u64::from(hash) * stride as u64) >> 32) as usize]
+        },
+    )
 }

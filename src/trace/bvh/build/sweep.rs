@@ -5,7 +5,7 @@
 
 use super::lanes::{Boxes, RANKED};
 use super::record::Record;
-use super::split::{Cut, Rule, Split};
+use super::split::{Cheapest, Cut, Rule, Split};
 use crate::trace::bvh::simd::{Simd, Vector};
 
 /// The largest number of items.
@@ -30,31 +30,16 @@ pub(super) fn best<S: Simd>(items: &[Record], rule: &Rule) -> Option<Split> {
         right = join(right, at(k));
         right_areas[k] = S::V8::half_areas(right);
     }
-    let mut least = S::V4::splat(f32::INFINITY);
-    let mut best = None;
+    let mut cheapest = Cheapest::<S>::new();
     let mut left = [S::V8::splat(f32::NEG_INFINITY); 3];
-    for k in 1..n {
+    for (k, right_areas) in right_areas.iter().enumerate().take(n).skip(1) {
         left = join(left, at(k - 1));
         let left_cost = S::V4::load(&S::V8::half_areas(left)).mul(S::V4::splat(rule.blocks(k)));
-        let cost = S::V4::load(&right_areas[k]).mul(S::V4::splat(rule.blocks(n - k))).add(left_cost);
-        if cost.less(least) & 7 != 0 {
-            let cost = cost.to_array();
-            for axis in 0..3 {
-                if cost[axis] < least.to_array()[0] {
-                    least = S::V4::splat(cost[axis]);
-                    best = Some((axis, k, cost[axis]));
-                }
-            }
-        }
+        cheapest.offer(k, S::V4::load(right_areas).mul(S::V4::splat(rule.blocks(n - k))).add(left_cost));
     }
-    let (axis, k, cost) = best?;
-    let sum = |order: &[u8]| {
-        let join = |sum: S::V8, &i: &u8| sum.max(S::V8::load(&items[usize::from(i)].0));
-        order.iter().fold(S::V8::splat(f32::NEG_INFINITY), join).to_array()
-    };
-    let order = &orders[axis][..n];
-    let mask = order[..k].iter().fold(0, |mask, &i| mask | 1 << i);
-    Some(Split { cut: Cut::Mask(mask), cost, left: sum(&order[..k]), right: sum(&order[k..]) })
+    let (axis, k, cost) = cheapest.found()?;
+    let mask = orders[axis][..k].iter().fold(0, |mask, &i| mask | 1 << i);
+    Some(Split { cut: Cut::Mask(mask), cost })
 }
 
 /// The items' numbers by rising centre, for each axis.

@@ -1,13 +1,14 @@
-//! Ranges too large for one thread: bins are filled and items partitioned chunk by chunk, side by side.
+//! Ranges too large for one thread: items are partitioned chunk by chunk, side by side.
 //!
 //! Chunks have a fixed size and are put together in order, so the result does not depend on how many threads there are.
 
 use rayon::prelude::*;
 
-use super::bins::{Bins, Grid, MANY};
+use super::bins::MANY;
 use super::children::Splitter;
 use super::record::Record;
 use super::split::{Range, Rule, Split};
+use super::subtree::binned;
 use crate::trace::bvh::isa::{self, Isa, Kernel};
 use crate::trace::bvh::simd::{Simd, Vector};
 
@@ -38,12 +39,8 @@ impl Splitter for Shared<'_> {
         if self.halve {
             return Split::HALF;
         }
-        let grid = Grid::new::<MANY>(&range.centres);
-        let (isa, rule) = (self.isa, self.rule);
-        let chunks = self.items[range.within(0)].par_chunks(CHUNK);
-        let filled = chunks.map(|items| isa::dispatch(isa, BinKernel { items, grid: &grid }));
-        let bins = filled.reduce_with(|a, b| isa::dispatch(isa, MergeKernel(a, b)));
-        bins.and_then(|bins| isa::dispatch(isa, BestKernel { bins: &bins, grid: &grid, rule })).unwrap_or(Split::HALF)
+        let items = &self.items[range.within(0)];
+        isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
     }
 
     fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
@@ -61,9 +58,12 @@ impl Splitter for Shared<'_> {
             .collect();
         let left_len = sides.iter().map(|[left, _]| left.len as usize).sum();
         gather(items, &sides, left_len);
-        let [left, right] =
-            sides.into_iter().fold([Range::EMPTY; 2], |[left, right], [l, r]| [left.union(l), right.union(r)]);
-        split.sides(range, left_len, [left.centres, right.centres])
+        if left_len == 0 || left_len == items.len() {
+            return isa::dispatch(isa, PartitionKernel { items, range, split: &Split::HALF });
+        }
+        let union = |[left, right]: [Range; 2], [l, r]: [Range; 2]| [left.union(l), right.union(r)];
+        let [left, right] = sides.into_iter().fold([Range::EMPTY; 2], union);
+        split.sides(range, left_len, [left.bounds, right.bounds])
     }
 }
 
@@ -116,44 +116,17 @@ impl Kernel for RangeKernel<'_> {
     }
 }
 
-struct BinKernel<'a> {
+struct FindKernel<'a> {
     items: &'a [Record],
-    grid: &'a Grid,
-}
-
-impl Kernel for BinKernel<'_> {
-    type Output = Box<Bins<MANY>>;
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Box<Bins<MANY>> {
-        let mut bins = Box::new(Bins::empty());
-        bins.add::<S>(self.items, self.grid);
-        bins
-    }
-}
-
-struct MergeKernel(Box<Bins<MANY>>, Box<Bins<MANY>>);
-
-impl Kernel for MergeKernel {
-    type Output = Box<Bins<MANY>>;
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Box<Bins<MANY>> {
-        let Self(mut sum, other) = self;
-        sum.merge::<S>(&other);
-        sum
-    }
-}
-
-struct BestKernel<'a> {
-    bins: &'a Bins<MANY>,
-    grid: &'a Grid,
+    range: &'a Range,
     rule: &'a Rule,
 }
 
-impl Kernel for BestKernel<'_> {
+impl Kernel for FindKernel<'_> {
     type Output = Option<Split>;
     #[inline(always)]
     fn run<S: Simd>(self) -> Option<Split> {
-        self.bins.best::<S>(self.grid, self.rule)
+        binned::<S, MANY>(self.items, self.range, self.rule)
     }
 }
 
