@@ -25,7 +25,7 @@ const LAYERS: &[&[&str]] = &[
 const UNSAFE: &[&str] = &[
     "trace/embree/",
     "trace/bvh/isa.rs",
-    "trace/bvh/simd.rs",
+    "trace/bvh/simd/",
     "trace/bvh/build/lanes.rs",
     "image/oiio.rs",
     "io/mapped.rs",

@@ -39,7 +39,7 @@ pub trait Corners {
 impl Corners for [Vec3; 3] {
     #[inline]
     fn rounded(&self) -> [DVec3; 3] {
-        self.map(|p| p.as_dvec3())
+        [self[0].as_dvec3(), self[1].as_dvec3(), self[2].as_dvec3()]
     }
     #[inline]
     fn slack(&self) -> [DVec3; 3] {
@@ -114,23 +114,6 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
 }
 
-/// The same, to the bit, for a ray that is known to pass inside and to hit within its range: only t, u and v are
-/// computed.
-#[inline]
-pub(crate) fn intersect_inside(ray: &Ray, corners: &[Vec3; 3]) -> Option<TriangleHit> {
-    let d = ray.direction.as_dvec3();
-    let seen = Seen::new(ray.origin.as_dvec3(), d, corners.rounded());
-    let [a, b, c] = seen.edges;
-    let long = a.abs().max(b.abs()).max(c.abs()).max_element();
-    // The bound of `intersect`, from above.
-    let sizes = seen.corners[0].abs().max_element() * seen.slope.abs() + d.abs().max_element() * seen.height.abs();
-    if 6.0 * K * long * long * sizes <= (seen.height * seen.slope).abs() * T_PRECISION {
-        Some(seen.hit())
-    } else {
-        intersect(ray, corners)
-    }
-}
-
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
 /// the dot product; and the bound's own rounding.
 const K: f64 = gamma64(32);
@@ -167,7 +150,8 @@ impl Seen {
     #[inline(always)]
     fn hit(&self) -> TriangleHit {
         let &Self { volumes, slope, height, .. } = self;
-        TriangleHit { t: height / slope, u: volumes[1] / slope, v: volumes[2] / slope }
+        let inverse = 1.0 / slope;
+        TriangleHit { t: height * inverse, u: volumes[1] * inverse, v: volumes[2] * inverse }
     }
 }
 

@@ -6,7 +6,7 @@
 //! rounding error. What remains goes to the exact test.
 
 use super::block::Block;
-use super::simd::{Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
 use crate::ray::Ray;
 
@@ -42,7 +42,7 @@ impl Filter {
         let along = direction[z];
         Self {
             axes,
-            origin: axes.map(|axis| origin[axis]),
+            origin: [origin[axes[0]], origin[axes[1]], origin[z]],
             shear: [direction[axes[0]] / along, direction[axes[1]] / along],
             error: 8.0 * UNIT_ROUNDOFF * blur,
             blur: if blur > 1.0 { ray.origin.abs().max_element() } else { 0.0 },
@@ -71,8 +71,7 @@ impl Filter {
             y[k] = py.sub(pz.mul(splat(self.shear[1])));
             sheared = sheared.max(x[k].abs().max(y[k].abs()));
         }
-        let edge = |a: usize, b: usize| x[a].mul(y[b]).sub(y[a].mul(x[b]));
-        let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+        let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
         let e = largest.mul(splat(self.error));
         // The sum doubled against rounding of the bound; a constant against underflow.
         let edges = e.mul(sheared.mul(splat(8.0)).add(e.mul(splat(4.0))));
@@ -82,7 +81,13 @@ impl Filter {
         let high = u.max(v).max(w).sub(bound);
         let zero = splat(0.0);
         // Whatever overflowed is not rejected.
-        let outside = low.less(zero) & zero.less(high);
-        !outside & block.lanes
+        let outside = low.less(zero).and(zero.less(high));
+        !outside.bits() & block.lanes
     }
+}
+
+/// The edge function of the edge from corner `a` to corner `b`, each of which is at (x, y).
+#[inline(always)]
+fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
+    x[a].mul(y[b]).sub(y[a].mul(x[b]))
 }

@@ -23,9 +23,11 @@ mod build;
 mod bundle;
 mod edges;
 mod filter;
+mod inside;
 mod isa;
 mod node;
 mod placements;
+mod query;
 mod shapes;
 mod simd;
 mod slab;
@@ -41,6 +43,7 @@ use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use filter::Filter;
 use placements::PlacementTree;
+use query::{Closest, Occluded, Query};
 use shapes::ShapeTree;
 use simd::Simd;
 use slab::SlabRay;
@@ -132,20 +135,20 @@ impl Bvh {
 
     /// One ray, from the root: the nearest hit, or just any.
     #[inline(always)]
-    fn trace<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
+    fn trace<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
         if !ray.is_valid() {
             return None;
         }
         let mut nearest = Nearest::new(ray);
-        self.fixed.trace::<S, ANY>(ray, ray, None, &mut stacks.level, &mut nearest);
-        self.enter_placements::<S, ANY>(ray, stacks, &mut nearest);
+        self.fixed.trace::<S, Q>(ray, ray, None, &mut stacks.level, &mut nearest);
+        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
         nearest.hit()
     }
 
     /// Placed objects for one ray.
     #[inline(always)]
-    fn enter_placements<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
-        if self.placements.is_empty() || ANY && nearest.hit().is_some() {
+    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+        if self.placements.is_empty() || Q::ANY && nearest.hit().is_some() {
             return;
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
@@ -162,68 +165,76 @@ impl Bvh {
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };
                         let level = &self.objects[placement.object as usize];
-                        level.trace::<S, ANY>(ray, &object_ray, Some(through), lower, nearest);
+                        level.trace::<S, Q>(ray, &object_ray, Some(through), lower, nearest);
                     }
                 }
-                Visit::after::<ANY>(nearest)
+                Visit::after::<Q>(nearest)
             },
         );
     }
 
     /// Many rays, one after the other.
     #[inline(always)]
-    fn trace_rays<S: Simd, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
+    fn trace_rays<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        for (i, ray) in rays.iter().enumerate() {
-            answer(i, self.trace::<S, ANY>(ray, &mut stacks));
+        for (ray, answer) in rays.iter().zip(answers) {
+            *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
         }
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
     #[inline(always)]
-    fn trace_bundles<S: Simd, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
+    fn trace_bundles<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
         let mut scratch = tile::Scratch::new();
-        let (bundles, rest) = rays.as_chunks::<{ bundle::RAYS }>();
-        let has_triangles = !self.fixed.triangles.tree().is_empty();
-        for (i, rays) in bundles.iter().enumerate() {
-            let is_bundle = has_triangles && tile::trace::<S, ANY>(&mut scratch, &self.fixed.triangles, rays);
-            for (k, ray) in rays.iter().enumerate() {
-                let hit = if is_bundle {
-                    let nearest = scratch.nearest(k);
-                    self.fixed.trace_shapes::<S, ANY>(ray, None, 1.0, &mut stacks.level, nearest);
-                    self.enter_placements::<S, ANY>(ray, &mut stacks, nearest);
-                    nearest.hit()
-                } else {
-                    self.trace::<S, ANY>(ray, &mut stacks)
-                };
-                answer(i * bundle::RAYS + k, hit);
+        let triangles = &self.fixed.triangles;
+        let is_all = self.fixed.shapes.tree().is_empty() && self.placements.is_empty();
+        for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
+            let is_empty = triangles.tree().is_empty();
+            let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
+            let all = u64::MAX >> (bundle::RAYS - rays.len());
+            if traced == all && is_all {
+                continue;
+            }
+            for (k, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+                if traced >> k & 1 == 0 {
+                    *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
+                    continue;
+                }
+                let mut nearest = Nearest::new(ray);
+                if !is_all && Q::resume(&mut nearest, scratch.t[k], *answer) {
+                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                    self.enter_placements::<S, Q>(ray, &mut stacks, &mut nearest);
+                    *answer = Q::answer(nearest.hit());
+                }
             }
         }
-        for (k, ray) in rest.iter().enumerate() {
-            answer(rays.len() - rest.len() + k, self.trace::<S, ANY>(ray, &mut stacks));
-        }
+    }
+
+    fn run_batch<Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer], batch: Batch) {
+        assert_eq!(rays.len(), answers.len(), "one answer a ray");
+        isa::dispatch(self.isa, BatchKernel::<Q> { bvh: self, rays, answers, batch });
     }
 }
 
 /// A batch, for one instruction set at a time.
-struct BatchKernel<'a, F, const ANY: bool> {
+struct BatchKernel<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
     batch: Batch,
-    answer: F,
 }
 
-impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<'_, F, ANY> {
+impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, rays, batch, answer } = self;
+        let Self { bvh, rays, answers, batch } = self;
         if batch.coherent {
-            bvh.trace_bundles::<S, ANY>(rays, answer);
+            bvh.trace_bundles::<S, Q>(rays, answers);
         } else {
-            bvh.trace_rays::<S, ANY>(rays, answer);
+            bvh.trace_rays::<S, Q>(rays, answers);
         }
     }
 }
@@ -244,7 +255,7 @@ impl Level {
 
     /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
     #[inline(always)]
-    fn trace<S: Simd, const ANY: bool>(
+    fn trace<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
         local: &Ray,
@@ -265,15 +276,15 @@ impl Level {
                 #[inline(always)]
                 |first, count| {
                     self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
-                    Visit::after::<ANY>(nearest)
+                    Visit::after::<Q>(nearest)
                 },
             );
         }
-        self.trace_shapes::<S, ANY>(local, through, blur, stack, nearest);
+        self.trace_shapes::<S, Q>(local, through, blur, stack, nearest);
     }
 
     #[inline(always)]
-    fn trace_shapes<S: Simd, const ANY: bool>(
+    fn trace_shapes<S: Simd, Q: Query>(
         &self,
         local: &Ray,
         through: Option<Through<'_>>,
@@ -281,7 +292,7 @@ impl Level {
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        let is_done = ANY && nearest.hit().is_some();
+        let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
             walk::single::<S>(
@@ -292,39 +303,31 @@ impl Level {
                 #[inline(always)]
                 |first, count| {
                     self.shapes.offer_leaf(first, count, local, through, nearest);
-                    Visit::after::<ANY>(nearest)
+                    Visit::after::<Q>(nearest)
                 },
             );
         }
     }
 }
 
-impl Bvh {
-    fn run_batch<const ANY: bool>(&self, rays: &[Ray], batch: Batch, answer: impl FnMut(usize, Option<Hit>)) {
-        isa::dispatch(self.isa, BatchKernel::<_, ANY> { bvh: self, rays, batch, answer });
-    }
-}
-
 impl Tracer for Bvh {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut found = None;
-        self.run_batch::<false>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit);
-        found
+        let mut answer = [None];
+        self.run_batch::<Closest>(std::slice::from_ref(ray), &mut answer, Batch::default());
+        answer[0]
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut found = false;
-        self.run_batch::<true>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit.is_some());
-        found
+        let mut answer = [false];
+        self.run_batch::<Occluded>(std::slice::from_ref(ray), &mut answer, Batch::default());
+        answer[0]
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
-        assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        self.run_batch::<false>(rays, batch, |i, hit| hits[i] = hit);
+        self.run_batch::<Closest>(rays, hits, batch);
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
-        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        self.run_batch::<true>(rays, batch, |i, hit| occluded[i] = hit.is_some());
+        self.run_batch::<Occluded>(rays, occluded, batch);
     }
 }

@@ -11,7 +11,7 @@
 //! lets everything pass.
 
 use super::node::{Node, WIDTH};
-use super::simd::{Portable, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -65,60 +65,6 @@ impl SlabRay {
         slab
     }
 
-    /// A ray that stands for one end of a bundle: from `origin`, with these reciprocals of its direction, none of them 0.
-    /// `extra` is how far the origin may be off.
-    #[inline(always)]
-    pub fn of_bundle(origin: [f32; 3], reciprocal: [f32; 3], reach: Vec3, extra: f32) -> Option<Self> {
-        let mut slab = Self { reciprocal, near_offset: [0.0; 3], far_offset: [0.0; 3], near: [0; 3], tmin: 0.0 };
-        for axis in 0..3 {
-            let r = reciprocal[axis];
-            let span = origin[axis].abs() + reach[axis];
-            if r.abs() * span >= HUGE {
-                return None;
-            }
-            let (near, far) = Self::offsets::<Portable>(origin[axis], [r; WIDTH], reach[axis], extra);
-            slab.near_offset[axis] = near[0];
-            slab.far_offset[axis] = far[0];
-            slab.near[axis] = if r < 0.0 { axis + 3 } else { axis };
-        }
-        Some(slab)
-    }
-
-    /// -origin / direction, less and plus the pad, for eight rays; `extra` is how far the origin may be off.
-    #[inline(always)]
-    pub fn offsets<S: Simd>(origin: f32, reciprocal: S::V8, reach: f32, extra: f32) -> (S::V8, S::V8) {
-        let width = S::V8::splat(6.0 * UNIT_ROUNDOFF * (origin.abs() + reach) + extra);
-        let pad = reciprocal.abs().mul(width);
-        let offset = reciprocal.mul(S::V8::splat(-origin));
-        (offset.sub(pad), offset.add(pad))
-    }
-
-    /// Which of a node's six bounds is met first, by axis.
-    #[inline(always)]
-    pub fn near_sides(&self) -> [usize; 3] {
-        self.near
-    }
-
-    /// As [`SlabRay::enter`], for a bundle whose reciprocals lie between those of two rays of one octant.
-    #[inline(always)]
-    pub fn enter_either<S: Simd>(ends: &[Self; 2], node: &Node, limit: f32) -> (u32, [f32; WIDTH]) {
-        let mut near = S::V8::splat(ends[0].tmin);
-        let mut far = S::V8::splat(limit);
-        for axis in 0..3 {
-            let side = ends[0].near[axis];
-            let first = S::V8::load(&node.bounds[side]);
-            let second = S::V8::load(&node.bounds[if side < 3 { side + 3 } else { side - 3 }]);
-            let (low, high) = (S::V8::splat(ends[0].reciprocal[axis]), S::V8::splat(ends[1].reciprocal[axis]));
-            let near_low = first.mul_add(low, S::V8::splat(ends[0].near_offset[axis]));
-            let near_high = first.mul_add(high, S::V8::splat(ends[1].near_offset[axis]));
-            let far_low = second.mul_add(low, S::V8::splat(ends[0].far_offset[axis]));
-            let far_high = second.mul_add(high, S::V8::splat(ends[1].far_offset[axis]));
-            near = near_low.min(near_high).max(near);
-            far = far_low.max(far_high).min(far);
-        }
-        (near.at_most(far), near.to_array())
-    }
-
     /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each,
     /// not below 0.
     #[inline(always)]
@@ -133,6 +79,6 @@ impl SlabRay {
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);
             far = second.mul_add(reciprocal, S::V8::splat(self.far_offset[axis])).min(far);
         }
-        (near.at_most(far), near.to_array())
+        (near.at_most(far).bits(), near.to_array())
     }
 }

@@ -1,11 +1,9 @@
 //! Leaves of triangles: blocks of four, rejected together ([`Filter`], [`Edges`]), decided one by one.
 
-use super::block::{Block, LANES};
 use rayon::prelude::*;
 
+use super::block::{Block, LANES};
 use super::build::{self, Record};
-use super::bundle::Bundle;
-use super::edges::Edges;
 use super::filter::Filter;
 use super::isa::Isa;
 use super::node::Tree;
@@ -97,22 +95,23 @@ impl TriangleTree {
         self.offer(self.block(id / LANES as u32), id as usize % LANES, ray, None, nearest);
     }
 
-    /// The hit of `ray` with a triangle that it is known to hit, numbered as in [`Self::offer_one`].
+    /// The corners of a triangle, numbered as in [`Self::offer_one`], one after the other.
     #[inline(always)]
-    pub fn hit_one(&self, id: u32, ray: &Ray) -> Option<(f64, Hit)> {
+    pub fn corners(&self, id: u32) -> [f32; 9] {
         let (block, lane) = (self.block(id / LANES as u32), id as usize % LANES);
-        let hit = triangle::intersect_inside(ray, &block.triangle(lane))?;
-        let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
-        let (t, u, v) = (hit.t as f32, hit.u as f32, hit.v as f32);
-        Some((hit.t, Hit { t, u, v, primitive: block.primitive[lane], geometry, instance }))
+        let mut corners = [0.0; 9];
+        for (corner, component) in corners.iter_mut().zip(&block.corners) {
+            *corner = component[lane];
+        }
+        corners
     }
 
-    /// The triangles of a block that some ray of the bundle may hit up to `most`, as a bit mask, and their edges.
+    /// A hit with a triangle, numbered as in [`Self::offer_one`].
     #[inline(always)]
-    pub fn edges<S: Simd>(&self, block: u32, bundle: &Bundle, most: f32) -> (u32, Edges) {
-        let block = self.block(block);
-        let (lanes, edges) = Edges::new::<S>(&block.corners, bundle, most);
-        (lanes & block.lanes, edges)
+    pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
+        let (block, lane) = (self.block(id / LANES as u32), id as usize % LANES);
+        let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
+        Hit { t, u, v, primitive: block.primitive[lane], geometry, instance }
     }
 
     #[inline]

@@ -4,6 +4,7 @@
 
 use super::build::MAX_DEPTH;
 use super::node::{Tree, WIDTH};
+use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
@@ -20,8 +21,8 @@ pub(super) enum Visit {
 impl Visit {
     /// After offers to `nearest`: an any-hit query stops at the first hit.
     #[inline(always)]
-    pub fn after<const ANY: bool>(nearest: &Nearest) -> Self {
-        if ANY && nearest.hit().is_some() { Self::Stop } else { Self::Until(nearest.limit()) }
+    pub fn after<Q: Query>(nearest: &Nearest) -> Self {
+        if Q::ANY && nearest.hit().is_some() { Self::Stop } else { Self::Until(nearest.limit()) }
     }
 }
 
@@ -88,13 +89,13 @@ pub(super) fn single<S: Simd>(
             let (mut mask, near) = ray.enter::<S>(node, limit);
             if mask != 0 {
                 let child = |i: usize| Entry { near: near[i], index: node.index[i], count: node.count[i] };
-                let first = mask.trailing_zeros() as usize;
+                let first = mask.trailing_zeros() as usize % WIDTH;
                 mask &= mask - 1;
                 next = child(first);
                 // Mostly one or two children are entered: the nearest goes on, the other waits.
                 let base = stack.len;
                 while mask != 0 {
-                    let i = mask.trailing_zeros() as usize;
+                    let i = mask.trailing_zeros() as usize % WIDTH;
                     mask &= mask - 1;
                     let mut other = child(i);
                     if other.near < next.near {

@@ -4,7 +4,7 @@
 use super::lanes::Boxes;
 use super::record::{EMPTY, Record};
 use super::split::{Cheapest, Cut, Rule, Split};
-use crate::trace::bvh::simd::{Simd, Vector};
+use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// Bins an axis of a large range is divided into.
 pub(super) const MANY: usize = 16;

@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn both_give_the_same_bits() {
         use crate::trace::bvh::isa::{self, Isa, Kernel};
-        use crate::trace::bvh::simd::{Simd, Vector};
+        use crate::trace::bvh::simd::{Array, Simd};
         struct All([[f32; 8]; 3], [f32; RANKED]);
         impl Kernel for All {
             type Output = (bool, [[f32; 8]; 2], [i32; 8], [u32; 3], [u32; RANKED]);

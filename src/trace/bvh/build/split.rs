@@ -2,7 +2,7 @@
 
 use super::lanes::Boxes;
 use super::record::{EMPTY, Record, half_area};
-use crate::trace::bvh::simd::{Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 
 /// What a tree costs.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ impl<S: Simd> Cheapest<S> {
     /// costs infinity times zero.
     #[inline(always)]
     pub fn offer(&mut self, place: usize, costs: S::V4) {
-        if costs.less(self.least) & 7 == 0 {
+        if costs.less(self.least).bits() & 7 == 0 {
             return;
         }
         let mut least = self.least.to_array()[0];

@@ -6,7 +6,7 @@
 use super::lanes::{Boxes, RANKED};
 use super::record::Record;
 use super::split::{Cheapest, Cut, Rule, Split};
-use crate::trace::bvh::simd::{Simd, Vector};
+use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// The largest number of items.
 pub(super) const MOST: usize = RANKED;
