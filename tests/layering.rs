@@ -27,6 +27,7 @@ const UNSAFE: &[&str] = &[
     "trace/bvh/isa.rs",
     "trace/bvh/simd/",
     "trace/bvh/build/lanes.rs",
+    "trace/bvh/memory.rs",
     "image/oiio.rs",
     "io/mapped.rs",
 ];

@@ -25,8 +25,11 @@ mod edges;
 mod filter;
 mod inside;
 mod isa;
+mod leaves;
+mod memory;
 mod node;
 mod placements;
+mod preset;
 mod query;
 mod shapes;
 mod simd;
@@ -36,9 +39,12 @@ mod triangles;
 mod walk;
 
 pub use isa::Isa;
+pub use preset::{Options, Preset};
+
+use std::ops::Range;
 
 use super::nearest::Nearest;
-use super::{Batch, Tracer, World};
+use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use filter::Filter;
@@ -55,6 +61,7 @@ pub struct Bvh {
     fixed: Level,
     objects: Vec<Level>,
     placements: PlacementTree,
+    preset: Preset,
     isa: Isa,
 }
 
@@ -87,19 +94,21 @@ struct Through<'a> {
 impl Bvh {
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
     pub fn build(world: &World) -> Self {
-        Self::build_for(world, Isa::detect())
+        Self::build_with(world, Options::default())
     }
 
-    /// The same, with the instruction set given; hits do not depend on it.
+    /// The same, as `options` tell; hits do not depend on them.
     ///
     /// # Panics
-    /// Where this processor does not have `isa`.
-    pub fn build_for(world: &World, isa: Isa) -> Self {
+    /// Where this processor does not have `options.isa`.
+    pub fn build_with(world: &World, options: Options<'_>) -> Self {
+        let Options { preset, isa, .. } = options;
         assert!(isa.is_available(), "{isa:?} is not available on this processor");
-        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone(), isa)).collect();
+        let level = |parts: &Range<usize>| Level::build(&world.parts[parts.clone()], &options);
+        let objects: Vec<Level> = world.objects.iter().map(level).collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds, isa);
-        Self { fixed: Level::build(world, world.fixed.clone(), isa), objects, placements, isa }
+        let placements = PlacementTree::build(&world.placements, &bounds, &options);
+        Self { fixed: level(&world.fixed), objects, placements, preset, isa }
     }
 
     /// Memory the trees hold, in bytes.
@@ -126,6 +135,11 @@ impl Bvh {
         });
         let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));
         if whole > 0.0 { (of(&self.fixed) + placed) / whole } else { 0.0 }
+    }
+
+    /// What it was built for.
+    pub fn preset(&self) -> Preset {
+        self.preset
     }
 
     /// The instruction set its kernels use.
@@ -244,9 +258,8 @@ fn area(bounds: Aabb) -> f64 {
 }
 
 impl Level {
-    fn build(world: &World, parts: std::ops::Range<usize>, isa: Isa) -> Self {
-        let parts = &world.parts[parts];
-        Self { triangles: TriangleTree::build(parts, isa), shapes: ShapeTree::build(parts, isa) }
+    fn build(parts: &[Part], options: &Options<'_>) -> Self {
+        Self { triangles: TriangleTree::build(parts, options), shapes: ShapeTree::build(parts, options) }
     }
 
     fn bounds(&self) -> Aabb {

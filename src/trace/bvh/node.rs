@@ -104,14 +104,8 @@ impl Tree {
         })
     }
 
-    /// Visits every leaf in order and lets it be renamed: `(first, count)` becomes what `rename` returns.
-    pub fn rename_leaves(&mut self, mut rename: impl FnMut(u32, u8) -> (u32, u8)) {
-        for node in &mut self.nodes {
-            for slot in 0..WIDTH {
-                if node.count[slot] != 0 && node.count[slot] != NO_CHILD {
-                    (node.index[slot], node.count[slot]) = rename(node.index[slot], node.count[slot]);
-                }
-            }
-        }
+    /// All nodes, so that leaves can be renamed.
+    pub fn nodes_mut(&mut self) -> &mut [Node] {
+        &mut self.nodes
     }
 }

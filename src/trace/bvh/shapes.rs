@@ -1,8 +1,8 @@
 //! Leaves of shapes that are not triangles.
 
 use super::build::{self, Record};
-use super::isa::Isa;
 use super::node::Tree;
+use super::preset::Options;
 use super::{PartId, Through};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
@@ -24,7 +24,7 @@ pub(super) struct ShapeTree {
 
 impl ShapeTree {
     /// Over the shapes of `parts` that can be hit.
-    pub fn build(parts: &[Part], isa: Isa) -> Self {
+    pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
         let mut items = Vec::new();
         for (p, part) in parts.iter().enumerate() {
             let Primitives::Shapes(list) = &part.primitives else { continue };
@@ -35,7 +35,7 @@ impl ShapeTree {
                 }
             }
         }
-        let tree = build::build(&mut items, 1, isa);
+        let tree = build::build(&mut items, 1, options);
         let entry = |item: &Record| {
             let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };

@@ -30,9 +30,11 @@ mod top;
 use rayon::prelude::*;
 
 use super::isa::{self, Isa};
+use super::memory;
 use super::node::{Node, Tree, WIDTH};
+use super::preset::Options;
 use children::Children;
-pub(super) use record::Record;
+pub(super) use record::{Record, triangle_items};
 use split::Rule;
 use subtree::{Parent, SubtreeKernel, Task};
 use top::Shared;
@@ -51,13 +53,14 @@ const TASK: u32 = 1 << 14;
 ///
 /// # Panics
 /// With more than 2^32 - 1 items.
-pub(super) fn build(items: &mut [Record], block: u32, isa: Isa) -> Tree {
+pub(super) fn build(items: &mut [Record], block: u32, options: &Options<'_>) -> Tree {
     assert!(u32::try_from(items.len()).is_ok(), "more primitives than 32-bit indices can name");
     if items.is_empty() {
         return Tree::new(Vec::new());
     }
-    let rule = Rule { block };
+    let (rule, isa) = (Rule { block }, options.isa);
     let (top, tasks) = upper_nodes(items, &rule, isa);
+    let in_top = items.len() - tasks.iter().map(|(_, task)| task.range.len as usize).sum::<usize>();
     let mut rest = items;
     let mut jobs = Vec::with_capacity(tasks.len());
     let mut first = 0;
@@ -71,8 +74,14 @@ pub(super) fn build(items: &mut [Record], block: u32, isa: Isa) -> Tree {
     let built: Vec<(Option<Parent>, Vec<Node>)> = jobs
         .into_par_iter()
         .with_max_len(1)
-        .map(|(parent, task, items)| (parent, isa::dispatch(isa, SubtreeKernel { rule: &rule, items, task })))
+        .map(|(parent, task, items)| {
+            let count = items.len();
+            let nodes = isa::dispatch(isa, SubtreeKernel { rule: &rule, items, task });
+            options.report(count);
+            (parent, nodes)
+        })
         .collect();
+    options.report(in_top);
     Tree::new(join(top, built))
 }
 
@@ -100,20 +109,24 @@ fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(
     (nodes, tasks)
 }
 
-/// Appends the subtrees' nodes to those above them.
-fn join(mut nodes: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<Node> {
-    nodes.reserve_exact(subtrees.iter().map(|(_, subtree)| subtree.len()).sum());
-    for (parent, subtree) in subtrees {
-        let base = nodes.len() as u32;
-        point(&mut nodes, parent, base);
-        nodes.extend(subtree.into_iter().map(|mut node| {
+/// Puts the subtrees' nodes behind those above them.
+fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<Node> {
+    let mut base = top.len();
+    for (parent, subtree) in &subtrees {
+        point(&mut top, *parent, base as u32);
+        base += subtree.len();
+    }
+    let mut chunks = vec![(top.len(), (false, top))];
+    chunks.extend(subtrees.into_iter().map(|(_, subtree)| (subtree.len(), (true, subtree))));
+    memory::fill(chunks, |(is_subtree, nodes): (bool, Vec<Node>), room| {
+        let base = if is_subtree { room.first as u32 } else { 0 };
+        for mut node in nodes {
             for slot in 0..WIDTH {
                 node.index[slot] += if node.count[slot] == 0 { base } else { 0 };
             }
-            node
-        }));
-    }
-    nodes
+            room.push(node);
+        }
+    })
 }
 
 /// Lets a child's slot name its node.
@@ -125,6 +138,8 @@ fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
     use super::super::node::NO_CHILD;
     use super::*;
     use crate::math::{Aabb, Vec3};
@@ -172,7 +187,10 @@ mod tests {
             [(1, 1.0, 4), (5, 1.0, 4), (33, 0.1, 1), (1000, 0.3, 4), (70_000, 0.01, 4), (200_000, 0.0, 1)]
         {
             let mut items = items(count, size);
-            let tree = build(&mut items, block, Isa::detect());
+            let reported = AtomicU64::new(0);
+            let progress = |count| _ = reported.fetch_add(count, Ordering::Relaxed);
+            let tree = build(&mut items, block, &Options { progress: Some(&progress), ..Options::default() });
+            assert_eq!(reported.into_inner(), u64::from(count));
             let mut seen = vec![false; items.len()];
             check(&tree, &items, 0, block, &mut seen);
             assert!(seen.iter().all(|&seen| seen), "{count} items");
@@ -184,7 +202,7 @@ mod tests {
         let build = |isa, threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             let mut items = items(60_000, 0.02);
-            let tree = pool.install(|| build(&mut items, 4, isa));
+            let tree = pool.install(|| build(&mut items, 4, &Options { isa, ..Options::default() }));
             let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
             (format!("{tree:?}"), numbers)
         };

@@ -1,6 +1,10 @@
 //! What the builder moves about: a box and whose it is, in 32 bytes.
 
-use crate::math::{Aabb, Vec3};
+use rayon::prelude::*;
+
+use crate::math::{Aabb, Vec3, is_traceable};
+use crate::trace::bvh::memory;
+use crate::trace::{Part, Primitives};
 
 /// A box as [-min, max]: one eight-wide maximum joins two of them (Fuetterling, Lojewski, Pfreundt, Hamann, Ebert 2017,
 /// *Accelerated single ray tracing for wide vector units*, among others). Lanes 3 and 7 carry two numbers that are not
@@ -59,4 +63,24 @@ pub(super) fn half_area(bounds: &[f32; 8]) -> f32 {
 pub(super) fn aabb(bounds: &[f32; 8]) -> Aabb {
     let &[x, y, z, _, max_x, max_y, max_z, _] = bounds;
     Aabb { min: Vec3::new(0.0 - x, 0.0 - y, 0.0 - z), max: Vec3::new(max_x, max_y, max_z) }
+}
+
+/// One item for each traceable triangle of `parts`, in order.
+pub(in crate::trace::bvh) fn triangle_items(parts: &[Part]) -> Vec<Record> {
+    let mut items = memory::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
+    for (p, part) in parts.iter().enumerate() {
+        let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
+        items.par_extend(triangles.par_iter().enumerate().map(|(i, corners)| {
+            let corners = corners.map(|i| positions[i as usize]);
+            if corners.iter().all(|&corner| is_traceable(corner)) {
+                Record::new(&Aabb::around(corners), p as u32, i as u32)
+            } else {
+                Record::NOTHING
+            }
+        }));
+    }
+    if items.par_iter().any(Record::is_nothing) {
+        items.retain(|item| !item.is_nothing());
+    }
+    items
 }
