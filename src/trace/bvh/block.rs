@@ -1,8 +1,6 @@
 //! Four triangles, laid out component by component for four-wide arithmetic.
 
-use super::build::Item;
 use crate::math::Vec3;
-use crate::trace::{Part, Primitives};
 
 /// Triangles in a block.
 pub(super) const LANES: usize = 4;
@@ -19,22 +17,21 @@ pub(super) struct Block {
 }
 
 impl Block {
-    pub fn new(parts: &[Part], items: &[Item]) -> Self {
-        let mut block = Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], lanes: 0 };
-        for (lane, item) in items.iter().enumerate() {
-            let Primitives::Triangles { positions, triangles } = &parts[item.part as usize].primitives else {
-                unreachable!("items of a triangle tree come from meshes")
-            };
-            for (k, &corner) in triangles[item.primitive as usize].iter().enumerate() {
-                for axis in 0..3 {
-                    block.corners[3 * k + axis][lane] = positions[corner as usize][axis];
-                }
+    /// Without triangles.
+    pub const EMPTY: Self = Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], lanes: 0 };
+
+    /// Adds a triangle, the fourth at most.
+    #[inline(always)]
+    pub fn push(&mut self, corners: [Vec3; 3], part: u32, primitive: u32) {
+        let lane = self.lanes.trailing_ones() as usize % LANES;
+        for (k, corner) in corners.into_iter().enumerate() {
+            for axis in 0..3 {
+                self.corners[3 * k + axis][lane] = corner[axis];
             }
-            block.primitive[lane] = item.primitive;
-            block.part[lane] = item.part;
-            block.lanes |= 1 << lane;
         }
-        block
+        self.primitive[lane] = primitive;
+        self.part[lane] = part;
+        self.lanes |= 1 << lane;
     }
 
     #[inline(always)]

@@ -25,8 +25,11 @@ mod edges;
 mod filter;
 mod inside;
 mod isa;
+mod leaves;
+mod memory;
 mod node;
 mod placements;
+mod preset;
 mod query;
 mod shapes;
 mod simd;
@@ -36,9 +39,12 @@ mod triangles;
 mod walk;
 
 pub use isa::Isa;
+pub use preset::{Options, Preset};
+
+use std::ops::Range;
 
 use super::nearest::Nearest;
-use super::{Batch, Tracer, World};
+use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use filter::Filter;
@@ -55,6 +61,7 @@ pub struct Bvh {
     fixed: Level,
     objects: Vec<Level>,
     placements: PlacementTree,
+    preset: Preset,
     isa: Isa,
 }
 
@@ -87,25 +94,52 @@ struct Through<'a> {
 impl Bvh {
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
     pub fn build(world: &World) -> Self {
-        Self::build_for(world, Isa::detect())
+        Self::build_with(world, Options::default())
     }
 
-    /// The same, with the instruction set given; hits do not depend on it.
+    /// The same, as `options` tell; hits do not depend on them.
     ///
     /// # Panics
-    /// Where this processor does not have `isa`.
-    pub fn build_for(world: &World, isa: Isa) -> Self {
+    /// Where this processor does not have `options.isa`.
+    pub fn build_with(world: &World, options: Options<'_>) -> Self {
+        let Options { preset, isa, .. } = options;
         assert!(isa.is_available(), "{isa:?} is not available on this processor");
-        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone())).collect();
+        let level = |parts: &Range<usize>| Level::build(&world.parts[parts.clone()], &options);
+        let objects: Vec<Level> = world.objects.iter().map(level).collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds);
-        Self { fixed: Level::build(world, world.fixed.clone()), objects, placements, isa }
+        let placements = PlacementTree::build(&world.placements, &bounds, &options);
+        Self { fixed: level(&world.fixed), objects, placements, preset, isa }
     }
 
     /// Memory the trees hold, in bytes.
     pub fn bytes(&self) -> usize {
         let level = |level: &Level| level.triangles.bytes() + level.shapes.bytes();
         level(&self.fixed) + self.objects.iter().map(level).sum::<usize>() + self.placements.bytes()
+    }
+
+    /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
+    /// four triangles: the sum over nodes of their area, and over leaves of their area times the blocks (or shapes) in them,
+    /// divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
+    /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
+    /// much as its own tree, by the area of its box in the world. 0 for an empty scene.
+    pub fn sah_cost(&self) -> f64 {
+        let of = |level: &Level| {
+            let tests = |_: u32, count: u8| f64::from(count);
+            level.triangles.tree().cost(tests) + level.shapes.tree().cost(tests)
+        };
+        let objects: Vec<f64> =
+            self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
+        let placed = self.placements.tree().cost(|first, count| {
+            let costs = self.placements.leaf(first, count).iter().map(|placement| objects[placement.object as usize]);
+            costs.sum()
+        });
+        let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));
+        if whole > 0.0 { (of(&self.fixed) + placed) / whole } else { 0.0 }
+    }
+
+    /// What it was built for.
+    pub fn preset(&self) -> Preset {
+        self.preset
     }
 
     /// The instruction set its kernels use.
@@ -219,10 +253,13 @@ impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     }
 }
 
+fn area(bounds: Aabb) -> f64 {
+    f64::from(bounds.half_area())
+}
+
 impl Level {
-    fn build(world: &World, parts: std::ops::Range<usize>) -> Self {
-        let parts = &world.parts[parts];
-        Self { triangles: TriangleTree::build(parts), shapes: ShapeTree::build(parts) }
+    fn build(parts: &[Part], options: &Options<'_>) -> Self {
+        Self { triangles: TriangleTree::build(parts, options), shapes: ShapeTree::build(parts, options) }
     }
 
     fn bounds(&self) -> Aabb {

@@ -275,7 +275,8 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
     fn visit<S: Simd>(&mut self, leaf: Entry) -> bool {
         let mut changed = false;
         for index in leaf.index..leaf.index + u32::from(leaf.count) {
-            let block = self.tree.block(index);
+            let mut scratch = None;
+            let block = self.tree.block(index, &mut scratch);
             let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, self.most);
             let mut lanes = lanes & block.lanes;
             while lanes != 0 {

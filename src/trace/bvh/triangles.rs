@@ -1,62 +1,48 @@
 //! Leaves of triangles: blocks of four, rejected together ([`Filter`], [`Edges`]), decided one by one.
 
 use super::block::{Block, LANES};
-use super::build::{self, Item};
+use super::build;
 use super::filter::Filter;
+use super::leaves::Leaves;
 use super::node::Tree;
+use super::preset::{Options, Preset};
 use super::simd::Simd;
 use super::{PartId, Through};
-use crate::math::{Aabb, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Placed};
+use crate::trace::Part;
 use crate::trace::nearest::Nearest;
-use crate::trace::{Part, Primitives};
 
 /// All triangles of a level.
 pub(super) struct TriangleTree {
     tree: Tree,
-    blocks: Vec<Block>,
+    leaves: Leaves,
     parts: Vec<PartId>,
 }
 
 impl TriangleTree {
     /// Over the traceable triangles of `parts`.
-    pub fn build(parts: &[Part]) -> Self {
-        let mut items = Vec::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
-        for (p, part) in parts.iter().enumerate() {
-            let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
-            for (i, corners) in triangles.iter().enumerate() {
-                let corners = corners.map(|i| positions[i as usize]);
-                if corners.iter().all(|&corner| is_traceable(corner)) {
-                    items.push(Item { bounds: Aabb::around(corners), part: p as u32, primitive: i as u32 });
-                }
-            }
-        }
-        let mut tree = build::build(&mut items, LANES);
-        let mut blocks = Vec::with_capacity(items.len() / 3);
-        tree.rename_leaves(|first, count| {
-            let leaf = &items[first as usize..first as usize + count as usize];
-            let first_block = blocks.len() as u32;
-            blocks.extend(leaf.chunks(LANES).map(|items| Block::new(parts, items)));
-            (first_block, leaf.len().div_ceil(LANES) as u8)
-        });
+    pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
+        let mut items = build::triangle_items(parts);
+        let mut tree = build::build(&mut items, LANES as u32, options);
+        let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
         let parts = parts.iter().map(|part| PartId { geometry: part.geometry, instance: part.instance }).collect();
-        Self { tree, blocks, parts }
+        Self { tree, leaves, parts }
     }
 
     pub fn tree(&self) -> &Tree {
         &self.tree
     }
 
-    /// Block `index`, of those that the leaves name.
+    /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
     #[inline(always)]
-    pub fn block(&self, index: u32) -> &Block {
-        &self.blocks[index as usize]
+    pub fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.leaves.block(index, scratch)
     }
 
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.bytes() + size_of_val(&self.blocks[..]) + size_of_val(&self.parts[..])
+        self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
     }
 
     /// Offers what `ray` (in the world) hits in a leaf; `filter` is of the ray in this level's coordinates.
@@ -71,7 +57,8 @@ impl TriangleTree {
         nearest: &mut Nearest,
     ) {
         for index in first..first + u32::from(count) {
-            let block = self.block(index);
+            let mut scratch = None;
+            let block = self.block(index, &mut scratch);
             let mut candidates = filter.candidates::<S>(block);
             while candidates != 0 {
                 let lane = candidates.trailing_zeros() as usize;
@@ -84,13 +71,15 @@ impl TriangleTree {
     /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.
     #[inline]
     pub fn offer_one(&self, id: u32, ray: &Ray, nearest: &mut Nearest) {
-        self.offer(self.block(id / LANES as u32), id as usize % LANES, ray, None, nearest);
+        let mut scratch = None;
+        self.offer(self.block(id / LANES as u32, &mut scratch), id as usize % LANES, ray, None, nearest);
     }
 
     /// The corners of a triangle, numbered as in [`Self::offer_one`], one after the other.
     #[inline(always)]
     pub fn corners(&self, id: u32) -> [f32; 9] {
-        let (block, lane) = (self.block(id / LANES as u32), id as usize % LANES);
+        let mut scratch = None;
+        let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
         let mut corners = [0.0; 9];
         for (corner, component) in corners.iter_mut().zip(&block.corners) {
             *corner = component[lane];
@@ -101,9 +90,9 @@ impl TriangleTree {
     /// A hit with a triangle, numbered as in [`Self::offer_one`].
     #[inline(always)]
     pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
-        let (block, lane) = (self.block(id / LANES as u32), id as usize % LANES);
-        let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
-        Hit { t, u, v, primitive: block.primitive[lane], geometry, instance }
+        let (part, primitive) = self.leaves.number(id);
+        let PartId { geometry, instance } = self.parts[part as usize];
+        Hit { t, u, v, primitive, geometry, instance }
     }
 
     #[inline]

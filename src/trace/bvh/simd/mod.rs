@@ -11,8 +11,9 @@ mod x86;
 
 pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
-pub(super) use x86::Avx2;
+pub(super) use x86::{Avx2, V8};
 
+use super::build::lanes::Boxes;
 use super::bundle::{PerRay, RAYS};
 
 /// An instruction set, as a family of vector types.
@@ -20,7 +21,7 @@ pub(super) trait Simd {
     /// Four f32.
     type V4: Vector + Array<4>;
     /// Eight f32.
-    type V8: Vector + Array<8>;
+    type V8: Vector + Array<8> + Boxes;
     /// As many f32 as one instruction takes.
     type Wide: Group;
     /// Four f64.

@@ -58,7 +58,7 @@ pub struct V4(__m128);
 
 /// Eight f32.
 #[derive(Clone, Copy)]
-pub struct V8(__m256);
+pub struct V8(pub __m256);
 
 /// Four f64.
 #[derive(Clone, Copy)]
