@@ -8,6 +8,7 @@ use super::block::{Block, LANES};
 use super::build::Record;
 use super::memory;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
+use super::simd::Simd;
 use crate::math::Vec3;
 use crate::trace::{Part, Primitives};
 
@@ -73,6 +74,15 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.block(index)),
+        }
+    }
+
+    /// Has a block loaded that will be needed soon.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, index: u32) {
+        match self {
+            Self::Blocks(blocks) => S::prefetch(&blocks[index as usize]),
+            Self::Numbers(numbers) => S::prefetch(&numbers.blocks[index as usize]),
         }
     }
 

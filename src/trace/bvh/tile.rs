@@ -233,7 +233,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     if child.count == 0 {
                         S::prefetch(tree.node(child.index));
                     } else {
-                        S::prefetch(self.tree.block(child.index));
+                        self.tree.prefetch::<S>(child.index);
                     }
                 }
             } else if self.visit::<S>(next) {

@@ -40,6 +40,12 @@ impl TriangleTree {
         self.leaves.block(index, scratch)
     }
 
+    /// Has a block loaded that will be needed soon.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, index: u32) {
+        self.leaves.prefetch::<S>(index);
+    }
+
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
