@@ -12,6 +12,7 @@
 use super::node::{Node, WIDTH};
 use super::query::Query;
 use super::simd::{Array, Group, Mask, Simd, Vector};
+use super::slab::load;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -262,11 +263,6 @@ impl Bundle {
 #[inline(always)]
 pub(super) const fn axes(axis: usize) -> [usize; 3] {
     [(axis + 1) % 3, (axis + 2) % 3, axis]
-}
-
-#[inline(always)]
-fn load<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
-    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }
 
 #[inline(always)]

@@ -23,13 +23,13 @@ mod build;
 mod bundle;
 mod edges;
 mod filter;
-mod inside;
 mod isa;
 mod leaves;
 mod memory;
 mod node;
 mod placements;
 mod preset;
+mod quad;
 mod query;
 mod shapes;
 mod simd;
@@ -52,7 +52,7 @@ use placements::PlacementTree;
 use query::{Closest, Occluded, Query};
 use shapes::ShapeTree;
 use simd::Simd;
-use slab::SlabRay;
+use slab::{SlabRay, SlabRays};
 use triangles::TriangleTree;
 use walk::{Stack, Visit};
 
@@ -90,6 +90,9 @@ struct Through<'a> {
     instance: u32,
     to_world: &'a Affine3,
 }
+
+/// Blur of a ray in an object's coordinates: rounding it moves it by as much again as the slab test itself may err.
+const PLACED: f32 = 4.0;
 
 impl Bvh {
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
@@ -147,18 +150,6 @@ impl Bvh {
         self.isa
     }
 
-    /// One ray, from the root: the nearest hit, or just any.
-    #[inline(always)]
-    fn trace<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
-        if !ray.is_valid() {
-            return None;
-        }
-        let mut nearest = Nearest::new(ray);
-        self.fixed.trace::<S, Q>(ray, ray, None, &mut stacks.level, &mut nearest);
-        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
-        nearest.hit()
-    }
-
     /// Placed objects for one ray.
     #[inline(always)]
     fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
@@ -167,7 +158,7 @@ impl Bvh {
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
         let Stacks { upper, level: lower } = stacks;
-        walk::single::<S>(
+        walk::single::<S, Q>(
             upper,
             self.placements.tree(),
             &slab,
@@ -179,7 +170,8 @@ impl Bvh {
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };
                         let level = &self.objects[placement.object as usize];
-                        level.trace::<S, Q>(ray, &object_ray, Some(through), lower, nearest);
+                        let slab = SlabRay::new(&object_ray, level.triangles.tree().reach(), PLACED);
+                        level.trace::<S, Q>(ray, &object_ray, &slab, Some(through), lower, nearest);
                     }
                 }
                 Visit::after::<Q>(nearest)
@@ -187,40 +179,51 @@ impl Bvh {
         );
     }
 
-    /// Many rays, one after the other.
+    /// Many rays, one after the other; made ready eight at a time.
     #[inline(always)]
-    fn trace_rays<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        for (ray, answer) in rays.iter().zip(answers) {
-            *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
+    fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
+        for (rays, answers) in rays.chunks(8).zip(answers.chunks_mut(8)) {
+            let mut eight = [rays[0]; 8];
+            eight[..rays.len()].copy_from_slice(rays);
+            let slabs = SlabRays::new::<S>(&eight, self.fixed.triangles.tree().reach());
+            for (i, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+                *answer = Q::MISS;
+                if let Some(slab) = slabs.get(i) {
+                    let mut nearest = Nearest::new(ray);
+                    self.fixed.trace::<S, Q>(ray, ray, &slab, None, &mut stacks.level, &mut nearest);
+                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                    *answer = Q::answer(nearest.hit());
+                }
+            }
         }
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
     #[inline(always)]
-    fn trace_bundles<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+    fn trace_bundles<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut scratch = tile::Scratch::new();
         let triangles = &self.fixed.triangles;
         let is_all = self.fixed.shapes.tree().is_empty() && self.placements.is_empty();
         for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
             let is_empty = triangles.tree().is_empty();
             let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
-            let all = u64::MAX >> (bundle::RAYS - rays.len());
-            if traced == all && is_all {
-                continue;
+            if !is_all {
+                for (k, (ray, answer)) in rays.iter().zip(&mut *answers).enumerate() {
+                    let mut nearest = Nearest::new(ray);
+                    if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
+                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                        *answer = Q::answer(nearest.hit());
+                    }
+                }
             }
-            for (k, (ray, answer)) in rays.iter().zip(answers).enumerate() {
-                if traced >> k & 1 == 0 {
-                    *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
-                    continue;
-                }
-                let mut nearest = Nearest::new(ray);
-                if !is_all && Q::resume(&mut nearest, scratch.t[k], *answer) {
-                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
-                    self.enter_placements::<S, Q>(ray, &mut stacks, &mut nearest);
-                    *answer = Q::answer(nearest.hit());
-                }
+            // The others, in runs.
+            let mut rest = !traced & u64::MAX >> (bundle::RAYS - rays.len());
+            while rest != 0 {
+                let first = rest.trailing_zeros() as usize;
+                let end = first + (rest >> first).trailing_ones() as usize;
+                self.trace_rays::<S, Q>(stacks, &rays[first..end], &mut answers[first..end]);
+                rest &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
         }
     }
@@ -245,10 +248,11 @@ impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { bvh, rays, answers, batch } = self;
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
         if batch.coherent {
-            bvh.trace_bundles::<S, Q>(rays, answers);
+            bvh.trace_bundles::<S, Q>(&mut stacks, rays, answers);
         } else {
-            bvh.trace_rays::<S, Q>(rays, answers);
+            bvh.trace_rays::<S, Q>(&mut stacks, rays, answers);
         }
     }
 }
@@ -266,25 +270,25 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
+    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded;
+    /// `slab` is that, made ready for the triangles.
     #[inline(always)]
     fn trace<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
         local: &Ray,
+        slab: &SlabRay,
         through: Option<Through<'_>>,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        // Rounding the local ray moves it by as much again as the slab test itself may err.
-        let blur = if through.is_some() { 4.0 } else { 1.0 };
+        let blur = if through.is_some() { PLACED } else { 1.0 };
         if !self.triangles.tree().is_empty() {
-            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
-            let filter = Filter::new(local, blur);
-            walk::single::<S>(
+            let filter = Filter::new(local, slab, blur);
+            walk::single::<S, Q>(
                 stack,
                 self.triangles.tree(),
-                &slab,
+                slab,
                 nearest.limit(),
                 #[inline(always)]
                 |first, count| {
@@ -308,7 +312,7 @@ impl Level {
         let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single::<S>(
+            walk::single::<S, Q>(
                 stack,
                 self.shapes.tree(),
                 &slab,

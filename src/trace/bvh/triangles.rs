@@ -6,7 +6,8 @@ use super::filter::Filter;
 use super::leaves::Leaves;
 use super::node::Tree;
 use super::preset::{Options, Preset};
-use super::simd::Simd;
+use super::quad::{Quad, Verdict};
+use super::simd::{Doubles, Simd};
 use super::{PartId, Through};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Placed};
@@ -65,13 +66,45 @@ impl TriangleTree {
         for index in first..first + u32::from(count) {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
-            let mut candidates = filter.candidates::<S>(block);
-            while candidates != 0 {
-                let lane = candidates.trailing_zeros() as usize;
-                candidates &= candidates - 1;
+            let mut open = filter.candidates::<S>(block, nearest.limit());
+            if open == 0 {
+                continue;
+            }
+            if through.is_none() {
+                open &= self.offer_block::<S>(block, open, ray, nearest);
+            }
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize % LANES;
+                open &= open - 1;
                 self.offer(block, lane, ray, through, nearest);
             }
         }
+    }
+
+    /// Offers what `ray` hits for sure of the triangles of a block that are bits of `candidates`. Bits are set in the
+    /// result for those that remain to be decided.
+    #[inline(always)]
+    fn offer_block<S: Simd>(&self, block: &Block, candidates: u32, ray: &Ray, nearest: &mut Nearest) -> u32 {
+        let splat = |x: f32| S::D4::splat(f64::from(x));
+        let (o, d) = (ray.origin, ray.direction);
+        let origin = [splat(o.x), splat(o.y), splat(o.z)];
+        let quad = Quad::new::<S>(origin, [splat(d.x), splat(d.y), splat(d.z)], &block.corners);
+        let Verdict { hit, open } = quad.verdict();
+        let mut hit = hit & candidates;
+        if hit != 0 {
+            let numbers = quad.numbers::<S>();
+            while hit != 0 {
+                let lane = hit.trailing_zeros() as usize % LANES;
+                hit &= hit - 1;
+                let (t, u, v) = (numbers.t32[lane], numbers.u[lane], numbers.v[lane]);
+                if ray.tmin <= t && t <= ray.tmax && t.is_finite() {
+                    let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
+                    let primitive = block.primitive[lane];
+                    nearest.offer(numbers.t[lane], Hit { t, u, v, primitive, geometry, instance });
+                }
+            }
+        }
+        open
     }
 
     /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.

@@ -86,7 +86,7 @@ pub(super) trait Group: Vector {
 /// Four values of f64.
 pub(super) trait Doubles: Copy {
     /// As many f32.
-    type F;
+    type F: Array<4>;
     fn splat(value: f64) -> Self;
     /// Exact.
     fn widen(values: Self::F) -> Self;
@@ -97,4 +97,9 @@ pub(super) trait Doubles: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Bit i is set where lane i of self is less than that of other; not for NaN.
+    fn less(self, other: Self) -> u32;
 }
