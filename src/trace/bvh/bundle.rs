@@ -9,6 +9,7 @@
 //! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
 //! asked of the rays as they were given.
 
+use super::filter::largest_axis;
 use super::node::{Node, WIDTH};
 use super::query::Query;
 use super::simd::{Array, Group, Mask, Simd, Vector};
@@ -174,14 +175,8 @@ impl Bundle {
     /// Everything that is derived from the directions.
     #[inline(always)]
     fn project<S: Simd>(&mut self) -> Fit {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.direction[axis].0[0].abs());
-        self.axis = if x > y && x > z {
-            0
-        } else if y > z {
-            1
-        } else {
-            2
-        };
+        let [x, y, z] = &self.direction;
+        self.axis = largest_axis(Vec3::new(x.0[0], y.0[0], z.0[0]).abs());
         let [p, q, along] = axes(self.axis);
         let splat = S::Wide::splat;
         let sign = splat(if self.is_turned { -1.0 } else { 1.0 });

@@ -23,6 +23,7 @@ mod build;
 mod bundle;
 mod edges;
 mod filter;
+mod found;
 mod isa;
 mod leaves;
 mod memory;
@@ -48,8 +49,10 @@ use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use filter::Filter;
+use found::{Found, NONE};
 use placements::PlacementTree;
-use query::{Closest, Occluded, Query};
+use quad::widen;
+use query::{Closest, Occluded, Query, SOMETHING};
 use shapes::ShapeTree;
 use simd::Simd;
 use slab::{SlabRay, SlabRays};
@@ -170,8 +173,7 @@ impl Bvh {
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };
                         let level = &self.objects[placement.object as usize];
-                        let slab = SlabRay::new(&object_ray, level.triangles.tree().reach(), PLACED);
-                        level.trace::<S, Q>(ray, &object_ray, &slab, Some(through), lower, nearest);
+                        level.trace_placed::<S, Q>(ray, &object_ray, through, lower, nearest);
                     }
                 }
                 Visit::after::<Q>(nearest)
@@ -179,23 +181,85 @@ impl Bvh {
         );
     }
 
-    /// Many rays, one after the other; made ready eight at a time.
+    /// Many rays, one after the other; made ready, and their hits computed, several at a time.
     #[inline(always)]
     fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
-        for (rays, answers) in rays.chunks(8).zip(answers.chunks_mut(8)) {
-            let mut eight = [rays[0]; 8];
-            eight[..rays.len()].copy_from_slice(rays);
-            let slabs = SlabRays::new::<S>(&eight, self.fixed.triangles.tree().reach());
-            for (i, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+        let triangles = &self.fixed.triangles;
+        let is_all = self.has_only_triangles();
+        // Rays, and the triangles that they hit for sure.
+        let (mut pending, mut ids, mut count) = ([0; 4], [NONE; 4], 0);
+        for first in (0..rays.len()).step_by(8) {
+            let some = &rays[first..rays.len().min(first + 8)];
+            let mut eight = [some[0]; 8];
+            eight[..some.len()].copy_from_slice(some);
+            let slabs = SlabRays::new::<S>(&eight, triangles.tree().reach());
+            for (i, ray) in some.iter().enumerate() {
+                let answer = &mut answers[first + i];
                 *answer = Q::MISS;
-                if let Some(slab) = slabs.get(i) {
-                    let mut nearest = Nearest::new(ray);
-                    self.fixed.trace::<S, Q>(ray, ray, &slab, None, &mut stacks.level, &mut nearest);
-                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
-                    *answer = Q::answer(nearest.hit());
+                let Some((slab, filter)) = slabs.get(i) else { continue };
+                let mut found = self.fixed.find::<S, Q>(ray, &slab, &filter, &mut stacks.level);
+                if found.noted != NONE && Q::ANY {
+                    *answer = Q::answer(Some(SOMETHING));
+                    continue;
                 }
+                if found.noted != NONE && is_all {
+                    (pending[count % 4], ids[count % 4]) = (first + i, found.noted);
+                    count += 1;
+                    if count == 4 {
+                        count = 0;
+                        self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+                    }
+                    continue;
+                }
+                found.compute(triangles, ray);
+                let mut nearest = found.nearest;
+                if !(is_all || Q::ANY && nearest.hit().is_some()) {
+                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                }
+                *answer = Q::answer(nearest.hit());
             }
         }
+        if count > 0 {
+            // The others are computed twice, or again.
+            for i in count..4 {
+                (pending[i], ids[i]) = (pending[0], ids[0]);
+            }
+            self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+        }
+    }
+
+    /// The hits of four rays, by number, with the triangles that are noted.
+    #[inline(always)]
+    fn compute_noted<S: Simd, Q: Query>(
+        &self,
+        pending: &[usize; 4],
+        ids: &[u32; 4],
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+    ) {
+        let [a, b, c, d] = pending.map(|i| &rays[i]);
+        let (oa, ob, oc, od) = (a.origin, b.origin, c.origin, d.origin);
+        let origin = [
+            widen::<S>(&[oa.x, ob.x, oc.x, od.x]),
+            widen::<S>(&[oa.y, ob.y, oc.y, od.y]),
+            widen::<S>(&[oa.z, ob.z, oc.z, od.z]),
+        ];
+        let (da, db, dc, dd) = (a.direction, b.direction, c.direction, d.direction);
+        let direction = [
+            widen::<S>(&[da.x, db.x, dc.x, dd.x]),
+            widen::<S>(&[da.y, db.y, dc.y, dd.y]),
+            widen::<S>(&[da.z, db.z, dc.z, dd.z]),
+        ];
+        let (_, hits) = self.fixed.triangles.hits::<S>(origin, direction, *ids);
+        for (i, hit) in pending.iter().zip(hits) {
+            answers[*i] = Q::answer(Some(hit));
+        }
+    }
+
+    /// Whether there are neither shapes nor placed objects.
+    fn has_only_triangles(&self) -> bool {
+        self.fixed.shapes.tree().is_empty() && self.placements.is_empty()
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
@@ -203,7 +267,7 @@ impl Bvh {
     fn trace_bundles<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut scratch = tile::Scratch::new();
         let triangles = &self.fixed.triangles;
-        let is_all = self.fixed.shapes.tree().is_empty() && self.placements.is_empty();
+        let is_all = self.has_only_triangles();
         for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
             let is_empty = triangles.tree().is_empty();
             let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
@@ -270,25 +334,45 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded;
-    /// `slab` is that, made ready for the triangles.
+    /// What `ray` hits among the triangles of this level, which is in the world; `slab` and `filter` are the ray, made
+    /// ready for them.
     #[inline(always)]
-    fn trace<S: Simd, Q: Query>(
-        &self,
-        ray: &Ray,
-        local: &Ray,
-        slab: &SlabRay,
-        through: Option<Through<'_>>,
-        stack: &mut Stack,
-        nearest: &mut Nearest,
-    ) {
-        let blur = if through.is_some() { PLACED } else { 1.0 };
+    fn find<S: Simd, Q: Query>(&self, ray: &Ray, slab: &SlabRay, filter: &Filter, stack: &mut Stack) -> Found {
+        let mut found = Found::new(ray);
         if !self.triangles.tree().is_empty() {
-            let filter = Filter::new(local, slab, blur);
             walk::single::<S, Q>(
                 stack,
                 self.triangles.tree(),
                 slab,
+                found.limit,
+                #[inline(always)]
+                |first, count| {
+                    self.triangles.find_leaf::<S, Q>(first, count, ray, filter, &mut found);
+                    if Q::ANY && found.is_hit() { Visit::Stop } else { Visit::Until(found.limit) }
+                },
+            );
+        }
+        found
+    }
+
+    /// Offers what `ray` hits in this level placed by `through`; `local` is the same ray in this level's coordinates,
+    /// rounded.
+    #[inline(always)]
+    fn trace_placed<S: Simd, Q: Query>(
+        &self,
+        ray: &Ray,
+        local: &Ray,
+        through: Through<'_>,
+        stack: &mut Stack,
+        nearest: &mut Nearest,
+    ) {
+        if !self.triangles.tree().is_empty() {
+            let slab = SlabRay::new(local, self.triangles.tree().reach(), PLACED);
+            let filter = Filter::new(local, PLACED);
+            walk::single::<S, Q>(
+                stack,
+                self.triangles.tree(),
+                &slab,
                 nearest.limit(),
                 #[inline(always)]
                 |first, count| {
@@ -297,7 +381,7 @@ impl Level {
                 },
             );
         }
-        self.trace_shapes::<S, Q>(local, through, blur, stack, nearest);
+        self.trace_shapes::<S, Q>(local, Some(through), PLACED, stack, nearest);
     }
 
     #[inline(always)]

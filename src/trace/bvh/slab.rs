@@ -10,6 +10,7 @@
 //! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. What still overflows turns into a pad that
 //! lets everything pass.
 
+use super::filter::{Filter, Filters};
 use super::node::{Node, WIDTH};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -65,12 +66,6 @@ impl SlabRay {
         slab
     }
 
-    /// 1 / direction, exactly rounded along the largest component.
-    #[inline(always)]
-    pub fn reciprocal(&self) -> &[f32; 3] {
-        &self.reciprocal
-    }
-
     /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each,
     /// not below 0.
     #[inline(always)]
@@ -96,6 +91,7 @@ pub(super) struct SlabRays {
     near_offset: [[f32; 8]; 3],
     far_offset: [[f32; 8]; 3],
     tmin: [f32; 8],
+    filters: Filters,
     /// A bit for each ray that [is valid](Ray::is_valid).
     valid: u32,
 }
@@ -124,7 +120,9 @@ impl SlabRays {
         let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
         let mut finite = zero;
         let empty = [[0.0; 8]; 3];
-        let mut slabs = Self { reciprocal: empty, near_offset: empty, far_offset: empty, tmin: [0.0; 8], valid: 0 };
+        let filters = Filters::new::<S>(origin, direction, tmin);
+        let mut slabs =
+            Self { reciprocal: empty, near_offset: empty, far_offset: empty, tmin: [0.0; 8], filters, valid: 0 };
         for axis in 0..3 {
             let d = direction[axis];
             finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
@@ -149,21 +147,22 @@ impl SlabRays {
         slabs
     }
 
-    /// One of them, if it is valid.
+    /// One of them, for nodes and for triangles, if it is valid.
     #[inline(always)]
-    pub fn get(&self, ray: usize) -> Option<SlabRay> {
+    pub fn get(&self, ray: usize) -> Option<(SlabRay, Filter)> {
         if self.valid >> ray & 1 == 0 {
             return None;
         }
         let side = |axis: usize| if self.reciprocal[axis][ray] < 0.0 { axis + 3 } else { axis };
         let of = |values: &[[f32; 8]; 3]| [values[0][ray], values[1][ray], values[2][ray]];
-        Some(SlabRay {
+        let slab = SlabRay {
             reciprocal: of(&self.reciprocal),
             near_offset: of(&self.near_offset),
             far_offset: of(&self.far_offset),
             near: [side(0), side(1), side(2)],
             tmin: self.tmin[ray],
-        })
+        };
+        Some((slab, self.filters.get(ray)))
     }
 }
 

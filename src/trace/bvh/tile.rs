@@ -10,7 +10,7 @@
 //!   of rays takes three scalar products.
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
-//!   and v of what was noted are computed four rays at a time ([`Quad`]), with the bits that a single ray would get.
+//!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`]), with the bits that a single ray would get.
 
 use std::marker::PhantomData;
 
@@ -18,17 +18,15 @@ use super::block::LANES;
 use super::build::MAX_DEPTH;
 use super::bundle::{Boxes, Bundle, BundleSlab, Fit, PerRay, RAYS, SLACK, TINY};
 use super::edges::Edges;
+use super::found::NONE;
 use super::node::WIDTH;
-use super::quad::{Quad, widen};
-use super::query::Query;
+use super::quad::widen;
+use super::query::{Query, SOMETHING};
 use super::simd::{Doubles, Group, Mask, Simd, Vector};
 use super::triangles::TriangleTree;
 use crate::math::Vec3;
-use crate::ray::{Hit, Ray};
+use crate::ray::Ray;
 use crate::trace::nearest::Nearest;
-
-/// No triangle is noted.
-const NONE: u32 = u32::MAX;
 
 /// Fewer rays than this are better traced one by one.
 const FEWEST: usize = 6;
@@ -442,30 +440,14 @@ fn answer_noted<S: Simd, Q: Query>(
     t: &mut [f64; 4],
     answers: &mut [Q::Answer; 4],
 ) {
-    let [a, b, c, d] = ids;
-    let corners = gather(tree.corners(a), tree.corners(b), tree.corners(c), tree.corners(d));
     let [x, y, z] = &bundle.direction;
     let lanes = |d: &PerRay| d.0.as_chunks().0[chunk];
     let direction = [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))];
     let [x, y, z] = bundle.origin;
     let origin = [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())];
-    let numbers = Quad::new::<S>(origin, direction, &corners).numbers::<S>();
-    *t = numbers.t;
-    for lane in 0..4 {
-        let hit = tree.hit(ids[lane], numbers.t32[lane], numbers.u[lane], numbers.v[lane]);
-        answers[lane] = Q::answer(Some(hit));
+    let (exact, hits) = tree.hits::<S>(origin, direction, ids);
+    *t = exact;
+    for (answer, hit) in answers.iter_mut().zip(hits) {
+        *answer = Q::answer(Some(hit));
     }
 }
-
-/// Component by component.
-#[inline(always)]
-fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; 4]; 9] {
-    let mut corners = [[0.0; 4]; 9];
-    for (i, corner) in corners.iter_mut().enumerate() {
-        *corner = [a[i], b[i], c[i], d[i]];
-    }
-    corners
-}
-
-/// That there is a hit, where nobody asks which.
-const SOMETHING: Hit = Hit { t: f32::NAN, u: f32::NAN, v: f32::NAN, primitive: 0, geometry: 0, instance: 0 };

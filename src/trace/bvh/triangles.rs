@@ -3,11 +3,13 @@
 use super::block::{Block, LANES};
 use super::build;
 use super::filter::Filter;
+use super::found::Found;
 use super::leaves::Leaves;
 use super::node::Tree;
 use super::preset::{Options, Preset};
-use super::quad::{Quad, Verdict};
-use super::simd::{Doubles, Simd};
+use super::quad::{Numbers, Quad};
+use super::query::Query;
+use super::simd::Simd;
 use super::{PartId, Through};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Placed};
@@ -52,7 +54,24 @@ impl TriangleTree {
         self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
     }
 
-    /// Offers what `ray` (in the world) hits in a leaf; `filter` is of the ray in this level's coordinates.
+    /// Takes what `ray`, in the world as this level is, may hit in a leaf; `filter` is the ray's.
+    #[inline(always)]
+    pub fn find_leaf<S: Simd, Q: Query>(&self, first: u32, count: u8, ray: &Ray, filter: &Filter, found: &mut Found) {
+        for index in first..first + u32::from(count) {
+            let mut scratch = None;
+            let block = self.block(index, &mut scratch);
+            let candidates = filter.candidates::<S>(block, found.limit);
+            if candidates.lanes != 0 {
+                found.offer::<Q>(self, index, block, &candidates, ray);
+                if Q::ANY && found.is_hit() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Offers what `ray`, in the world, hits in a leaf of a placed object; `filter` is of the ray in this level's
+    /// coordinates.
     #[inline(always)]
     pub fn offer_leaf<S: Simd>(
         &self,
@@ -60,51 +79,36 @@ impl TriangleTree {
         count: u8,
         ray: &Ray,
         filter: &Filter,
-        through: Option<Through<'_>>,
+        through: Through<'_>,
         nearest: &mut Nearest,
     ) {
         for index in first..first + u32::from(count) {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
-            let mut open = filter.candidates::<S>(block, nearest.limit());
-            if open == 0 {
-                continue;
-            }
-            if through.is_none() {
-                open &= self.offer_block::<S>(block, open, ray, nearest);
-            }
+            let mut open = filter.candidates::<S>(block, nearest.limit()).lanes;
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;
                 open &= open - 1;
-                self.offer(block, lane, ray, through, nearest);
+                self.offer(block, lane, ray, Some(through), nearest);
             }
         }
     }
 
-    /// Offers what `ray` hits for sure of the triangles of a block that are bits of `candidates`. Bits are set in the
-    /// result for those that remain to be decided.
+    /// The hits of four rays, each of which hits a triangle for sure, and t in f64; `ids` as in [`Self::offer_one`].
+    ///
+    /// The caller knows that f64 is precise enough for what [`triangle::intersect`] would answer.
     #[inline(always)]
-    fn offer_block<S: Simd>(&self, block: &Block, candidates: u32, ray: &Ray, nearest: &mut Nearest) -> u32 {
-        let splat = |x: f32| S::D4::splat(f64::from(x));
-        let (o, d) = (ray.origin, ray.direction);
-        let origin = [splat(o.x), splat(o.y), splat(o.z)];
-        let quad = Quad::new::<S>(origin, [splat(d.x), splat(d.y), splat(d.z)], &block.corners);
-        let Verdict { hit, open } = quad.verdict();
-        let mut hit = hit & candidates;
-        if hit != 0 {
-            let numbers = quad.numbers::<S>();
-            while hit != 0 {
-                let lane = hit.trailing_zeros() as usize % LANES;
-                hit &= hit - 1;
-                let (t, u, v) = (numbers.t32[lane], numbers.u[lane], numbers.v[lane]);
-                if ray.tmin <= t && t <= ray.tmax && t.is_finite() {
-                    let PartId { geometry, instance } = self.parts[block.part[lane] as usize];
-                    let primitive = block.primitive[lane];
-                    nearest.offer(numbers.t[lane], Hit { t, u, v, primitive, geometry, instance });
-                }
-            }
-        }
-        open
+    pub fn hits<S: Simd>(&self, origin: [S::D4; 3], direction: [S::D4; 3], ids: [u32; LANES]) -> ([f64; 4], [Hit; 4]) {
+        let [a, b, c, d] = ids;
+        let corners = gather(self.corners(a), self.corners(b), self.corners(c), self.corners(d));
+        let Numbers { t, t32, u, v } = Quad::new::<S>(origin, direction, &corners).numbers();
+        let hits = [
+            self.hit(a, t32[0], u[0], v[0]),
+            self.hit(b, t32[1], u[1], v[1]),
+            self.hit(c, t32[2], u[2], v[2]),
+            self.hit(d, t32[3], u[3], v[3]),
+        ];
+        (t, hits)
     }
 
     /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.
@@ -116,7 +120,7 @@ impl TriangleTree {
 
     /// The corners of a triangle, numbered as in [`Self::offer_one`], one after the other.
     #[inline(always)]
-    pub fn corners(&self, id: u32) -> [f32; 9] {
+    fn corners(&self, id: u32) -> [f32; 9] {
         let mut scratch = None;
         let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
         let mut corners = [0.0; 9];
@@ -128,14 +132,15 @@ impl TriangleTree {
 
     /// A hit with a triangle, numbered as in [`Self::offer_one`].
     #[inline(always)]
-    pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
+    fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
         let (part, primitive) = self.leaves.number(id);
         let PartId { geometry, instance } = self.parts[part as usize];
         Hit { t, u, v, primitive, geometry, instance }
     }
 
+    /// The same of lane `lane` of a block, which may be placed.
     #[inline]
-    fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         let corners = block.triangle(lane);
         let part = self.parts[block.part[lane] as usize];
         let (hit, instance) = match through {
@@ -148,4 +153,14 @@ impl TriangleTree {
             nearest.offer(hit.t, Hit { t, u, v, primitive, geometry, instance });
         }
     }
+}
+
+/// Component by component.
+#[inline(always)]
+fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; LANES]; 9] {
+    let mut corners = [[0.0; LANES]; 9];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = [a[i], b[i], c[i], d[i]];
+    }
+    corners
 }

@@ -97,9 +97,4 @@ pub(super) trait Doubles: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
-    fn max(self, other: Self) -> Self;
-    fn min(self, other: Self) -> Self;
-    fn abs(self) -> Self;
-    /// Bit i is set where lane i of self is less than that of other; not for NaN.
-    fn less(self, other: Self) -> u32;
 }

@@ -169,8 +169,6 @@ impl Doubles for [f64; 4] {
         sub: |a, b| a - b;
         mul: |a, b| a * b;
         div: |a, b| a / b;
-        max: |a, b| if a > b { a } else { b };
-        min: |a, b| if a < b { a } else { b };
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -187,17 +185,5 @@ impl Doubles for [f64; 4] {
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {
         self
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.map(f64::abs)
-    }
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        let mut bits = 0;
-        for i in 0..4 {
-            bits |= u32::from(self[i] < other[i]) << i;
-        }
-        bits
     }
 }

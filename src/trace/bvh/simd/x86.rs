@@ -270,8 +270,6 @@ impl Doubles for D4 {
         sub: _mm256_sub_pd;
         mul: _mm256_mul_pd;
         div: _mm256_div_pd;
-        max: _mm256_max_pd;
-        min: _mm256_min_pd;
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -290,13 +288,5 @@ impl Doubles for D4 {
         let mut values = [0.0; 4];
         unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) };
         values
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
-    }
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
 }
