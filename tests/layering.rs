@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The layers, from the bottom up. A module may use those in the layers below its own, and itself. `main` is the program.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["output"],
+    &["output", "memory"],
     &["math"],
     &["ray"],
     &["shape", "image"],
@@ -22,7 +22,8 @@ const LAYERS: &[&[&str]] = &[
 ];
 
 /// Files and folders that may say `unsafe`.
-const UNSAFE: &[&str] = &["trace/embree/", "trace/bvh/isa.rs", "trace/bvh/simd.rs", "image/oiio.rs", "io/mapped.rs"];
+const UNSAFE: &[&str] =
+    &["trace/embree/", "trace/bvh/isa.rs", "trace/bvh/simd.rs", "image/oiio.rs", "io/mapped.rs", "memory.rs"];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")

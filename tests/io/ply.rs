@@ -100,7 +100,7 @@ fn faults_are_told_with_their_place() {
     fault(truncated, &format!("byte {}", start + 4 * 12 + 13), "ends before its last element");
     let mut far = binary(false);
     far[start + 48 + 1] = 200;
-    fault(far, &format!("byte {}", start + 48 + 26), "index 200 is not one of the 4 vertices");
+    fault(far, &format!("byte {}", start + 48 + 13), "index 200 is not one of the 4 vertices");
     fault(ascii().replace("3 0 2 3", "3 0 2 4").into(), "line 16", "index 4");
     fault(ascii().replace("3 0 2 3", "3 0 2 -1").into(), "line 16", "index -1");
     fault(ascii().replace("3 0 2 3", "3 0 2").into(), "line 16", "ends before");

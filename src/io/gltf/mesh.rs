@@ -4,6 +4,9 @@
 //! read, so that sharing costs nothing.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
 
 use super::Document;
 use super::accessor::View;
@@ -55,6 +58,9 @@ pub(super) fn groups(
     Ok(groups)
 }
 
+/// Corners or vertices that are worth a task of their own.
+const TASK: usize = 1 << 14;
+
 fn read(
     document: &Document<'_>,
     materials: &mut Materials<'_>,
@@ -84,10 +90,10 @@ fn read(
     let uvs = attribute(&format!("TEXCOORD_{}", texture_set.unwrap_or(0)), &["VEC2"])?;
     let colors = attribute("COLOR_0", &["VEC3", "VEC4"])?;
 
-    let corners: Vec<u32> = match primitive.indices {
+    let mut triangles: Vec<[u32; 3]> = match primitive.indices {
         None => {
             document.spend(pointer, positions.count as u64 * 4)?;
-            (0..positions.count as u32).collect()
+            triangles(mode, &(0..positions.count as u32).collect::<Vec<_>>())
         }
         Some(index) => {
             let indices = view(index, &["SCALAR"])?;
@@ -96,48 +102,85 @@ fn read(
                 return Err(document.error(format!("/accessors/{index}/componentType"), message));
             }
             document.spend(pointer, indices.count as u64 * 4)?;
-            let corners: Vec<u32> = (0..indices.count).map(|i| indices.index(i)).collect();
-            if let Some(at) = corners.iter().position(|&i| i as usize >= positions.count) {
-                let message = format!("index {} (element {at}) is past the {} vertices", corners[at], positions.count);
+            let triangles = match mode {
+                4 => indices.triples(),
+                _ => triangles(mode, &(0..indices.count).map(|i| indices.index(i)).collect::<Vec<_>>()),
+            };
+            let is_past = |&i: &u32| i as usize >= positions.count;
+            let tasks = triangles.as_flattened().par_chunks(TASK);
+            if let Some(past) = tasks.find_map_first(|part| part.iter().copied().find(is_past)) {
+                // Looked for only now, since corners of strips and fans belong to several triangles.
+                let at = (0..indices.count).position(|i| is_past(&indices.index(i))).unwrap_or_default();
+                let message = format!("index {past} (element {at}) is past the {} vertices", positions.count);
                 return Err(document.error(format!("/accessors/{index}"), message));
             }
-            corners
+            triangles
         }
     };
-    let (used, corners) = compact(corners, positions.count);
-    // Positions 12, normals 12, uvs 8, colours 16, and up to 12 a corner for triangles.
-    document.spend(pointer, used.len() as u64 * 48 + corners.len() as u64 * 12)?;
-    let each = || used.iter().map(|&i| i as usize);
-    let normal = |v: &View<'_>, i| DVec3::from(v.floats::<3>(i).map(f64::from)).normalize_or_zero().as_vec3();
+    let used = compact(triangles.as_flattened_mut(), positions.count);
+    // Positions 12, normals 12, uvs 8, colours 16, and 12 a triangle.
+    let count = used.as_ref().map_or(positions.count, Vec::len);
+    document.spend(pointer, count as u64 * 48 + triangles.len() as u64 * 12)?;
+    let normal = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero().as_vec3();
     // glTF's v points down, ours up.
-    let uv = |v: &View<'_>, i| Vec2::from(v.floats::<2>(i)) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
-    let color = |v: &View<'_>, i| {
-        let color = Vec4::from(v.floats::<4>(i));
-        if v.components() == 3 { color.with_w(1.0) } else { color }
+    let uv = |uv: [f32; 2]| Vec2::from(uv) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
+    let color = |v: &View<'_>, color: [f32; 4]| {
+        if v.components() == 3 { Vec4::from(color).with_w(1.0) } else { Vec4::from(color) }
     };
     Ok(Mesh {
-        positions: Arc::new(each().map(|i| Vec3::from(positions.floats::<3>(i))).collect()),
-        normals: normals.map_or(Vec::new(), |v| each().map(|i| normal(&v, i)).collect()),
-        uvs: uvs.map_or(Vec::new(), |v| each().map(|i| uv(&v, i)).collect()),
-        colors: colors.map_or(Vec::new(), |v| each().map(|i| color(&v, i)).collect()),
-        triangles: Arc::new(triangles(mode, &corners)),
+        positions: Arc::new(match &used {
+            None => positions.vectors(Vec3::from),
+            Some(used) => pick(used, |i| Vec3::from(positions.floats::<3>(i))),
+        }),
+        normals: normals.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, normal),
+            Some(used) => pick(used, |i| normal(v.floats(i))),
+        }),
+        uvs: uvs.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, uv),
+            Some(used) => pick(used, |i| uv(v.floats(i))),
+        }),
+        colors: colors.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, |c| color(&v, c)),
+            Some(used) => pick(used, |i| color(&v, v.floats(i))),
+        }),
+        triangles: Arc::new(triangles),
         material,
         ..Mesh::default()
     })
 }
 
-/// The vertices that are used, in rising order, and the corners as indices into those.
-fn compact(mut corners: Vec<u32>, count: usize) -> (Vec<u32>, Vec<u32>) {
-    let mut used = corners.clone();
-    used.sort_unstable();
-    used.dedup();
-    if used.len() < count {
-        for corner in &mut corners {
+/// What becomes of the vertices with these indices.
+fn pick<T: Send>(used: &[u32], make: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    used.par_iter().with_min_len(TASK).map(|&i| make(i as usize)).collect()
+}
+
+/// The vertices that are used, in rising order, and makes the corners indices into those; none, and leaves the corners as
+/// they are, where all `count` vertices are used.
+fn compact(corners: &mut [u32], count: usize) -> Option<Vec<u32>> {
+    // A flag for each vertex costs no more than the corners do where there are no more vertices than corners; where
+    // there are, a small part of a shared list is used, and is sorted.
+    if corners.len() < count {
+        let mut used = corners.to_vec();
+        used.sort_unstable();
+        used.dedup();
+        for corner in corners {
             // Found always: `used` has every corner.
             *corner = used.partition_point(|&i| i < *corner) as u32;
         }
+        return Some(used);
     }
-    (used, corners)
+    let is_used: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
+    corners.par_chunks(TASK).flatten_iter().for_each(|&i| is_used[i as usize].store(true, Ordering::Relaxed));
+    let is_used: Vec<bool> = is_used.into_iter().map(AtomicBool::into_inner).collect();
+    if is_used.iter().all(|&is_used| is_used) {
+        return None;
+    }
+    let used: Vec<u32> = (0..).zip(&is_used).filter(|(_, is_used)| **is_used).map(|(i, _)| i).collect();
+    let mut numbers = vec![0; count];
+    used.iter().zip(0..).for_each(|(&i, number)| numbers[i as usize] = number);
+    corners.par_iter_mut().with_min_len(TASK).for_each(|corner| *corner = numbers[*corner as usize]);
+    Some(used)
 }
 
 /// Triangles of a list (4), a strip (5) or a fan (6); corners that do not complete one are dropped, as they are by
@@ -172,7 +215,9 @@ mod tests {
 
     #[test]
     fn unused_vertices_are_left_out() {
-        assert_eq!(compact(vec![7, 3, 7, 9], 10), (vec![3, 7, 9], vec![1, 0, 1, 2]));
-        assert_eq!(compact(vec![1, 0, 2], 3), (vec![0, 1, 2], vec![1, 0, 2]));
+        let compact = |mut corners: Vec<u32>, count| (super::compact(&mut corners, count), corners);
+        assert_eq!(compact(vec![7, 3, 7, 9], 10), (Some(vec![3, 7, 9]), vec![1, 0, 1, 2]));
+        assert_eq!(compact(vec![4, 1, 4, 2, 1], 5), (Some(vec![1, 2, 4]), vec![2, 0, 2, 1, 0]));
+        assert_eq!(compact(vec![1, 0, 2], 3), (None, vec![1, 0, 2]));
     }
 }
