@@ -8,7 +8,6 @@
 //! compare between stretches. That is divided by hash, so that again each part has a small table of its own. One table
 //! for all of 60 million corners misses the cache at nearly every look, and takes four times as long on one thread.
 
-use std::hash::{BuildHasher, BuildHasherDefault, Hasher};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -17,15 +16,37 @@ use rayon::prelude::*;
 use crate::memory;
 
 /// Items in a stretch.
-const STRETCH: usize = 1 << 16;
+const STRETCH: usize = 1 << 15;
 
 /// Parts that distinct keys are divided into, a power of two.
 const PARTS: usize = 256;
 
-/// A key of vertices: their bits.
-pub(crate) trait Key: Copy + Eq + std::hash::Hash + Send + Sync {}
+/// What tells vertices apart: the bits of their coordinates.
+pub(crate) trait Key: Copy + Eq + Send + Sync {
+    /// A number whose bits all depend on all bits of the key.
+    fn hash(&self) -> u64;
+}
 
-impl<K: Copy + Eq + std::hash::Hash + Send + Sync> Key for K {}
+impl Key for [u32; 3] {
+    fn hash(&self) -> u64 {
+        let [x, y, z] = *self;
+        mix(mix(u64::from(x) | u64::from(y) << 32) ^ u64::from(z))
+    }
+}
+
+impl Key for [u64; 3] {
+    fn hash(&self) -> u64 {
+        self.iter().fold(0, |hash, word| mix(hash ^ word))
+    }
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014, *Fast splittable pseudorandom number generators*).
+fn mix(word: u64) -> u64 {
+    let z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
 
 /// The distinct keys of `count` items of M keys each, numbered in the order of their first appearance; and the numbers
 /// of every item's keys. `keys` gives an item's keys, and `done` is told of items that will not be asked for again.
@@ -47,7 +68,8 @@ where
         .enumerate()
         .map(|(s, items)| {
             let range = s * STRETCH..s * STRETCH + items.len();
-            let mut table = Weld::new();
+            // Half as many vertices as triangles is the rule.
+            let mut table = Weld::with_slots((2 * items.len()).next_power_of_two());
             for (item, i) in items.iter_mut().zip(range.clone()) {
                 *item = keys(i).map(|key| table.index(key));
             }
@@ -64,7 +86,7 @@ where
         sum += stretch.keys.len() as u32;
     }
     // For each, the first that is equal; then its number.
-    let numbers: Vec<AtomicU32> = bytemuck::zeroed_vec::<u32>(sum as usize).into_iter().map(AtomicU32::new).collect();
+    let numbers: Vec<AtomicU32> = memory::zeroed::<u32>(sum as usize).into_iter().map(AtomicU32::new).collect();
     (0..PARTS).into_par_iter().for_each(|part| {
         let (mut table, mut firsts) = (Weld::new(), Vec::new());
         for (stretch, begin) in stretches.iter().zip(&begin) {
@@ -78,7 +100,7 @@ where
             }
         }
     });
-    let mut distinct = Vec::new();
+    let mut distinct = memory::with_capacity(sum as usize);
     let mut numbers: Vec<u32> = numbers.into_iter().map(AtomicU32::into_inner).collect();
     for (key, place) in stretches.iter().flat_map(|stretch| &stretch.keys).zip(0..) {
         let first = numbers[place];
@@ -90,6 +112,7 @@ where
             numbers[first as usize]
         };
     }
+    distinct.shrink_to_fit();
     items.par_chunks_mut(STRETCH).zip(&begin).for_each(|(items, begin)| {
         for number in items.as_flattened_mut() {
             *number = numbers[(begin + *number) as usize];
@@ -110,7 +133,7 @@ struct Stretch<K> {
 impl<K: Key> Stretch<K> {
     fn new(keys: Vec<K>) -> Self {
         // The table's slots are the hash's low bits.
-        let part = |key: &K| (hash(key) >> 32) as usize % PARTS;
+        let part = |key: &K| (key.hash() >> 32) as usize % PARTS;
         let mut ends = vec![0; PARTS + 1];
         keys.iter().for_each(|key| ends[part(key) + 1] += 1);
         for p in 1..=PARTS {
@@ -133,10 +156,6 @@ impl<K: Key> Stretch<K> {
     }
 }
 
-fn hash<K: std::hash::Hash>(key: &K) -> u64 {
-    BuildHasherDefault::<Mixer>::default().hash_one(key)
-}
-
 /// Distinct keys, numbered in the order of their first appearance.
 pub(crate) struct Weld<K> {
     keys: Vec<K>,
@@ -144,9 +163,14 @@ pub(crate) struct Weld<K> {
     slots: Vec<u32>,
 }
 
-impl<K: Copy + Eq + std::hash::Hash> Weld<K> {
+impl<K: Key> Weld<K> {
     pub(crate) fn new() -> Self {
-        Self { keys: Vec::new(), slots: vec![0; 64] }
+        Self::with_slots(64)
+    }
+
+    /// With a power of two of slots to begin with.
+    fn with_slots(slots: usize) -> Self {
+        Self { keys: Vec::new(), slots: vec![0; slots.max(64)] }
     }
 
     /// The number of `key`. There may be at most 2^32 - 2 keys, which callers ensure by the size of their input.
@@ -154,7 +178,7 @@ impl<K: Copy + Eq + std::hash::Hash> Weld<K> {
         if self.keys.len() * 2 >= self.slots.len() {
             self.grow();
         }
-        let slot = self.find(&key, hash(&key));
+        let slot = self.find(&key, key.hash());
         if self.slots[slot] == 0 {
             self.keys.push(key);
             self.slots[slot] = self.keys.len() as u32;
@@ -180,35 +204,9 @@ impl<K: Copy + Eq + std::hash::Hash> Weld<K> {
     fn grow(&mut self) {
         self.slots = vec![0; self.slots.len() * 2];
         for i in 0..self.keys.len() {
-            let slot = self.find(&self.keys[i], hash(&self.keys[i]));
+            let slot = self.find(&self.keys[i], self.keys[i].hash());
             self.slots[slot] = i as u32 + 1;
         }
-    }
-}
-
-/// Multiplies and folds, 64 bits at a time (Steele, Lea, Flood 2014, *Fast splittable pseudorandom number generators*:
-/// the constants of the finaliser).
-#[derive(Default)]
-struct Mixer(u64);
-
-impl Hasher for Mixer {
-    fn write(&mut self, bytes: &[u8]) {
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.write_u64(u64::from_le_bytes(word));
-        }
-    }
-
-    fn write_u64(&mut self, word: u64) {
-        let mut z = (self.0 ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        self.0 = z ^ (z >> 31);
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
     }
 }
 
@@ -236,7 +234,7 @@ mod tests {
     #[test]
     fn in_parallel_as_one_by_one() {
         // Neighbours that share, keys that come again far away, and stretches of unequal size.
-        let key = |i: usize| [(i / 3) as u32 % 70_001, (i % 5) as u32];
+        let key = |i: usize| [(i / 3) as u32 % 70_001, 7, (i % 5) as u32];
         for count in [0, 1, STRETCH - 1, 3 * STRETCH + 12_345] {
             let mut one = Weld::new();
             let expected: Vec<[u32; 3]> =
