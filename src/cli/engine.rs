@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use super::{interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::plan::BuildPreset;
 use crate::render::{Control, Counted, Renderer};
 use crate::trace::bvh::Bvh;
 use crate::trace::{Tracer, Width, World};
@@ -64,6 +65,8 @@ pub(super) struct Job<'a> {
     pub(super) pixels: u64,
     pub(super) cancel: &'a AtomicBool,
     pub(super) quiet: bool,
+    /// How well the native tree is worth building.
+    pub(super) build: BuildPreset,
 }
 
 /// What came of it.
@@ -90,6 +93,8 @@ impl Job<'_> {
     }
 
     fn native(&self) -> Result<(Bvh, Pass)> {
+        // To be handed to the builder, which has one preset so far.
+        let _preset = self.build;
         let build = || Ok(Bvh::build(self.world));
         self.pass(build, |_| "native (BVH)".to_owned(), Bvh::bytes)
     }
@@ -127,7 +132,11 @@ impl Job<'_> {
         bytes: impl FnOnce(&T) -> usize,
     ) -> Result<(T, Pass)> {
         let start = Instant::now();
-        let tracer = build()?;
+        // The time alone, until builders tell how many triangles they have placed.
+        let bar = progress::spinner("building", self.quiet);
+        let tracer = build();
+        bar.finish_and_clear();
+        let tracer = tracer?;
         let build_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use super::build::BuildArgs;
 use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
@@ -13,6 +14,7 @@ use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
 use crate::math::Vec3;
+use crate::plan::{BuildChoice, BuildPreset};
 use crate::render::{Renderer, Settings, TileOrder};
 use crate::scene::{Geometry, Scene};
 use crate::trace::{Batch, Primitives, Width, World};
@@ -73,6 +75,9 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "N")]
     packet: Option<Packet>,
 
+    #[command(flatten)]
+    build: BuildArgs,
+
     /// Order of the tiles; never changes a picture
     #[arg(long, value_enum, default_value_t)]
     tile_order: Order,
@@ -131,7 +136,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     pool.install(|| {
         let start = Instant::now();
-        let (scene, warnings) = args.scene.load()?;
+        let (scene, warnings) = args.scene.load_with_bar(args.quiet)?;
         warn(&warnings);
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
@@ -153,7 +158,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         interrupt::check()?;
 
         let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let job = Job { world: &world, renderer: &renderer, pixels, cancel, quiet: args.quiet };
+        let stored = stored_triangles(&world);
+        let build = args.build.choose(args.backend, stored, pixels * u64::from(args.spp), pixels, renderer.plan())?;
+        let job = Job {
+            world: &world,
+            renderer: &renderer,
+            pixels,
+            cancel,
+            quiet: args.quiet,
+            build: build.as_ref().map_or(BuildPreset::Default, |build| build.preset),
+        };
         let outcome = job.run(args.backend)?;
         let picture = &outcome.passes[0];
 
@@ -162,7 +176,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         outputs::write_pictures(&args.output, &picture.image, &metadata)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
-        let stored = stored_triangles(&world);
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
             triangles: placed_triangles(&scene),
@@ -180,7 +193,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            say(args.summary(&scene, &renderer, &camera_source, &stats))?;
+            say(args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats))?;
         }
         args.judge(&outcome, reference.as_ref())
     })
@@ -210,7 +223,14 @@ impl RenderArgs {
         }
     }
 
-    fn summary(&self, scene: &Scene, renderer: &Renderer, camera_source: &str, stats: &Stats) -> Summary {
+    fn summary(
+        &self,
+        scene: &Scene,
+        renderer: &Renderer,
+        camera_source: &str,
+        build: Option<&BuildChoice>,
+        stats: &Stats,
+    ) -> Summary {
         let mut summary = Summary::default();
         let parts = [
             counted(stats.triangles, "triangle", "triangles"),
@@ -220,6 +240,9 @@ impl RenderArgs {
         summary.line("scene", format_args!("{}: {}", stats.scene, parts.join(", ")));
         if self.verbose {
             summary.line("plan", renderer.plan());
+            if let Some(build) = build {
+                summary.line("build", format_args!("{}: {}", build.preset.name(), build.why));
+            }
         }
         summary.line("camera", camera_source);
         let [width, height] = stats.size;

@@ -87,9 +87,22 @@ pub const SUFFIXES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
 /// # Errors
 /// [`Error::Input`] for anything that is wrong with the file or with what it refers to.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, Vec<Warning>)> {
+    load_watched(path, options, None)
+}
+
+/// The same, and tells of the bytes of the file as they are read: their number, from any thread. Bytes may be skipped, or
+/// read more than once, so that the sum may differ from the file's length.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_watched(
+    path: &Path,
+    options: &LoadOptions,
+    on_bytes: Option<&(dyn Fn(u64) + Sync)>,
+) -> Result<(Scene, Vec<Warning>)> {
     let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
     // First, so that a directory, a missing or an empty file is called that, whatever its name.
-    let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(None);
+    let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(on_bytes);
     if file.is_empty() {
         return Err(Error::input(path, "", "is empty, where a scene is needed"));
     }

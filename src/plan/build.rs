@@ -1,0 +1,228 @@
+//! How well the tree is worth building: seconds spent on triangles against seconds won on rays, within the memory there
+//! is.
+//!
+//! The model is linear: a preset costs so much for every triangle and every ray, and the cheapest whose memory fits is
+//! taken. Finer models (depth, occlusion, coherence) would need what only the finished tree tells, and move the limits
+//! by less than machines differ.
+
+use std::fmt;
+
+/// Bytes that Embree holds for a triangle at most, while it builds and beside the mesh; measured on 20 million.
+pub const EMBREE_BYTES: u64 = 120;
+
+/// A way of building the native tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BuildPreset {
+    /// Soon ready, slower to trace.
+    Fast,
+    /// In between.
+    Default,
+    /// With spatial splits: slow to build, fastest to trace.
+    High,
+    /// A third of the memory, slower to trace.
+    Compact,
+}
+
+/// What decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildRequest {
+    /// Triangles as stored: those of an instanced mesh count once.
+    pub triangles: u64,
+    /// Rays that will be traced, at most.
+    pub rays: u64,
+    /// Bytes that the process holds before it builds, the meshes among them, and those it will need for the picture.
+    pub held: u64,
+    /// Bytes that it may hold at any time; none for no limit.
+    pub max_memory: Option<u64>,
+    /// The preset that was asked for; none to choose one.
+    pub wanted: Option<BuildPreset>,
+}
+
+/// What was decided.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BuildChoice {
+    /// How to build.
+    pub preset: BuildPreset,
+    /// An estimate of the most bytes the process will hold.
+    pub memory: u64,
+    /// Why, as half a sentence.
+    pub why: String,
+}
+
+/// No preset fits, or not the one that was asked for, or what was not chosen at all does not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotEnoughMemory {
+    /// The preset that needs least, or was asked for; none where nothing was to be chosen.
+    pub preset: Option<BuildPreset>,
+    /// Bytes it would need.
+    pub needed: u64,
+    /// Bytes there may be.
+    pub limit: u64,
+}
+
+/// What a preset costs.
+struct Cost {
+    /// Nanoseconds to build a triangle, one thread.
+    build: f64,
+    /// Nanoseconds to trace a ray, one thread; a mixture of camera and shadow rays on a large mesh.
+    ray: f64,
+    /// Bytes a triangle of the finished tree.
+    tree: u64,
+    /// Bytes a triangle beside the tree while it is built.
+    building: u64,
+}
+
+impl BuildPreset {
+    /// All of them, the better known first.
+    pub const ALL: [Self; 4] = [Self::Default, Self::Fast, Self::High, Self::Compact];
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Default => "default",
+            Self::High => "high",
+            Self::Compact => "compact",
+        }
+    }
+
+    /// The differences decide: `Fast` pays below 4 rays a triangle, `High` above 73.
+    const fn cost(self) -> Cost {
+        match self {
+            Self::Fast => Cost { build: 120.0, ray: 250.0, tree: 63, building: 32 },
+            Self::Default => Cost { build: 320.0, ray: 200.0, tree: 63, building: 32 },
+            // A third more references.
+            Self::High => Cost { build: 2500.0, ray: 170.0, tree: 84, building: 43 },
+            // Chosen for its memory alone.
+            Self::Compact => Cost { build: 400.0, ray: 300.0, tree: 22, building: 32 },
+        }
+    }
+
+    /// Bytes that the process will hold at most.
+    fn memory(self, request: &BuildRequest) -> u64 {
+        let Cost { tree, building, .. } = self.cost();
+        request.held.saturating_add(request.triangles.saturating_mul(tree + building))
+    }
+
+    fn nanoseconds(self, request: &BuildRequest) -> f64 {
+        let Cost { build, ray, .. } = self.cost();
+        build * request.triangles as f64 + ray * request.rays as f64
+    }
+}
+
+impl BuildRequest {
+    /// Whether what is held anyway fits.
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] where it does not.
+    pub fn fits(&self) -> Result<(), NotEnoughMemory> {
+        let (needed, limit) = (self.held, self.max_memory.unwrap_or(u64::MAX));
+        if needed <= limit { Ok(()) } else { Err(NotEnoughMemory { preset: None, needed, limit }) }
+    }
+
+    /// Chooses a preset.
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] where none fits within `max_memory`, or not the one that is wanted.
+    pub fn choose(&self) -> Result<BuildChoice, NotEnoughMemory> {
+        let limit = self.max_memory.unwrap_or(u64::MAX);
+        let allowed = |preset: &BuildPreset| self.wanted.is_none_or(|wanted| wanted == *preset);
+        let cheaper = |a: &BuildPreset, b: &BuildPreset| a.nanoseconds(self).total_cmp(&b.nanoseconds(self));
+        let candidates = || BuildPreset::ALL.into_iter().filter(allowed);
+        let Some(preset) = candidates().filter(|preset| preset.memory(self) <= limit).min_by(cheaper) else {
+            let least = candidates().min_by_key(|preset| preset.memory(self)).unwrap_or(BuildPreset::Compact);
+            return Err(NotEnoughMemory { preset: Some(least), needed: least.memory(self), limit });
+        };
+        let unlimited = candidates().min_by(cheaper).unwrap_or(preset);
+        let why = if self.wanted.is_some() {
+            "asked for".to_owned()
+        } else if preset != unlimited {
+            format!("{} would take more memory than there may be", unlimited.name())
+        } else {
+            let rays = self.rays as f64 / self.triangles.max(1) as f64;
+            let judged = match preset {
+                BuildPreset::Fast => "too few to pay for a better tree",
+                BuildPreset::Default | BuildPreset::Compact => "enough for a good tree, too few for the best",
+                BuildPreset::High => "enough to pay for the best tree",
+            };
+            format!("{rays:.1} rays a triangle are {judged}")
+        };
+        Ok(BuildChoice { preset, memory: preset.memory(self), why })
+    }
+}
+
+impl fmt::Display for NotEnoughMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mega = |bytes: u64| bytes.div_ceil(1 << 20);
+        let Self { preset, needed, limit } = self;
+        let (needed, limit) = (mega(*needed), limit >> 20);
+        match preset {
+            Some(preset) => write!(f, "its {} build", preset.name())?,
+            None => write!(f, "its build")?,
+        }
+        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
+        match preset {
+            Some(BuildPreset::Compact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
+            Some(_) => {
+                write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
+            }
+            None => write!(f, "give at least --max-memory {needed}M, or use --backend native, which may need less"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MESH: BuildRequest =
+        BuildRequest { triangles: 1_000_000, rays: 0, held: 500 << 20, max_memory: None, wanted: None };
+
+    fn preset(rays: u64, max_memory: Option<u64>) -> Option<BuildPreset> {
+        BuildRequest { rays, max_memory, ..MESH }.choose().ok().map(|choice| choice.preset)
+    }
+
+    #[test]
+    fn rays_pay_for_triangles() {
+        use BuildPreset::{Default, Fast, High};
+        // The limits follow from the costs: (320 - 120) / (250 - 200) and (2500 - 320) / (200 - 170).
+        let millions = [(0, Fast), (3, Fast), (5, Default), (72, Default), (73, High), (10_000, High)];
+        for (rays, expected) in millions {
+            assert_eq!(preset(rays * 1_000_000, None), Some(expected), "{rays}");
+        }
+        assert_eq!(BuildRequest { triangles: 0, ..MESH }.choose().map(|c| c.preset), Ok(Default));
+        assert_eq!(BuildRequest { triangles: u64::MAX, ..MESH }.choose().map(|c| c.preset), Ok(Fast));
+    }
+
+    #[test]
+    fn memory_comes_first() {
+        use BuildPreset::{Compact, Default, Fast, High};
+        let held = MESH.held;
+        let many = 1_000_000_000;
+        let at = |rays, bytes: u64| preset(rays, Some(held + bytes * MESH.triangles));
+        assert_eq!(
+            [at(many, 127), at(many, 126), at(many, 95), at(many, 94)],
+            [High, Default, Default, Compact].map(Some)
+        );
+        assert_eq!([at(0, 95), at(0, 94), at(0, 54), at(0, 53)], [Some(Fast), Some(Compact), Some(Compact), None]);
+        let error = BuildRequest { max_memory: Some(held), ..MESH }.choose().unwrap_err();
+        assert_eq!(error, NotEnoughMemory { preset: Some(Compact), needed: held + 54_000_000, limit: held });
+        let error = BuildRequest { max_memory: Some(held - 1), ..MESH }.fits().unwrap_err();
+        assert_eq!((error.needed, MESH.fits()), (held, Ok(())));
+        // What the message asks for is enough.
+        let text = BuildRequest { max_memory: Some(held), ..MESH }.choose().unwrap_err().to_string();
+        assert!(text.contains("limit of 500 MiB") && text.contains("--max-memory 552M"), "{text}");
+        assert!(preset(0, Some(552 << 20)).is_some() && preset(0, Some(551 << 20)).is_none());
+    }
+
+    #[test]
+    fn a_wish_is_kept_or_refused() {
+        for wanted in BuildPreset::ALL {
+            let request = BuildRequest { wanted: Some(wanted), rays: 1 << 30, ..MESH };
+            let choice = request.choose().unwrap();
+            assert_eq!((choice.preset, choice.why.as_str()), (wanted, "asked for"));
+            let error = BuildRequest { max_memory: Some(choice.memory - 1), ..request }.choose().unwrap_err();
+            assert_eq!((error.preset, error.needed), (Some(wanted), choice.memory));
+        }
+    }
+}
