@@ -6,6 +6,7 @@
 //! normals on request, axes and units, and a last check of the whole scene.
 
 mod check;
+mod compact;
 mod gltf;
 mod mapped;
 mod obj;

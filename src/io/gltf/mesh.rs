@@ -4,7 +4,6 @@
 //! read, so that sharing costs nothing.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
@@ -13,6 +12,7 @@ use super::accessor::View;
 use super::material::Materials;
 use super::schema::Primitive;
 use crate::error::{Result, Warning};
+use crate::io::compact::{compact, pick};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Geometry, Group, Mesh, Scene};
 
@@ -150,39 +150,6 @@ fn read(
     })
 }
 
-/// What becomes of the vertices with these indices.
-fn pick<T: Send>(used: &[u32], make: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    used.par_iter().with_min_len(TASK).map(|&i| make(i as usize)).collect()
-}
-
-/// The vertices that are used, in rising order, and makes the corners indices into those; none, and leaves the corners as
-/// they are, where all `count` vertices are used.
-fn compact(corners: &mut [u32], count: usize) -> Option<Vec<u32>> {
-    // A flag for each vertex costs no more than the corners do where there are no more vertices than corners; where
-    // there are, a small part of a shared list is used, and is sorted.
-    if corners.len() < count {
-        let mut used = corners.to_vec();
-        used.sort_unstable();
-        used.dedup();
-        for corner in corners {
-            // Found always: `used` has every corner.
-            *corner = used.partition_point(|&i| i < *corner) as u32;
-        }
-        return Some(used);
-    }
-    let is_used: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
-    corners.par_chunks(TASK).flatten_iter().for_each(|&i| is_used[i as usize].store(true, Ordering::Relaxed));
-    let is_used: Vec<bool> = is_used.into_iter().map(AtomicBool::into_inner).collect();
-    if is_used.iter().all(|&is_used| is_used) {
-        return None;
-    }
-    let used: Vec<u32> = (0..).zip(&is_used).filter(|(_, is_used)| **is_used).map(|(i, _)| i).collect();
-    let mut numbers = vec![0; count];
-    used.iter().zip(0..).for_each(|(&i, number)| numbers[i as usize] = number);
-    corners.par_iter_mut().with_min_len(TASK).for_each(|corner| *corner = numbers[*corner as usize]);
-    Some(used)
-}
-
 /// Triangles of a list (4), a strip (5) or a fan (6); corners that do not complete one are dropped, as they are by
 /// graphics hardware.
 fn triangles(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
@@ -211,13 +178,5 @@ mod tests {
         assert_eq!(triangles(5, &[0, 1, 2, 3, 4]), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
         assert_eq!(triangles(6, &[9, 1, 2, 3]), [[1, 2, 9], [2, 3, 9]]);
         assert!([4, 5, 6].iter().all(|&mode| triangles(mode, &[]).is_empty() && triangles(mode, &[1, 2]).is_empty()));
-    }
-
-    #[test]
-    fn unused_vertices_are_left_out() {
-        let compact = |mut corners: Vec<u32>, count| (super::compact(&mut corners, count), corners);
-        assert_eq!(compact(vec![7, 3, 7, 9], 10), (Some(vec![3, 7, 9]), vec![1, 0, 1, 2]));
-        assert_eq!(compact(vec![4, 1, 4, 2, 1], 5), (Some(vec![1, 2, 4]), vec![2, 0, 2, 1, 0]));
-        assert_eq!(compact(vec![1, 0, 2], 3), (None, vec![1, 0, 2]));
     }
 }
