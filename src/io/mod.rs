@@ -121,6 +121,7 @@ pub fn load_watched(
     drop(file);
     scene.transform(&options.transform());
     check::check(&scene).map_err(|message| Error::input(path, "", message))?;
+    scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
             options.normals.apply(mesh);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, DAabb, DAffine3, DVec3, Vec2, Vec3, Vec4, is_traceable};
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, is_traceable};
 
 /// Vertices or triangles that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -68,6 +68,16 @@ impl Mesh {
             return DAabb::EMPTY;
         }
         DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
+    }
+
+    /// Turns positions and normals, in place where nothing else holds them.
+    pub(crate) fn turn(&mut self, turn: &DMat3) {
+        self.origin = *turn * self.origin;
+        let turn = turn.as_mat3();
+        // Adding 0 makes one zero of the two.
+        let apply = |v: &mut Vec3| *v = turn * *v + Vec3::ZERO;
+        Arc::make_mut(&mut self.positions).par_iter_mut().with_min_len(TASK).for_each(apply);
+        self.normals.par_iter_mut().with_min_len(TASK).for_each(apply);
     }
 
     /// How many triangles have a corner that is NaN, infinite or too large to trace.
