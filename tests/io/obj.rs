@@ -259,9 +259,10 @@ fn large_files_are_read_as_small_ones() {
         };
         patches.iter().cloned().flatten().flat_map(patch).collect()
     };
-    let ranges = [&[0..1000][..], &[1000..30_000, 45_000..PATCHES], &[30_000..45_000]];
+    let empty = PATCHES..PATCHES;
+    let ranges = [[0..1000, empty.clone()], [1000..30_000, 45_000..PATCHES], [30_000..45_000, empty]];
     for (mesh, ranges) in meshes.iter().zip(ranges) {
-        assert!(corners(mesh) == expected(ranges), "{}", mesh.name);
+        assert!(corners(mesh) == expected(&ranges), "{}", mesh.name);
         // Every second corner of a patch is red.
         for (position, color) in mesh.positions.iter().zip(&mesh.colors) {
             let is_red = (position.y, position.z) == (1.0, 0.0);

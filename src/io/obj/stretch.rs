@@ -57,7 +57,7 @@ pub(super) fn begins(stretches: &[&[u8]]) -> (Vec<Begin>, [usize; 3]) {
 fn count(text: &[u8]) -> Begin {
     let mut counts = [0; 3];
     let mut lines = Lines::new(text);
-    while let Some((line, text)) = lines.next() {
+    for (line, text) in lines.by_ref() {
         match Words::new(&text, line).next() {
             Some(b"v") => counts[0] += 1,
             Some(b"vt") => counts[1] += 1,
