@@ -13,10 +13,10 @@ use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_me
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::plan::{BuildChoice, BuildPreset};
 use crate::render::{Renderer, Settings, TileOrder};
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Light, Scene};
 use crate::trace::{Batch, Primitives, Width, World};
 
 /// Render a scene
@@ -86,6 +86,10 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
     background: Option<Vec3>,
 
+    /// Light with hard shadows that comes from this direction, in place of the scene's lights
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
+    sun: Option<DVec3>,
+
     /// Say more: plan, rays, memory
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
@@ -136,8 +140,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     pool.install(|| {
         let start = Instant::now();
-        let (scene, warnings) = args.scene.load_with_bar(args.quiet)?;
+        let (mut scene, warnings) = args.scene.load_with_bar(args.quiet)?;
         warn(&warnings);
+        if let Some(sun) = args.sun {
+            scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];
+        }
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
@@ -327,6 +334,12 @@ fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
 
 pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
     text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
+}
+
+/// As a unit vector.
+fn parse_direction(text: &str) -> std::result::Result<DVec3, String> {
+    let direction = parse_vector(text)?.try_normalize();
+    direction.ok_or_else(|| "expected a direction, which is not zero".to_owned())
 }
 
 fn parse_color(text: &str) -> std::result::Result<Vec3, String> {

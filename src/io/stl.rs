@@ -17,6 +17,8 @@ use crate::scene::{Geometry, Material, Mesh, Scene};
 
 const HEADER: usize = 84;
 const FACET: usize = 50;
+/// Facets of a text until the file is told that they have been read.
+const TELL: usize = 1 << 14;
 
 /// Reads an STL file.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
@@ -76,7 +78,9 @@ fn vectors(bits: Vec<[u32; 3]>) -> Vec<Vec3> {
     bits.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
 }
 
-fn text(path: &Path, bytes: &[u8]) -> Result<Mesh> {
+fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
+    let bytes: &[u8] = file;
+    let mut told = 0;
     let mut words = Words::new(bytes, 1);
     let mut weld = Weld::new();
     let mut triangles = Vec::new();
@@ -111,6 +115,11 @@ fn text(path: &Path, bytes: &[u8]) -> Result<Mesh> {
                 expect(path, &mut words, "endloop")?;
                 expect(path, &mut words, "endfacet")?;
                 triangles.push(triangle);
+                if triangles.len() % TELL == 0 {
+                    let read = bytes.len() - words.remaining();
+                    file.done(&bytes[told..read]);
+                    told = read;
+                }
             }
             _ => return Err(unexpected(path, &words, Some(word), "facet, solid or endsolid")),
         }

@@ -14,12 +14,14 @@ use crate::math::Vec3;
 pub(super) struct Binary<'a, const BIG: bool> {
     file: &'a Mapped<'a>,
     rest: &'a [u8],
+    /// Bytes that are left beyond those that the file has been told of.
+    untold: usize,
 }
 
 impl<'a, const BIG: bool> Binary<'a, BIG> {
     /// The body, which begins at the given byte of the file.
     pub(super) fn new(file: &'a Mapped<'a>, begin: usize) -> Self {
-        Self { file, rest: &file[begin..] }
+        Self { file, rest: &file[begin..], untold: file.len() - begin }
     }
 
     /// The next `count` records of `stride` bytes, of which bytes from `offset` on are wanted.
@@ -27,6 +29,12 @@ impl<'a, const BIG: bool> Binary<'a, BIG> {
         // Beyond the last record there is nothing to read, be there room or not.
         let bytes = self.rest.get(offset..).unwrap_or_default();
         Records { file: Some(self.file), bytes, count, stride }
+    }
+
+    /// Goes on behind records that were read at once, and that the file knows of.
+    fn skip(&mut self, bytes: usize) {
+        self.rest = &self.rest[bytes..];
+        self.untold = self.rest.len();
     }
 
     /// Makes something of every one of the next `count` records, whose fields have these types and offsets.
@@ -77,6 +85,12 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
         self.rest.len()
     }
 
+    fn tell(&mut self) {
+        let [from, to] = [self.untold, self.rest.len()].map(|left| self.file.len() - left);
+        self.file.done(&self.file[from..to]);
+        self.untold = self.rest.len();
+    }
+
     fn least_size(&self, element: &Element) -> usize {
         element.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum()
     }
@@ -120,7 +134,7 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
             uvs: layout.uv.map_or(Vec::new(), uv),
             colors: layout.rgb.map_or(Vec::new(), color),
         };
-        self.rest = &self.rest[count * stride..];
+        self.skip(count * stride);
         Some(vertices)
     }
 
@@ -144,7 +158,7 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
             triangle.iter().all(|&i| (i as usize) < vertices).then_some(triangle)
         };
         let triangles = self.records(count, stride, offset).read_while(triangle);
-        self.rest = &self.rest[triangles.len() * stride..];
+        self.skip(triangles.len() * stride);
         triangles
     }
 }

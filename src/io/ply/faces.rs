@@ -2,7 +2,7 @@
 
 use super::header::Element;
 use super::vertices::Positions;
-use super::{Items, read_list};
+use super::{Items, TELL, read_list};
 use crate::io::{Placeless, polygon};
 
 /// The face and tristrips elements.
@@ -19,11 +19,14 @@ impl Faces {
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
         self.triangles = items.triangles(element, positions.len());
-        let mut corners = Vec::new();
+        let (mut values, mut corners) = (Vec::new(), Vec::new());
         let (mut around, mut parts) = (Vec::new(), Vec::new());
-        for _ in self.triangles.len()..count {
-            read_list(element, items, list, &mut corners)?;
-            let corners = whole(&corners, positions.len())?;
+        for i in self.triangles.len()..count {
+            if i % TELL == 0 {
+                items.tell();
+            }
+            read_list(element, items, list, &mut values)?;
+            whole(&values, positions.len(), &mut corners)?;
             match corners[..] {
                 [a, b, c] => self.triangles.push([a, b, c]),
                 [_, _, _, _, ..] => {
@@ -48,11 +51,11 @@ impl Faces {
         positions: &Positions,
     ) -> Placeless<()> {
         let list = indices(element)?;
-        let mut values = Vec::new();
+        let (mut values, mut strip) = (Vec::new(), Vec::new());
         for _ in 0..element.count {
             read_list(element, items, list, &mut values)?;
-            for strip in values.split(|&i| i == -1.0) {
-                let strip = whole(strip, positions.len())?;
+            for part in values.split(|&i| i == -1.0) {
+                whole(part, positions.len(), &mut strip)?;
                 self.triangles.extend(strip.windows(3).enumerate().filter_map(|(k, w)| {
                     // Every other triangle turns the other way; strips are stitched with triangles without area.
                     let triangle = if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
@@ -71,13 +74,17 @@ pub(super) fn indices(element: &Element) -> Placeless<usize> {
     index.ok_or_else(|| format!("element {} needs the list property {}", element.name, names[0]))
 }
 
-/// Values as indices of vertices.
-fn whole(values: &[f64], count: usize) -> Placeless<Vec<u32>> {
-    let index = |&value: &f64| {
+/// Values as indices of vertices, in place of what `indices` held.
+fn whole(values: &[f64], count: usize, indices: &mut Vec<u32>) -> Placeless<()> {
+    indices.clear();
+    for &value in values {
         let inside = value >= 0.0 && value < count as f64 && value < f64::from(u32::MAX) && value.fract() == 0.0;
-        if inside { Ok(value as u32) } else { Err(past(value, count)) }
-    };
-    values.iter().map(index).collect()
+        if !inside {
+            return Err(past(value, count));
+        }
+        indices.push(value as u32);
+    }
+    Ok(())
 }
 
 fn past(index: f64, count: usize) -> String {

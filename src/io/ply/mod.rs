@@ -26,6 +26,9 @@ use crate::io::mapped::Mapped;
 use crate::math::Vec3;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 
+/// Items that are read one by one until the file is told.
+const TELL: usize = 1 << 16;
+
 /// Where elements come from: the rest of the file, in either encoding.
 trait Items {
     /// Where reading is, for messages: `byte 80` or `line 12`.
@@ -34,6 +37,8 @@ trait Items {
     fn remaining(&self) -> usize;
     /// The fewest bytes that an item of this element takes.
     fn least_size(&self, element: &Element) -> usize;
+    /// Tells the file how far reading is; called every [`TELL`] items.
+    fn tell(&mut self);
     /// The next value.
     fn scalar(&mut self, scalar: Scalar) -> Placeless<f64>;
     /// All vertices at once where they are records of one size. There is room for all of them.
@@ -52,7 +57,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     let header = header::parse(path, file)?;
     let begin = header.length;
     let mesh = match header.encoding {
-        Encoding::Ascii => read(path, &header, ascii::Ascii::new(&file[begin..], header.lines + 1), warnings)?,
+        Encoding::Ascii => read(path, &header, ascii::Ascii::new(file, begin, header.lines + 1), warnings)?,
         Encoding::Little => read(path, &header, binary::Binary::<false>::new(file, begin), warnings)?,
         Encoding::Big => read(path, &header, binary::Binary::<true>::new(file, begin), warnings)?,
     };

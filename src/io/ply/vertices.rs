@@ -1,7 +1,7 @@
 //! The element vertex: positions, and what else a mesh has at its vertices.
 
 use super::header::{Element, Scalar};
-use super::{Items, read_item};
+use super::{Items, TELL, read_item};
 use crate::image::srgb;
 use crate::io::Placeless;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
@@ -127,9 +127,12 @@ impl Vertices {
         }
         vertices.reserve(element.count as usize, &layout);
         let mut values = vec![0.0; element.properties.len()];
-        for _ in 0..element.count {
+        for i in 0..element.count as usize {
             read_item(element, items, |_| false, |index, value| values[index] = value)?;
             vertices.push(&layout, |index| values[index]);
+            if i % TELL == 0 {
+                items.tell();
+            }
         }
         Ok(vertices)
     }
