@@ -6,7 +6,7 @@
 //! [`weld`] does the same for many vertices at once, in parallel and with the same result: each stretch of the input has
 //! a table of its own, small enough for the cache, and since neighbours share most of their vertices little is left to
 //! compare between stretches. That is divided by hash, so that again each part has a small table of its own. One table
-//! for all of 60 million corners misses the cache at nearly every look, and takes four times as long on one thread.
+//! for all of 60 million corners misses the cache at most looks: it took 1.8 times the processor time, on one thread.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
