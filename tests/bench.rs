@@ -4,7 +4,7 @@ use std::path::Path;
 
 use twincast::io::UpAxis;
 use twincast::lab::bench::{Built, Contender, Kind, SIDE, Setup, Subject};
-use twincast::trace::bvh::{Bvh, Isa};
+use twincast::trace::bvh::{Bvh, Isa, Options};
 use twincast::{Batch, Error, Hit, Ray, Tracer, World};
 
 /// How many rays of each kind hit something.
@@ -100,8 +100,8 @@ fn contender(
     bend: impl Fn(&Ray, Option<Hit>, Batch) -> Option<Hit> + Copy + Send + Sync + 'static,
 ) -> Contender {
     let build = move |world: &World| {
-        let bvh = Bvh::build_for(world, Isa::Portable);
-        Ok(Built { seconds: 0.5, bytes: 8000, tracer: Box::new(Bent(bvh, bend)) })
+        let bvh = Bvh::build_with(world, Options { isa: Isa::Portable, ..Options::default() });
+        Ok(Built { seconds: 0.5, bytes: 8000, sah_cost: None, tracer: Box::new(Bent(bvh, bend)) })
     };
     Contender { backend, mode, build: Box::new(build) }
 }

@@ -3,12 +3,12 @@
 use twincast::math::Vec3;
 use twincast::scene::{Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Isa};
+use twincast::trace::bvh::{Bvh, Isa, Options, Preset};
 use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 
 use crate::scenes::{self, Random};
 
-/// Closest hits by single rays and packets, with every instruction set, and occlusion, against brute force.
+/// Closest hits by single rays and packets, with every preset and instruction set, and occlusion, against brute force.
 #[track_caller]
 fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
     let world = World::new(scene).expect("the scene is sound");
@@ -18,22 +18,20 @@ fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
 #[track_caller]
 fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
-    for isa in [Isa::Portable, Isa::Avx2] {
-        if !isa.is_available() {
-            continue;
-        }
-        let bvh = Bvh::build_for(world, isa);
+    let every = Preset::ALL.into_iter().flat_map(|preset| [(preset, Isa::Portable), (preset, Isa::Avx2)]);
+    for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {
+        let bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
         let packets = Width::ALL.map(|width| Batch { width, coherent: false });
         for batch in packets.into_iter().chain([Batch { width: Width::One, coherent: true }]) {
             let mut hits = vec![None; rays.len()];
             bvh.closest_batch(rays, &mut hits, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(hits[i], expected[i], "{isa:?} {batch:?} {ray:?}");
+                assert_eq!(hits[i], expected[i], "{preset:?} {isa:?} {batch:?} {ray:?}");
             }
             let mut occluded = vec![false; rays.len()];
             bvh.occluded_batch(rays, &mut occluded, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(occluded[i], expected[i].is_some(), "occluded {isa:?} {batch:?} {ray:?}");
+                assert_eq!(occluded[i], expected[i].is_some(), "occluded {preset:?} {isa:?} {batch:?} {ray:?}");
             }
         }
         for (ray, expected) in rays.iter().zip(&expected).take(100) {

@@ -36,13 +36,14 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "KIND,...", value_enum, value_delimiter = ',', default_value = "primary,diffuse,shadow")]
     rays: Vec<RaysArg>,
 
-    /// Modes: native's default; Embree's fast, robust, compact, and high (quality, fast otherwise)
+    /// Modes: native's default, native-fast, native-high, native-compact; Embree's fast, robust, compact, and high (quality,
+    /// fast otherwise)
     #[arg(
         long,
         value_name = "MODE,...",
         value_enum,
         value_delimiter = ',',
-        default_value = "default,fast,robust,compact,high"
+        default_value = "default,native-fast,native-high,native-compact,fast,robust,compact,high"
     )]
     modes: Vec<ModeArg>,
 
@@ -85,6 +86,12 @@ impl RaysArg {
 enum ModeArg {
     /// Native, as it renders
     Default,
+    /// Native, built fastest
+    NativeFast,
+    /// Native, with spatial splits
+    NativeHigh,
+    /// Native, in least memory
+    NativeCompact,
     /// Embree, medium quality, rays may slip between triangles
     Fast,
     /// Embree, medium quality, robust
@@ -119,11 +126,20 @@ mod with_embree {
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject};
     use crate::trace::World;
-    use crate::trace::bvh::Bvh;
+    use crate::trace::bvh::{Bvh, Preset};
     use crate::trace::embree::{Embree, Options, Quality};
 
     /// Every mode, native first.
-    const MODES: [ModeArg; 5] = [ModeArg::Default, ModeArg::Fast, ModeArg::Robust, ModeArg::Compact, ModeArg::High];
+    const MODES: [ModeArg; 8] = [
+        ModeArg::Default,
+        ModeArg::NativeFast,
+        ModeArg::NativeHigh,
+        ModeArg::NativeCompact,
+        ModeArg::Fast,
+        ModeArg::Robust,
+        ModeArg::Compact,
+        ModeArg::High,
+    ];
 
     pub(super) fn bench(args: &BenchArgs) -> Result<()> {
         let cancel = interrupt::install()?;
@@ -179,10 +195,16 @@ mod with_embree {
             mode,
             build: Box::new(move |world| build_embree(world, &options)),
         };
+        let native = |preset: Preset| Contender {
+            backend: "native",
+            mode: preset.name(),
+            build: Box::new(move |world| Ok(build_native(world, preset))),
+        };
         match mode {
-            ModeArg::Default => {
-                Contender { backend: "native", mode: "default", build: Box::new(|world| Ok(build_native(world))) }
-            }
+            ModeArg::Default => native(Preset::Default),
+            ModeArg::NativeFast => native(Preset::Fast),
+            ModeArg::NativeHigh => native(Preset::High),
+            ModeArg::NativeCompact => native(Preset::Compact),
             ModeArg::Fast => embree("fast", medium),
             ModeArg::Robust => embree("robust", Options { robust: true, ..medium }),
             ModeArg::Compact => embree("compact", Options { compact: true, ..medium }),
@@ -190,16 +212,17 @@ mod with_embree {
         }
     }
 
-    fn build_native(world: &World) -> Built {
+    fn build_native(world: &World, preset: Preset) -> Built {
         let start = Instant::now();
-        let bvh = Bvh::build(world);
-        Built { seconds: start.elapsed().as_secs_f64(), bytes: bvh.bytes(), tracer: Box::new(bvh) }
+        let bvh = Bvh::build_with(world, preset.into());
+        let seconds = start.elapsed().as_secs_f64();
+        Built { seconds, bytes: bvh.bytes(), sah_cost: Some(bvh.sah_cost()), tracer: Box::new(bvh) }
     }
 
     /// Only what Embree itself does is charged to it: neither our copies of the triangles for it, nor their bytes.
     fn build_embree(world: &World, options: &Options) -> Result<Built> {
         let embree = Embree::new(world, options)?;
         let (seconds, bytes) = (embree.commit_time().as_secs_f64(), embree.tree_bytes());
-        Ok(Built { seconds, bytes, tracer: Box::new(embree) })
+        Ok(Built { seconds, bytes, sah_cost: None, tracer: Box::new(embree) })
     }
 }

@@ -6,7 +6,8 @@ use super::common::parse_bytes;
 use super::engine::BackendArg;
 use super::report::held_memory;
 use crate::error::{Error, Result};
-use crate::plan::{BuildChoice, BuildPreset, BuildRequest, EMBREE_BYTES, Lighting, NotEnoughMemory, Plan};
+use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, Lighting, NotEnoughMemory, Plan};
+use crate::trace::bvh::Preset;
 
 /// Bytes that a picture takes for each pixel: four floats, once more while it is written.
 const BYTES_A_PIXEL: u64 = 32;
@@ -38,13 +39,13 @@ enum Build {
 }
 
 impl Build {
-    fn wanted(self) -> Option<BuildPreset> {
+    fn wanted(self) -> Option<Preset> {
         match self {
             Self::Auto => None,
-            Self::Fast => Some(BuildPreset::Fast),
-            Self::Default => Some(BuildPreset::Default),
-            Self::High => Some(BuildPreset::High),
-            Self::Compact => Some(BuildPreset::Compact),
+            Self::Fast => Some(Preset::Fast),
+            Self::Default => Some(Preset::Default),
+            Self::High => Some(Preset::High),
+            Self::Compact => Some(Preset::Compact),
         }
     }
 }

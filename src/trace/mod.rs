@@ -46,7 +46,8 @@ pub trait Tracer: Sync {
 /// How a batch is traced. It changes the speed, never a native answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Batch {
-    /// Rays that travel the tree together.
+    /// Rays of a packet, for engines that trace packets; the native tracer goes ray by ray, or by bundles where
+    /// `coherent` promises some.
     pub width: Width,
     /// Whether neighbours in the batch start and point alike.
     pub coherent: bool,

@@ -24,7 +24,14 @@ impl Nearest {
         self.limit
     }
 
+    /// t of the hit; infinite for none.
+    #[inline]
+    pub fn t(&self) -> f64 {
+        self.t
+    }
+
     /// What was found.
+    #[inline]
     pub fn hit(&self) -> Option<Hit> {
         self.hit
     }

@@ -1,6 +1,7 @@
 //! The rays that are timed: those of `benches/embree_ref.cpp`, formula by formula, in f32.
 //!
-//! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet. From each point they hit one
+//! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet; the blocks in tiles of 8 x 8 as
+//! a renderer would have them, not in rows across the picture, which is all the same to a packet. From each point they hit one
 //! diffuse ray, cosine-distributed about the normal, and one shadow ray towards a point light. Rays are made before any
 //! clock starts.
 
@@ -15,6 +16,8 @@ use crate::trace::{Batch, Primitives, Tracer, Width, World};
 pub const SIDE: usize = 1024;
 /// Rays to a side of a block.
 pub const BLOCK: usize = 4;
+/// Rays to a side of a tile.
+pub const TILE: usize = 8;
 /// Tangent of half the camera's angle.
 const TANGENT: f32 = 0.45;
 /// Where a ray without an end ends.
@@ -103,10 +106,10 @@ impl View {
             .map(|(x, z)| self.centre + self.frame(Vec3::new(x, 0.0, z) * (4.0 * self.radius)) + bottom)
     }
 
-    /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole blocks; `tracer` finds where the others
+    /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole tiles; `tracer` finds where the others
     /// start.
     pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
-        let primary = self.primary(side.next_multiple_of(BLOCK));
+        let primary = self.primary(side.next_multiple_of(TILE));
         let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
         if kinds.iter().any(|&kind| kind != Kind::Primary) {
             let mut hits = vec![None; primary.len()];
@@ -135,9 +138,15 @@ impl View {
         let up = right.cross(forward);
         let of = |pixel: usize| (pixel as f32 + 0.5) / side as f32 * 2.0;
         let mut rays = Vec::with_capacity(side * side);
-        for (block_y, block_x) in (0..side).step_by(BLOCK).flat_map(|y| (0..side).step_by(BLOCK).map(move |x| (y, x))) {
-            for (y, x) in (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (y, x))) {
-                let (a, b) = ((of(block_x + x) - 1.0) * TANGENT, (1.0 - of(block_y + y)) * TANGENT);
+        let grid = |size: usize, step: usize| {
+            (0..size).step_by(step).flat_map(move |y| (0..size).step_by(step).map(move |x| (y, x)))
+        };
+        for ((tile_y, tile_x), (block_y, block_x)) in
+            grid(side, TILE).flat_map(|tile| grid(TILE, BLOCK).map(move |block| (tile, block)))
+        {
+            for (y, x) in grid(BLOCK, 1) {
+                let (x, y) = (tile_x + block_x + x, tile_y + block_y + y);
+                let (a, b) = ((of(x) - 1.0) * TANGENT, (1.0 - of(y)) * TANGENT);
                 let direction = (forward + right * a + up * b).normalize();
                 rays.push(Ray { tmax: FAR, ..Ray::new(eye, direction) });
             }

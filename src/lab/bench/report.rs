@@ -49,6 +49,8 @@ pub struct BuildRow {
     pub mtris_per_s: Spread,
     /// Bytes of the trees for each stored triangle, without the mesh itself.
     pub bytes_per_triangle: f64,
+    /// The surface area heuristic's cost of the tree; none where it is not known.
+    pub sah_cost: Option<f64>,
 }
 
 /// Tracing one kind of ray.
@@ -136,9 +138,14 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let threads = if self.threads == 1 { "thread" } else { "threads" };
         writeln!(f, "{}: {} triangles, {} {threads}", self.scene, self.triangles, self.threads)?;
-        writeln!(f, "\n  {:<22}{:>9}{:>9}{:>9}{:>12}", "build, Mtri/s", "median", "min", "max", "B/triangle")?;
-        for BuildRow { backend, mode, mtris_per_s, bytes_per_triangle } in &self.builds {
-            writeln!(f, "  {:<22}{mtris_per_s}{bytes_per_triangle:12.1}", format!("{backend} {mode}"))?;
+        writeln!(
+            f,
+            "\n  {:<22}{:>9}{:>9}{:>9}{:>12}{:>10}",
+            "build, Mtri/s", "median", "min", "max", "B/triangle", "SAH cost"
+        )?;
+        for BuildRow { backend, mode, mtris_per_s, bytes_per_triangle, sah_cost } in &self.builds {
+            write!(f, "  {:<22}{mtris_per_s}{bytes_per_triangle:12.1}", format!("{backend} {mode}"))?;
+            writeln!(f, "{}", sah_cost.map(|cost| format!("{cost:10.3}")).unwrap_or_default())?;
         }
         for Ratio { kind, over_embree_robust, over_embree_fast } in &self.ratios {
             let head = format!("{}, Mray/s", kind.name());

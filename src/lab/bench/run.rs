@@ -45,6 +45,9 @@ pub struct Built {
     pub seconds: f64,
     /// Bytes of the tree, without the mesh.
     pub bytes: usize,
+    /// The surface area heuristic's cost of the tree, where it is known: see
+    /// [`Bvh::sah_cost`](crate::trace::bvh::Bvh::sah_cost).
+    pub sah_cost: Option<f64>,
 }
 
 /// What is measured, and how often.
@@ -125,6 +128,7 @@ impl Setup<'_> {
             backend: contender.backend,
             mode: contender.mode,
             mtris_per_s: Spread::of(rates),
+            sah_cost: built.as_ref().and_then(|b| b.sah_cost),
             bytes_per_triangle: built.as_ref().map_or(0.0, |b| b.bytes as f64) / triangles.max(1.0),
         });
         let rows = rows.collect();

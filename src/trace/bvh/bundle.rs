@@ -1,23 +1,32 @@
-//! 64 rays that share an origin, or that end in one point: made ready for tests in common.
+//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common.
 //!
-//! Shadow rays towards a point light do not share their origin but their end. They are turned round: the bundle starts
-//! at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is asked of the
-//! rays as they were given.
+//! **Projection.** All rays run the same way along one axis, the bundle's; a ray is its slopes (p, q) against it, and t
+//! is measured along it: t' = t |d|, d being the direction's component. Box and triangle tests then take two products
+//! where three were, boxes are entered along the axis at the same t' by all rays, and the rectangle of all slopes bounds
+//! the bundle more tightly than a box of directions would.
+//!
+//! **Turning.** Shadow rays towards a point light do not share their origin but their end. They are turned round: the
+//! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
+//! asked of the rays as they were given.
 
-use super::simd::{Simd, Vector};
-use super::slab::SlabRay;
+use super::node::{Node, WIDTH};
+use super::query::Query;
+use super::simd::{Array, Group, Mask, Simd, Vector};
+use super::slab::load;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
-/// Rays tested together by one vector instruction.
-pub(super) const LANES: usize = 8;
-/// Groups of them in a bundle.
-pub(super) const GROUPS: usize = 8;
 /// Rays in a bundle.
-pub(super) const RAYS: usize = LANES * GROUPS;
+pub(super) const RAYS: usize = 64;
 
 /// One number for each ray.
-pub(super) type PerRay = [[f32; LANES]; GROUPS];
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct PerRay(pub [f32; RAYS]);
+
+impl PerRay {
+    pub const ZERO: Self = Self([0.0; RAYS]);
+}
 
 /// The rays of a bundle, component by component.
 pub(super) struct Bundle {
@@ -25,135 +34,287 @@ pub(super) struct Bundle {
     pub origin: [f32; 3],
     /// How far a ray's own origin may be from there, in each component.
     pub blur: f32,
-    /// Directions.
+    /// The axis that all rays run along; the other two are the next ones, cyclically.
+    pub axis: usize,
+    /// 1 or -1: which way they run along it.
+    pub forward: f32,
+    /// Directions, as given.
     pub direction: [PerRay; 3],
-    /// Smallest and largest component of the directions.
-    pub low: [f32; 3],
-    pub high: [f32; 3],
-    /// Largest magnitude of a component of the directions.
+    /// The axis' component of each direction, without its sign: t' of t = 1.
+    pub depth: PerRay,
+    /// Directions on the other two axes over `depth`, the smallest and largest of them, and the largest magnitude (or 1).
+    pub slope: [PerRay; 2],
+    pub low: [f32; 2],
+    pub high: [f32; 2],
     pub largest: f32,
-    /// Least and most that t may be, in f32; rounded inwards, so that what lies between is within the range for sure.
+    /// 1 / slope.
+    pub reciprocal: [PerRay; 2],
+    /// Least and most that t' may be; rounded inwards, so that what lies between is within the range for sure.
     pub begin: PerRay,
     pub end: PerRay,
+    /// The most that t' may be, rounded outwards; and the least for any ray, likewise.
+    pub limit: PerRay,
+    pub first: f32,
     /// Whether t runs from the common end back to the rays' own origins.
     pub is_turned: bool,
 }
 
+/// How rays make a bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// All of them make one.
+    Whole,
+    /// They have a point in common, but some are not valid or run into another octant.
+    Parts,
+    /// They have nothing in common.
+    None,
+}
+
+/// Relative slack for t' that is rounded outwards or inwards: a product and the conversion, four times over.
+pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+/// Absolute slack, against underflow.
+pub(super) const TINY: f32 = 1e-37;
+/// Products of this size are not trusted to be finite after a sum.
+const HUGE: f32 = 1e37;
+/// Slopes beyond this spoil the bounds for all rays.
+const STEEPEST: f32 = 16.0;
+
 impl Bundle {
-    /// None where the rays do not start, nor (`ends`) end, in one point, where one of them is not valid, or where a
-    /// component of their directions changes its sign or vanishes.
-    #[inline(always)]
-    pub fn new<S: Simd>(rays: &[Ray; RAYS], ends: bool) -> Option<Self> {
-        let empty = [[0.0; LANES]; GROUPS];
-        let origin = rays[0].origin;
-        let mut bundle = Self {
-            origin: origin.to_array(),
+    pub fn new() -> Self {
+        Self {
+            origin: [0.0; 3],
             blur: 0.0,
-            direction: [empty; 3],
-            low: [0.0; 3],
-            high: [0.0; 3],
-            largest: 0.0,
-            begin: empty,
-            end: empty,
+            axis: 0,
+            forward: 1.0,
+            direction: [PerRay::ZERO; 3],
+            depth: PerRay::ZERO,
+            slope: [PerRay::ZERO; 2],
+            low: [0.0; 2],
+            high: [0.0; 2],
+            largest: 1.0,
+            reciprocal: [PerRay::ZERO; 2],
+            begin: PerRay::ZERO,
+            end: PerRay::ZERO,
+            limit: PerRay::ZERO,
+            first: 0.0,
             is_turned: false,
+        }
+    }
+
+    /// Takes the rays, of which the bundle is valid only if they fit as a whole. Those that end in one point fit only if
+    /// any hit is asked for.
+    #[inline(always)]
+    pub fn fill<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS]) -> Fit {
+        let fit = self.gather::<S, Q>(rays);
+        if fit == Fit::Whole { self.project::<S>() } else { fit }
+    }
+
+    /// Directions and ranges as they are; where all rays start, or end.
+    #[inline(always)]
+    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS]) -> Fit {
+        let zero = S::V8::splat(0.0);
+        let start = splat::<S>(rays[0].origin);
+        let last = rays[0].origin + rays[0].direction;
+        let end = splat::<S>(last);
+        // Zero while every ray is finite, and while all start in one point.
+        let (mut finite, mut spread) = (zero, zero);
+        let (mut apart, mut size) = (zero, zero);
+        let (mut in_range, mut latest) = (u32::MAX, zero);
+        for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
+            let [a, b, c, d, e, f, g, h] = rays;
+            let [x, y, z, dx, dy, dz, tmin, tmax] = S::transpose([
+                load::<S>(a),
+                load::<S>(b),
+                load::<S>(c),
+                load::<S>(d),
+                load::<S>(e),
+                load::<S>(f),
+                load::<S>(g),
+                load::<S>(h),
+            ]);
+            let (origin, direction) = ([x, y, z], [dx, dy, dz]);
+            for axis in 0..3 {
+                store::<S>(&mut self.direction[axis], i, direction[axis]);
+                finite = direction[axis].mul_add(zero, finite);
+                spread = spread.add(origin[axis].sub(start[axis]).abs());
+                if Q::ANY {
+                    apart = origin[axis].add(direction[axis]).sub(end[axis]).abs().max(apart);
+                    size = origin[axis].abs().add(direction[axis].abs()).max(size);
+                    finite = origin[axis].mul_add(zero, finite);
+                }
+            }
+            in_range &= zero.at_most(tmin).and(tmin.at_most(tmax)).bits();
+            latest = latest.max(tmax);
+            store::<S>(&mut self.begin, i, tmin);
+            store::<S>(&mut self.end, i, tmax);
+        }
+        let is_shared = spread.at_most(zero).bits() == 0xff;
+        (self.origin, self.blur, self.is_turned) = (rays[0].origin.to_array(), 0.0, !is_shared);
+        let is_valid = finite.at_most(zero).bits() == 0xff && in_range & 0xff == 0xff;
+        if is_shared {
+            return if is_valid { Fit::Whole } else { Fit::Parts };
+        }
+        if !Q::ANY {
+            return Fit::None;
+        }
+        if !is_valid {
+            // One ray that is not valid may be what is off.
+            return Fit::Parts;
+        }
+        let (apart, rounding) = (apart.largest(), 4.0 * UNIT_ROUNDOFF * size.largest());
+        // A light of some size is no point: its rays are better traced one by one. And farther than the common end, t
+        // does not run backwards from it.
+        if !(apart <= 4.0 * rounding && latest.largest() <= 1.0 && last.is_finite()) {
+            return Fit::None;
+        }
+        (self.origin, self.blur) = (last.to_array(), apart + rounding);
+        Fit::Whole
+    }
+
+    /// Everything that is derived from the directions.
+    #[inline(always)]
+    fn project<S: Simd>(&mut self) -> Fit {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.direction[axis].0[0].abs());
+        self.axis = if x > y && x > z {
+            0
+        } else if y > z {
+            1
+        } else {
+            2
         };
-        let mut is_shared = true;
-        let mut in_range = true;
-        for group in 0..GROUPS {
-            for lane in 0..LANES {
-                let ray = &rays[group * LANES + lane];
-                is_shared &= ray.origin == origin;
-                in_range &= ray.tmin >= 0.0 && ray.tmin <= ray.tmax;
-                bundle.begin[group][lane] = ray.tmin;
-                bundle.end[group][lane] = ray.tmax;
-                bundle.direction[0][group][lane] = ray.direction.x;
-                bundle.direction[1][group][lane] = ray.direction.y;
-                bundle.direction[2][group][lane] = ray.direction.z;
+        let [p, q, along] = axes(self.axis);
+        let splat = S::Wide::splat;
+        let sign = splat(if self.is_turned { -1.0 } else { 1.0 });
+        let infinite = splat(f32::INFINITY);
+        let (mut low, mut high) = ([infinite; 3], [splat(f32::NEG_INFINITY); 3]);
+        let mut first = infinite;
+        for group in 0..RAYS / S::Wide::LANES {
+            let d = S::Wide::at(&self.direction[along], group).mul(sign);
+            (low[2], high[2]) = (d.min(low[2]), d.max(high[2]));
+            let depth = d.abs();
+            depth.put(&mut self.depth, group);
+            let shrink = splat(1.0).div(depth).mul(sign);
+            for (i, axis) in [p, q].into_iter().enumerate() {
+                let slope = S::Wide::at(&self.direction[axis], group).mul(shrink);
+                slope.put(&mut self.slope[i], group);
+                splat(1.0).div(slope).put(&mut self.reciprocal[i], group);
+                (low[i], high[i]) = (slope.min(low[i]), slope.max(high[i]));
             }
+            let (begin, end) = (S::Wide::at(&self.begin, group), S::Wide::at(&self.end, group));
+            // In turned t, both inwards and both outwards. 1 - t is off by half a step of 1 at most.
+            let (begin, end, start, limit) = if self.is_turned {
+                let (a, b) = (splat(1.0 + 1e-6), splat(1.0 - 1e-6));
+                (a.sub(end), b.sub(begin), b.sub(end), a.sub(begin))
+            } else {
+                (begin, end, begin, end)
+            };
+            begin.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.begin, group);
+            end.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).put(&mut self.end, group);
+            limit.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.limit, group);
+            first = start.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(first);
         }
-        if !in_range || !origin.is_finite() {
-            return None;
+        self.first = first.smallest().max(0.0);
+        let low = [low[0].smallest(), low[1].smallest(), low[2].smallest()];
+        let high = [high[0].largest(), high[1].largest(), high[2].largest()];
+        let one_sided = |i: usize| low[i] > f32::MIN_POSITIVE || high[i] < -f32::MIN_POSITIVE;
+        if !(one_sided(0) && one_sided(1) && one_sided(2)) {
+            return Fit::Parts;
         }
-        if !is_shared {
-            if !ends {
-                return None;
-            }
-            bundle.turn(rays)?;
-        }
-        for axis in 0..3 {
-            let sign = S::V8::splat(if bundle.is_turned { -1.0 } else { 1.0 });
-            let mut low = S::V8::splat(f32::INFINITY);
-            let mut high = S::V8::splat(f32::NEG_INFINITY);
-            let mut zero = S::V8::splat(0.0);
-            for group in &mut bundle.direction[axis] {
-                let d = S::V8::load(group).mul(sign);
-                *group = d.to_array();
-                low = low.min(d);
-                high = high.max(d);
-                // Stays zero only for finite numbers.
-                zero = d.mul_add(S::V8::splat(0.0), zero);
-            }
-            let (low, high) = (low.to_array(), high.to_array());
-            let (mut least, mut most) = (low[0], high[0]);
-            for lane in 1..LANES {
-                least = if low[lane] < least { low[lane] } else { least };
-                most = if high[lane] > most { high[lane] } else { most };
-            }
-            let one_sided = least > f32::MIN_POSITIVE || most < -f32::MIN_POSITIVE;
-            if !one_sided || zero.at_most(S::V8::splat(0.0)) != 0xff {
-                return None;
-            }
-            (bundle.low[axis], bundle.high[axis]) = (least, most);
-            let magnitude = if most > -least { most } else { -least };
-            bundle.largest = if magnitude > bundle.largest { magnitude } else { bundle.largest };
-        }
-        for group in 0..GROUPS {
-            for lane in 0..LANES {
-                let (low, high) = (bundle.begin[group][lane].next_up(), bundle.end[group][lane].next_down());
-                // 1 - t is off by half a step of 1 at most.
-                let (begin, end) = if bundle.is_turned { (1.0 - high + 1e-6, 1.0 - low - 1e-6) } else { (low, high) };
-                bundle.begin[group][lane] = begin;
-                bundle.end[group][lane] = end;
-            }
-        }
-        Some(bundle)
+        self.forward = if low[2] > 0.0 { 1.0 } else { -1.0 };
+        (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
+        self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
+        // NaN and infinity, too: a direction whose smallest component vanishes against the others.
+        if self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
 
-    /// Starts the bundle where the rays end, if that is one point up to rounding.
+    /// The slope rectangle's reciprocals, against the boxes of a tree that reaches that far. None where they are too
+    /// large.
     #[inline(always)]
-    fn turn(&mut self, rays: &[Ray; RAYS]) -> Option<()> {
-        let end = rays[0].origin + rays[0].direction;
-        let mut apart = Vec3::ZERO;
-        let mut size = Vec3::ZERO;
-        for ray in rays {
-            // NaN, too.
-            if !ray.is_valid() {
+    pub fn slab(&self, reach: Vec3) -> Option<BundleSlab> {
+        let axes = axes(self.axis);
+        let sign = [0, 1].map(|i| if self.low[i] > 0.0 { 1.0f32 } else { -1.0 });
+        let sign = [sign[0], sign[1], self.forward];
+        let mut slab = BundleSlab {
+            near: [0; 3],
+            far: [0; 3],
+            near_origin: [0.0; 3],
+            far_origin: [0.0; 3],
+            reciprocal: [0, 1].map(|i| [1.0 / self.low[i], 1.0 / self.high[i]]),
+            forward: self.forward,
+        };
+        for (i, axis) in axes.into_iter().enumerate() {
+            let span = self.origin[axis].abs() + reach[axis];
+            // Origin and box are subtracted (2 u of the span), the slope is off by 2 u, its reciprocal and the product
+            // by another each.
+            let pad = sign[i] * (8.0 * UNIT_ROUNDOFF * span + self.blur);
+            slab.near_origin[i] = self.origin[axis] + pad;
+            slab.far_origin[i] = self.origin[axis] - pad;
+            (slab.near[i], slab.far[i]) = if sign[i] > 0.0 { (axis, axis + 3) } else { (axis + 3, axis) };
+            let steepest = slab.reciprocal.get(i).map_or(1.0, |[a, b]| a.abs().max(b.abs()));
+            if !(steepest * span < HUGE) {
                 return None;
             }
-            // Farther than the common end, t does not run backwards from it.
-            if ray.tmax > 1.0 {
-                return None;
-            }
-            apart = apart.max((ray.origin + ray.direction - end).abs());
-            size = size.max(ray.origin.abs() + ray.direction.abs());
         }
-        let rounding = 4.0 * UNIT_ROUNDOFF * size.max_element();
-        // A light of some size is no point: its rays are better traced one by one.
-        if apart.max_element() > 4.0 * rounding {
-            return None;
-        }
-        self.origin = end.to_array();
-        self.blur = apart.max_element() + rounding;
-        self.is_turned = true;
-        Some(())
+        Some(slab)
     }
+}
 
-    /// The two ends of the bundle for slab tests in a tree that reaches that far.
+/// The two axes beside `axis`, and itself.
+#[inline(always)]
+pub(super) const fn axes(axis: usize) -> [usize; 3] {
+    [(axis + 1) % 3, (axis + 2) % 3, axis]
+}
+
+#[inline(always)]
+fn splat<S: Simd>(p: Vec3) -> [S::V8; 3] {
+    [S::V8::splat(p.x), S::V8::splat(p.y), S::V8::splat(p.z)]
+}
+
+#[inline(always)]
+fn store<S: Simd>(values: &mut PerRay, i: usize, lanes: S::V8) {
+    values.0.as_chunks_mut().0[i] = lanes.to_array();
+}
+
+/// A bundle made ready for slab tests in one tree, on its own axes.
+pub(super) struct BundleSlab {
+    /// Which of a node's six bounds is met first, and last.
+    near: [usize; 3],
+    far: [usize; 3],
+    /// What is subtracted from them: the origin, and the pad.
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
+    /// Of the smallest and the largest slope.
+    reciprocal: [[f32; 2]; 2],
+    forward: f32,
+}
+
+/// The boxes of a node, seen from the origin of a bundle.
+pub(super) struct Boxes {
+    /// On the first two axes: what reciprocals of slopes are multiplied with. On the third: t'.
+    pub near: [[f32; WIDTH]; 3],
+    pub far: [[f32; WIDTH]; 3],
+}
+
+impl BundleSlab {
+    /// The children that some ray of the bundle may enter with t' from `begin` to `limit`, as a bit mask; where it enters
+    /// each at the earliest; and the boxes.
     #[inline(always)]
-    pub fn slabs(&self, reach: Vec3) -> Option<[SlabRay; 2]> {
-        let low = [1.0 / self.low[0], 1.0 / self.low[1], 1.0 / self.low[2]];
-        let high = [1.0 / self.high[0], 1.0 / self.high[1], 1.0 / self.high[2]];
-        let low = SlabRay::of_bundle(self.origin, low, reach, self.blur)?;
-        Some([low, SlabRay::of_bundle(self.origin, high, reach, self.blur)?])
+    pub fn enter<S: Simd>(&self, node: &Node, begin: f32, limit: f32) -> (u32, [f32; WIDTH], Boxes) {
+        let splat = S::V8::splat;
+        let forward = splat(self.forward);
+        let near_along = S::V8::load(&node.bounds[self.near[2]]).sub(splat(self.near_origin[2])).mul(forward);
+        let far_along = S::V8::load(&node.bounds[self.far[2]]).sub(splat(self.far_origin[2])).mul(forward);
+        let (mut near, mut far) = (near_along.max(splat(begin)), far_along.min(splat(limit)));
+        let mut boxes = Boxes { near: [near.to_array(); 3], far: [far_along.to_array(); 3] };
+        for i in 0..2 {
+            let first = S::V8::load(&node.bounds[self.near[i]]).sub(splat(self.near_origin[i]));
+            let last = S::V8::load(&node.bounds[self.far[i]]).sub(splat(self.far_origin[i]));
+            let [a, b] = self.reciprocal[i];
+            let (a, b) = (splat(a), splat(b));
+            near = first.mul(a).min(first.mul(b)).max(near);
+            far = last.mul(a).max(last.mul(b)).min(far);
+            (boxes.near[i], boxes.far[i]) = (first.to_array(), last.to_array());
+        }
+        (near.at_most(far).bits(), near.to_array(), boxes)
     }
 }

@@ -1,111 +1,106 @@
 //! Four triangles seen from the common origin of a bundle: normals of their edges, and bounds on the rounding.
 //!
 //! With A, B, C the corners relative to the origin, the edge function at A is d . (B x C) = d . (B x (C - B)). The second
-//! form is computed: its products are of the size of the edge, not of the distance, so it does not cancel. With u =
-//! 2^-24, L the largest component of a corner relative to the origin, s the largest of an edge, D the largest of a
-//! direction, and the origin off by at most b:
+//! form is computed: its products are of the size of the edge, not of the distance, so it does not cancel. The direction
+//! is the bundle's (p, q, +-1), with p and q off by 2 u. With u = 2^-24, L the largest component of a corner relative to
+//! the origin, s the largest of an edge, D >= 1 the largest of a direction, and the origin off by at most b:
 //!
 //! | value | rounding | origin off |
 //! | --- | --- | --- |
-//! | edge function | 42 u D L s: corner, edge, product, difference (4 u of 2 L s a component), three products and sums | 6 D b s |
-//! | slope d . N | 42 u D s^2 | 0 |
+//! | edge function | 46 u D L s: corner, edge, product, difference (8 u L s a component), the slopes, products and sums | 6 D b s |
+//! | slope d . N | 46 u D s^2 | 0 |
 //! | height A . N | 48 u L s^2 | 6 b s^2 |
 
-use super::bundle::Bundle;
-use super::simd::{Simd, Vector};
+use super::block::LANES;
+use super::bundle::{Bundle, axes};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
-
-/// Triangles in a block.
-const LANES: usize = 4;
 
 /// Numbers of four triangles; the sign is such that the bundle sees each from its front (slope > 0).
 pub(super) struct Edges {
-    /// Component i of the normal of edge k is `normals[3 * k + i]`; the fourth is the triangle's own.
-    pub normals: [[f32; LANES]; 12],
-    /// t times the slope.
-    pub height: [f32; LANES],
+    /// On the bundle's axes, the third turned forward: the scalar product with (p, q, 1) is the edge function, and with
+    /// the fourth, the triangle's own normal, the slope.
+    pub normals: [[[f32; LANES]; 3]; 4],
+    /// t' times the slope, for the least and the most that t' may be in view of all rounding.
+    pub near_height: [f32; LANES],
+    pub far_height: [f32; LANES],
     pub edge_error: [f32; LANES],
-    pub slope_error: [f32; LANES],
-    pub height_error: [f32; LANES],
-    /// A bit for every triangle that rays of the bundle may see from both sides.
-    pub is_two_sided: u32,
+    /// A bit for every triangle that rays of the bundle may see from both sides, or too obliquely to bound t'.
+    pub is_vague: u32,
 }
 
 impl Edges {
-    /// Also a bit for every triangle that some ray of the bundle may hit before `most`.
+    /// Also a bit for every triangle that some ray of the bundle may hit before `most`. `AXIS` is the bundle's.
     #[inline(always)]
-    pub fn new<S: Simd>(corners: &[[f32; LANES]; 9], bundle: &Bundle, most: f32) -> (u32, Self) {
+    pub fn new<S: Simd, const AXIS: usize>(corners: &[[f32; LANES]; 9], bundle: &Bundle, most: f32) -> (u32, Self) {
         let splat = S::V4::splat;
+        let [x, y, z] = bundle.origin;
+        let origin = [splat(x), splat(y), splat(z)];
         let (pa, pb, pc) = (corner::<S>(corners, 0), corner::<S>(corners, 1), corner::<S>(corners, 2));
-        let o = [splat(bundle.origin[0]), splat(bundle.origin[1]), splat(bundle.origin[2])];
-        let (a, b, c) = (minus(pa, o), minus(pb, o), minus(pc, o));
+        let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
         let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
-        let mut normals = [cross(b, ea), cross(c, eb), cross(a, ec), cross(eb, ec)];
-        let n = normals[3];
-        let mut height = a[0].mul(n[0]).add(a[1].mul(n[1])).add(a[2].mul(n[2]));
+        let n = cross(eb, ec);
+        let height = a[0].mul(n[0]).add(a[1].mul(n[1])).add(a[2].mul(n[2]));
+        let far = size(a).max(size(b)).max(size(c));
+        let long = size(ea).max(size(eb)).max(size(ec));
 
-        let (far, long) = (size(a).max(size(b)).max(size(c)), size(ea).max(size(eb)).max(size(ec)));
         let u = UNIT_ROUNDOFF;
         let tiny = splat(1e-36);
-        let reach = far.mul_add(splat(56.0 * u), splat(8.0 * bundle.blur));
+        let reach = far.mul_add(splat(64.0 * u), splat(8.0 * bundle.blur));
         let edge_error = long.mul(splat(bundle.largest)).mul_add(reach, tiny);
         let square = long.mul(long);
-        let slope_error = square.mul_add(splat(56.0 * u * bundle.largest), tiny);
+        let slope_error = square.mul_add(splat(64.0 * u * bundle.largest), tiny);
         let height_error = square.mul_add(reach, tiny);
 
-        let slopes = ends::<S>(n, bundle);
-        let front = slope_error.less(slopes.0);
-        let back = slopes.1.less(splat(0.0).sub(slope_error));
-        let two_sided = !(front | back) & 0b1111;
+        let forward = splat(bundle.forward);
+        let mut normals = [
+            turned::<S, AXIS>(cross(b, ea), forward),
+            turned::<S, AXIS>(cross(c, eb), forward),
+            turned::<S, AXIS>(cross(a, ec), forward),
+            turned::<S, AXIS>(n, forward),
+        ];
+        let (least_slope, most_slope) = ends::<S>(&normals[3], bundle);
+        let zero = splat(0.0);
+        let front = slope_error.less(least_slope);
+        let back = most_slope.less(zero.sub(slope_error));
+        let two_sided = !front.or(back).bits() & 0b1111;
         // Turned so that the slope is positive.
-        let sign = S::V4::load(&SIGNS[back as usize]);
+        let sign = S::V4::select(back, splat(-1.0), splat(1.0));
         for normal in &mut normals {
             *normal = [normal[0].mul(sign), normal[1].mul(sign), normal[2].mul(sign)];
         }
-        height = height.mul(sign);
-        let most_slope = slopes.1.mul(sign).max(slopes.0.mul(sign));
+        let height = height.mul(sign);
+        let (least_slope, most_slope) = (least_slope.mul(sign), most_slope.mul(sign));
+        let (least_slope, most_slope) = (least_slope.min(most_slope), least_slope.max(most_slope));
 
-        let outside = splat(0.0).sub(edge_error);
-        let mut misses = 0;
-        for normal in &normals[..3] {
-            misses |= ends::<S>(*normal, bundle).1.less(outside);
-        }
-        // t at the least: height over the steepest slope. Behind the origin it is negative for all.
-        let behind = height.add(height_error).less(splat(0.0));
+        let outside = zero.sub(edge_error);
+        let misses = ends::<S>(&normals[0], bundle).1.less(outside);
+        let misses = misses.or(ends::<S>(&normals[1], bundle).1.less(outside));
+        let misses = misses.or(ends::<S>(&normals[2], bundle).1.less(outside));
+        // t' at the least: height over the steepest slope. Behind the origin it is negative for all.
+        let behind = height.add(height_error).less(zero);
         let nearest = height.sub(height_error);
         let beyond = most_slope.add(slope_error).mul(splat(most * (1.0 + 1e-6))).less(nearest);
-        let culled = (misses | behind | beyond) & !two_sided;
-
-        let mut stored = [[0.0; LANES]; 12];
-        for (k, normal) in normals.iter().enumerate() {
-            for axis in 0..3 {
-                stored[3 * k + axis] = normal[axis].to_array();
-            }
+        let culled = misses.or(behind).or(beyond).bits() & !two_sided;
+        // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few roundings.
+        let (x, y) = (height_error.div(height), slope_error.div(least_slope.sub(slope_error)));
+        let quarter = splat(0.25);
+        let tame = zero.less(x).and(x.at_most(quarter)).and(zero.less(y)).and(y.at_most(quarter));
+        let error = x.add(y).mul_add(splat(1.25), splat(16.0 * u));
+        let mut stored = [[[0.0; LANES]; 3]; 4];
+        for (stored, normal) in stored.iter_mut().zip(&normals) {
+            *stored = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
         }
         let edges = Self {
             normals: stored,
-            height: height.to_array(),
+            near_height: height.sub(height.mul(error)).to_array(),
+            far_height: height.add(height.mul(error)).to_array(),
             edge_error: edge_error.to_array(),
-            slope_error: slope_error.to_array(),
-            height_error: height_error.to_array(),
-            is_two_sided: two_sided,
+            is_vague: two_sided | !tame.bits(),
         };
         (!culled & 0b1111, edges)
     }
 }
-
-/// -1 for every set bit, 1 for the others.
-const SIGNS: [[f32; LANES]; 16] = {
-    let mut signs = [[1.0; LANES]; 16];
-    let mut i = 0;
-    while i < 16 * LANES {
-        if (i / LANES) >> (i % LANES) & 1 != 0 {
-            signs[i / LANES][i % LANES] = -1.0;
-        }
-        i += 1;
-    }
-    signs
-};
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
 
@@ -114,31 +109,38 @@ fn corner<S: Simd>(corners: &[[f32; LANES]; 9], k: usize) -> [S::V4; 3] {
     [S::V4::load(&corners[3 * k]), S::V4::load(&corners[3 * k + 1]), S::V4::load(&corners[3 * k + 2])]
 }
 
+/// On the bundle's axes, the third turned forward.
 #[inline(always)]
-fn minus<V: Vector<LANES>>(p: [V; 3], q: [V; 3]) -> [V; 3] {
+fn turned<S: Simd, const AXIS: usize>(n: [S::V4; 3], forward: S::V4) -> [S::V4; 3] {
+    let [p, q, along] = axes(AXIS);
+    [n[p], n[q], n[along].mul(forward)]
+}
+
+#[inline(always)]
+fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[0].sub(q[0]), p[1].sub(q[1]), p[2].sub(q[2])]
 }
 
 #[inline(always)]
-fn cross<V: Vector<LANES>>(p: [V; 3], q: [V; 3]) -> [V; 3] {
+fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[1].mul(q[2]).sub(p[2].mul(q[1])), p[2].mul(q[0]).sub(p[0].mul(q[2])), p[0].mul(q[1]).sub(p[1].mul(q[0]))]
 }
 
 /// The largest magnitude of a component.
 #[inline(always)]
-fn size<V: Vector<LANES>>(p: [V; 3]) -> V {
+fn size<V: Vector>(p: [V; 3]) -> V {
     p[0].abs().max(p[1].abs()).max(p[2].abs())
 }
 
 /// The least and the largest scalar product with a direction of the bundle.
 #[inline(always)]
-fn ends<S: Simd>(n: [S::V4; 3], bundle: &Bundle) -> (S::V4, S::V4) {
-    let (mut least, mut most) = (S::V4::splat(0.0), S::V4::splat(0.0));
-    for (axis, component) in n.into_iter().enumerate() {
-        let p = component.mul(S::V4::splat(bundle.low[axis]));
-        let q = component.mul(S::V4::splat(bundle.high[axis]));
-        least = least.add(p.min(q));
-        most = most.add(p.max(q));
+fn ends<S: Simd>(n: &[S::V4; 3], bundle: &Bundle) -> (S::V4, S::V4) {
+    let (mut least, mut most) = (n[2], n[2]);
+    for i in 0..2 {
+        let a = n[i].mul(S::V4::splat(bundle.low[i]));
+        let b = n[i].mul(S::V4::splat(bundle.high[i]));
+        least = least.add(a.min(b));
+        most = most.add(a.max(b));
     }
     (least, most)
 }

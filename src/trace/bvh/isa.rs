@@ -44,7 +44,7 @@ pub(super) trait Kernel {
 #[inline(always)]
 pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
     match isa {
-        // SAFETY: `Bvh::build_for` keeps only an instruction set that this processor has.
+        // SAFETY: `Bvh::build_with` keeps only an instruction set that this processor has.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { with_avx2(kernel) },
         _ => kernel.run::<Portable>(),

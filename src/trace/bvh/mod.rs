@@ -5,9 +5,10 @@
 //! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
 //! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `walk` | one ray, and packets of rays, from the root to the leaves |
+//! | `walk` | one ray, from the root to the leaves |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
-//! | `triangles`, `shapes`, `placements` | what leaves hold: blocks of four triangles, shapes, placed objects |
+//! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
@@ -17,12 +18,19 @@
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
+mod block;
 mod build;
 mod bundle;
 mod edges;
+mod filter;
 mod isa;
+mod leaves;
+mod memory;
 mod node;
 mod placements;
+mod preset;
+mod quad;
+mod query;
 mod shapes;
 mod simd;
 mod slab;
@@ -31,16 +39,21 @@ mod triangles;
 mod walk;
 
 pub use isa::Isa;
+pub use preset::{Options, Preset};
+
+use std::ops::Range;
 
 use super::nearest::Nearest;
-use super::{Batch, Tracer, Width, World};
+use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
+use filter::Filter;
 use placements::PlacementTree;
+use query::{Closest, Occluded, Query};
 use shapes::ShapeTree;
 use simd::Simd;
-use slab::SlabRay;
-use triangles::{Filter, TriangleTree};
+use slab::{SlabRay, SlabRays};
+use triangles::TriangleTree;
 use walk::{Stack, Visit};
 
 /// The native tracer.
@@ -48,6 +61,7 @@ pub struct Bvh {
     fixed: Level,
     objects: Vec<Level>,
     placements: PlacementTree,
+    preset: Preset,
     isa: Isa,
 }
 
@@ -77,22 +91,27 @@ struct Through<'a> {
     to_world: &'a Affine3,
 }
 
+/// Blur of a ray in an object's coordinates: rounding it moves it by as much again as the slab test itself may err.
+const PLACED: f32 = 4.0;
+
 impl Bvh {
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
     pub fn build(world: &World) -> Self {
-        Self::build_for(world, Isa::detect())
+        Self::build_with(world, Options::default())
     }
 
-    /// The same, with the instruction set given; hits do not depend on it.
+    /// The same, as `options` tell; hits do not depend on them.
     ///
     /// # Panics
-    /// Where this processor does not have `isa`.
-    pub fn build_for(world: &World, isa: Isa) -> Self {
+    /// Where this processor does not have `options.isa`.
+    pub fn build_with(world: &World, options: Options<'_>) -> Self {
+        let Options { preset, isa, .. } = options;
         assert!(isa.is_available(), "{isa:?} is not available on this processor");
-        let objects: Vec<Level> = world.objects.iter().map(|parts| Level::build(world, parts.clone())).collect();
+        let level = |parts: &Range<usize>| Level::build(&world.parts[parts.clone()], &options);
+        let objects: Vec<Level> = world.objects.iter().map(level).collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds);
-        Self { fixed: Level::build(world, world.fixed.clone()), objects, placements, isa }
+        let placements = PlacementTree::build(&world.placements, &bounds, &options);
+        Self { fixed: level(&world.fixed), objects, placements, preset, isa }
     }
 
     /// Memory the trees hold, in bytes.
@@ -101,32 +120,45 @@ impl Bvh {
         level(&self.fixed) + self.objects.iter().map(level).sum::<usize>() + self.placements.bytes()
     }
 
+    /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
+    /// four triangles: the sum over nodes of their area, and over leaves of their area times the blocks (or shapes) in them,
+    /// divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
+    /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
+    /// much as its own tree, by the area of its box in the world. 0 for an empty scene.
+    pub fn sah_cost(&self) -> f64 {
+        let of = |level: &Level| {
+            let tests = |_: u32, count: u8| f64::from(count);
+            level.triangles.tree().cost(tests) + level.shapes.tree().cost(tests)
+        };
+        let objects: Vec<f64> =
+            self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
+        let placed = self.placements.tree().cost(|first, count| {
+            let costs = self.placements.leaf(first, count).iter().map(|placement| objects[placement.object as usize]);
+            costs.sum()
+        });
+        let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));
+        if whole > 0.0 { (of(&self.fixed) + placed) / whole } else { 0.0 }
+    }
+
+    /// What it was built for.
+    pub fn preset(&self) -> Preset {
+        self.preset
+    }
+
     /// The instruction set its kernels use.
     pub fn isa(&self) -> Isa {
         self.isa
     }
 
-    /// One ray, from the root: the nearest hit, or just any.
-    #[inline(always)]
-    fn trace<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
-        if !ray.is_valid() {
-            return None;
-        }
-        let mut nearest = Nearest::new(ray);
-        self.fixed.trace::<S, ANY>(ray, ray, None, &mut stacks.level, &mut nearest);
-        self.enter_placements::<S, ANY>(ray, stacks, &mut nearest);
-        nearest.hit()
-    }
-
     /// Placed objects for one ray.
     #[inline(always)]
-    fn enter_placements<S: Simd, const ANY: bool>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
-        if self.placements.is_empty() || ANY && nearest.hit().is_some() {
+    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+        if self.placements.is_empty() || Q::ANY && nearest.hit().is_some() {
             return;
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
         let Stacks { upper, level: lower } = stacks;
-        walk::single::<S>(
+        walk::single::<S, Q>(
             upper,
             self.placements.tree(),
             &slab,
@@ -138,143 +170,138 @@ impl Bvh {
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };
                         let level = &self.objects[placement.object as usize];
-                        level.trace::<S, ANY>(ray, &object_ray, Some(through), lower, nearest);
+                        let slab = SlabRay::new(&object_ray, level.triangles.tree().reach(), PLACED);
+                        level.trace::<S, Q>(ray, &object_ray, &slab, Some(through), lower, nearest);
                     }
                 }
-                Visit::after::<ANY>(nearest)
+                Visit::after::<Q>(nearest)
             },
         );
     }
 
-    /// Rays that walk the fixed trees together, and the placed objects one by one.
+    /// Many rays, one after the other; made ready eight at a time.
     #[inline(always)]
-    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray; N],
-        stacks: &mut Stacks,
-    ) -> [Option<Hit>; N] {
-        let mut nearest = rays.map(|ray| Nearest::new(&ray));
-        self.fixed.trace_packet::<S, N, ANY>(rays, &mut stacks.level, &mut nearest);
-        for (ray, nearest) in rays.iter().zip(&mut nearest).filter(|(ray, _)| ray.is_valid()) {
-            self.enter_placements::<S, ANY>(ray, stacks, nearest);
-        }
-        nearest.map(|nearest| nearest.hit())
-    }
-
-    /// Many rays in packets of N; the rest, and N = 1, ray by ray.
-    #[inline(always)]
-    fn trace_batch<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray],
-        mut answer: impl FnMut(usize, Option<Hit>),
-    ) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        let packets = if N > 1 { rays.as_chunks::<N>().0 } else { &[] };
-        for (i, packet) in packets.iter().enumerate() {
-            for (k, hit) in self.trace_packet::<S, N, ANY>(packet, &mut stacks).into_iter().enumerate() {
-                answer(i * N + k, hit);
+    fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
+        for (rays, answers) in rays.chunks(8).zip(answers.chunks_mut(8)) {
+            let mut eight = [rays[0]; 8];
+            eight[..rays.len()].copy_from_slice(rays);
+            let slabs = SlabRays::new::<S>(&eight, self.fixed.triangles.tree().reach());
+            for (i, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+                *answer = Q::MISS;
+                if let Some(slab) = slabs.get(i) {
+                    let mut nearest = Nearest::new(ray);
+                    self.fixed.trace::<S, Q>(ray, ray, &slab, None, &mut stacks.level, &mut nearest);
+                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                    *answer = Q::answer(nearest.hit());
+                }
             }
-        }
-        for (i, ray) in rays.iter().enumerate().skip(packets.len() * N) {
-            answer(i, self.trace::<S, ANY>(ray, &mut stacks));
         }
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
     #[inline(always)]
-    fn trace_bundles<S: Simd, const ANY: bool>(&self, rays: &[Ray], mut answer: impl FnMut(usize, Option<Hit>)) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+    fn trace_bundles<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut scratch = tile::Scratch::new();
-        let (bundles, rest) = rays.as_chunks::<{ bundle::RAYS }>();
-        let has_triangles = !self.fixed.triangles.tree().is_empty();
-        for (i, rays) in bundles.iter().enumerate() {
-            let is_bundle = has_triangles && tile::trace::<S, ANY>(&mut scratch, &self.fixed.triangles, rays);
-            for (k, ray) in rays.iter().enumerate() {
-                let hit = if is_bundle {
-                    let nearest = scratch.nearest(k);
-                    self.fixed.trace_shapes::<S, ANY>(ray, None, 1.0, &mut stacks.level, nearest);
-                    self.enter_placements::<S, ANY>(ray, &mut stacks, nearest);
-                    nearest.hit()
-                } else {
-                    self.trace::<S, ANY>(ray, &mut stacks)
-                };
-                answer(i * bundle::RAYS + k, hit);
+        let triangles = &self.fixed.triangles;
+        let is_all = self.fixed.shapes.tree().is_empty() && self.placements.is_empty();
+        for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
+            let is_empty = triangles.tree().is_empty();
+            let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
+            if !is_all {
+                for (k, (ray, answer)) in rays.iter().zip(&mut *answers).enumerate() {
+                    let mut nearest = Nearest::new(ray);
+                    if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
+                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                        *answer = Q::answer(nearest.hit());
+                    }
+                }
+            }
+            // The others, in runs.
+            let mut rest = !traced & u64::MAX >> (bundle::RAYS - rays.len());
+            while rest != 0 {
+                let first = rest.trailing_zeros() as usize;
+                let end = first + (rest >> first).trailing_ones() as usize;
+                self.trace_rays::<S, Q>(stacks, &rays[first..end], &mut answers[first..end]);
+                rest &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
         }
-        for (k, ray) in rest.iter().enumerate() {
-            answer(rays.len() - rest.len() + k, self.trace::<S, ANY>(ray, &mut stacks));
-        }
+    }
+
+    fn run_batch<Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer], batch: Batch) {
+        assert_eq!(rays.len(), answers.len(), "one answer a ray");
+        isa::dispatch(self.isa, BatchKernel::<Q> { bvh: self, rays, answers, batch });
     }
 }
 
 /// A batch, for one instruction set at a time.
-struct BatchKernel<'a, F, const ANY: bool> {
+struct BatchKernel<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
     batch: Batch,
-    answer: F,
 }
 
-impl<F: FnMut(usize, Option<Hit>), const ANY: bool> isa::Kernel for BatchKernel<'_, F, ANY> {
+impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, rays, batch, answer } = self;
+        let Self { bvh, rays, answers, batch } = self;
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
         if batch.coherent {
-            return bvh.trace_bundles::<S, ANY>(rays, answer);
-        }
-        match batch.width {
-            Width::One => bvh.trace_batch::<S, 1, ANY>(rays, answer),
-            Width::Four => bvh.trace_batch::<S, 4, ANY>(rays, answer),
-            Width::Eight => bvh.trace_batch::<S, 8, ANY>(rays, answer),
-            Width::Sixteen => bvh.trace_batch::<S, 16, ANY>(rays, answer),
+            bvh.trace_bundles::<S, Q>(&mut stacks, rays, answers);
+        } else {
+            bvh.trace_rays::<S, Q>(&mut stacks, rays, answers);
         }
     }
 }
 
+fn area(bounds: Aabb) -> f64 {
+    f64::from(bounds.half_area())
+}
+
 impl Level {
-    fn build(world: &World, parts: std::ops::Range<usize>) -> Self {
-        let parts = &world.parts[parts];
-        Self { triangles: TriangleTree::build(parts), shapes: ShapeTree::build(parts) }
+    fn build(parts: &[Part], options: &Options<'_>) -> Self {
+        Self { triangles: TriangleTree::build(parts, options), shapes: ShapeTree::build(parts, options) }
     }
 
     fn bounds(&self) -> Aabb {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
+    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded;
+    /// `slab` is that, made ready for the triangles.
     #[inline(always)]
-    fn trace<S: Simd, const ANY: bool>(
+    fn trace<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
         local: &Ray,
+        slab: &SlabRay,
         through: Option<Through<'_>>,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        // Rounding the local ray moves it by as much again as the slab test itself may err.
-        let blur = if through.is_some() { 4.0 } else { 1.0 };
+        let blur = if through.is_some() { PLACED } else { 1.0 };
         if !self.triangles.tree().is_empty() {
-            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
-            let filter = Filter::new(local, blur);
-            walk::single::<S>(
+            let filter = Filter::new(local, slab, blur);
+            walk::single::<S, Q>(
                 stack,
                 self.triangles.tree(),
-                &slab,
+                slab,
                 nearest.limit(),
                 #[inline(always)]
                 |first, count| {
                     self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
-                    Visit::after::<ANY>(nearest)
+                    Visit::after::<Q>(nearest)
                 },
             );
         }
-        self.trace_shapes::<S, ANY>(local, through, blur, stack, nearest);
+        self.trace_shapes::<S, Q>(local, through, blur, stack, nearest);
     }
 
     #[inline(always)]
-    fn trace_shapes<S: Simd, const ANY: bool>(
+    fn trace_shapes<S: Simd, Q: Query>(
         &self,
         local: &Ray,
         through: Option<Through<'_>>,
@@ -282,10 +309,10 @@ impl Level {
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        let is_done = ANY && nearest.hit().is_some();
+        let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single::<S>(
+            walk::single::<S, Q>(
                 stack,
                 self.shapes.tree(),
                 &slab,
@@ -293,81 +320,31 @@ impl Level {
                 #[inline(always)]
                 |first, count| {
                     self.shapes.offer_leaf(first, count, local, through, nearest);
-                    Visit::after::<ANY>(nearest)
+                    Visit::after::<Q>(nearest)
                 },
             );
         }
-    }
-
-    /// Rays in the world against a level in the world.
-    #[inline(always)]
-    fn trace_packet<S: Simd, const N: usize, const ANY: bool>(
-        &self,
-        rays: &[Ray; N],
-        stack: &mut Stack,
-        nearest: &mut [Nearest; N],
-    ) {
-        let live = rays.iter().enumerate().fold(0, |live, (k, ray)| live | u32::from(ray.is_valid()) << k);
-        if !self.triangles.tree().is_empty() {
-            let slabs = rays.map(|ray| SlabRay::new(&ray, self.triangles.tree().reach(), 1.0));
-            let filters = rays.map(|ray| Filter::new(&ray, 1.0));
-            walk::packet::<S, N>(
-                stack,
-                self.triangles.tree(),
-                &slabs,
-                live,
-                nearest,
-                #[inline(always)]
-                |first, count, k, nearest: &mut Nearest| {
-                    self.triangles.offer_leaf::<S>(first, count, &rays[k], &filters[k], None, nearest);
-                    Visit::after::<ANY>(nearest)
-                },
-            );
-        }
-        if !self.shapes.tree().is_empty() {
-            let slabs = rays.map(|ray| SlabRay::new(&ray, self.shapes.tree().reach(), 1.0));
-            walk::packet::<S, N>(
-                stack,
-                self.shapes.tree(),
-                &slabs,
-                live,
-                nearest,
-                #[inline(always)]
-                |first, count, k, nearest: &mut Nearest| {
-                    self.shapes.offer_leaf(first, count, &rays[k], None, nearest);
-                    Visit::after::<ANY>(nearest)
-                },
-            );
-        }
-    }
-}
-
-impl Bvh {
-    fn run_batch<const ANY: bool>(&self, rays: &[Ray], batch: Batch, answer: impl FnMut(usize, Option<Hit>)) {
-        isa::dispatch(self.isa, BatchKernel::<_, ANY> { bvh: self, rays, batch, answer });
     }
 }
 
 impl Tracer for Bvh {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut found = None;
-        self.run_batch::<false>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit);
-        found
+        let mut answer = [None];
+        self.run_batch::<Closest>(std::slice::from_ref(ray), &mut answer, Batch::default());
+        answer[0]
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut found = false;
-        self.run_batch::<true>(std::slice::from_ref(ray), Batch::default(), |_, hit| found = hit.is_some());
-        found
+        let mut answer = [false];
+        self.run_batch::<Occluded>(std::slice::from_ref(ray), &mut answer, Batch::default());
+        answer[0]
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
-        assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        self.run_batch::<false>(rays, batch, |i, hit| hits[i] = hit);
+        self.run_batch::<Closest>(rays, hits, batch);
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
-        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        self.run_batch::<true>(rays, batch, |i, hit| occluded[i] = hit.is_some());
+        self.run_batch::<Occluded>(rays, occluded, batch);
     }
 }

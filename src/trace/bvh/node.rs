@@ -90,14 +90,22 @@ impl Tree {
         size_of_val(&self.nodes[..])
     }
 
-    /// Visits every leaf in order and lets it be renamed: `(first, count)` becomes what `rename` returns.
-    pub fn rename_leaves(&mut self, mut rename: impl FnMut(u32, u8) -> (u32, u8)) {
-        for node in &mut self.nodes {
-            for slot in 0..WIDTH {
-                if node.count[slot] != 0 && node.count[slot] != NO_CHILD {
-                    (node.index[slot], node.count[slot]) = rename(node.index[slot], node.count[slot]);
-                }
-            }
-        }
+    /// The surface area heuristic's cost, in half areas times tests: each node counts 1, a leaf what `leaf` says of its
+    /// `(first, count)`.
+    pub fn cost(&self, leaf: impl Fn(u32, u8) -> f64) -> f64 {
+        let root = f64::from(self.bounds.half_area());
+        self.nodes.iter().fold(root, |sum, node| {
+            let slots = (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD);
+            let cost = slots.map(|slot| {
+                let tests = if node.count[slot] == 0 { 1.0 } else { leaf(node.index[slot], node.count[slot]) };
+                tests * f64::from(node.child_bounds(slot).half_area())
+            });
+            sum + cost.sum::<f64>()
+        })
+    }
+
+    /// All nodes, so that leaves can be renamed.
+    pub fn nodes_mut(&mut self) -> &mut [Node] {
+        &mut self.nodes
     }
 }

@@ -1,7 +1,8 @@
 //! The upper level: a tree over placed objects.
 
-use super::build::{self, Item};
+use super::build::{self, Record};
 use super::node::Tree;
+use super::preset::Options;
 use crate::math::{Aabb, Vec3};
 use crate::trace::Placement;
 
@@ -13,14 +14,14 @@ pub(super) struct PlacementTree {
 
 impl PlacementTree {
     /// `objects` are the bounds of the objects in their own coordinates.
-    pub fn build(placements: &[Placement], objects: &[Aabb]) -> Self {
+    pub fn build(placements: &[Placement], objects: &[Aabb], options: &Options<'_>) -> Self {
         let item = |(i, placement): (usize, &Placement)| {
             let bounds = placement.bounds(objects[placement.object as usize]);
-            (!bounds.is_empty()).then_some(Item { bounds, part: 0, primitive: i as u32 })
+            (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
         };
-        let mut items: Vec<Item> = placements.iter().enumerate().filter_map(item).collect();
-        let tree = build::build(&mut items, 1);
-        Self { tree, placements: items.iter().map(|item| placements[item.primitive as usize].clone()).collect() }
+        let mut items: Vec<Record> = placements.iter().enumerate().filter_map(item).collect();
+        let tree = build::build(&mut items, 1, options);
+        Self { tree, placements: items.iter().map(|item| placements[item.primitive() as usize].clone()).collect() }
     }
 
     pub fn is_empty(&self) -> bool {

@@ -1,7 +1,8 @@
 //! Leaves of shapes that are not triangles.
 
-use super::build::{self, Item};
+use super::build::{self, Record};
 use super::node::Tree;
+use super::preset::Options;
 use super::{PartId, Through};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
@@ -23,23 +24,23 @@ pub(super) struct ShapeTree {
 
 impl ShapeTree {
     /// Over the shapes of `parts` that can be hit.
-    pub fn build(parts: &[Part]) -> Self {
+    pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
         let mut items = Vec::new();
         for (p, part) in parts.iter().enumerate() {
             let Primitives::Shapes(list) = &part.primitives else { continue };
             for (i, shape) in list.iter().enumerate() {
                 let bounds = shape.bounds();
                 if !bounds.is_empty() {
-                    items.push(Item { bounds, part: p as u32, primitive: i as u32 });
+                    items.push(Record::new(&bounds, p as u32, i as u32));
                 }
             }
         }
-        let tree = build::build(&mut items, 1);
-        let entry = |item: &Item| {
-            let part = &parts[item.part as usize];
+        let tree = build::build(&mut items, 1, options);
+        let entry = |item: &Record| {
+            let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };
             let ids = PartId { geometry: part.geometry, instance: part.instance };
-            Entry { shape: list[item.primitive as usize], primitive: item.primitive, part: ids }
+            Entry { shape: list[item.primitive() as usize], primitive: item.primitive(), part: ids }
         };
         Self { tree, entries: items.iter().map(entry).collect() }
     }

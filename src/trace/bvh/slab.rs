@@ -11,7 +11,7 @@
 //! lets everything pass.
 
 use super::node::{Node, WIDTH};
-use super::simd::{Portable, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -65,58 +65,10 @@ impl SlabRay {
         slab
     }
 
-    /// A ray that stands for one end of a bundle: from `origin`, with these reciprocals of its direction, none of them 0.
-    /// `extra` is how far the origin may be off.
+    /// 1 / direction, exactly rounded along the largest component.
     #[inline(always)]
-    pub fn of_bundle(origin: [f32; 3], reciprocal: [f32; 3], reach: Vec3, extra: f32) -> Option<Self> {
-        let mut slab = Self { reciprocal, near_offset: [0.0; 3], far_offset: [0.0; 3], near: [0; 3], tmin: 0.0 };
-        for axis in 0..3 {
-            let r = reciprocal[axis];
-            let span = origin[axis].abs() + reach[axis];
-            if r.abs() * span >= HUGE {
-                return None;
-            }
-            let (near, far) = Self::offsets::<Portable>(origin[axis], [r; WIDTH], reach[axis], extra);
-            slab.near_offset[axis] = near[0];
-            slab.far_offset[axis] = far[0];
-            slab.near[axis] = if r < 0.0 { axis + 3 } else { axis };
-        }
-        Some(slab)
-    }
-
-    /// -origin / direction, less and plus the pad, for eight rays; `extra` is how far the origin may be off.
-    #[inline(always)]
-    pub fn offsets<S: Simd>(origin: f32, reciprocal: S::V8, reach: f32, extra: f32) -> (S::V8, S::V8) {
-        let width = S::V8::splat(6.0 * UNIT_ROUNDOFF * (origin.abs() + reach) + extra);
-        let pad = reciprocal.abs().mul(width);
-        let offset = reciprocal.mul(S::V8::splat(-origin));
-        (offset.sub(pad), offset.add(pad))
-    }
-
-    /// Which of a node's six bounds is met first, by axis.
-    #[inline(always)]
-    pub fn near_sides(&self) -> [usize; 3] {
-        self.near
-    }
-
-    /// As [`SlabRay::enter`], for a bundle whose reciprocals lie between those of two rays of one octant.
-    #[inline(always)]
-    pub fn enter_either<S: Simd>(ends: &[Self; 2], node: &Node, limit: f32) -> (u32, [f32; WIDTH]) {
-        let mut near = S::V8::splat(ends[0].tmin);
-        let mut far = S::V8::splat(limit);
-        for axis in 0..3 {
-            let side = ends[0].near[axis];
-            let first = S::V8::load(&node.bounds[side]);
-            let second = S::V8::load(&node.bounds[if side < 3 { side + 3 } else { side - 3 }]);
-            let (low, high) = (S::V8::splat(ends[0].reciprocal[axis]), S::V8::splat(ends[1].reciprocal[axis]));
-            let near_low = first.mul_add(low, S::V8::splat(ends[0].near_offset[axis]));
-            let near_high = first.mul_add(high, S::V8::splat(ends[1].near_offset[axis]));
-            let far_low = second.mul_add(low, S::V8::splat(ends[0].far_offset[axis]));
-            let far_high = second.mul_add(high, S::V8::splat(ends[1].far_offset[axis]));
-            near = near_low.min(near_high).max(near);
-            far = far_low.max(far_high).min(far);
-        }
-        (near.at_most(far), near.to_array())
+    pub fn reciprocal(&self) -> &[f32; 3] {
+        &self.reciprocal
     }
 
     /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each,
@@ -133,6 +85,90 @@ impl SlabRay {
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);
             far = second.mul_add(reciprocal, S::V8::splat(self.far_offset[axis])).min(far);
         }
-        (near.at_most(far), near.to_array())
+        (near.at_most(far).bits(), near.to_array())
     }
+}
+
+/// Rays made ready eight at a time.
+pub(super) struct SlabRays {
+    /// Of each axis: 1 / direction, and -origin / direction less and plus the pad.
+    reciprocal: [[f32; 8]; 3],
+    near_offset: [[f32; 8]; 3],
+    far_offset: [[f32; 8]; 3],
+    tmin: [f32; 8],
+    /// A bit for each ray that [is valid](Ray::is_valid).
+    valid: u32,
+}
+
+impl SlabRays {
+    /// As [`SlabRay::new`] for each of them, with no blur.
+    #[inline(always)]
+    pub fn new<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> Self {
+        let splat = S::V8::splat;
+        let zero = splat(0.0);
+        let [a, b, c, d, e, f, g, h] = rays;
+        let [x, y, z, dx, dy, dz, tmin, tmax] = S::transpose([
+            load::<S>(a),
+            load::<S>(b),
+            load::<S>(c),
+            load::<S>(d),
+            load::<S>(e),
+            load::<S>(f),
+            load::<S>(g),
+            load::<S>(h),
+        ]);
+        let (origin, direction) = ([x, y, z], [dx, dy, dz]);
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
+        let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
+        let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
+        let mut finite = zero;
+        let empty = [[0.0; 8]; 3];
+        let mut slabs = Self { reciprocal: empty, near_offset: empty, far_offset: empty, tmin: [0.0; 8], valid: 0 };
+        for axis in 0..3 {
+            let d = direction[axis];
+            finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
+            let least = S::V8::select(d.less(zero), zero.sub(smallest), smallest);
+            let kept = S::V8::select(d.abs().less(smallest), least, d);
+            let reciprocal = splat(1.0).div(kept);
+            let steep = reciprocal.abs();
+            let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
+            let is_small = steep.mul(span[axis]).less(splat(HUGE));
+            let pad = S::V8::select(is_small, width, splat(f32::INFINITY));
+            let offset = zero.sub(origin[axis]).mul(reciprocal);
+            slabs.reciprocal[axis] = reciprocal.to_array();
+            slabs.near_offset[axis] = offset.sub(pad).to_array();
+            slabs.far_offset[axis] = offset.add(pad).to_array();
+        }
+        // Rounded down, for t is rounded before it is held against it.
+        let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE));
+        slabs.tmin = least.max(zero).to_array();
+        let in_range = zero.at_most(tmin).and(tmin.at_most(tmax));
+        let directed = splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
+        slabs.valid = in_range.and(directed).bits();
+        slabs
+    }
+
+    /// One of them, if it is valid.
+    #[inline(always)]
+    pub fn get(&self, ray: usize) -> Option<SlabRay> {
+        if self.valid >> ray & 1 == 0 {
+            return None;
+        }
+        let side = |axis: usize| if self.reciprocal[axis][ray] < 0.0 { axis + 3 } else { axis };
+        let of = |values: &[[f32; 8]; 3]| [values[0][ray], values[1][ray], values[2][ray]];
+        Some(SlabRay {
+            reciprocal: of(&self.reciprocal),
+            near_offset: of(&self.near_offset),
+            far_offset: of(&self.far_offset),
+            near: [side(0), side(1), side(2)],
+            tmin: self.tmin[ray],
+        })
+    }
+}
+
+/// A ray as eight numbers, in the order of its fields.
+#[inline(always)]
+pub(super) fn load<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
+    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

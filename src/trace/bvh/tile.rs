@@ -1,28 +1,37 @@
-//! A bundle of 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a point light.
+//! A bundle of up to 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a point
+//! light.
 //!
-//! - **Nodes**: eight boxes are tested against the bundle's two extreme rays, an interval test that rejects for all 64
+//! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
-//!   remains is tested for eight rays at a time, up to the first group that hits: the groups before it take no part
-//!   in that subtree.
+//!   remains is tested group by group, up to the first group of rays that hits: the groups before it take no part in
+//!   that subtree.
 //! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
-//!   that belongs to the edge. Four triangles are rejected at once by the interval of the directions; of the others each
-//!   group of eight rays takes three scalar products.
-//! - **Decisions**: edge functions and t carry bounds on their rounding errors. Where these leave no doubt, a hit is only
-//!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect), as are in the
-//!   end the t, u and v of what was noted. So the answers are those of single rays, to the bit.
+//!   that belongs to the edge. Four triangles are rejected at once by the rectangle of slopes; of the others each group
+//!   of rays takes three scalar products.
+//! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
+//!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
+//!   and v of what was noted are computed four rays at a time ([`Quad`]), with the bits that a single ray would get.
 
+use std::marker::PhantomData;
+
+use super::block::LANES;
 use super::build::MAX_DEPTH;
-use super::bundle::{Bundle, GROUPS, LANES, PerRay, RAYS};
+use super::bundle::{Boxes, Bundle, BundleSlab, Fit, PerRay, RAYS, SLACK, TINY};
 use super::edges::Edges;
-use super::node::{Node, Tree};
-use super::simd::{Simd, Vector};
-use super::slab::SlabRay;
+use super::node::WIDTH;
+use super::quad::{Quad, widen};
+use super::query::Query;
+use super::simd::{Doubles, Group, Mask, Simd, Vector};
 use super::triangles::TriangleTree;
-use crate::ray::Ray;
+use crate::math::Vec3;
+use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 
 /// No triangle is noted.
 const NONE: u32 = u32::MAX;
+
+/// Fewer rays than this are better traced one by one.
+const FEWEST: usize = 6;
 
 /// A child to be visited.
 #[derive(Clone, Copy, Default)]
@@ -38,128 +47,181 @@ struct Entry {
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
     stack: [Entry; MAX_DEPTH * 7 + 8],
-    nearest: [Nearest; RAYS],
-}
-
-impl Scratch {
-    pub fn new() -> Self {
-        let nothing = Nearest::new(&Ray::new(crate::math::Vec3::ZERO, crate::math::Vec3::X));
-        Self { stack: [Entry::default(); MAX_DEPTH * 7 + 8], nearest: [nothing; RAYS] }
-    }
-
-    /// What the last bundle's ray of that number hits.
-    #[inline(always)]
-    pub fn nearest(&mut self, ray: usize) -> &mut Nearest {
-        &mut self.nearest[ray]
-    }
-}
-
-/// A bundle on its way through a tree of triangles.
-struct Walk<'a, const ANY: bool> {
-    tree: &'a TriangleTree,
-    rays: &'a [Ray; RAYS],
     bundle: Bundle,
-    reciprocal: [PerRay; 3],
-    near_offset: [PerRay; 3],
-    far_offset: [PerRay; 3],
-    tmin: PerRay,
-    /// No hit beyond this is wanted; rounded up. Below every t for a ray that is done.
+    found: Found,
+    /// t of the closest hits of the last bundle.
+    pub t: [f64; RAYS],
+    /// Rays of one octant.
+    part: [Ray; RAYS],
+}
+
+/// What the rays of a bundle have hit so far.
+struct Found {
+    /// No hit beyond this t' is wanted; rounded up. Below every t' for a ray that is done.
     limit: PerRay,
     /// A hit nearer than this is the nearest for sure.
     sure: PerRay,
     /// What was found without doubt, but not computed yet: block and lane.
     noted: [u32; RAYS],
     /// What was computed: valid for the rays of the bit mask `computed`.
-    nearest: &'a mut [Nearest; RAYS],
+    nearest: [Nearest; RAYS],
     computed: u64,
-    most: f32,
 }
 
-/// Traces rays that start in one point (or, for any hit, that end in one) through `tree`, and leaves in `scratch` what
-/// each hits. False, and nothing done, where they are no bundle.
+/// A bundle on its way through a tree of triangles.
+struct Walk<'a, Q, const AXIS: usize> {
+    tree: &'a TriangleTree,
+    rays: &'a [Ray; RAYS],
+    bundle: &'a Bundle,
+    found: &'a mut Found,
+    groups: usize,
+    /// The largest limit of all rays.
+    most: f32,
+    query: PhantomData<Q>,
+}
+
+impl Scratch {
+    pub fn new() -> Self {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X);
+        let found = Found {
+            limit: PerRay::ZERO,
+            sure: PerRay::ZERO,
+            noted: [NONE; RAYS],
+            nearest: [Nearest::new(&ray); RAYS],
+            computed: 0,
+        };
+        Self {
+            stack: [Entry::default(); MAX_DEPTH * 7 + 8],
+            bundle: Bundle::new(),
+            found,
+            t: [0.0; RAYS],
+            part: [ray; RAYS],
+        }
+    }
+}
+
+/// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through `tree`, into `answers` of the
+/// same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
+/// have too little in common.
 #[inline(always)]
-pub(super) fn trace<S: Simd, const ANY: bool>(scratch: &mut Scratch, tree: &TriangleTree, rays: &[Ray; RAYS]) -> bool {
-    let Some(bundle) = Bundle::new::<S>(rays, ANY) else { return false };
-    let Some(slabs) = bundle.slabs(tree.tree().reach()) else { return false };
-    let Scratch { stack, nearest } = scratch;
-    let mut walk = Walk::<ANY>::new::<S>(tree, rays, bundle, nearest);
-    walk.run::<S>(stack, &slabs);
-    walk.finish();
+pub(super) fn trace<S: Simd, Q: Query>(
+    scratch: &mut Scratch,
+    tree: &TriangleTree,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) -> u64 {
+    let Scratch { stack, bundle, found, t, part } = scratch;
+    if let (Ok(rays), Ok(answers)) = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers))
+    {
+        match bundle.fill::<S, Q>(rays) {
+            Fit::Whole => {
+                let is_traced = whole::<S, Q>(stack, bundle, found, tree, rays, RAYS, answers, t);
+                return if is_traced { u64::MAX } else { 0 };
+            }
+            Fit::Parts => {}
+            Fit::None => return 0,
+        }
+    }
+    let mut octants = [0u64; 8];
+    for (i, ray) in rays.iter().enumerate() {
+        let d = ray.direction;
+        let octant = usize::from(d.x < 0.0) | usize::from(d.y < 0.0) << 1 | usize::from(d.z < 0.0) << 2;
+        octants[octant] |= u64::from(ray.is_valid()) << i;
+    }
+    let mut done = 0;
+    for members in octants {
+        if (members.count_ones() as usize) < FEWEST {
+            continue;
+        }
+        let (mut index, mut rest, mut count) = ([0u8; RAYS], members, 0);
+        while rest != 0 {
+            index[count] = rest.trailing_zeros() as u8;
+            part[count] = rays[usize::from(index[count])];
+            rest &= rest - 1;
+            count += 1;
+        }
+        // What fills the last group is traced, and forgotten.
+        let last = part[count - 1];
+        part[count..].fill(last);
+        let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
+        if bundle.fill::<S, Q>(part) == Fit::Whole
+            && whole::<S, Q>(stack, bundle, found, tree, part, count, &mut part_answers, &mut part_t)
+        {
+            for (k, &i) in index[..count].iter().enumerate() {
+                (answers[usize::from(i)], t[usize::from(i)]) = (part_answers[k], part_t[k]);
+            }
+            done |= members;
+        }
+    }
+    done
+}
+
+/// Traces a bundle of which the first `count` rays matter. False, and nothing done, where it is too steep for the tree.
+#[inline(always)]
+fn whole<S: Simd, Q: Query>(
+    stack: &mut [Entry],
+    bundle: &Bundle,
+    found: &mut Found,
+    tree: &TriangleTree,
+    rays: &[Ray; RAYS],
+    count: usize,
+    answers: &mut [Q::Answer; RAYS],
+    t: &mut [f64; RAYS],
+) -> bool {
+    let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
+    let groups = count.div_ceil(S::Wide::LANES);
+    match bundle.axis {
+        0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+        1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+        _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+    }
+    if Q::ANY {
+        for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
+            *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
+        }
+    } else {
+        found.finish::<S, Q>(tree, bundle, count, answers, t);
+    }
     true
 }
 
-impl<'a, const ANY: bool> Walk<'a, ANY> {
+impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
     #[inline(always)]
-    fn new<S: Simd>(
+    fn new(
         tree: &'a TriangleTree,
         rays: &'a [Ray; RAYS],
-        bundle: Bundle,
-        nearest: &'a mut [Nearest; RAYS],
+        bundle: &'a Bundle,
+        found: &'a mut Found,
+        groups: usize,
     ) -> Self {
-        let empty = [[0.0; LANES]; GROUPS];
-        let (limit, sure, tmin) = (bundle.end, bundle.end, bundle.begin);
-        let mut walk = Self {
-            tree,
-            rays,
-            bundle,
-            reciprocal: [empty; 3],
-            near_offset: [empty; 3],
-            far_offset: [empty; 3],
-            tmin,
-            limit,
-            sure,
-            noted: [NONE; RAYS],
-            nearest,
-            computed: 0,
-            most: 0.0,
-        };
-        let reach = tree.tree().reach();
-        for group in 0..GROUPS {
-            // The range is rounded inwards; boxes and doubtful hits are judged by it widened.
-            let widen = S::V8::splat(if walk.bundle.is_turned { 4e-6 } else { 0.0 });
-            let begin = S::V8::load(&walk.bundle.begin[group]).sub(widen).max(S::V8::splat(0.0));
-            let end = S::V8::load(&walk.bundle.end[group]);
-            let wider = end.mul_add(S::V8::splat(1e-6), end).add(widen);
-            walk.tmin[group] = begin.mul(S::V8::splat(1.0 - 1e-6)).to_array();
-            // An end at infinity, rounded inwards, stands at the largest number.
-            walk.limit[group] = wider.max(end).to_array();
-            for axis in 0..3 {
-                let r = S::V8::splat(1.0).div(S::V8::load(&walk.bundle.direction[axis][group]));
-                let (near_offset, far_offset) =
-                    SlabRay::offsets::<S>(walk.bundle.origin[axis], r, reach[axis], walk.bundle.blur);
-                walk.reciprocal[axis][group] = r.to_array();
-                walk.near_offset[axis][group] = near_offset.to_array();
-                walk.far_offset[axis][group] = far_offset.to_array();
-            }
-        }
-        walk.measure::<S>();
-        walk
+        (found.limit, found.sure, found.noted, found.computed) = (bundle.limit, bundle.end, [NONE; RAYS], 0);
+        Self { tree, rays, bundle, found, groups, most: 0.0, query: PhantomData }
     }
 
-    /// The largest limit of all rays.
     #[inline(always)]
     fn measure<S: Simd>(&mut self) {
-        let mut most = S::V8::load(&self.limit[0]);
-        for limit in &self.limit[1..] {
-            most = most.max(S::V8::load(limit));
+        let mut most = S::Wide::at(&self.found.limit, 0);
+        for group in 1..self.groups {
+            most = most.max(S::Wide::at(&self.found.limit, group));
         }
-        self.most = most.to_array().into_iter().fold(f32::NEG_INFINITY, |most, t| if t > most { t } else { most });
+        self.most = most.largest();
     }
 
     #[inline(always)]
-    fn run<S: Simd>(&mut self, stack: &mut [Entry; MAX_DEPTH * 7 + 8], slabs: &[SlabRay; 2]) {
-        let tree: &Tree = self.tree.tree();
+    fn run<S: Simd>(mut self, stack: &mut [Entry], slab: &BundleSlab) {
+        self.measure::<S>();
+        let tree = self.tree.tree();
         let mut len = 0;
         let mut next = Entry::default();
         loop {
             if next.count == 0 {
                 let node = tree.node(next.index);
-                let (mut mask, near) = SlabRay::enter_either::<S>(slabs, node, self.most);
+                let (mut mask, near, boxes) = slab.enter::<S>(node, self.bundle.first, self.most);
                 let base = len;
                 while mask != 0 {
-                    let slot = mask.trailing_zeros() as usize;
+                    let slot = mask.trailing_zeros() as usize % WIDTH;
                     mask &= mask - 1;
-                    let Some(first) = self.first_group::<S>(slabs, node, slot, next.first) else { continue };
+                    let Some(first) = self.first_group::<S>(&boxes, slot, next.first) else { continue };
                     let child = Entry { near: near[slot], index: node.index[slot], count: node.count[slot], first };
                     let mut at = len;
                     while at > base && stack[at - 1].near < child.near {
@@ -168,6 +230,11 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
                     }
                     stack[at] = child;
                     len += 1;
+                    if child.count == 0 {
+                        S::prefetch(tree.node(child.index));
+                    } else {
+                        self.tree.prefetch::<S>(child.index);
+                    }
                 }
             } else if self.visit::<S>(next) {
                 self.measure::<S>();
@@ -184,26 +251,19 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
         }
     }
 
-    /// The first group, from `from` on, with a ray that enters the child.
+    /// The first group, from `from` on, with a ray that enters the box.
     #[inline(always)]
-    fn first_group<S: Simd>(&self, slabs: &[SlabRay; 2], node: &Node, slot: usize, from: u8) -> Option<u8> {
-        let sides = slabs[0].near_sides();
-        let zero = S::V8::splat(0.0);
-        let (mut first, mut second) = ([zero; 3], [zero; 3]);
-        for axis in 0..3 {
-            let side = sides[axis];
-            first[axis] = S::V8::splat(node.bounds[side][slot]);
-            second[axis] = S::V8::splat(node.bounds[if side < 3 { side + 3 } else { side - 3 }][slot]);
-        }
-        for group in from as usize..GROUPS {
-            let mut near = S::V8::load(&self.tmin[group]);
-            let mut far = S::V8::load(&self.limit[group]);
-            for axis in 0..3 {
-                let r = S::V8::load(&self.reciprocal[axis][group]);
-                near = first[axis].mul_add(r, S::V8::load(&self.near_offset[axis][group])).max(near);
-                far = second[axis].mul_add(r, S::V8::load(&self.far_offset[axis][group])).min(far);
-            }
-            if near.at_most(far) != 0 {
+    fn first_group<S: Simd>(&self, boxes: &Boxes, slot: usize, from: u8) -> Option<u8> {
+        let splat = S::Wide::splat;
+        let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
+        let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
+        for group in usize::from(from)..self.groups {
+            let p = S::Wide::at(&self.bundle.reciprocal[0], group);
+            let q = S::Wide::at(&self.bundle.reciprocal[1], group);
+            let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
+            let limit = S::Wide::at(&self.found.limit, group).min(far[2]);
+            let last = far[0].mul(p).min(far[1].mul(q)).min(limit);
+            if first.at_most(last).bits() != 0 {
                 return Some(group as u8);
             }
         }
@@ -214,12 +274,15 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
     #[inline(always)]
     fn visit<S: Simd>(&mut self, leaf: Entry) -> bool {
         let mut changed = false;
-        for block in leaf.index..leaf.index + u32::from(leaf.count) {
-            let (mut lanes, edges) = self.tree.edges::<S>(block, &self.bundle, self.most);
+        for index in leaf.index..leaf.index + u32::from(leaf.count) {
+            let mut scratch = None;
+            let block = self.tree.block(index, &mut scratch);
+            let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, self.most);
+            let mut lanes = lanes & block.lanes;
             while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
+                let lane = lanes.trailing_zeros() as usize % LANES;
                 lanes &= lanes - 1;
-                changed |= self.triangle::<S>(4 * block + lane as u32, &edges, lane, leaf.first);
+                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, leaf.first);
             }
         }
         changed
@@ -228,117 +291,181 @@ impl<'a, const ANY: bool> Walk<'a, ANY> {
     /// One triangle against the groups from `first` on.
     #[inline(always)]
     fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, first: u8) -> bool {
-        let splat = S::V8::splat;
-        let mut normals = [splat(0.0); 12];
-        for (normal, lanes) in normals.iter_mut().zip(&edges.normals) {
-            *normal = splat(lanes[lane]);
-        }
+        let splat = S::Wide::splat;
+        let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
         let bound = splat(edges.edge_error[lane]);
         let below = splat(-edges.edge_error[lane]);
-        let (height, height_error) = (splat(edges.height[lane]), splat(edges.height_error[lane]));
-        let slope_error = splat(edges.slope_error[lane]);
-        let mut changed = false;
-        for group in first as usize..GROUPS {
-            let dx = S::V8::load(&self.bundle.direction[0][group]);
-            let dy = S::V8::load(&self.bundle.direction[1][group]);
-            let dz = S::V8::load(&self.bundle.direction[2][group]);
-            let u = dz.mul_add(normals[2], dy.mul_add(normals[1], dx.mul(normals[0])));
-            let v = dz.mul_add(normals[5], dy.mul_add(normals[4], dx.mul(normals[3])));
-            let w = dz.mul_add(normals[8], dy.mul_add(normals[7], dx.mul(normals[6])));
+        let is_vague = edges.is_vague >> lane & 1 != 0;
+        let (mut changed, first_t) = (false, splat(self.bundle.first));
+        for group in usize::from(first)..self.groups {
+            let p = S::Wide::at(&self.bundle.slope[0], group);
+            let q = S::Wide::at(&self.bundle.slope[1], group);
+            let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
             let least = u.min(v).min(w);
-            let mut candidates = below.at_most(least);
-            if edges.is_two_sided >> lane & 1 != 0 {
-                // The bundle sees both sides: the signs must only agree.
-                candidates |= u.max(v).max(w).at_most(bound);
-            }
-            if candidates == 0 {
-                continue;
-            }
-            let slope = dz.mul_add(normals[11], dy.mul_add(normals[10], dx.mul(normals[9])));
-            let least_slope = slope.sub(slope_error);
-            let t = height.div(slope);
-            let error = t.abs().mul_add(slope_error, height_error).div(least_slope);
-            // Half as much again for the rounding of t and of the error itself.
-            let error = error.mul_add(splat(1.5), t.abs().mul(splat(1e-6)));
-            let (low, high) = (t.sub(error), t.add(error));
-            let mut sure = 0;
-            if edges.is_two_sided >> lane & 1 == 0 {
-                // A slope that may be 0 bounds nothing.
-                let steep = splat(0.0).less(least_slope);
-                let limit = S::V8::load(&self.limit[group]);
-                candidates &= !steep | low.at_most(limit) & S::V8::load(&self.tmin[group]).at_most(high);
-                let in_range =
-                    high.less(S::V8::load(&self.sure[group])) & S::V8::load(&self.bundle.begin[group]).less(low);
-                sure = steep & bound.less(least) & in_range;
-            }
-            let (low, high) = (low.to_array(), high.to_array());
-            while candidates != 0 {
-                let i = candidates.trailing_zeros() as usize;
-                candidates &= candidates - 1;
-                if sure >> i & 1 != 0 {
-                    self.note(group, i, id, low[i], high[i]);
+            let inside = below.at_most(least);
+            let mut open = inside.bits();
+            if is_vague {
+                // Where the bundle sees both sides, the signs must only agree.
+                open |= u.max(v).max(w).at_most(bound).bits();
+            } else if open != 0 {
+                let inverse = splat(1.0).div(along(&normal::<S>(edges, 3, lane), p, q));
+                let low = splat(edges.near_height[lane]).mul(inverse);
+                let high = splat(edges.far_height[lane]).mul(inverse);
+                let limit = S::Wide::at(&self.found.limit, group);
+                let before = S::Wide::at(&self.found.sure, group);
+                let in_range = high.less(before).and(S::Wide::at(&self.bundle.begin, group).less(low));
+                let sure = bound.less(least).and(in_range);
+                let outside = limit.less(low).or(high.less(first_t));
+                open = inside.without(sure).without(outside).bits();
+                if sure.bits() != 0 {
+                    let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
+                    S::Wide::select(sure, high, limit).put(&mut self.found.limit, group);
+                    S::Wide::select(sure, low, before).put(&mut self.found.sure, group);
+                    S::Wide::put_where(sure, id, &mut self.found.noted, group);
                     changed = true;
-                } else {
-                    changed |= self.decide(group, i, id);
                 }
+            }
+            while open != 0 {
+                let i = open.trailing_zeros() as usize;
+                open &= open - 1;
+                changed |= self.decide(group * S::Wide::LANES + i, id);
             }
         }
         changed
     }
 
-    /// A hit that is the nearest so far without doubt.
-    #[inline(always)]
-    fn note(&mut self, group: usize, lane: usize, id: u32, low: f32, high: f32) {
-        self.noted[group * LANES + lane] = id;
-        (self.sure[group][lane], self.limit[group][lane]) = if ANY { DONE } else { (low, high) };
-    }
-
     /// What the bounds leave open.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, group: usize, lane: usize, id: u32) -> bool {
-        let ray = group * LANES + lane;
-        if ANY && self.limit[group][lane] < 0.0 {
+    fn decide(&mut self, ray: usize, id: u32) -> bool {
+        let Self { tree, rays, bundle, found, .. } = self;
+        if Q::ANY && found.limit.0[ray] < 0.0 {
             return false;
         }
-        self.compute(ray);
-        let before = self.nearest[ray].limit();
-        self.tree.offer_one(id, &self.rays[ray], &mut self.nearest[ray]);
-        let Some(hit) = self.nearest[ray].hit() else { return false };
-        if ANY {
-            (self.sure[group][lane], self.limit[group][lane]) = DONE;
+        found.compute(tree, rays, ray);
+        let before = found.nearest[ray].limit();
+        tree.offer_one(id, &rays[ray], &mut found.nearest[ray]);
+        let Some(hit) = found.nearest[ray].hit() else { return false };
+        if Q::ANY {
+            (found.sure.0[ray], found.limit.0[ray]) = (DONE, DONE);
             return true;
         }
-        self.sure[group][lane] = hit.t.next_down();
-        self.limit[group][lane] = self.nearest[ray].limit();
-        self.limit[group][lane] < before
+        let depth = bundle.depth.0[ray];
+        found.sure.0[ray] = hit.t.next_down() * depth * (1.0 - SLACK) - TINY;
+        found.limit.0[ray] = found.nearest[ray].limit() * depth * (1.0 + SLACK) + TINY;
+        found.nearest[ray].limit() < before
     }
+}
 
+/// Normal k of one triangle, for each ray.
+#[inline(always)]
+fn normal<S: Simd>(edges: &Edges, k: usize, lane: usize) -> [S::Wide; 3] {
+    let [x, y, z] = &edges.normals[k];
+    [S::Wide::splat(x[lane]), S::Wide::splat(y[lane]), S::Wide::splat(z[lane])]
+}
+
+/// The scalar product with (p, q, 1).
+#[inline(always)]
+fn along<V: Vector>(n: &[V; 3], p: V, q: V) -> V {
+    p.mul_add(n[0], q.mul_add(n[1], n[2]))
+}
+
+/// `sure` and `limit` of a ray that needs no more hits.
+const DONE: f32 = f32::NEG_INFINITY;
+
+impl Found {
     /// Makes `nearest` valid for a ray, from what is noted.
-    #[inline(always)]
-    fn compute(&mut self, ray: usize) {
+    fn compute(&mut self, tree: &TriangleTree, rays: &[Ray; RAYS], ray: usize) {
         let id = std::mem::replace(&mut self.noted[ray], NONE);
         // What is noted is nearer than whatever was computed before.
         if id != NONE || self.computed >> ray & 1 == 0 {
-            self.nearest[ray] = Nearest::new(&self.rays[ray]);
+            self.nearest[ray] = Nearest::new(&rays[ray]);
             self.computed |= 1 << ray;
         }
         if id != NONE {
-            let hit = self.tree.hit_one(id, &self.rays[ray]);
-            debug_assert!(hit.is_some(), "what is noted is hit without doubt");
-            if let Some((t, hit)) = hit {
-                self.nearest[ray].offer(t, hit);
-            }
+            tree.offer_one(id, &rays[ray], &mut self.nearest[ray]);
+            debug_assert!(self.nearest[ray].hit().is_some(), "what is noted is hit without doubt");
         }
     }
 
+    /// Computes what is noted, and answers for the first `count` rays.
     #[inline(always)]
-    fn finish(&mut self) {
-        for ray in 0..RAYS {
-            self.compute(ray);
+    fn finish<S: Simd, Q: Query>(
+        &mut self,
+        tree: &TriangleTree,
+        bundle: &Bundle,
+        count: usize,
+        answers: &mut [Q::Answer; RAYS],
+        t: &mut [f64; RAYS],
+    ) {
+        for chunk in 0..count.div_ceil(4) {
+            let chunk = chunk % (RAYS / 4);
+            let ids: [u32; 4] = self.noted.as_chunks().0[chunk];
+            let answers: &mut [Q::Answer; 4] = &mut answers.as_chunks_mut().0[chunk];
+            let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
+            // NONE is the largest number.
+            let [a, b, c, d] = ids;
+            let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            if all != NONE {
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+                continue;
+            }
+            if some != NONE {
+                // Lanes without a triangle compute something harmless.
+                let or_some = |id: u32| if id == NONE { some } else { id };
+                let ids = [or_some(a), or_some(b), or_some(c), or_some(d)];
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+            }
+            for lane in 0..4 {
+                let ray = 4 * chunk + lane;
+                if ids[lane] == NONE {
+                    let is_hit = self.computed >> ray & 1 != 0;
+                    answers[lane] = if is_hit { Q::answer(self.nearest[ray].hit()) } else { Q::MISS };
+                    t[lane] = self.nearest[ray].t();
+                }
+            }
         }
     }
 }
 
-/// `sure` and `limit` of a ray that needs no more hits.
-const DONE: (f32, f32) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
+/// Answers for the four rays of a chunk, each of which hits a triangle for sure.
+///
+/// What remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough. It is: the
+/// bounds on t' come from rounding in f32 and are half of t' apart at most. That of f64 is 2^29 times smaller, and 2^21
+/// times is wanted; both count some 50 roundings of the same products.
+#[inline(always)]
+fn answer_noted<S: Simd, Q: Query>(
+    tree: &TriangleTree,
+    bundle: &Bundle,
+    chunk: usize,
+    ids: [u32; 4],
+    t: &mut [f64; 4],
+    answers: &mut [Q::Answer; 4],
+) {
+    let [a, b, c, d] = ids;
+    let corners = gather(tree.corners(a), tree.corners(b), tree.corners(c), tree.corners(d));
+    let [x, y, z] = &bundle.direction;
+    let lanes = |d: &PerRay| d.0.as_chunks().0[chunk];
+    let direction = [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))];
+    let [x, y, z] = bundle.origin;
+    let origin = [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())];
+    let numbers = Quad::new::<S>(origin, direction, &corners).numbers::<S>();
+    *t = numbers.t;
+    for lane in 0..4 {
+        let hit = tree.hit(ids[lane], numbers.t32[lane], numbers.u[lane], numbers.v[lane]);
+        answers[lane] = Q::answer(Some(hit));
+    }
+}
+
+/// Component by component.
+#[inline(always)]
+fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; 4]; 9] {
+    let mut corners = [[0.0; 4]; 9];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = [a[i], b[i], c[i], d[i]];
+    }
+    corners
+}
+
+/// That there is a hit, where nobody asks which.
+const SOMETHING: Hit = Hit { t: f32::NAN, u: f32::NAN, v: f32::NAN, primitive: 0, geometry: 0, instance: 0 };

@@ -1,9 +1,10 @@
-//! From the root to the leaves: one ray, or a packet of rays that share one stack.
+//! One ray from the root to the leaves.
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
 use super::build::MAX_DEPTH;
-use super::node::{Tree, WIDTH};
+use super::node::{Node, Tree, WIDTH};
+use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
@@ -20,24 +21,27 @@ pub(super) enum Visit {
 impl Visit {
     /// After offers to `nearest`: an any-hit query stops at the first hit.
     #[inline(always)]
-    pub fn after<const ANY: bool>(nearest: &Nearest) -> Self {
-        if ANY && nearest.hit().is_some() { Self::Stop } else { Self::Until(nearest.limit()) }
+    pub fn after<Q: Query>(nearest: &Nearest) -> Self {
+        if Q::ANY && nearest.hit().is_some() { Self::Stop } else { Self::Until(nearest.limit()) }
     }
 }
 
 /// A child to be visited.
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
-    /// Where the ray, or the first ray of the packet, enters it.
+    /// Where the ray enters it.
     near: f32,
     index: u32,
-    /// The rays of the packet that enter it.
-    rays: u32,
     count: u8,
 }
 
 impl Entry {
-    const ROOT: Self = Self { near: 0.0, index: 0, rays: 1, count: 0 };
+    #[inline(always)]
+    fn child(node: &Node, near: &[f32; WIDTH], slot: usize) -> Self {
+        Self { near: near[slot], index: node.index[slot], count: node.count[slot] }
+    }
+
+    const ROOT: Self = Self { near: 0.0, index: 0, count: 0 };
 }
 
 /// Every level of the tree leaves at most seven siblings waiting.
@@ -54,17 +58,16 @@ impl Stack {
         Self { entries: [Entry::default(); STACK], len: 0 }
     }
 
-    /// Holds the root alone.
-    #[inline(always)]
-    fn start(&mut self, rays: u32) {
-        self.entries[0] = Entry { rays, ..Entry::ROOT };
-        self.len = 1;
-    }
-
     #[inline(always)]
     fn pop(&mut self) -> Option<Entry> {
         self.len = self.len.checked_sub(1)?;
         Some(self.entries[self.len])
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: Entry) {
+        self.entries[self.len] = entry;
+        self.len += 1;
     }
 
     /// Pushes so that of what came since `base` the nearest ends on top.
@@ -80,9 +83,9 @@ impl Stack {
     }
 }
 
-/// Visits the leaves that the ray enters before `limit`, near ones first.
+/// Visits the leaves that the ray enters before `limit`; near ones first, if that matters to the query.
 #[inline(always)]
-pub(super) fn single<S: Simd>(
+pub(super) fn single<S: Simd, Q: Query>(
     stack: &mut Stack,
     tree: &Tree,
     ray: &SlabRay,
@@ -92,28 +95,38 @@ pub(super) fn single<S: Simd>(
     stack.len = 0;
     let mut next = Entry::ROOT;
     loop {
-        if next.count == 0 {
+        // Down to a leaf. Mostly one or two children are entered: each number has its own branch, which is predicted
+        // better than the length of a loop.
+        while next.count == 0 {
             let node = tree.node(next.index);
-            let (mut mask, near) = ray.enter::<S>(node, limit);
-            if mask != 0 {
-                let child = |i: usize| Entry { near: near[i], index: node.index[i], rays: 1, count: node.count[i] };
-                let first = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                next = child(first);
-                // Mostly one or two children are entered: the nearest goes on, the other waits.
-                let base = stack.len;
-                while mask != 0 {
-                    let i = mask.trailing_zeros() as usize;
-                    mask &= mask - 1;
-                    let mut other = child(i);
-                    if other.near < next.near {
-                        std::mem::swap(&mut next, &mut other);
-                    }
-                    stack.insert(base, other);
-                }
+            let (mask, near) = ray.enter::<S>(node, limit);
+            if mask == 0 {
+                break;
+            }
+            let (first, rest) = lowest(mask);
+            next = Entry::child(node, &near, first);
+            if rest == 0 {
                 continue;
             }
-        } else {
+            let (second, rest) = lowest(rest);
+            let mut other = Entry::child(node, &near, second);
+            if other.near < next.near {
+                std::mem::swap(&mut next, &mut other);
+            }
+            let base = stack.len;
+            stack.push(other);
+            let mut rest = rest;
+            while rest != 0 {
+                let (slot, others) = lowest(rest);
+                rest = others;
+                let mut other = Entry::child(node, &near, slot);
+                if other.near < next.near {
+                    std::mem::swap(&mut next, &mut other);
+                }
+                if Q::ANY { stack.push(other) } else { stack.insert(base, other) }
+            }
+        }
+        if next.count != 0 {
             match leaf(next.index, next.count) {
                 Visit::Until(t) => limit = t,
                 Visit::Stop => return,
@@ -129,52 +142,8 @@ pub(super) fn single<S: Simd>(
     }
 }
 
-/// Visits, for each ray of a packet, at least the leaves that it enters before its limit. `leaf` gets a leaf, the
-/// ray's place in the packet and its nearest hit. Only the rays in the bit mask `live` take part.
+/// The lowest bit's place, and the other bits.
 #[inline(always)]
-pub(super) fn packet<S: Simd, const N: usize>(
-    stack: &mut Stack,
-    tree: &Tree,
-    rays: &[SlabRay; N],
-    mut live: u32,
-    nearest: &mut [Nearest; N],
-    mut leaf: impl FnMut(u32, u8, usize, &mut Nearest) -> Visit,
-) {
-    let mut limit = std::array::from_fn::<f32, N, _>(|k| nearest[k].limit());
-    stack.start(live);
-    while let Some(entry) = stack.pop() {
-        let mut waiting = entry.rays & live;
-        if entry.count != 0 {
-            while waiting != 0 {
-                let k = waiting.trailing_zeros() as usize;
-                waiting &= waiting - 1;
-                match leaf(entry.index, entry.count, k, &mut nearest[k]) {
-                    Visit::Until(t) => limit[k] = t,
-                    Visit::Stop => live &= !(1 << k),
-                }
-            }
-            continue;
-        }
-        let node = tree.node(entry.index);
-        let mut entering = [0u32; WIDTH];
-        let mut first = [f32::INFINITY; WIDTH];
-        while waiting != 0 {
-            let k = waiting.trailing_zeros() as usize;
-            waiting &= waiting - 1;
-            let (mask, near) = rays[k].enter::<S>(node, limit[k]);
-            for i in 0..WIDTH {
-                if mask >> i & 1 != 0 {
-                    entering[i] |= 1 << k;
-                    first[i] = if near[i] < first[i] { near[i] } else { first[i] };
-                }
-            }
-        }
-        let base = stack.len;
-        for i in 0..WIDTH {
-            if entering[i] != 0 {
-                let entry = Entry { near: first[i], index: node.index[i], rays: entering[i], count: node.count[i] };
-                stack.insert(base, entry);
-            }
-        }
-    }
+fn lowest(mask: u32) -> (usize, u32) {
+    (mask.trailing_zeros() as usize % WIDTH, mask & (mask - 1))
 }

@@ -1,0 +1,53 @@
+//! Four triangles, laid out component by component for four-wide arithmetic.
+
+use crate::math::Vec3;
+
+/// Triangles in a block.
+pub(super) const LANES: usize = 4;
+
+/// Four triangles, component by component.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    /// Component i of corner k is `corners[3 * k + i]`.
+    pub corners: [[f32; LANES]; 9],
+    pub primitive: [u32; LANES],
+    pub part: [u32; LANES],
+    /// At least the largest component of an edge.
+    pub size: f32,
+    /// A bit for every lane that has a triangle.
+    pub lanes: u32,
+}
+
+impl Block {
+    /// Without triangles.
+    pub const EMPTY: Self =
+        Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], size: 0.0, lanes: 0 };
+
+    /// Adds a triangle, the fourth at most.
+    #[inline(always)]
+    pub fn push(&mut self, corners: [Vec3; 3], part: u32, primitive: u32) {
+        let lane = self.lanes.trailing_ones() as usize % LANES;
+        for (k, corner) in corners.into_iter().enumerate() {
+            for axis in 0..3 {
+                self.corners[3 * k + axis][lane] = corner[axis];
+            }
+        }
+        let [a, b, c] = corners;
+        let size = (b - a).abs().max((c - b).abs()).max((a - c).abs()).max_element();
+        // Rounded up.
+        self.size = self.size.max(size * (1.0 + f32::EPSILON));
+        self.primitive[lane] = primitive;
+        self.part[lane] = part;
+        self.lanes |= 1 << lane;
+    }
+
+    #[inline(always)]
+    pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] = &self.corners;
+        [
+            Vec3::new(ax[lane], ay[lane], az[lane]),
+            Vec3::new(bx[lane], by[lane], bz[lane]),
+            Vec3::new(cx[lane], cy[lane], cz[lane]),
+        ]
+    }
+}

@@ -1,0 +1,214 @@
+//! From a list of boxes to a tree: binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding
+//! volume hierarchies*), eight children at a time (Wald, Benthin, Boulos 2008, *Getting rid of packets*).
+//!
+//! | file | idea |
+//! | --- | --- |
+//! | `record`, `lanes` | a box in one register, as [-min, max] |
+//! | `split` | a range of items, and how it is divided in two |
+//! | `bins` | the best plane between bins, for large ranges |
+//! | `sweep` | the best of all divisions, for small ones |
+//! | `children` | from one range to the eight children of a node |
+//! | `subtree`, `top` | by one thread, by all threads |
+//!
+//! A node starts as one range of items; the child with the largest surface is split in two until there are eight or none is
+//! worth it. Leaves are charged by blocks, ceil(n / block), so that they fill. A binary tree collapsed afterwards, the
+//! simpler alternative, writes every box twice and chooses worse.
+//!
+//! The upper nodes are made one after the other, each by all threads; below them whole subtrees are tasks of one thread. The
+//! tree is the same for any number of threads and any instruction set: every decision depends on its range alone,
+//! chunks have a fixed size, and no arithmetic is fused.
+
+mod bins;
+mod children;
+pub(super) mod lanes;
+mod record;
+mod split;
+mod subtree;
+mod sweep;
+mod top;
+
+use rayon::prelude::*;
+
+use super::isa::{self, Isa};
+use super::memory;
+use super::node::{Node, Tree, WIDTH};
+use super::preset::Options;
+use children::Children;
+pub(super) use record::{Record, triangle_items};
+use split::Rule;
+use subtree::{Parent, SubtreeKernel, Task};
+use top::Shared;
+
+/// Levels a tree can have: the stack of a walk is made for it.
+pub(super) const MAX_DEPTH: usize = 40;
+
+/// From this level on ranges are cut into halves, a node into eighths: 12 more levels hold 2^36 items.
+const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;
+
+/// Ranges of at most this many items are tasks of one thread.
+const TASK: u32 = 1 << 14;
+
+/// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
+/// `block`, a power of two, is how many items are tested together.
+///
+/// # Panics
+/// With more than 2^32 - 1 items.
+pub(super) fn build(items: &mut [Record], block: u32, options: &Options<'_>) -> Tree {
+    assert!(u32::try_from(items.len()).is_ok(), "more primitives than 32-bit indices can name");
+    if items.is_empty() {
+        return Tree::new(Vec::new());
+    }
+    let (rule, isa) = (Rule { block }, options.isa);
+    let (top, tasks) = upper_nodes(items, &rule, isa);
+    let in_top = items.len() - tasks.iter().map(|(_, task)| task.range.len as usize).sum::<usize>();
+    let mut rest = items;
+    let mut jobs = Vec::with_capacity(tasks.len());
+    let mut first = 0;
+    for (parent, task) in tasks {
+        // Between them are leaves of the upper nodes.
+        let (_, own) = rest.split_at_mut((task.range.first - first) as usize);
+        let (own, others) = own.split_at_mut(task.range.len as usize);
+        (rest, first) = (others, task.range.first + task.range.len);
+        jobs.push((parent, task, own));
+    }
+    let built: Vec<(Option<Parent>, Vec<Node>)> = jobs
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|(parent, task, items)| {
+            let count = items.len();
+            let nodes = isa::dispatch(isa, SubtreeKernel { rule: &rule, items, task });
+            options.report(count);
+            (parent, nodes)
+        })
+        .collect();
+    options.report(in_top);
+    Tree::new(join(top, built))
+}
+
+/// The nodes over everything of more than [`TASK`] items, and what is below them, in the order of the items.
+fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(Option<Parent>, Task)>) {
+    let mut shared = Shared { rule, items, isa, halve: false };
+    let (mut nodes, mut tasks) = (Vec::new(), Vec::new());
+    let mut open = vec![(None, Task { range: shared.whole(), depth: 0, split: None })];
+    while let Some((parent, task)) = open.pop() {
+        if task.range.len <= TASK {
+            tasks.push((parent, task));
+            continue;
+        }
+        let index = nodes.len() as u32;
+        point(&mut nodes, parent, index);
+        shared.halve = task.depth >= CUT_DEPTH;
+        let children = Children::new(task.range, task.split, rule, &mut shared);
+        subtree::emit(&children, &mut nodes);
+        for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
+            let parent = Parent { node: index, slot: slot as u32 };
+            open.push((Some(parent), Task { range: child.range, depth: task.depth + 1, split: child.split }));
+        }
+    }
+    tasks.sort_by_key(|(_, task)| task.range.first);
+    (nodes, tasks)
+}
+
+/// Puts the subtrees' nodes behind those above them.
+fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<Node> {
+    let mut base = top.len();
+    for (parent, subtree) in &subtrees {
+        point(&mut top, *parent, base as u32);
+        base += subtree.len();
+    }
+    let mut chunks = vec![(top.len(), (false, top))];
+    chunks.extend(subtrees.into_iter().map(|(_, subtree)| (subtree.len(), (true, subtree))));
+    memory::fill(chunks, |(is_subtree, nodes): (bool, Vec<Node>), room| {
+        let base = if is_subtree { room.first as u32 } else { 0 };
+        for mut node in nodes {
+            for slot in 0..WIDTH {
+                node.index[slot] += if node.count[slot] == 0 { base } else { 0 };
+            }
+            room.push(node);
+        }
+    })
+}
+
+/// Lets a child's slot name its node.
+fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
+    if let Some(Parent { node, slot }) = parent {
+        nodes[node as usize].index[slot as usize] = index;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::super::node::NO_CHILD;
+    use super::*;
+    use crate::math::{Aabb, Vec3};
+
+    /// Boxes of a size, scattered by a linear congruence; numbered in order.
+    fn items(count: u32, size: f32) -> Vec<Record> {
+        let mut state = count;
+        let mut unit = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut item = |i| {
+            let min = Vec3::new(unit(), unit() - 0.5, unit() * 0.1);
+            Record::new(&Aabb { min, max: min + Vec3::new(unit(), unit(), unit()) * size }, 7, i)
+        };
+        (0..count).map(&mut item).collect()
+    }
+
+    /// The box around a subtree, which every box above it must equal; marks its items.
+    fn check(tree: &Tree, items: &[Record], index: u32, block: u32, seen: &mut [bool]) -> Aabb {
+        let node = tree.node(index);
+        let mut all = Aabb::EMPTY;
+        for slot in (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD) {
+            let inside = if node.count[slot] == 0 {
+                check(tree, items, node.index[slot], block, seen)
+            } else {
+                assert!(u32::from(node.count[slot]) <= block * children::MAX_LEAF_BLOCKS);
+                let first = node.index[slot] as usize;
+                let leaf = &items[first..first + node.count[slot] as usize];
+                leaf.iter().fold(Aabb::EMPTY, |sum, item| {
+                    assert_eq!(item.part(), 7);
+                    assert!(!std::mem::replace(&mut seen[item.primitive() as usize], true), "in one leaf only");
+                    sum.union(record::aabb(&item.0))
+                })
+            };
+            assert_eq!(node.child_bounds(slot), inside);
+            all = all.union(inside);
+        }
+        all
+    }
+
+    #[test]
+    fn every_item_is_in_one_leaf_and_boxes_are_tight() {
+        for (count, size, block) in
+            [(1, 1.0, 4), (5, 1.0, 4), (33, 0.1, 1), (1000, 0.3, 4), (70_000, 0.01, 4), (200_000, 0.0, 1)]
+        {
+            let mut items = items(count, size);
+            let reported = AtomicU64::new(0);
+            let progress = |count| _ = reported.fetch_add(count, Ordering::Relaxed);
+            let tree = build(&mut items, block, &Options { progress: Some(&progress), ..Options::default() });
+            assert_eq!(reported.into_inner(), u64::from(count));
+            let mut seen = vec![false; items.len()];
+            check(&tree, &items, 0, block, &mut seen);
+            assert!(seen.iter().all(|&seen| seen), "{count} items");
+        }
+    }
+
+    #[test]
+    fn instruction_sets_and_threads_give_the_same_tree() {
+        let build = |isa, threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let mut items = items(60_000, 0.02);
+            let tree = pool.install(|| build(&mut items, 4, &Options { isa, ..Options::default() }));
+            let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
+            (format!("{tree:?}"), numbers)
+        };
+        let expected = build(Isa::Portable, 1);
+        for threads in [1, 3] {
+            assert!(build(Isa::detect(), threads) == expected);
+        }
+    }
+}

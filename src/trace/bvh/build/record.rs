@@ -1,0 +1,86 @@
+//! What the builder moves about: a box and whose it is, in 32 bytes.
+
+use rayon::prelude::*;
+
+use crate::math::{Aabb, Vec3, is_traceable};
+use crate::trace::bvh::memory;
+use crate::trace::{Part, Primitives};
+
+/// A box as [-min, max]: one eight-wide maximum joins two of them (Fuetterling, Lojewski, Pfreundt, Hamann, Ebert 2017,
+/// *Accelerated single ray tracing for wide vector units*, among others). Lanes 3 and 7 carry two numbers that are not
+/// f32; whatever is computed of them is never looked at.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(in crate::trace::bvh) struct Record(pub [f32; 8]);
+
+/// Lane of the primitive's number.
+const PRIMITIVE: usize = 3;
+/// Lane of the part's number.
+const PART: usize = 7;
+
+/// The box of nothing, as [-min, max].
+pub(super) const EMPTY: [f32; 8] = [f32::NEG_INFINITY; 8];
+
+impl Record {
+    /// `bounds` is not empty.
+    #[inline(always)]
+    pub fn new(bounds: &Aabb, part: u32, primitive: u32) -> Self {
+        // 0 - x and x + 0 are never -0, so that joining boxes in another order gives the same bits.
+        let (low, high) = (Vec3::ZERO - bounds.min, bounds.max + Vec3::ZERO);
+        Self([low.x, low.y, low.z, f32::from_bits(primitive), high.x, high.y, high.z, f32::from_bits(part)])
+    }
+
+    /// Of something that cannot be hit, to be dropped.
+    pub const NOTHING: Self = Self(EMPTY);
+
+    /// Whether it is [`Record::NOTHING`].
+    pub fn is_nothing(&self) -> bool {
+        self.0[0] == f32::NEG_INFINITY
+    }
+
+    /// Index in its part.
+    #[inline(always)]
+    pub fn primitive(&self) -> u32 {
+        self.0[PRIMITIVE].to_bits()
+    }
+
+    /// Index of the part.
+    #[inline(always)]
+    pub fn part(&self) -> u32 {
+        self.0[PART].to_bits()
+    }
+}
+
+/// Half the surface of a box; without order for an empty one.
+#[inline(always)]
+pub(super) fn half_area(bounds: &[f32; 8]) -> f32 {
+    let [x, y, z] = [0, 1, 2].map(|axis| bounds[axis] + bounds[axis + 4]);
+    y * (x + z) + z * x
+}
+
+/// The box as others know it.
+#[inline(always)]
+pub(super) fn aabb(bounds: &[f32; 8]) -> Aabb {
+    let &[x, y, z, _, max_x, max_y, max_z, _] = bounds;
+    Aabb { min: Vec3::new(0.0 - x, 0.0 - y, 0.0 - z), max: Vec3::new(max_x, max_y, max_z) }
+}
+
+/// One item for each traceable triangle of `parts`, in order.
+pub(in crate::trace::bvh) fn triangle_items(parts: &[Part]) -> Vec<Record> {
+    let mut items = memory::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
+    for (p, part) in parts.iter().enumerate() {
+        let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
+        items.par_extend(triangles.par_iter().enumerate().map(|(i, corners)| {
+            let corners = corners.map(|i| positions[i as usize]);
+            if corners.iter().all(|&corner| is_traceable(corner)) {
+                Record::new(&Aabb::around(corners), p as u32, i as u32)
+            } else {
+                Record::NOTHING
+            }
+        }));
+    }
+    if items.par_iter().any(Record::is_nothing) {
+        items.retain(|item| !item.is_nothing());
+    }
+    items
+}

@@ -1,0 +1,145 @@
+//! Ranges too large for one thread: items are partitioned chunk by chunk, side by side.
+//!
+//! Chunks have a fixed size and are put together in order, so the result does not depend on how many threads there are.
+
+use rayon::prelude::*;
+
+use super::bins::MANY;
+use super::children::Splitter;
+use super::record::Record;
+use super::split::{Range, Rule, Split};
+use super::subtree::binned;
+use crate::trace::bvh::isa::{self, Isa, Kernel};
+use crate::trace::bvh::simd::{Simd, Vector};
+
+/// Items in a chunk.
+const CHUNK: usize = 1 << 15;
+
+/// Divides ranges of all items by all threads.
+pub(super) struct Shared<'a> {
+    pub rule: &'a Rule,
+    pub items: &'a mut [Record],
+    pub isa: Isa,
+    /// Too deep for anything but halves.
+    pub halve: bool,
+}
+
+impl Shared<'_> {
+    /// The range of all items.
+    pub fn whole(&self) -> Range {
+        let isa = self.isa;
+        let chunk = |items| isa::dispatch(isa, RangeKernel(items));
+        let whole = self.items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
+        Range { len: self.items.len() as u32, ..whole }
+    }
+}
+
+impl Splitter for Shared<'_> {
+    fn find(&mut self, range: &Range) -> Split {
+        if self.halve {
+            return Split::HALF;
+        }
+        let items = &self.items[range.within(0)];
+        isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
+    }
+
+    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+        let isa = self.isa;
+        let items = &mut self.items[range.within(0)];
+        if matches!(split.cut, super::split::Cut::Half) {
+            return isa::dispatch(isa, PartitionKernel { items, range, split });
+        }
+        let chunks = items.par_chunks_mut(CHUNK);
+        let sides: Vec<[Range; 2]> = chunks
+            .map(|items| {
+                let range = Range { first: 0, len: items.len() as u32, ..*range };
+                isa::dispatch(isa, PartitionKernel { items, range: &range, split })
+            })
+            .collect();
+        let left_len = sides.iter().map(|[left, _]| left.len as usize).sum();
+        gather(items, &sides, left_len);
+        if left_len == 0 || left_len == items.len() {
+            return isa::dispatch(isa, PartitionKernel { items, range, split: &Split::HALF });
+        }
+        let union = |[left, right]: [Range; 2], [l, r]: [Range; 2]| [left.union(l), right.union(r)];
+        let [left, right] = sides.into_iter().fold([Range::EMPTY; 2], union);
+        split.sides(range, left_len, [left.bounds, right.bounds])
+    }
+}
+
+/// Brings the left sides of all chunks together at the front: what is of the right side there changes place with what is
+/// of the left side behind.
+fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
+    let (front, back) = items.split_at_mut(left_len);
+    let (mut gaps, mut strays) = (Vec::new(), Vec::new());
+    let mut at = 0;
+    for [left, right] in sides {
+        let middle = at + left.len as usize;
+        let end = middle + right.len as usize;
+        gaps.push(middle.min(left_len)..end.min(left_len));
+        strays.push(at.max(left_len) - left_len..middle.max(left_len) - left_len);
+        at = end;
+    }
+    let mut strays = strays.into_iter().filter(|range| !range.is_empty());
+    let mut stray = strays.next().unwrap_or(0..0);
+    for mut gap in gaps {
+        while !gap.is_empty() {
+            if stray.is_empty() {
+                stray = strays.next().unwrap_or(0..0);
+                if stray.is_empty() {
+                    return;
+                }
+            }
+            let len = gap.len().min(stray.len());
+            front[gap.start..gap.start + len].swap_with_slice(&mut back[stray.start..stray.start + len]);
+            gap.start += len;
+            stray.start += len;
+        }
+    }
+}
+
+impl Range {
+    fn union(self, other: Self) -> Self {
+        let max = |a: [f32; 8], b: [f32; 8]| a.max(b);
+        let (bounds, centres) = (max(self.bounds, other.bounds), max(self.centres, other.centres));
+        Self { bounds, centres, ..self }
+    }
+}
+
+struct RangeKernel<'a>(&'a [Record]);
+
+impl Kernel for RangeKernel<'_> {
+    type Output = Range;
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Range {
+        Range::new::<S>(self.0, 0)
+    }
+}
+
+struct FindKernel<'a> {
+    items: &'a [Record],
+    range: &'a Range,
+    rule: &'a Rule,
+}
+
+impl Kernel for FindKernel<'_> {
+    type Output = Option<Split>;
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Option<Split> {
+        binned::<S, MANY>(self.items, self.range, self.rule)
+    }
+}
+
+struct PartitionKernel<'a> {
+    items: &'a mut [Record],
+    range: &'a Range,
+    split: &'a Split,
+}
+
+impl Kernel for PartitionKernel<'_> {
+    type Output = [Range; 2];
+    #[inline(always)]
+    fn run<S: Simd>(self) -> [Range; 2] {
+        self.split.partition::<S>(self.items, self.range)
+    }
+}

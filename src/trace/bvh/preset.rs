@@ -1,0 +1,64 @@
+//! How much work goes into a tree, and how much memory.
+
+use super::isa::Isa;
+
+/// What a tree is built for. Hits do not depend on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// Built fastest, for few rays.
+    Fast,
+    /// Built by the surface area heuristic.
+    #[default]
+    Default,
+    /// Built slowest, for many rays: triangles that are much larger than their neighbours are referenced from several leaves.
+    High,
+    /// The default tree in least memory: leaves hold numbers of triangles, whose corners are fetched from the mesh.
+    Compact,
+}
+
+impl Preset {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Fast, Self::Default, Self::High, Self::Compact];
+
+    /// In lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Default => "default",
+            Self::High => "high",
+            Self::Compact => "compact",
+        }
+    }
+}
+
+/// How a tracer is built.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// What for.
+    pub preset: Preset,
+    /// What with; must be available. Neither the tree nor hits depend on it.
+    pub isa: Isa,
+    /// Called from any thread with numbers of primitives that have found their place; they add up to all that can
+    /// be hit, stored ones and placed objects.
+    pub progress: Option<&'a (dyn Fn(u64) + Sync)>,
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self { preset: Preset::default(), isa: Isa::detect(), progress: None }
+    }
+}
+
+impl From<Preset> for Options<'_> {
+    fn from(preset: Preset) -> Self {
+        Self { preset, ..Self::default() }
+    }
+}
+
+impl Options<'_> {
+    pub(super) fn report(&self, primitives: usize) {
+        if let Some(progress) = self.progress {
+            progress(primitives as u64);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The two questions a ray asks, as types: kernels are compiled once for each.
+
+use crate::ray::Hit;
+use crate::trace::nearest::Nearest;
+
+/// A question and its answer.
+pub(super) trait Query {
+    /// Whether any hit will do.
+    const ANY: bool;
+    type Answer: Copy;
+    const MISS: Self::Answer;
+    fn answer(hit: Option<Hit>) -> Self::Answer;
+    /// What is found so far, where a hit of another kind of primitive had the exact `t`; none where no more is wanted.
+    fn resume(nearest: &mut Nearest, t: f64, answer: Self::Answer) -> bool;
+}
+
+/// The nearest hit.
+pub(super) enum Closest {}
+
+/// Whether there is any hit.
+pub(super) enum Occluded {}
+
+impl Query for Closest {
+    const ANY: bool = false;
+    type Answer = Option<Hit>;
+    const MISS: Option<Hit> = None;
+    #[inline(always)]
+    fn answer(hit: Option<Hit>) -> Option<Hit> {
+        hit
+    }
+    #[inline(always)]
+    fn resume(nearest: &mut Nearest, t: f64, answer: Option<Hit>) -> bool {
+        if let Some(hit) = answer {
+            nearest.offer(t, hit);
+        }
+        true
+    }
+}
+
+impl Query for Occluded {
+    const ANY: bool = true;
+    type Answer = bool;
+    const MISS: bool = false;
+    #[inline(always)]
+    fn answer(hit: Option<Hit>) -> bool {
+        hit.is_some()
+    }
+    #[inline(always)]
+    fn resume(_: &mut Nearest, _: f64, answer: bool) -> bool {
+        !answer
+    }
+}

@@ -1,0 +1,105 @@
+//! Several numbers at a time, by whatever the processor has.
+//!
+//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, and
+//! [`Avx2`]. The two may differ in the last bit of an f32 where a product and a sum are fused, so f32 serves only tests
+//! that reject conservatively. f64 is never fused: its operations round as the scalar ones of
+//! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub(super) use portable::Portable;
+#[cfg(target_arch = "x86_64")]
+pub(super) use x86::{Avx2, V8};
+
+use super::build::lanes::Boxes;
+use super::bundle::{PerRay, RAYS};
+
+/// An instruction set, as a family of vector types.
+pub(super) trait Simd {
+    /// Four f32.
+    type V4: Vector + Array<4>;
+    /// Eight f32.
+    type V8: Vector + Array<8> + Boxes;
+    /// As many f32 as one instruction takes.
+    type Wide: Group;
+    /// Four f64.
+    type D4: Doubles<F = Self::V4>;
+    /// Rows become columns.
+    fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
+    /// Has a value loaded that will be needed soon.
+    fn prefetch<T>(value: &T);
+}
+
+/// One truth a lane.
+pub(super) trait Mask: Copy {
+    fn and(self, other: Self) -> Self;
+    fn or(self, other: Self) -> Self;
+    /// Where self holds and other does not.
+    fn without(self, other: Self) -> Self;
+    /// Bit i is set where it holds in lane i.
+    fn bits(self) -> u32;
+}
+
+/// Values of f32. `max` and `min` return the second operand where one is NaN.
+pub(super) trait Vector: Copy {
+    type Mask: Mask;
+    fn splat(value: f32) -> Self;
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// self * factor + summand, rounded once or twice.
+    fn mul_add(self, factor: Self, summand: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Where self is at most other; not for NaN.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// Where self is less than other; not for NaN.
+    fn less(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The largest lane; NaN are passed over or not.
+    fn largest(self) -> f32;
+    /// The smallest lane; NaN are passed over or not.
+    fn smallest(self) -> f32;
+}
+
+/// Loaded from and stored to an array.
+pub(super) trait Array<const N: usize>: Sized {
+    fn load(values: &[f32; N]) -> Self;
+    fn to_array(self) -> [f32; N];
+}
+
+/// The rays of a bundle, group by group.
+pub(super) trait Group: Vector {
+    /// Rays in a group.
+    const LANES: usize;
+    fn at(values: &PerRay, group: usize) -> Self;
+    fn put(self, values: &mut PerRay, group: usize);
+    /// Sets the group's values where the mask holds.
+    fn put_where(mask: Self::Mask, value: u32, values: &mut [u32; RAYS], group: usize);
+}
+
+/// Four values of f64.
+pub(super) trait Doubles: Copy {
+    /// As many f32.
+    type F: Array<4>;
+    fn splat(value: f64) -> Self;
+    /// Exact.
+    fn widen(values: Self::F) -> Self;
+    /// Rounded to nearest.
+    fn narrow(self) -> Self::F;
+    fn to_array(self) -> [f64; 4];
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Bit i is set where lane i of self is less than that of other; not for NaN.
+    fn less(self, other: Self) -> u32;
+}

@@ -1,0 +1,302 @@
+//! AVX2 and FMA.
+//!
+//! SAFETY of every block below: the vectors are made only in kernels that `isa::dispatch` runs, which asks the
+//! processor first; loads and stores go through references to arrays of the vector's size.
+#![allow(unsafe_code)] // Intrinsics.
+
+use std::arch::x86_64::*;
+
+use super::{Array, Doubles, Group, Mask, Simd, Vector};
+use crate::trace::bvh::bundle::{PerRay, RAYS};
+
+/// AVX2 and FMA.
+pub struct Avx2;
+
+impl Simd for Avx2 {
+    type V4 = V4;
+    type V8 = V8;
+    type Wide = V8;
+    type D4 = D4;
+
+    #[inline(always)]
+    fn prefetch<T>(value: &T) {
+        for line in (0..size_of::<T>()).step_by(64) {
+            // A hint, and of memory that is there.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast::<i8>().add(line)) };
+        }
+    }
+
+    #[inline(always)]
+    fn transpose(rows: [V8; 8]) -> [V8; 8] {
+        let [V8(a), V8(b), V8(c), V8(d), V8(e), V8(f), V8(g), V8(h)] = rows;
+        unsafe {
+            let (ab0, ab1) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (cd0, cd1) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            let (ef0, ef1) = (_mm256_unpacklo_ps(e, f), _mm256_unpackhi_ps(e, f));
+            let (gh0, gh1) = (_mm256_unpacklo_ps(g, h), _mm256_unpackhi_ps(g, h));
+            let (p0, p1) = (_mm256_shuffle_ps::<0x44>(ab0, cd0), _mm256_shuffle_ps::<0xee>(ab0, cd0));
+            let (p2, p3) = (_mm256_shuffle_ps::<0x44>(ab1, cd1), _mm256_shuffle_ps::<0xee>(ab1, cd1));
+            let (q0, q1) = (_mm256_shuffle_ps::<0x44>(ef0, gh0), _mm256_shuffle_ps::<0xee>(ef0, gh0));
+            let (q2, q3) = (_mm256_shuffle_ps::<0x44>(ef1, gh1), _mm256_shuffle_ps::<0xee>(ef1, gh1));
+            [
+                V8(_mm256_permute2f128_ps::<0x20>(p0, q0)),
+                V8(_mm256_permute2f128_ps::<0x20>(p1, q1)),
+                V8(_mm256_permute2f128_ps::<0x20>(p2, q2)),
+                V8(_mm256_permute2f128_ps::<0x20>(p3, q3)),
+                V8(_mm256_permute2f128_ps::<0x31>(p0, q0)),
+                V8(_mm256_permute2f128_ps::<0x31>(p1, q1)),
+                V8(_mm256_permute2f128_ps::<0x31>(p2, q2)),
+                V8(_mm256_permute2f128_ps::<0x31>(p3, q3)),
+            ]
+        }
+    }
+}
+
+/// Four f32.
+#[derive(Clone, Copy)]
+pub struct V4(__m128);
+
+/// Eight f32.
+#[derive(Clone, Copy)]
+pub struct V8(pub __m256);
+
+/// Four f64.
+#[derive(Clone, Copy)]
+pub struct D4(__m256d);
+
+/// A function of two vectors by its intrinsic, as a method.
+macro_rules! lanewise {
+    ($($name:ident: $intrinsic:ident;)*) => {
+        $(#[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            Self(unsafe { $intrinsic(self.0, other.0) })
+        })*
+    };
+}
+
+/// All bits of a lane of four, or none.
+#[derive(Clone, Copy)]
+pub struct M4(__m128);
+
+/// All bits of a lane of eight, or none.
+#[derive(Clone, Copy)]
+pub struct M8(__m256);
+
+impl Mask for M4 {
+    lanewise! {
+        and: _mm_and_ps;
+        or: _mm_or_ps;
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(unsafe { _mm_andnot_ps(other.0, self.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm_movemask_ps(self.0) as u32 }
+    }
+}
+
+impl Mask for M8 {
+    lanewise! {
+        and: _mm256_and_ps;
+        or: _mm256_or_ps;
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(other.0, self.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+}
+
+impl Vector for V4 {
+    type Mask = M4;
+    lanewise! {
+        add: _mm_add_ps;
+        sub: _mm_sub_ps;
+        mul: _mm_mul_ps;
+        div: _mm_div_ps;
+        max: _mm_max_ps;
+        min: _mm_min_ps;
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> M4 {
+        M4(unsafe { _mm_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> M4 {
+        M4(unsafe { _mm_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn select(mask: M4, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm_blendv_ps(no.0, yes.0, mask.0) })
+    }
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        unsafe {
+            let pair = _mm_max_ps(self.0, _mm_movehl_ps(self.0, self.0));
+            _mm_cvtss_f32(_mm_max_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
+        }
+    }
+    #[inline(always)]
+    fn smallest(self) -> f32 {
+        unsafe {
+            let pair = _mm_min_ps(self.0, _mm_movehl_ps(self.0, self.0));
+            _mm_cvtss_f32(_mm_min_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
+        }
+    }
+}
+
+impl Array<4> for V4 {
+    #[inline(always)]
+    fn load(values: &[f32; 4]) -> Self {
+        Self(unsafe { _mm_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 4] {
+        let mut values = [0.0; 4];
+        unsafe { _mm_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+}
+
+impl Vector for V8 {
+    type Mask = M8;
+    lanewise! {
+        add: _mm256_add_ps;
+        sub: _mm256_sub_ps;
+        mul: _mm256_mul_ps;
+        div: _mm256_div_ps;
+        max: _mm256_max_ps;
+        min: _mm256_min_ps;
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> M8 {
+        M8(unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> M8 {
+        M8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn select(mask: M8, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask.0) })
+    }
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        let [low, high] = self.halves();
+        low.max(high).largest()
+    }
+    #[inline(always)]
+    fn smallest(self) -> f32 {
+        let [low, high] = self.halves();
+        low.min(high).smallest()
+    }
+}
+
+impl V8 {
+    #[inline(always)]
+    fn halves(self) -> [V4; 2] {
+        unsafe { [V4(_mm256_castps256_ps128(self.0)), V4(_mm256_extractf128_ps::<1>(self.0))] }
+    }
+}
+
+impl Array<8> for V8 {
+    #[inline(always)]
+    fn load(values: &[f32; 8]) -> Self {
+        Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        let mut values = [0.0; 8];
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+}
+
+impl Group for V8 {
+    const LANES: usize = 8;
+    #[inline(always)]
+    fn at(values: &PerRay, group: usize) -> Self {
+        Self::load(&values.0.as_chunks().0[group % (RAYS / 8)])
+    }
+    #[inline(always)]
+    fn put(self, values: &mut PerRay, group: usize) {
+        let values: &mut [f32; 8] = &mut values.0.as_chunks_mut().0[group % (RAYS / 8)];
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+    }
+    #[inline(always)]
+    fn put_where(mask: M8, value: u32, values: &mut [u32; RAYS], group: usize) {
+        let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
+        unsafe {
+            let at = values.as_mut_ptr().cast();
+            let value = _mm256_set1_epi32(value as i32);
+            _mm256_storeu_si256(at, _mm256_blendv_epi8(_mm256_loadu_si256(at), value, _mm256_castps_si256(mask.0)));
+        }
+    }
+}
+
+impl Doubles for D4 {
+    type F = V4;
+    lanewise! {
+        add: _mm256_add_pd;
+        sub: _mm256_sub_pd;
+        mul: _mm256_mul_pd;
+        div: _mm256_div_pd;
+        max: _mm256_max_pd;
+        min: _mm256_min_pd;
+    }
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self(unsafe { _mm256_set1_pd(value) })
+    }
+    #[inline(always)]
+    fn widen(values: V4) -> Self {
+        Self(unsafe { _mm256_cvtps_pd(values.0) })
+    }
+    #[inline(always)]
+    fn narrow(self) -> V4 {
+        V4(unsafe { _mm256_cvtpd_ps(self.0) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        let mut values = [0.0; 4];
+        unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) };
+        values
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    }
+}
