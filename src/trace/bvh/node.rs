@@ -1,5 +1,6 @@
 //! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
 
+use super::build::NODE_COST;
 use crate::math::{Aabb, Vec3};
 
 /// Children of a node.
@@ -90,14 +91,15 @@ impl Tree {
         size_of_val(&self.nodes[..])
     }
 
-    /// The surface area heuristic's cost, in half areas times tests: each node counts 1, a leaf what `leaf` says of its
+    /// The surface area heuristic's cost, in half areas times tests: each node counts [`NODE_COST`], a leaf what `leaf` says of its
     /// `(first, count)`.
     pub fn cost(&self, leaf: impl Fn(u32, u8) -> f64) -> f64 {
-        let root = f64::from(self.bounds.half_area());
+        let root = f64::from(NODE_COST) * f64::from(self.bounds.half_area());
         self.nodes.iter().fold(root, |sum, node| {
             let slots = (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD);
             let cost = slots.map(|slot| {
-                let tests = if node.count[slot] == 0 { 1.0 } else { leaf(node.index[slot], node.count[slot]) };
+                let tests =
+                    if node.count[slot] == 0 { f64::from(NODE_COST) } else { leaf(node.index[slot], node.count[slot]) };
                 tests * f64::from(node.child_bounds(slot).half_area())
             });
             sum + cost.sum::<f64>()

@@ -4,11 +4,8 @@
 use super::split::{Range, Rule, Split};
 use crate::trace::bvh::node::WIDTH;
 
-/// Cost of visiting a node, in tests of a block.
-const NODE_COST: f32 = 1.0;
-
-/// What a split must save to be worth a place among the children, in tests of a block.
-const PLACE_COST: f32 = 0.0;
+/// Cost of visiting a node, in tests of a block. Measured: from 1 to 4 rates hardly differ, bytes do.
+pub(in crate::trace::bvh) const NODE_COST: f32 = 2.0;
 
 /// Most items in a leaf, in blocks.
 pub(super) const MAX_LEAF_BLOCKS: u32 = 4;
@@ -59,7 +56,7 @@ impl Children {
                 #[inline(always)]
                 || splitter.find(&child.range),
             );
-            if is_leaf_better(child, &split, rule, PLACE_COST) {
+            if is_leaf_better(child, &split, rule, 0.0) {
                 child.is_leaf = true;
                 continue;
             }

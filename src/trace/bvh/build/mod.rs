@@ -34,6 +34,7 @@ use super::memory;
 use super::node::{Node, Tree, WIDTH};
 use super::preset::Options;
 use children::Children;
+pub(super) use children::NODE_COST;
 pub(super) use record::{Record, triangle_items};
 use split::Rule;
 use subtree::{Parent, SubtreeKernel, Task};
