@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::block::{Block, LANES};
-use super::build::Record;
+use super::build::{Record, morton};
 use super::memory;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
 use crate::math::Vec3;
@@ -65,6 +65,35 @@ impl Leaves {
             }
             block
         }))
+    }
+
+    /// Blocks of four triangles each that follow one another along a curve.
+    pub fn along_curve(parts: &[Part]) -> Self {
+        let numbers = Numbers { blocks: Vec::new(), meshes: Numbers::meshes(parts) };
+        let sorted = morton::sorted(parts, &Numbers::firsts(&numbers.meshes, parts.len()));
+        let chunks = sorted.chunks(CHUNK * LANES).map(|chunk| (chunk.len().div_ceil(LANES), chunk)).collect();
+        Self::Blocks(memory::fill(chunks, |chunk, room| {
+            for four in chunk.chunks(LANES) {
+                let mut block = Block::EMPTY;
+                for item in four {
+                    let (mesh, primitive) = numbers.find(item.number);
+                    block.push(corners(&mesh.positions, &mesh.triangles[primitive as usize]), mesh.part, primitive);
+                }
+                room.push(block);
+            }
+        }))
+    }
+
+    /// One item for each block, numbered in order.
+    pub fn items(&self) -> Vec<Record> {
+        let count = match self {
+            Self::Blocks(blocks) => blocks.len(),
+            Self::Numbers(numbers) => numbers.blocks.len(),
+        };
+        let item = |index: usize| Record::new(&self.block(index as u32, &mut None).bounds(), 0, index as u32);
+        let mut items = memory::with_capacity(count);
+        items.par_extend((0..count).into_par_iter().map(item));
+        items
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
