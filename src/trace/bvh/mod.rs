@@ -21,12 +21,14 @@
 mod block;
 mod build;
 mod bundle;
+mod clusters;
 mod edges;
 mod filter;
 mod inside;
 mod isa;
 mod leaves;
 mod memory;
+mod meshes;
 mod node;
 mod placements;
 mod preset;

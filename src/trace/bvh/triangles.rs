@@ -2,9 +2,10 @@
 
 use super::block::{Block, LANES};
 use super::build;
+use super::clusters;
 use super::filter::Filter;
 use super::leaves::Leaves;
-use super::node::{Tree, WIDTH};
+use super::node::Tree;
 use super::preset::{Options, Preset};
 use super::simd::Simd;
 use super::{PartId, Through};
@@ -24,7 +25,7 @@ impl TriangleTree {
     /// Over the traceable triangles of `parts`.
     pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
         let (tree, leaves) = match options.preset {
-            Preset::Fast => Self::from_quads(parts, options),
+            Preset::Fast => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
                 let mut items = build::triangle_items(parts);
                 let mut tree = build::build(&mut items, LANES as u32, build::MAX_LEAF_BLOCKS, options);
@@ -34,19 +35,6 @@ impl TriangleTree {
         };
         let parts = parts.iter().map(|part| PartId { geometry: part.geometry, instance: part.instance }).collect();
         Self { tree, leaves, parts }
-    }
-
-    /// A tree over blocks of triangles that follow one another along a curve.
-    fn from_quads(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
-        let leaves = Leaves::along_curve(parts);
-        let mut items = leaves.items();
-        let mut tree = build::build(&mut items, 1, 1, options);
-        for node in tree.nodes_mut() {
-            for slot in (0..WIDTH).filter(|&slot| node.count[slot] == 1) {
-                node.index[slot] = items[node.index[slot] as usize].primitive();
-            }
-        }
-        (tree, leaves)
     }
 
     pub fn tree(&self) -> &Tree {
