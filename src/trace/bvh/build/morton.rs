@@ -16,6 +16,9 @@ use crate::trace::bvh::meshes::{Mesh, Meshes};
 /// Bits of a code for each axis.
 const BITS: u32 = 10;
 
+/// Set in the codes of large triangles.
+const LARGE_BIT: u32 = 3 * BITS;
+
 /// No code of a triangle that can be hit.
 const UNTRACEABLE: u32 = u32::MAX;
 
@@ -53,13 +56,15 @@ struct Grid {
     /// Three times the smallest corner: corners are added up, not averaged.
     origin: Vec3,
     scale: f32,
+    /// Triangles wider than this come last, by themselves: among small ones they would spoil a whole cluster's box.
+    large: f32,
 }
 
 impl Grid {
     fn new(bounds: &Aabb) -> Self {
         let size = 3.0 * bounds.size().max_element();
         let scale = ((1 << BITS) as f32 / size).min(f32::MAX);
-        Self { origin: 3.0 * bounds.min, scale: if size > 0.0 { scale } else { 0.0 } }
+        Self { origin: 3.0 * bounds.min, scale: if size > 0.0 { scale } else { 0.0 }, large: size / 48.0 }
     }
 
     #[inline]
@@ -67,7 +72,8 @@ impl Grid {
         let cell = (corners[0] + corners[1] + corners[2] - self.origin) * self.scale;
         // The cast saturates, and makes NaN 0.
         let [x, y, z] = cell.to_array().map(|x| spread((x as u32).min((1 << BITS) - 1)));
-        x << 2 | y << 1 | z
+        let extent = corners[0].max(corners[1]).max(corners[2]) - corners[0].min(corners[1]).min(corners[2]);
+        u32::from(extent.max_element() > self.large) << LARGE_BIT | x << 2 | y << 1 | z
     }
 }
 
@@ -80,10 +86,12 @@ fn spread(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// Stable, by counting ten bits at a time.
+/// Bits that are sorted by at a time.
+const DIGIT_BITS: u32 = 11;
+
+/// Stable, by counting eleven bits at a time.
 fn radix_sort(coded: &mut Vec<Coded>) {
-    const BUCKETS: usize = 1 << BITS;
-    let mut counts = [[0u32; BUCKETS]; 3];
+    let mut counts = [[0u32; 1 << DIGIT_BITS]; 3];
     for item in coded.iter() {
         for (pass, counts) in counts.iter_mut().enumerate() {
             counts[digit(item, pass)] += 1;
@@ -107,7 +115,7 @@ fn radix_sort(coded: &mut Vec<Coded>) {
 
 #[inline(always)]
 fn digit(item: &Coded, pass: usize) -> usize {
-    (item.code >> (BITS * pass as u32)) as usize % (1 << BITS)
+    (item.code >> (DIGIT_BITS * pass as u32)) as usize % (1 << DIGIT_BITS)
 }
 
 /// Lengths of the clusters, in order: each of at most `most` items, and cut from others where the highest bit of the codes
@@ -145,6 +153,7 @@ mod tests {
         }
         let grid = Grid::new(&Aabb { min: Vec3::ZERO, max: Vec3::new(1024.0, 3.0, 512.0) });
         assert_eq!(grid.code(&[Vec3::new(1.5, 2.5, 3.5); 3]), 0b011_101);
+        assert_eq!(grid.code(&[Vec3::ZERO, Vec3::ZERO, Vec3::X * 65.0]) >> LARGE_BIT, 1);
         assert_eq!(grid.code(&[Vec3::MAX; 3]), (1 << 30) - 1, "outside counts as at the border");
     }
 
@@ -163,7 +172,7 @@ mod tests {
         let mut coded: Vec<Coded> = (0..10_000)
             .map(|number| {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                Coded { code: (state >> 2) & 0x3fc0_03ff, number }
+                Coded { code: (state >> 1) & 0x7fc0_07ff, number }
             })
             .collect();
         let mut expected = coded.clone();
