@@ -1,6 +1,6 @@
 //! Four triangles, laid out component by component for four-wide arithmetic.
 
-use crate::math::Vec3;
+use crate::math::{Aabb, Vec3};
 
 /// Triangles in a block.
 pub(super) const LANES: usize = 4;
@@ -39,6 +39,13 @@ impl Block {
         self.primitive[lane] = primitive;
         self.part[lane] = part;
         self.lanes |= 1 << lane;
+    }
+
+    /// The box around its triangles.
+    #[inline(always)]
+    pub fn bounds(&self) -> Aabb {
+        let lanes = (0..LANES).filter(|lane| self.lanes >> lane & 1 != 0);
+        Aabb::around(lanes.flat_map(|lane| self.triangle(lane)))
     }
 
     #[inline(always)]

@@ -237,6 +237,7 @@ impl Bundle {
             reciprocal: [0, 1].map(|i| [1.0 / self.low[i], 1.0 / self.high[i]]),
             forward: self.forward,
         };
+        let mut is_finite = true;
         for (i, axis) in axes.into_iter().enumerate() {
             let span = self.origin[axis].abs() + reach[axis];
             // Origin and box are subtracted (2 u of the span), the slope is off by 2 u, its reciprocal and the product
@@ -246,11 +247,9 @@ impl Bundle {
             slab.far_origin[i] = self.origin[axis] - pad;
             (slab.near[i], slab.far[i]) = if sign[i] > 0.0 { (axis, axis + 3) } else { (axis + 3, axis) };
             let steepest = slab.reciprocal.get(i).map_or(1.0, |[a, b]| a.abs().max(b.abs()));
-            if !(steepest * span < HUGE) {
-                return None;
-            }
+            is_finite &= steepest * span < HUGE;
         }
-        Some(slab)
+        is_finite.then_some(slab)
     }
 }
 

@@ -1,16 +1,14 @@
 //! What leaves of triangles hold: blocks of corners, or numbers of triangles whose corners are fetched from the mesh.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::block::{Block, LANES};
 use super::build::Record;
 use super::memory;
+use super::meshes::Meshes;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
 use super::simd::Simd;
-use crate::math::Vec3;
-use crate::trace::{Part, Primitives};
+use crate::trace::Part;
 
 /// The blocks of a tree of triangles.
 pub(super) enum Leaves {
@@ -23,20 +21,11 @@ pub(super) enum Leaves {
 /// Blocks of triangle numbers.
 pub(super) struct Numbers {
     blocks: Vec<[u32; LANES]>,
-    meshes: Vec<Mesh>,
+    meshes: Meshes,
 }
 
 /// Fills a block's lanes that have no triangle.
 const NONE: u32 = u32::MAX;
-
-/// A mesh, shared with the scene.
-struct Mesh {
-    /// Number of its first triangle.
-    first: u32,
-    part: u32,
-    positions: Arc<Vec<Vec3>>,
-    triangles: Arc<Vec<[u32; 3]>>,
-}
 
 /// Nodes that are gone through by one thread.
 const CHUNK: usize = 512;
@@ -44,28 +33,31 @@ const CHUNK: usize = 512;
 impl Leaves {
     /// Makes the blocks of `tree`, whose leaves name ranges of `items`, and lets these name ranges of blocks instead.
     pub fn new(tree: &mut Tree, items: &[Record], parts: &[Part], compact: bool) -> Self {
+        let meshes = Meshes::new(parts);
         if compact {
-            let meshes = Numbers::meshes(parts);
-            let firsts = Numbers::firsts(&meshes, parts.len());
             let block = |items: &[Record]| {
                 let mut block = [NONE; LANES];
                 for (number, item) in block.iter_mut().zip(items) {
-                    *number = firsts[item.part() as usize] + item.primitive();
+                    *number = meshes.number(item.part(), item.primitive());
                 }
                 block
             };
-            return Self::Numbers(Numbers { blocks: blocks(tree, items, block), meshes });
+            let blocks = blocks(tree, items, block);
+            return Self::Numbers(Numbers { blocks, meshes });
         }
         Self::Blocks(blocks(tree, items, |items| {
             let mut block = Block::EMPTY;
             for item in items {
-                let Primitives::Triangles { positions, triangles } = &parts[item.part() as usize].primitives else {
-                    unreachable!("items of a triangle tree come from meshes")
-                };
-                block.push(corners(positions, &triangles[item.primitive() as usize]), item.part(), item.primitive());
+                let (part, primitive) = (item.part(), item.primitive());
+                block.push(meshes.of_part(part).corners(primitive), part, primitive);
             }
             block
         }))
+    }
+
+    /// Blocks that leaves name already.
+    pub fn of_blocks(blocks: Vec<Block>) -> Self {
+        Self::Blocks(blocks)
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
@@ -93,7 +85,7 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => (blocks[block].part[lane], blocks[block].primitive[lane]),
             Self::Numbers(numbers) => {
-                let (mesh, primitive) = numbers.find(numbers.blocks[block][lane]);
+                let (mesh, primitive) = numbers.meshes.find(numbers.blocks[block][lane]);
                 (mesh.part, primitive)
             }
         }
@@ -103,7 +95,7 @@ impl Leaves {
     pub fn bytes(&self) -> usize {
         match self {
             Self::Blocks(blocks) => size_of_val(&blocks[..]),
-            Self::Numbers(numbers) => size_of_val(&numbers.blocks[..]) + size_of_val(&numbers.meshes[..]),
+            Self::Numbers(numbers) => size_of_val(&numbers.blocks[..]),
         }
     }
 }
@@ -131,53 +123,12 @@ fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) 
     })
 }
 
-#[inline(always)]
-fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [Vec3; 3] {
-    triangle.map(
-        #[inline(always)]
-        |corner| positions[corner as usize],
-    )
-}
-
 impl Numbers {
-    /// The meshes among `parts`.
-    fn meshes(parts: &[Part]) -> Vec<Mesh> {
-        let mut first = 0;
-        let mesh = |(part, description): (usize, &Part)| {
-            let Primitives::Triangles { positions, triangles } = &description.primitives else { return None };
-            let (positions, triangles) = (Arc::clone(positions), Arc::clone(triangles));
-            let mesh = Mesh { first, part: part as u32, positions, triangles };
-            first += mesh.triangles.len() as u32;
-            Some(mesh)
-        };
-        parts.iter().enumerate().filter_map(mesh).collect()
-    }
-
-    /// Of each part the number of its first triangle.
-    fn firsts(meshes: &[Mesh], parts: usize) -> Vec<u32> {
-        let mut firsts = vec![0; parts];
-        for mesh in meshes {
-            firsts[mesh.part as usize] = mesh.first;
-        }
-        firsts
-    }
-
-    /// The mesh of a triangle, and the triangle's index in it.
-    #[inline(always)]
-    fn find(&self, number: u32) -> (&Mesh, u32) {
-        let mesh = match &self.meshes[..] {
-            [mesh] => mesh,
-            meshes => &meshes[meshes.partition_point(|mesh| mesh.first <= number) - 1],
-        };
-        (mesh, number - mesh.first)
-    }
-
     #[inline]
     fn block(&self, index: u32) -> Block {
         let mut block = Block::EMPTY;
         for &number in self.blocks[index as usize].iter().filter(|&&number| number != NONE) {
-            let (mesh, primitive) = self.find(number);
-            block.push(corners(&mesh.positions, &mesh.triangles[primitive as usize]), mesh.part, primitive);
+            self.meshes.push(&mut block, number);
         }
         block
     }

@@ -21,12 +21,14 @@
 mod block;
 mod build;
 mod bundle;
+mod clusters;
 mod edges;
 mod filter;
 mod found;
 mod isa;
 mod leaves;
 mod memory;
+mod meshes;
 mod node;
 mod placements;
 mod preset;
@@ -124,7 +126,7 @@ impl Bvh {
     }
 
     /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
-    /// four triangles: the sum over nodes of their area, and over leaves of their area times the blocks (or shapes) in them,
+    /// four triangles: the sum over nodes of twice their area, and over leaves of their area times the blocks (or shapes) in them,
     /// divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
     /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
     /// much as its own tree, by the area of its box in the world. 0 for an empty scene.

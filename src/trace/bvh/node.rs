@@ -1,5 +1,6 @@
 //! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
 
+use super::build::{NODE_COST, Record};
 use crate::math::{Aabb, Vec3};
 
 /// Children of a node.
@@ -37,6 +38,11 @@ impl Node {
         self.count[slot] = count;
     }
 
+    /// The box around all children.
+    pub fn bounds(&self) -> Aabb {
+        (0..WIDTH).map(|slot| self.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union)
+    }
+
     /// The box of one slot.
     pub fn child_bounds(&self, slot: usize) -> Aabb {
         let corner = |first: usize| {
@@ -57,8 +63,7 @@ pub(super) struct Tree {
 impl Tree {
     /// Of nodes of which the first is the root.
     pub fn new(nodes: Vec<Node>) -> Self {
-        let children = |root: &Node| (0..WIDTH).map(|slot| root.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union);
-        let bounds = nodes.first().map_or(Aabb::EMPTY, children);
+        let bounds = nodes.first().map_or(Aabb::EMPTY, Node::bounds);
         Self { nodes, bounds }
     }
 
@@ -90,18 +95,34 @@ impl Tree {
         size_of_val(&self.nodes[..])
     }
 
-    /// The surface area heuristic's cost, in half areas times tests: each node counts 1, a leaf what `leaf` says of its
+    /// The surface area heuristic's cost, in half areas times tests: each node counts [`NODE_COST`], a leaf what `leaf` says of its
     /// `(first, count)`.
     pub fn cost(&self, leaf: impl Fn(u32, u8) -> f64) -> f64 {
-        let root = f64::from(self.bounds.half_area());
+        let root = f64::from(NODE_COST) * f64::from(self.bounds.half_area());
         self.nodes.iter().fold(root, |sum, node| {
             let slots = (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD);
             let cost = slots.map(|slot| {
-                let tests = if node.count[slot] == 0 { 1.0 } else { leaf(node.index[slot], node.count[slot]) };
+                let tests =
+                    if node.count[slot] == 0 { f64::from(NODE_COST) } else { leaf(node.index[slot], node.count[slot]) };
                 tests * f64::from(node.child_bounds(slot).half_area())
             });
             sum + cost.sum::<f64>()
         })
+    }
+
+    /// This tree, whose leaves name one of `items` each, with nodes in their place: the item's primitive is the node's index.
+    pub fn over(mut self, items: &[Record], below: &mut Vec<Node>) -> Self {
+        let base = self.nodes.len() as u32;
+        for node in &mut self.nodes {
+            for slot in 0..WIDTH {
+                if node.count[slot] == 1 {
+                    node.index[slot] = base + items[node.index[slot] as usize].primitive();
+                    node.count[slot] = 0;
+                }
+            }
+        }
+        self.nodes.append(below);
+        self
     }
 
     /// All nodes, so that leaves can be renamed.

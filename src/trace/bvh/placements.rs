@@ -20,7 +20,7 @@ impl PlacementTree {
             (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
         };
         let mut items: Vec<Record> = placements.iter().enumerate().filter_map(item).collect();
-        let tree = build::build(&mut items, 1, options);
+        let tree = build::build(&mut items, 1, build::MAX_LEAF_BLOCKS, options);
         Self { tree, placements: items.iter().map(|item| placements[item.primitive() as usize].clone()).collect() }
     }
 

@@ -35,7 +35,7 @@ impl ShapeTree {
                 }
             }
         }
-        let tree = build::build(&mut items, 1, options);
+        let tree = build::build(&mut items, 1, build::MAX_LEAF_BLOCKS, options);
         let entry = |item: &Record| {
             let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };

@@ -44,13 +44,18 @@ struct Entry {
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
-    stack: [Entry; MAX_DEPTH * 7 + 8],
-    bundle: Bundle,
-    found: Found,
+    one: One,
     /// t of the closest hits of the last bundle.
     pub t: [f64; RAYS],
     /// Rays of one octant.
     part: [Ray; RAYS],
+}
+
+/// One bundle and its way.
+struct One {
+    stack: [Entry; MAX_DEPTH * 7 + 8],
+    bundle: Bundle,
+    found: Found,
 }
 
 /// What the rays of a bundle have hit so far.
@@ -88,13 +93,8 @@ impl Scratch {
             nearest: [Nearest::new(&ray); RAYS],
             computed: 0,
         };
-        Self {
-            stack: [Entry::default(); MAX_DEPTH * 7 + 8],
-            bundle: Bundle::new(),
-            found,
-            t: [0.0; RAYS],
-            part: [ray; RAYS],
-        }
+        let one = One { stack: [Entry::default(); MAX_DEPTH * 7 + 8], bundle: Bundle::new(), found };
+        Self { one, t: [0.0; RAYS], part: [ray; RAYS] }
     }
 }
 
@@ -108,12 +108,12 @@ pub(super) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
-    let Scratch { stack, bundle, found, t, part } = scratch;
+    let Scratch { one, t, part } = scratch;
     if let (Ok(rays), Ok(answers)) = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers))
     {
-        match bundle.fill::<S, Q>(rays) {
+        match one.bundle.fill::<S, Q>(rays) {
             Fit::Whole => {
-                let is_traced = whole::<S, Q>(stack, bundle, found, tree, rays, RAYS, answers, t);
+                let is_traced = one.trace::<S, Q>(tree, rays, RAYS, answers, t);
                 return if is_traced { u64::MAX } else { 0 };
             }
             Fit::Parts => {}
@@ -142,8 +142,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
         let last = part[count - 1];
         part[count..].fill(last);
         let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
-        if bundle.fill::<S, Q>(part) == Fit::Whole
-            && whole::<S, Q>(stack, bundle, found, tree, part, count, &mut part_answers, &mut part_t)
+        if one.bundle.fill::<S, Q>(part) == Fit::Whole
+            && one.trace::<S, Q>(tree, part, count, &mut part_answers, &mut part_t)
         {
             for (k, &i) in index[..count].iter().enumerate() {
                 (answers[usize::from(i)], t[usize::from(i)]) = (part_answers[k], part_t[k]);
@@ -154,33 +154,35 @@ pub(super) fn trace<S: Simd, Q: Query>(
     done
 }
 
-/// Traces a bundle of which the first `count` rays matter. False, and nothing done, where it is too steep for the tree.
-#[inline(always)]
-fn whole<S: Simd, Q: Query>(
-    stack: &mut [Entry],
-    bundle: &Bundle,
-    found: &mut Found,
-    tree: &TriangleTree,
-    rays: &[Ray; RAYS],
-    count: usize,
-    answers: &mut [Q::Answer; RAYS],
-    t: &mut [f64; RAYS],
-) -> bool {
-    let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
-    let groups = count.div_ceil(S::Wide::LANES);
-    match bundle.axis {
-        0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-        1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-        _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-    }
-    if Q::ANY {
-        for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
-            *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
+impl One {
+    /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
+    /// too steep for the tree.
+    #[inline(always)]
+    fn trace<S: Simd, Q: Query>(
+        &mut self,
+        tree: &TriangleTree,
+        rays: &[Ray; RAYS],
+        count: usize,
+        answers: &mut [Q::Answer; RAYS],
+        t: &mut [f64; RAYS],
+    ) -> bool {
+        let Self { stack, bundle, found } = self;
+        let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
+        let groups = count.div_ceil(S::Wide::LANES);
+        match bundle.axis {
+            0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+            1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+            _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
         }
-    } else {
-        found.finish::<S, Q>(tree, bundle, count, answers, t);
+        if Q::ANY {
+            for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
+                *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
+            }
+        } else {
+            found.finish::<S, Q>(tree, bundle, count, answers, t);
+        }
+        true
     }
-    true
 }
 
 impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {

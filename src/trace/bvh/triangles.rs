@@ -2,6 +2,7 @@
 
 use super::block::{Block, LANES};
 use super::build;
+use super::clusters;
 use super::filter::Filter;
 use super::found::Found;
 use super::leaves::Leaves;
@@ -26,9 +27,15 @@ pub(super) struct TriangleTree {
 impl TriangleTree {
     /// Over the traceable triangles of `parts`.
     pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
-        let mut items = build::triangle_items(parts);
-        let mut tree = build::build(&mut items, LANES as u32, options);
-        let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
+        let (tree, leaves) = match options.preset {
+            Preset::Fast => clusters::build(parts, options),
+            Preset::Default | Preset::High | Preset::Compact => {
+                let mut items = build::triangle_items(parts);
+                let mut tree = build::build(&mut items, LANES as u32, build::MAX_LEAF_BLOCKS, options);
+                let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
+                (tree, leaves)
+            }
+        };
         let parts = parts.iter().map(|part| PartId { geometry: part.geometry, instance: part.instance }).collect();
         Self { tree, leaves, parts }
     }

@@ -9,6 +9,7 @@
 //! | `sweep` | the best of all divisions, for small ones |
 //! | `children` | from one range to the eight children of a node |
 //! | `subtree`, `top` | by one thread, by all threads |
+//! | `morton` | neighbours along a curve: the fast preset |
 //!
 //! A node starts as one range of items; the child with the largest surface is split in two until there are eight or none is
 //! worth it. Leaves are charged by blocks, ceil(n / block), so that they fill. A binary tree collapsed afterwards, the
@@ -21,6 +22,7 @@
 mod bins;
 mod children;
 pub(super) mod lanes;
+pub(super) mod morton;
 mod record;
 mod split;
 mod subtree;
@@ -34,6 +36,7 @@ use super::memory;
 use super::node::{Node, Tree, WIDTH};
 use super::preset::Options;
 use children::Children;
+pub(super) use children::{MAX_LEAF_BLOCKS, NODE_COST};
 pub(super) use record::{Record, triangle_items};
 use split::Rule;
 use subtree::{Parent, SubtreeKernel, Task};
@@ -49,16 +52,16 @@ const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;
 const TASK: u32 = 1 << 14;
 
 /// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
-/// `block`, a power of two, is how many items are tested together.
+/// `block`, a power of two, is how many items are tested together, `most` how many blocks a leaf may hold.
 ///
 /// # Panics
 /// With more than 2^32 - 1 items.
-pub(super) fn build(items: &mut [Record], block: u32, options: &Options<'_>) -> Tree {
+pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Options<'_>) -> Tree {
     assert!(u32::try_from(items.len()).is_ok(), "more primitives than 32-bit indices can name");
     if items.is_empty() {
         return Tree::new(Vec::new());
     }
-    let (rule, isa) = (Rule { block }, options.isa);
+    let (rule, isa) = (Rule { block, leaf: block * most }, options.isa);
     let (top, tasks) = upper_nodes(items, &rule, isa);
     let in_top = items.len() - tasks.iter().map(|(_, task)| task.range.len as usize).sum::<usize>();
     let mut rest = items;
@@ -166,7 +169,7 @@ mod tests {
             let inside = if node.count[slot] == 0 {
                 check(tree, items, node.index[slot], block, seen)
             } else {
-                assert!(u32::from(node.count[slot]) <= block * children::MAX_LEAF_BLOCKS);
+                assert!(u32::from(node.count[slot]) <= block * MAX_LEAF_BLOCKS);
                 let first = node.index[slot] as usize;
                 let leaf = &items[first..first + node.count[slot] as usize];
                 leaf.iter().fold(Aabb::EMPTY, |sum, item| {
@@ -189,7 +192,8 @@ mod tests {
             let mut items = items(count, size);
             let reported = AtomicU64::new(0);
             let progress = |count| _ = reported.fetch_add(count, Ordering::Relaxed);
-            let tree = build(&mut items, block, &Options { progress: Some(&progress), ..Options::default() });
+            let tree =
+                build(&mut items, block, MAX_LEAF_BLOCKS, &Options { progress: Some(&progress), ..Options::default() });
             assert_eq!(reported.into_inner(), u64::from(count));
             let mut seen = vec![false; items.len()];
             check(&tree, &items, 0, block, &mut seen);
@@ -202,7 +206,7 @@ mod tests {
         let build = |isa, threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             let mut items = items(60_000, 0.02);
-            let tree = pool.install(|| build(&mut items, 4, &Options { isa, ..Options::default() }));
+            let tree = pool.install(|| build(&mut items, 4, MAX_LEAF_BLOCKS, &Options { isa, ..Options::default() }));
             let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
             (format!("{tree:?}"), numbers)
         };

@@ -9,6 +9,8 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 pub(super) struct Rule {
     /// Items tested together: a power of two.
     pub block: u32,
+    /// Most items in a leaf.
+    pub leaf: u32,
 }
 
 impl Rule {

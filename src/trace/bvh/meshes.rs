@@ -1,0 +1,91 @@
+//! The meshes of a level, their triangles numbered through.
+
+use std::sync::Arc;
+
+use super::block::Block;
+use crate::math::Vec3;
+use crate::trace::{Part, Primitives};
+
+/// Meshes, shared with the scene.
+pub(super) struct Meshes {
+    meshes: Vec<Mesh>,
+    /// Of each part its mesh, if it is one.
+    of_part: Vec<u32>,
+}
+
+/// A mesh and its numbers.
+pub(super) struct Mesh {
+    /// Number of its first triangle.
+    pub first: u32,
+    pub part: u32,
+    pub positions: Arc<Vec<Vec3>>,
+    pub triangles: Arc<Vec<[u32; 3]>>,
+}
+
+impl Mesh {
+    /// The corners of a triangle.
+    #[inline(always)]
+    pub fn corners(&self, primitive: u32) -> [Vec3; 3] {
+        self.triangles[primitive as usize].map(
+            #[inline(always)]
+            |corner| self.positions[corner as usize],
+        )
+    }
+}
+
+impl Meshes {
+    /// Those among `parts`, which have fewer than 2^32 triangles together.
+    pub fn new(parts: &[Part]) -> Self {
+        let mut all = Self { meshes: Vec::new(), of_part: vec![0; parts.len()] };
+        let mut first = 0;
+        for (part, description) in parts.iter().enumerate() {
+            let Primitives::Triangles { positions, triangles } = &description.primitives else { continue };
+            let (positions, triangles) = (Arc::clone(positions), Arc::clone(triangles));
+            let len = triangles.len();
+            all.of_part[part] = all.meshes.len() as u32;
+            all.meshes.push(Mesh { first: first as u32, part: part as u32, positions, triangles });
+            first += len;
+        }
+        assert!(u32::try_from(first).is_ok(), "more triangles than 32-bit indices can name");
+        all
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Mesh> {
+        self.meshes.iter()
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
+    }
+
+    /// The mesh that a part is.
+    #[inline(always)]
+    pub fn of_part(&self, part: u32) -> &Mesh {
+        &self.meshes[self.of_part[part as usize] as usize]
+    }
+
+    /// The number of a triangle.
+    #[inline(always)]
+    pub fn number(&self, part: u32, primitive: u32) -> u32 {
+        self.of_part(part).first + primitive
+    }
+
+    /// The mesh of a triangle, and the triangle's index in it.
+    #[inline(always)]
+    pub fn find(&self, number: u32) -> (&Mesh, u32) {
+        let mesh = match &self.meshes[..] {
+            [mesh] => mesh,
+            meshes => &meshes[meshes.partition_point(|mesh| mesh.first <= number) - 1],
+        };
+        (mesh, number - mesh.first)
+    }
+
+    /// Adds a triangle to a block.
+    #[inline(always)]
+    pub fn push(&self, block: &mut Block, number: u32) {
+        let (mesh, primitive) = self.find(number);
+        block.push(mesh.corners(primitive), mesh.part, primitive);
+    }
+}
