@@ -10,26 +10,47 @@ pub enum Isa {
     Portable,
     /// x86-64 with AVX2 and FMA.
     Avx2,
+    /// x86-64 with AVX-512 (F, VL, DQ, BW) besides.
+    Avx512,
 }
 
 impl Isa {
+    /// All of them, the best last.
+    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+
     /// The best of this processor.
     pub fn detect() -> Self {
-        if Self::Avx2.is_available() { Self::Avx2 } else { Self::Portable }
+        Self::ALL.into_iter().rfind(|isa| isa.is_available()).unwrap_or(Self::Portable)
+    }
+
+    /// As in options and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
     }
 
     /// Whether this processor has it.
+    #[cfg(target_arch = "x86_64")]
     pub fn is_available(self) -> bool {
+        use std::arch::is_x86_feature_detected as has;
         match self {
             Self::Portable => true,
-            #[cfg(target_arch = "x86_64")]
             Self::Avx2 => {
-                use std::arch::is_x86_feature_detected as has;
                 has!("avx2") && has!("fma") && has!("bmi1") && has!("bmi2") && has!("lzcnt") && has!("popcnt")
             }
-            #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 => false,
+            Self::Avx512 => {
+                Self::Avx2.is_available() && has!("avx512f") && has!("avx512vl") && has!("avx512dq") && has!("avx512bw")
+            }
         }
+    }
+
+    /// Whether this processor has it.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub fn is_available(self) -> bool {
+        self == Self::Portable
     }
 }
 
@@ -47,6 +68,9 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
         // SAFETY: `Bvh::build_with` keeps only an instruction set that this processor has.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { with_avx2(kernel) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => unsafe { with_avx512(kernel) },
         _ => kernel.run::<Portable>(),
     }
 }
@@ -55,4 +79,10 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<super::simd::Avx2>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<super::simd::Avx512>()
 }

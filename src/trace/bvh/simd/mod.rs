@@ -1,14 +1,18 @@
 //! Several numbers at a time, by whatever the processor has.
 //!
-//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, and
-//! [`Avx2`]. The two may differ in the last bit of an f32 where a product and a sum are fused, so f32 serves only tests
+//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, [`Avx2`]
+//! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so f32 serves only tests
 //! that reject conservatively. f64 is never fused: its operations round as the scalar ones of
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+#[cfg(target_arch = "x86_64")]
+pub(super) use avx512::Avx512;
 pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::{Avx2, V8};

@@ -1,0 +1,143 @@
+//! AVX-512: twice as many rays of a bundle at a time. The rest is as with AVX2.
+//!
+//! SAFETY of every block below: as in `x86`.
+#![allow(unsafe_code)] // Intrinsics.
+
+use std::arch::x86_64::*;
+
+use super::x86::{Avx2, D4, V4, V8};
+use super::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::bundle::{PerRay, RAYS};
+
+/// AVX-512 F, VL, DQ and BW.
+pub struct Avx512;
+
+impl Simd for Avx512 {
+    type V4 = V4;
+    type V8 = V8;
+    type Wide = V16;
+    type D4 = D4;
+
+    #[inline(always)]
+    fn prefetch<T>(value: &T) {
+        Avx2::prefetch(value);
+    }
+
+    #[inline(always)]
+    fn transpose(rows: [V8; 8]) -> [V8; 8] {
+        Avx2::transpose(rows)
+    }
+}
+
+/// Sixteen f32.
+#[derive(Clone, Copy)]
+pub struct V16(__m512);
+
+/// A bit for each of sixteen lanes.
+#[derive(Clone, Copy)]
+pub struct M16(__mmask16);
+
+impl Mask for M16 {
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+    #[inline(always)]
+    fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.into()
+    }
+}
+
+/// A function of two vectors by its intrinsic, as a method.
+macro_rules! lanewise {
+    ($($name:ident: $intrinsic:ident;)*) => {
+        $(#[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            Self(unsafe { $intrinsic(self.0, other.0) })
+        })*
+    };
+}
+
+impl Vector for V16 {
+    type Mask = M16;
+    lanewise! {
+        add: _mm512_add_ps;
+        sub: _mm512_sub_ps;
+        mul: _mm512_mul_ps;
+        div: _mm512_div_ps;
+        max: _mm512_max_ps;
+        min: _mm512_min_ps;
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm512_andnot_ps(_mm512_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> M16 {
+        M16(unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> M16 {
+        M16(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn select(mask: M16, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm512_mask_blend_ps(mask.0, no.0, yes.0) })
+    }
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        let [low, high] = self.halves();
+        low.max(high).largest()
+    }
+    #[inline(always)]
+    fn smallest(self) -> f32 {
+        let [low, high] = self.halves();
+        low.min(high).smallest()
+    }
+}
+
+impl V16 {
+    #[inline(always)]
+    fn halves(self) -> [V8; 2] {
+        unsafe { [V8(_mm512_castps512_ps256(self.0)), V8(_mm512_extractf32x8_ps::<1>(self.0))] }
+    }
+}
+
+impl Group for V16 {
+    const LANES: usize = 16;
+    #[inline(always)]
+    fn at(values: &PerRay, group: usize) -> Self {
+        let values: &[f32; 16] = &values.0.as_chunks().0[group % (RAYS / 16)];
+        Self(unsafe { _mm512_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn put(self, values: &mut PerRay, group: usize) {
+        let values: &mut [f32; 16] = &mut values.0.as_chunks_mut().0[group % (RAYS / 16)];
+        unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) };
+    }
+    #[inline(always)]
+    fn put_where(mask: M16, value: u32, values: &mut [u32; RAYS], group: usize) {
+        let values: &mut [u32; 16] = &mut values.as_chunks_mut().0[group % (RAYS / 16)];
+        unsafe {
+            let at = values.as_mut_ptr().cast::<i32>();
+            let old = _mm512_loadu_si512(at.cast());
+            _mm512_storeu_si512(at.cast(), _mm512_mask_set1_epi32(old, mask.0, value as i32));
+        }
+    }
+}
