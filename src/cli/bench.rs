@@ -55,6 +55,10 @@ pub(super) struct BenchArgs {
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
     threads: usize,
 
+    /// Instructions that both engines may use at most (default: what the processor has)
+    #[arg(long, value_enum)]
+    isa: Option<IsaArg>,
+
     /// How often everything is measured
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
@@ -62,6 +66,14 @@ pub(super) struct BenchArgs {
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum IsaArg {
+    /// Vectors of 8
+    Avx2,
+    /// Vectors of 16
+    Avx512,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -121,12 +133,12 @@ mod with_embree {
 
     use serde::Serialize;
 
-    use super::{BenchArgs, ModeArg};
+    use super::{BenchArgs, IsaArg, ModeArg};
     use crate::cli::{interrupt, progress, say, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject};
     use crate::trace::World;
-    use crate::trace::bvh::{Bvh, Preset};
+    use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{Embree, Options, Quality};
 
     /// Every mode, native first.
@@ -147,8 +159,19 @@ mod with_embree {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
-        let contenders: Vec<_> =
-            MODES.into_iter().filter(|mode| args.modes.contains(mode)).map(|mode| contender(mode, threads)).collect();
+        let isa = match args.isa {
+            None => Isa::detect(),
+            Some(IsaArg::Avx2) => Isa::Avx2,
+            Some(IsaArg::Avx512) => Isa::Avx512,
+        };
+        if !isa.is_available() {
+            return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
+        }
+        let contenders: Vec<_> = MODES
+            .into_iter()
+            .filter(|mode| args.modes.contains(mode))
+            .map(|mode| contender(mode, threads, isa))
+            .collect();
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
@@ -188,8 +211,9 @@ mod with_embree {
     }
 
     /// An engine as it is set up in `mode`.
-    fn contender(mode: ModeArg, threads: usize) -> Contender {
-        let medium = Options { robust: false, threads: Some(threads), ..Options::default() };
+    fn contender(mode: ModeArg, threads: usize, isa: Isa) -> Contender {
+        let avx2_at_most = isa == Isa::Avx2;
+        let medium = Options { robust: false, threads: Some(threads), avx2_at_most, ..Options::default() };
         let embree = |mode, options: Options| Contender {
             backend: "embree",
             mode,
@@ -198,7 +222,7 @@ mod with_embree {
         let native = |preset: Preset| Contender {
             backend: "native",
             mode: preset.name(),
-            build: Box::new(move |world| Ok(build_native(world, preset))),
+            build: Box::new(move |world| Ok(build_native(world, preset, isa))),
         };
         match mode {
             ModeArg::Default => native(Preset::Default),
@@ -212,9 +236,9 @@ mod with_embree {
         }
     }
 
-    fn build_native(world: &World, preset: Preset) -> Built {
+    fn build_native(world: &World, preset: Preset, isa: Isa) -> Built {
         let start = Instant::now();
-        let bvh = Bvh::build_with(world, preset.into());
+        let bvh = Bvh::build_with(world, bvh::Options { preset, isa, ..bvh::Options::default() });
         let seconds = start.elapsed().as_secs_f64();
         Built { seconds, bytes: bvh.bytes(), sah_cost: Some(bvh.sah_cost()), tracer: Box::new(bvh) }
     }

@@ -35,9 +35,12 @@ unsafe impl Send for Device {}
 unsafe impl Sync for Device {}
 
 impl Device {
-    /// A device whose scenes are built on `threads` threads, or on as many as there are processors.
-    pub(super) fn new(threads: Option<usize>) -> Result<Arc<Self>> {
-        let config = threads.map_or_else(String::new, |count| format!("threads={}", count.max(1)));
+    /// A device whose scenes are built on `threads` threads, or on as many as there are processors, and which uses no
+    /// instructions beyond AVX2 if `avx2_at_most`.
+    pub(super) fn new(threads: Option<usize>, avx2_at_most: bool) -> Result<Arc<Self>> {
+        let threads = threads.map(|count| format!("threads={}", count.max(1)));
+        let isa = avx2_at_most.then(|| "max_isa=avx2".to_owned());
+        let config = threads.into_iter().chain(isa).collect::<Vec<_>>().join(",");
         let config = CString::new(config).map_err(|e| backend(e.to_string()))?;
         // SAFETY: the string ends in NUL and outlives the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
@@ -186,7 +189,7 @@ mod tests {
 
     #[test]
     fn embrees_errors_come_out_once_with_code_and_step() {
-        let device = Device::new(Some(1)).unwrap();
+        let device = Device::new(Some(1), false).unwrap();
         // SAFETY: the device is alive; Embree refuses a type that does not exist and returns null.
         let geometry = unsafe { sys::rtcNewGeometry(device.raw(), 9999) };
         assert!(geometry.is_null());
@@ -215,7 +218,7 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_callback_is_an_error_of_the_next_check() {
-        let device = Device::new(Some(1)).unwrap();
+        let device = Device::new(Some(1), false).unwrap();
         assert!(!device.state().has_panicked());
         device.state().report_panic();
         assert!(device.state().has_panicked());

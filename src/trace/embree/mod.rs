@@ -44,11 +44,13 @@ pub struct Options {
     pub compact: bool,
     /// Threads that build; one for every processor by default. Queries run on the thread that asks.
     pub threads: Option<usize>,
+    /// Use no instructions beyond AVX2, to compare like with like.
+    pub avx2_at_most: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { quality: Quality::Medium, robust: true, compact: false, threads: None }
+        Self { quality: Quality::Medium, robust: true, compact: false, threads: None, avx2_at_most: false }
     }
 }
 
@@ -97,7 +99,7 @@ impl Embree {
     /// [`Error::Unavailable`] where the library that was loaded lays out its hits in another way than the header that
     /// this build was made with.
     pub fn new(world: &World, options: &Options) -> Result<Self> {
-        let device = Device::new(options.threads)?;
+        let device = Device::new(options.threads, options.avx2_at_most)?;
         let build = |parts: &[Part]| -> Result<SceneBuilder> {
             let mut builder = SceneBuilder::new(&device, options)?;
             for (id, part) in parts.iter().enumerate() {
