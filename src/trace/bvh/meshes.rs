@@ -26,10 +26,9 @@ impl Mesh {
     /// The corners of a triangle.
     #[inline(always)]
     pub fn corners(&self, primitive: u32) -> [Vec3; 3] {
-        self.triangles[primitive as usize].map(
-            #[inline(always)]
-            |corner| self.positions[corner as usize],
-        )
+        let [a, b, c] = self.triangles[primitive as usize];
+        let positions = &self.positions[..];
+        [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
 }
 
