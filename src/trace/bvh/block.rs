@@ -24,21 +24,33 @@ impl Block {
     #[inline(always)]
     pub fn push(&mut self, corners: [Vec3; 3], part: u32, primitive: u32) {
         let lane = self.lanes.trailing_ones() as usize % LANES;
-        for (k, corner) in corners.into_iter().enumerate() {
-            for axis in 0..3 {
-                self.corners[3 * k + axis][lane] = corner[axis];
-            }
-        }
+        self.set_corners(lane, corners);
         self.primitive[lane] = primitive;
         self.part[lane] = part;
         self.lanes |= 1 << lane;
     }
 
+    /// Moves a triangle.
+    #[inline(always)]
+    pub fn set_corners(&mut self, lane: usize, corners: [Vec3; 3]) {
+        for (k, corner) in corners.into_iter().enumerate() {
+            for axis in 0..3 {
+                self.corners[3 * k + axis][lane] = corner[axis];
+            }
+        }
+    }
+
+    /// The lanes that have a triangle.
+    #[inline(always)]
+    pub fn used(&self) -> impl Iterator<Item = usize> + use<> {
+        let lanes = self.lanes;
+        (0..LANES).filter(move |lane| lanes >> lane & 1 != 0)
+    }
+
     /// The box around its triangles.
     #[inline(always)]
     pub fn bounds(&self) -> Aabb {
-        let lanes = (0..LANES).filter(|lane| self.lanes >> lane & 1 != 0);
-        Aabb::around(lanes.flat_map(|lane| self.triangle(lane)))
+        Aabb::around(self.used().flat_map(|lane| self.triangle(lane)))
     }
 
     #[inline(always)]

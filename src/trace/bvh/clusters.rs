@@ -14,8 +14,8 @@ use crate::trace::Part;
 /// Clusters that are made by one thread.
 const CHUNK: usize = 256;
 
-/// The tree over the traceable triangles of `parts`.
-pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
+/// The tree over the traceable triangles of `parts`, its leaves, and how many triangles these are.
+pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usize) {
     let meshes = Meshes::new(parts);
     let sorted = morton::sorted(&meshes);
     let lengths = morton::clusters(&sorted, WIDTH * LANES);
@@ -38,6 +38,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
             }
         }
     });
+    let count = sorted.len();
     drop(sorted);
 
     let mut first = 0;
@@ -56,7 +57,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
     let mut items = memory::with_capacity(nodes.len());
     items.par_extend(nodes.par_iter().enumerate().map(item));
     let above = build::build(&mut items, 1, 1, options);
-    (above.over(&items, &mut nodes), Leaves::of_blocks(blocks))
+    (above.over(&items, &mut nodes), Leaves::of_blocks(blocks), count)
 }
 
 /// The node over up to eight blocks, the first of which has the index `first`.

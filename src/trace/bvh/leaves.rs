@@ -7,6 +7,7 @@ use super::build::Record;
 use super::memory;
 use super::meshes::Meshes;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
+use crate::math::is_traceable;
 use crate::trace::Part;
 
 /// The blocks of a tree of triangles.
@@ -65,6 +66,27 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.block(index)),
+        }
+    }
+
+    /// Takes the corners of `meshes`, whose triangles are the same. Whether all of them can still be hit.
+    pub fn refit(&mut self, meshes: &Meshes) -> bool {
+        let is_sound = |block: &Block| block.used().flat_map(|lane| block.triangle(lane)).all(is_traceable);
+        match self {
+            Self::Blocks(blocks) => blocks
+                .par_iter_mut()
+                .map(|block| {
+                    for lane in block.used() {
+                        block.set_corners(lane, meshes.of_part(block.part[lane]).corners(block.primitive[lane]));
+                    }
+                    is_sound(block)
+                })
+                .reduce(|| true, |a, b| a && b),
+            Self::Numbers(numbers) => {
+                numbers.meshes = meshes.clone();
+                let count = numbers.blocks.len() as u32;
+                (0..count).into_par_iter().all(|index| is_sound(&numbers.block(index)))
+            }
         }
     }
 

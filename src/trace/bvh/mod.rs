@@ -33,6 +33,7 @@ mod node;
 mod placements;
 mod preset;
 mod query;
+mod refit;
 mod shapes;
 mod simd;
 mod slab;
