@@ -28,6 +28,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
     }
     let counts: Vec<usize> = chunks.iter().map(|(count, _)| *count).collect();
     let blocks = memory::fill(chunks, |(lengths, mut rest), room| {
+        options.report(rest.len());
         for &len in lengths {
             let (own, others) = rest.split_at(len);
             rest = others;
@@ -56,7 +57,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
     let item = |(index, node): (usize, &Node)| Record::new(&node.bounds(), 0, index as u32);
     let mut items = memory::with_capacity(nodes.len());
     items.par_extend(nodes.par_iter().enumerate().map(item));
-    let above = build::build(&mut items, 1, 1, options);
+    let above = build::build(&mut items, 1, 1, &Options { progress: None, ..*options });
     (above.over(&items, &mut nodes), Leaves::of_blocks(blocks), count)
 }
 

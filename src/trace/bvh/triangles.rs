@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::block::{Block, LANES};
-use super::build;
+use super::build::{self, presplit};
 use super::clusters;
 use super::filter::Filter;
 use super::leaves::Leaves;
@@ -50,9 +50,13 @@ impl TriangleTree {
             Preset::Fast => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
                 let mut items = build::triangle_items(parts);
+                let count = items.len();
+                if options.preset == Preset::High {
+                    items = presplit::presplit(&items, &Meshes::new(parts));
+                }
                 let mut tree = build::build(&mut items, LANES as u32, build::MAX_LEAF_BLOCKS, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
-                (tree, leaves, items.len())
+                (tree, leaves, count)
             }
         };
         Self {

@@ -38,6 +38,11 @@ impl Record {
         self.0[0] == f32::NEG_INFINITY
     }
 
+    /// The box.
+    pub fn bounds(&self) -> Aabb {
+        aabb(&self.0)
+    }
+
     /// Index in its part.
     #[inline(always)]
     pub fn primitive(&self) -> u32 {
