@@ -33,6 +33,7 @@ pub mod image;
 pub mod io;
 pub mod lab;
 pub mod math;
+mod memory;
 pub mod output;
 pub mod plan;
 mod ray;

@@ -81,6 +81,9 @@ fn bad_usage_ends_with_2() {
         &["render", "x.glb", "-o", "x.png", "--camera", "front", "--eye", "1,2,3"],
         &["render", "x.glb", "-o", "x.png", "--threshold", "0.1"],
         &["render", "x.glb", "-o", "x.png", "--background", "-1,0,0"],
+        &["render", "x.glb", "-o", "x.png", "--sun", "0,0,0"],
+        &["render", "x.glb", "-o", "x.png", "--build", "slow"],
+        &["render", "x.glb", "-o", "x.png", "--max-memory", "much"],
         &["render", "x.glb", "-o", "x.png", "-v", "-q"],
         &["bench", "--repeat", "0"],
         &["bench", "--size", "2"],
@@ -216,6 +219,43 @@ fn threads_tile_orders_and_packets_give_the_same_file() {
     }
     assert!(folder.render("c.exr", &["--seed", "1", "-q"]).stdout.is_empty(), "-q says nothing");
     assert_ne!(folder.picture("a.exr"), folder.picture("c.exr"));
+}
+
+#[test]
+fn builds_never_change_a_picture_and_memory_is_kept() {
+    let folder = Folder::new();
+    let auto = folder.render("auto.exr", &["-v"]);
+    assert!(text(&auto.stdout).contains("rays a triangle are"), "{}", text(&auto.stdout));
+    for build in ["fast", "default", "high", "compact"] {
+        let output = folder.render("other.exr", &["-v", "--build", build, "--max-memory", "1T"]);
+        let summary = text(&output.stdout);
+        assert!(summary.contains(&format!("{build}: asked for")), "{summary}");
+        assert_eq!(folder.picture("auto.exr"), folder.picture("other.exr"), "{build}");
+    }
+    let output = folder.render("none.exr", &["--max-memory", "1M"]);
+    let message = text(&output.stderr);
+    assert_eq!((output.status.code(), message.lines().count()), (Some(3), 1), "{message}");
+    assert!(message.contains("compact build") && message.contains("give at least --max-memory"), "{message}");
+    assert!(!std::fs::exists(folder.path("none.exr")).unwrap());
+}
+
+#[test]
+fn the_sun_casts_shadows() {
+    let folder = Folder::new();
+    // Of the pyramid's sides that are seen, one or the other is lit.
+    let view = ["--eye", "0,4,6", "--look-at", "0,0.5,0", "-v", "--spp", "1"];
+    let halves = |sun: &str| {
+        let output = folder.render("sun.exr", &[&view[..], &["--sun", sun]].concat());
+        let summary = text(&output.stdout);
+        assert!(summary.contains("1 light with hard shadows") && !summary.contains(" + 0 shadow"), "{summary}");
+        let picture = folder.picture("sun.exr");
+        let sum = |columns: std::ops::Range<usize>| -> f32 {
+            picture.pixels.chunks(60).flat_map(|row| &row[columns.clone()]).map(|p| p.x).sum()
+        };
+        (sum(0..30), sum(30..60))
+    };
+    let ((left, dark), (other, right)) = (halves("-3,1,-0.1"), halves("3,1,-0.1"));
+    assert!(left > 2.0 * dark && right > 2.0 * other, "{left} {dark} {other} {right}");
 }
 
 #[test]

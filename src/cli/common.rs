@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
+use super::progress;
 use crate::error::{Error, Result, Warning};
 use crate::io::{self, LoadOptions};
 use crate::math::{DAabb, DVec3};
@@ -72,6 +73,16 @@ impl SceneArgs {
     /// Reads the scene.
     pub(crate) fn load(&self) -> Result<(Scene, Vec<Warning>)> {
         io::load(&self.scene, &self.options())
+    }
+
+    /// Reads the scene with a bar over the bytes of the file.
+    pub(crate) fn load_with_bar(&self, quiet: bool) -> Result<(Scene, Vec<Warning>)> {
+        // Whatever is wrong with the file is for the loader to say.
+        let length = std::fs::metadata(&self.scene).map_or(0, |file| file.len());
+        let bar = progress::bar(length, "loading", quiet);
+        let scene = io::load_watched(&self.scene, &self.options(), Some(&|bytes| bar.inc(bytes)));
+        bar.finish_and_clear();
+        scene
     }
 
     /// How the file is understood.
@@ -201,6 +212,23 @@ pub(crate) fn parse_vector(text: &str) -> std::result::Result<DVec3, String> {
     }
 }
 
+/// A number of bytes: `1.6G`, `500M`, `2GiB`, `123456`. K, M, G and T are powers of 1024.
+pub(crate) fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
+    let lower = text.trim().to_ascii_lowercase();
+    let digits = lower.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let factor = match &lower[digits.len()..] {
+        "" | "b" => Some(1u64),
+        "k" | "kb" | "ki" | "kib" => Some(1 << 10),
+        "m" | "mb" | "mi" | "mib" => Some(1 << 20),
+        "g" | "gb" | "gi" | "gib" => Some(1 << 30),
+        "t" | "tb" | "ti" | "tib" => Some(1 << 40),
+        _ => None,
+    };
+    let number = digits.trim_end().parse().ok().filter(|number: &f64| *number > 0.0);
+    let bytes = number.zip(factor).map(|(number, factor)| number * factor as f64).filter(|bytes| *bytes < 1e18);
+    bytes.map(|bytes| bytes as u64).ok_or_else(|| "expected a size as in 1.6G, 500M or 123456 (bytes)".to_owned())
+}
+
 /// An angle of view in degrees.
 fn parse_fov(text: &str) -> std::result::Result<f64, String> {
     let degrees = text.parse().ok().filter(|&degrees: &f64| degrees > 0.0 && degrees < 180.0);
@@ -229,6 +257,24 @@ mod tests {
         assert_eq!(parse_fov("179.5"), Ok(179.5));
         for bad in ["0", "180", "-3", "nan", "x"] {
             assert!(parse_fov(bad).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_memory() {
+        let good = [
+            ("1.5G", 3 << 29),
+            ("500M", 500 << 20),
+            ("2gib", 2 << 30),
+            ("64 kB", 64 << 10),
+            ("12", 12),
+            ("1Ti", 1 << 40),
+        ];
+        for (text, bytes) in good {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+        for bad in ["", "G", "-1G", "0", "1X", "nan", "inf", "1e30", "1 2M", "1.2.3G"] {
+            assert!(parse_bytes(bad).is_err(), "{bad:?}");
         }
     }
 

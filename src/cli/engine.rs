@@ -4,12 +4,13 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::ValueEnum;
+use indicatif::ProgressBar;
 
 use super::{interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::render::{Control, Counted, Renderer};
-use crate::trace::bvh::Bvh;
+use crate::trace::bvh::{self, Bvh, Preset};
 use crate::trace::{Tracer, Width, World};
 
 /// Which engine renders.
@@ -64,6 +65,8 @@ pub(super) struct Job<'a> {
     pub(super) pixels: u64,
     pub(super) cancel: &'a AtomicBool,
     pub(super) quiet: bool,
+    /// How well the native tree is worth building.
+    pub(super) build: Preset,
 }
 
 /// What came of it.
@@ -90,16 +93,22 @@ impl Job<'_> {
     }
 
     fn native(&self) -> Result<(Bvh, Pass)> {
-        let build = || Ok(Bvh::build(self.world));
-        self.pass(build, |_| "native (BVH)".to_owned(), Bvh::bytes)
+        let stored: u64 = self.world.parts.iter().map(|part| part.primitives.len() as u64).sum();
+        let bar = progress::bar(stored + self.world.placements.len() as u64, "building", self.quiet);
+        let placed = |count| bar.inc(count);
+        let options = bvh::Options { preset: self.build, progress: Some(&placed), ..bvh::Options::default() };
+        let build = || Ok(Bvh::build_with(self.world, options));
+        self.pass(&bar, build, |_| "native (BVH)".to_owned(), Bvh::bytes)
     }
 
     #[cfg(feature = "embree")]
     fn embree(&self) -> Result<(crate::trace::embree::Embree, Pass)> {
         use crate::trace::embree::{Embree, Options};
         let options = Options { threads: Some(rayon::current_num_threads()), ..Options::default() };
+        // Embree does not tell how far it is.
+        let bar = progress::spinner("building", self.quiet);
         let build = || Embree::new(self.world, &options);
-        self.pass(build, |embree| format!("embree {}", embree.version()), Embree::bytes)
+        self.pass(&bar, build, |embree| format!("embree {}", embree.version()), Embree::bytes)
     }
 
     #[cfg(feature = "embree")]
@@ -122,12 +131,15 @@ impl Job<'_> {
 
     fn pass<T: Tracer>(
         &self,
+        building: &ProgressBar,
         build: impl FnOnce() -> Result<T>,
         name: impl FnOnce(&T) -> String,
         bytes: impl FnOnce(&T) -> usize,
     ) -> Result<(T, Pass)> {
         let start = Instant::now();
-        let tracer = build()?;
+        let tracer = build();
+        building.finish_and_clear();
+        let tracer = tracer?;
         let build_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 

@@ -4,6 +4,7 @@
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
 mod bench;
+mod build;
 mod common;
 mod compare;
 mod completions;

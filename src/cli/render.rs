@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use super::build::BuildArgs;
 use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
@@ -12,9 +13,11 @@ use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_me
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
+use crate::plan::BuildChoice;
 use crate::render::{Renderer, Settings, TileOrder};
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Light, Scene};
+use crate::trace::bvh::Preset;
 use crate::trace::{Batch, Primitives, Width, World};
 
 /// Render a scene
@@ -73,6 +76,9 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "N")]
     packet: Option<Packet>,
 
+    #[command(flatten)]
+    build: BuildArgs,
+
     /// Order of the tiles; never changes a picture
     #[arg(long, value_enum, default_value_t)]
     tile_order: Order,
@@ -80,6 +86,10 @@ pub(super) struct RenderArgs {
     /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
     #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
     background: Option<Vec3>,
+
+    /// Light with hard shadows that comes from this direction, in place of the scene's lights
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
+    sun: Option<DVec3>,
 
     /// Say more: plan, rays, memory
     #[arg(short, long, conflicts_with = "quiet")]
@@ -131,8 +141,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     pool.install(|| {
         let start = Instant::now();
-        let (scene, warnings) = args.scene.load()?;
+        let (mut scene, warnings) = args.scene.load_with_bar(args.quiet)?;
         warn(&warnings);
+        if let Some(sun) = args.sun {
+            scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];
+        }
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
@@ -153,7 +166,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         interrupt::check()?;
 
         let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let job = Job { world: &world, renderer: &renderer, pixels, cancel, quiet: args.quiet };
+        let stored = stored_triangles(&world);
+        let build = args.build.choose(args.backend, stored, pixels * u64::from(args.spp), pixels, renderer.plan())?;
+        let job = Job {
+            world: &world,
+            renderer: &renderer,
+            pixels,
+            cancel,
+            quiet: args.quiet,
+            build: build.as_ref().map_or(Preset::Default, |build| build.preset),
+        };
         let outcome = job.run(args.backend)?;
         let picture = &outcome.passes[0];
 
@@ -162,7 +184,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         outputs::write_pictures(&args.output, &picture.image, &metadata)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
-        let stored = stored_triangles(&world);
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
             triangles: placed_triangles(&scene),
@@ -180,7 +201,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            say(args.summary(&scene, &renderer, &camera_source, &stats))?;
+            say(args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats))?;
         }
         args.judge(&outcome, reference.as_ref())
     })
@@ -210,7 +231,14 @@ impl RenderArgs {
         }
     }
 
-    fn summary(&self, scene: &Scene, renderer: &Renderer, camera_source: &str, stats: &Stats) -> Summary {
+    fn summary(
+        &self,
+        scene: &Scene,
+        renderer: &Renderer,
+        camera_source: &str,
+        build: Option<&BuildChoice>,
+        stats: &Stats,
+    ) -> Summary {
         let mut summary = Summary::default();
         let parts = [
             counted(stats.triangles, "triangle", "triangles"),
@@ -220,6 +248,9 @@ impl RenderArgs {
         summary.line("scene", format_args!("{}: {}", stats.scene, parts.join(", ")));
         if self.verbose {
             summary.line("plan", renderer.plan());
+            if let Some(build) = build {
+                summary.line("build", format_args!("{}: {}", build.preset.name(), build.why));
+            }
         }
         summary.line("camera", camera_source);
         let [width, height] = stats.size;
@@ -304,6 +335,12 @@ fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
 
 pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
     text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
+}
+
+/// As a unit vector.
+fn parse_direction(text: &str) -> std::result::Result<DVec3, String> {
+    let direction = parse_vector(text)?.try_normalize();
+    direction.ok_or_else(|| "expected a direction, which is not zero".to_owned())
 }
 
 fn parse_color(text: &str) -> std::result::Result<Vec3, String> {

@@ -3,6 +3,8 @@
 //! Loaders check as they go, and can name the place in the file; this is the net beneath them, so that no index of any
 //! format, old or new, reaches a tracer unchecked.
 
+use rayon::prelude::*;
+
 use crate::io::Placeless;
 use crate::math::Vec3;
 use crate::scene::{Geometry, Mesh, Scene};
@@ -57,7 +59,7 @@ fn check_mesh(mesh: &Mesh) -> Placeless<()> {
     if !mesh.origin.is_finite() {
         return Err("its origin is not finite".into());
     }
-    let highest = mesh.triangles.iter().flatten().max();
+    let highest = mesh.triangles.as_flattened().par_chunks(1 << 14).filter_map(|part| part.iter().max()).max();
     match highest.filter(|&&i| i as usize >= count) {
         Some(i) => Err(format!("index {i} is past its {count} vertices")),
         None => Ok(()),

@@ -6,11 +6,13 @@
 //! normals on request, axes and units, and a last check of the whole scene.
 
 mod check;
+mod compact;
 mod gltf;
 mod mapped;
 mod obj;
 mod ply;
 mod polygon;
+mod records;
 mod stl;
 mod text;
 mod texture;
@@ -20,7 +22,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use self::mapped::Mapped;
-use self::weld::Weld;
+use self::weld::weld;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::{Geometry, Mesh, Scene};
@@ -86,26 +88,40 @@ pub const SUFFIXES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
 /// # Errors
 /// [`Error::Input`] for anything that is wrong with the file or with what it refers to.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, Vec<Warning>)> {
+    load_watched(path, options, None)
+}
+
+/// The same, and tells of the bytes of the file as they are read: their number, from any thread. Bytes may be skipped, or
+/// read more than once, so that the sum may differ from the file's length.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_watched(
+    path: &Path,
+    options: &LoadOptions,
+    on_bytes: Option<&(dyn Fn(u64) + Sync)>,
+) -> Result<(Scene, Vec<Warning>)> {
     let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
     // First, so that a directory, a missing or an empty file is called that, whatever its name.
-    let bytes = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?;
-    if bytes.is_empty() {
+    let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(on_bytes);
+    if file.is_empty() {
         return Err(Error::input(path, "", "is empty, where a scene is needed"));
     }
     let mut warnings = Vec::new();
     let mut scene = match suffix.as_str() {
-        "glb" | "gltf" => gltf::load(path, &bytes, &mut warnings)?,
-        "obj" => obj::load(path, &bytes, &mut warnings)?,
-        "ply" => ply::load(path, &bytes, &mut warnings)?,
-        "stl" => stl::load(path, &bytes, &mut warnings)?,
+        "glb" | "gltf" => gltf::load(path, &file, &mut warnings)?,
+        "obj" => obj::load(path, &file, &mut warnings)?,
+        "ply" => ply::load(path, &file, &mut warnings)?,
+        "stl" => stl::load(path, &file, &mut warnings)?,
         _ => {
             let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
             return Err(Error::input(path, "", message));
         }
     };
-    drop(bytes);
+    drop(file);
     scene.transform(&options.transform());
     check::check(&scene).map_err(|message| Error::input(path, "", message))?;
+    scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
             options.normals.apply(mesh);
@@ -154,14 +170,14 @@ impl Normals {
 
 /// Smooth normals across vertices that differ in other attributes only, as they do at seams of textures.
 fn smooth(mesh: &mut Mesh) {
-    let mut weld = Weld::new();
     // Adding 0 makes one zero of the two.
-    let welded: Vec<u32> = mesh.positions.iter().map(|p| weld.index((*p + 0.0).to_array().map(f32::to_bits))).collect();
-    let positions = weld.into_keys().into_iter().map(|bits| bits.map(f32::from_bits).into()).collect();
-    let triangles = mesh.triangles.iter().map(|corners| corners.map(|i| welded[i as usize])).collect();
+    let key = |i: usize| [(mesh.positions[i] + 0.0).to_array().map(f32::to_bits)];
+    let (welded, keys) = weld(mesh.positions.len(), key, |_| ());
+    let positions = keys.into_iter().map(|bits| bits.map(f32::from_bits).into()).collect();
+    let triangles = mesh.triangles.iter().map(|corners| corners.map(|i| welded[i as usize][0])).collect();
     let mut joined = Mesh { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Mesh::default() };
     joined.smooth_normals();
-    mesh.normals = welded.into_iter().map(|i| joined.normals[i as usize]).collect();
+    mesh.normals = welded.into_iter().map(|[i]| joined.normals[i as usize]).collect();
 }
 
 fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {

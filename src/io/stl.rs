@@ -1,24 +1,28 @@
 //! STL, text and binary (3D Systems 1989, *StereoLithography interface specification*).
 //!
 //! A file is a list of loose triangles. Corners that are equal to the bit become one vertex, so that the mesh is
-//! connected as it was before it was written. The facets' own normals are left unread: they only repeat the corners'
+//! connected as it was before it was written: it takes a third of the memory, and its triangles find each other's corners
+//! in the cache. The facets' own normals are left unread: they only repeat the corners'
 //! order, or contradict it.
 
 use std::path::Path;
 use std::sync::Arc;
 
+use super::mapped::Mapped;
 use super::text::{Words, quoted};
-use super::weld::Weld;
+use super::weld::{Weld, weld};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Geometry, Material, Mesh, Scene};
 
 const HEADER: usize = 84;
 const FACET: usize = 50;
+/// Facets of a text until the file is told that they have been read.
+const TELL: usize = 1 << 14;
 
 /// Reads an STL file.
-pub(super) fn load(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let mesh = if is_text(bytes) { text(path, bytes)? } else { binary(path, bytes, warnings)? };
+pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
+    let mesh = if is_text(file) { text(path, file)? } else { binary(path, file, warnings)? };
     Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]))
 }
 
@@ -38,7 +42,8 @@ fn promised(bytes: &[u8]) -> Option<u64> {
     Some(u32::from_le_bytes(*count).into())
 }
 
-fn binary(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Mesh> {
+fn binary(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Mesh> {
+    let bytes: &[u8] = file;
     let Some(count) = promised(bytes) else {
         let message = format!("is no STL file: neither text that begins with \"solid\" nor {HEADER} bytes long");
         return Err(Error::input(path, "byte 0", message));
@@ -53,19 +58,29 @@ fn binary(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Mesh
         let message = format!("{} bytes after the last triangle are ignored", rest.len());
         warnings.push(Warning::new(path, format!("byte {}", bytes.len() - rest.len()), message));
     }
-    let mut weld = Weld::new();
-    let corner = |weld: &mut Weld<_>, at: &[u8]| {
+    let facets = facets.as_chunks::<FACET>().0;
+    let corner = |at: &[u8; 12]| {
         // Adding 0 makes one zero of the two.
         let float = |k: usize| f32::from_le_bytes([at[k], at[k + 1], at[k + 2], at[k + 3]]) + 0.0;
-        weld.index([float(0).to_bits(), float(4).to_bits(), float(8).to_bits()])
+        [float(0).to_bits(), float(4).to_bits(), float(8).to_bits()]
     };
-    let triangles =
-        facets.chunks_exact(FACET).map(|f| [12, 24, 36].map(|at| corner(&mut weld, &f[at..at + 12]))).collect();
-    let positions = weld.into_keys().into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect();
-    Ok(Mesh::new(positions, triangles))
+    let corners = |i: usize| {
+        let [_, _, _, _, _, _, _, _, _, _, _, _, corners @ .., _, _]: &[u8; FACET] = &facets[i];
+        let (corners, _) = corners.as_chunks();
+        [corner(&corners[0]), corner(&corners[1]), corner(&corners[2])]
+    };
+    let (triangles, positions) = weld(facets.len(), corners, |range| file.done(facets[range].as_flattened()));
+    Ok(Mesh::new(vectors(positions), triangles))
 }
 
-fn text(path: &Path, bytes: &[u8]) -> Result<Mesh> {
+/// Positions from their bits.
+fn vectors(bits: Vec<[u32; 3]>) -> Vec<Vec3> {
+    bits.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
+}
+
+fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
+    let bytes: &[u8] = file;
+    let mut told = 0;
     let mut words = Words::new(bytes, 1);
     let mut weld = Weld::new();
     let mut triangles = Vec::new();
@@ -100,6 +115,11 @@ fn text(path: &Path, bytes: &[u8]) -> Result<Mesh> {
                 expect(path, &mut words, "endloop")?;
                 expect(path, &mut words, "endfacet")?;
                 triangles.push(triangle);
+                if triangles.len() % TELL == 0 {
+                    let read = bytes.len() - words.remaining();
+                    file.done(&bytes[told..read]);
+                    told = read;
+                }
             }
             _ => return Err(unexpected(path, &words, Some(word), "facet, solid or endsolid")),
         }

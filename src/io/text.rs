@@ -17,11 +17,16 @@ impl<'a> Lines<'a> {
         Self { rest: text, line: 0 }
     }
 
+    /// Lines that have been read so far, joined ones counted as they stand.
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
     fn physical(&mut self) -> Option<&'a [u8]> {
         if self.rest.is_empty() {
             return None;
         }
-        let end = self.rest.iter().position(|&b| b == b'\n').unwrap_or(self.rest.len());
+        let end = memchr::memchr(b'\n', self.rest).unwrap_or(self.rest.len());
         let line = &self.rest[..end];
         self.rest = self.rest.get(end + 1..).unwrap_or_default();
         self.line += 1;

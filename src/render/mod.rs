@@ -17,7 +17,7 @@ pub use tiles::TileOrder;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{DVec2, Vec3, Vec4};
+use crate::math::{Vec3, Vec4};
 use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
@@ -27,6 +27,7 @@ use camera::Pinhole;
 use film::Film;
 use sampler::Sampler;
 use tiles::{Tile, tiles};
+use wavefront::Buffers;
 
 /// Most pixels a picture may have along one side.
 pub const LARGEST_SIDE: u32 = 65_536;
@@ -148,11 +149,12 @@ impl<'a> Renderer<'a> {
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
         rayon::broadcast(|_| {
+            let mut buffers = Buffers::default();
             while let Some(tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
                 if cancelled() {
                     return;
                 }
-                film.put(tile, &self.tile(tracer, tile));
+                film.put(tile, self.tile(tracer, tile, &mut buffers));
                 if let Some(on_tile) = control.on_tile {
                     on_tile(tile.len() as u64);
                 }
@@ -167,12 +169,11 @@ impl<'a> Renderer<'a> {
     /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the
     /// native ones, and Embree with [`Width::One`](crate::Width).
     pub fn pixel<T: Tracer>(&self, tracer: &T, x: u32, y: u32) -> Vec4 {
-        self.tile(tracer, &Tile { x, y, width: 1, height: 1 })[0]
+        self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        let corner = DVec2::new(f64::from(x), f64::from(y));
-        self.pinhole.ray(corner + self.sampler.place(x, y, sample))
+        self.pinhole.ray(self.sampler.place(&self.sampler.pattern(x, y), sample))
     }
 }

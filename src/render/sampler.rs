@@ -16,26 +16,58 @@ const JITTER: u32 = 1;
 pub struct Sampler {
     spp: u32,
     seed: u64,
+    /// Columns and rows of the grid that samples are stratified on, at least `spp` cells.
+    columns: u32,
+    rows: u32,
+}
+
+/// How one pixel's samples are arranged: what all of them have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Pattern {
+    x: u32,
+    y: u32,
+    order: Key,
+    columns: Key,
+    rows: Key,
 }
 
 impl Sampler {
     /// `spp` samples a pixel, at least 1.
     pub const fn new(spp: u32, seed: u64) -> Self {
-        Self { spp, seed }
+        let columns = spp.isqrt();
+        Self { spp, seed, columns, rows: spp.div_ceil(columns) }
     }
 
-    /// A point of the unit square: the place of one of a pixel's samples in it. The middle for a single sample.
-    pub fn place(&self, x: u32, y: u32, sample: u32) -> DVec2 {
+    /// What the samples of a pixel have in common, computed once for all of them.
+    pub fn pattern(&self, x: u32, y: u32) -> Pattern {
+        let hash = if self.spp == 1 { [0; 4] } else { self.hash(x, y, 0, PATTERN) };
+        let [order, columns, rows, _] = hash;
+        Pattern {
+            x,
+            y,
+            order: Key::new(order, self.spp),
+            columns: Key::new(columns, self.columns),
+            rows: Key::new(rows, self.rows),
+        }
+    }
+
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples. The pixel's
+    /// middle for a single sample.
+    pub fn place(&self, pixel: &Pattern, sample: u32) -> DVec2 {
+        let corner = DVec2::new(f64::from(pixel.x), f64::from(pixel.y));
+        corner + self.within(pixel, sample)
+    }
+
+    /// The same within the unit square.
+    fn within(&self, pixel: &Pattern, sample: u32) -> DVec2 {
         if self.spp == 1 {
             return DVec2::splat(0.5);
         }
-        let [order, columns, rows, _] = self.hash(x, y, 0, PATTERN);
-        let jitter = self.hash(x, y, sample, JITTER);
-        let m = self.spp.isqrt();
-        let n = self.spp.div_ceil(m);
-        let s = permute(sample, self.spp, order);
-        let column = f64::from(permute(s % m, m, columns));
-        let row = f64::from(permute(s / m, n, rows));
+        let jitter = self.hash(pixel.x, pixel.y, sample, JITTER);
+        let (m, n) = (self.columns, self.rows);
+        let s = permute(sample, self.spp, pixel.order);
+        let column = f64::from(permute(s % m, m, pixel.columns));
+        let row = f64::from(permute(s / m, n, pixel.rows));
         let (jx, jy) = (unit(jitter[0]), unit(jitter[1]));
         DVec2::new((column + (row + jx) / f64::from(n)) / f64::from(m), (f64::from(s) + jy) / f64::from(self.spp))
     }
@@ -43,6 +75,20 @@ impl Sampler {
     fn hash(&self, x: u32, y: u32, sample: u32, dimension: u32) -> [u32; 4] {
         let [a, b, c, d] = pcg4d([x, y, sample, dimension]);
         pcg4d([a ^ self.seed as u32, b ^ (self.seed >> 32) as u32, c, d])
+    }
+}
+
+/// Chooses a permutation of `0..length`.
+#[derive(Clone, Copy, Debug)]
+struct Key {
+    bits: u32,
+    /// The bits modulo the length: a division that all elements share.
+    turn: u32,
+}
+
+impl Key {
+    const fn new(bits: u32, length: u32) -> Self {
+        Self { bits, turn: bits % length }
     }
 }
 
@@ -72,7 +118,8 @@ const fn mix([x, y, z, w]: [u32; 4]) -> [u32; 4] {
 
 /// The `i`th element of a permutation of `0..length` that `key` chooses: Kensler's, a hash of the next power of two
 /// that is repeated until it falls inside.
-const fn permute(mut i: u32, length: u32, key: u32) -> u32 {
+const fn permute(mut i: u32, length: u32, key: Key) -> u32 {
+    let Key { bits: key, turn } = key;
     let mask = length.next_power_of_two() - 1;
     loop {
         i = (i ^ key).wrapping_mul(0xe170_893d);
@@ -90,7 +137,9 @@ const fn permute(mut i: u32, length: u32, key: u32) -> u32 {
         i = i.wrapping_mul(0xc860_a3df) & mask;
         i ^= i >> 5;
         if i < length {
-            return ((i as u64 + key as u64) % length as u64) as u32;
+            // i + key modulo length; neither exceeds the length.
+            let rest = length - turn;
+            return if i < rest { i + turn } else { i - rest };
         }
     }
 }
@@ -103,7 +152,7 @@ mod tests {
     fn permutations_are_permutations() {
         for length in [1, 2, 3, 5, 8, 13, 64, 100] {
             for key in [0, 1, 0x9e37_79b9, u32::MAX] {
-                let mut images: Vec<_> = (0..length).map(|i| permute(i, length, key)).collect();
+                let mut images: Vec<_> = (0..length).map(|i| permute(i, length, Key::new(key, length))).collect();
                 images.sort_unstable();
                 assert_eq!(images, (0..length).collect::<Vec<_>>(), "{length} by {key}");
             }
@@ -115,7 +164,7 @@ mod tests {
         for (spp, columns, rows) in [(4, 2, 2), (7, 2, 4), (16, 4, 4), (25, 5, 5)] {
             let sampler = Sampler::new(spp, 3);
             for (x, y) in [(0, 0), (5, 9), (4_000_000, 1)] {
-                let places: Vec<_> = (0..spp).map(|s| sampler.place(x, y, s)).collect();
+                let places: Vec<_> = (0..spp).map(|s| sampler.within(&sampler.pattern(x, y), s)).collect();
                 assert!(places.iter().all(|p| p.min_element() >= 0.0 && p.max_element() < 1.0));
                 let mut fine: Vec<_> = places.iter().map(|p| (p.y * f64::from(spp)) as u32).collect();
                 fine.sort_unstable();
@@ -133,19 +182,23 @@ mod tests {
 
     #[test]
     fn pixels_samples_and_seeds_differ_and_a_single_sample_is_central() {
-        let place = |seed, x, s| Sampler::new(4, seed).place(x, 0, s);
+        let within = |sampler: Sampler, x, y, s| sampler.within(&sampler.pattern(x, y), s);
+        let place = |seed, x, s| within(Sampler::new(4, seed), x, 0, s);
         assert_ne!(place(0, 0, 0), place(0, 1, 0));
         assert_ne!(place(0, 0, 0), place(1, 0, 0));
         assert_ne!(place(0, 0, 0), place(1 << 40, 0, 0));
         assert_ne!(place(0, 0, 0), place(0, 0, 1));
-        assert_eq!(Sampler::new(1, 9).place(3, 4, 0), DVec2::splat(0.5));
+        assert_eq!(within(Sampler::new(1, 9), 3, 4, 0), DVec2::splat(0.5));
+        let one = Sampler::new(1, 9);
+        assert_eq!(one.place(&one.pattern(3, 4), 0), DVec2::new(3.5, 4.5));
     }
 
     /// Mean and variance of a uniform distribution over many pixels: no corner of the pixel is preferred.
     #[test]
     fn samples_are_uniform() {
         let sampler = Sampler::new(5, 0);
-        let places: Vec<_> = (0..20_000u32).map(|i| sampler.place(i % 200, i / 200, i % 5)).collect();
+        let places: Vec<_> =
+            (0..20_000u32).map(|i| sampler.within(&sampler.pattern(i % 200, i / 200), i % 5)).collect();
         let n = places.len() as f64;
         let mean = places.iter().sum::<DVec2>() / n;
         let variance = places.iter().map(|p| (*p - mean) * (*p - mean)).sum::<DVec2>() / n;

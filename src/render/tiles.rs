@@ -29,8 +29,8 @@ impl Tile {
     /// Its pixels along a Z-order curve (Morton 1966): every 64 are a block of 8 x 8, every 16 one of 4 x 4.
     pub(super) fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let Self { x, y, width, height } = *self;
-        (0..TILE * TILE).filter_map(move |place| {
-            let (px, py) = (every_other_bit(place), every_other_bit(place >> 1));
+        Z_ORDER.iter().filter_map(move |&[px, py]| {
+            let (px, py) = (u32::from(px), u32::from(py));
             (px < width && py < height).then_some((x + px, y + py))
         })
     }
@@ -41,9 +41,25 @@ impl Tile {
     }
 }
 
+/// Column and row of every place along the curve.
+static Z_ORDER: [[u8; 2]; (TILE * TILE) as usize] = {
+    let mut order = [[0; 2]; (TILE * TILE) as usize];
+    let mut place = 0;
+    while place < TILE * TILE {
+        order[place as usize] = [every_other_bit(place), every_other_bit(place >> 1)];
+        place += 1;
+    }
+    order
+};
+
 /// Bits 0, 2, 4, 6, 8 of a number below 2^10, side by side.
-fn every_other_bit(number: u32) -> u32 {
-    (0..5).fold(0, |bits, i| bits | (number >> (2 * i) & 1) << i)
+const fn every_other_bit(number: u32) -> u8 {
+    let (mut bits, mut i) = (0, 0);
+    while i < 5 {
+        bits |= (number >> (2 * i) & 1) << i;
+        i += 1;
+    }
+    bits as u8
 }
 
 /// All tiles of a picture, in the given order.

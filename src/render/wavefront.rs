@@ -11,11 +11,15 @@ use crate::shade::light::LightSource;
 use crate::shade::phong::Shading;
 use crate::trace::Tracer;
 
+use super::sampler::Pattern;
 use super::{Renderer, tiles::Tile};
 
-/// Room for one tile, used again for each sample.
+/// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
-struct Buffers {
+pub(super) struct Buffers {
+    /// In the order of [`Tile::pixels`], as all others.
+    patterns: Vec<Pattern>,
+    sums: Vec<Vec4>,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     radiance: Vec<Vec4>,
@@ -35,19 +39,23 @@ struct Lit {
 
 impl Renderer<'_> {
     /// The pixels of a tile, in the order of [`Tile::pixels`].
-    pub(super) fn tile<T: Tracer>(&self, tracer: &T, tile: &Tile) -> Vec<Vec4> {
-        let mut sums = vec![Vec4::ZERO; tile.len()];
-        let mut buffers = Buffers::default();
+    pub(super) fn tile<'b, T: Tracer>(&self, tracer: &T, tile: &Tile, buffers: &'b mut Buffers) -> &'b [Vec4] {
+        buffers.patterns.clear();
+        buffers.patterns.extend(tile.pixels().map(|(x, y)| self.sampler.pattern(x, y)));
+        buffers.sums.clear();
+        buffers.sums.resize(tile.len(), Vec4::ZERO);
         for sample in 0..self.settings.spp {
+            let ray = |pixel| self.pinhole.ray(self.sampler.place(pixel, sample));
             buffers.rays.clear();
-            buffers.rays.extend(tile.pixels().map(|(x, y)| self.camera_ray(x, y, sample)));
-            self.radiance(tracer, &mut buffers);
-            for (sum, radiance) in sums.iter_mut().zip(&buffers.radiance) {
+            buffers.rays.extend(buffers.patterns.iter().map(ray));
+            self.radiance(tracer, buffers);
+            for (sum, radiance) in buffers.sums.iter_mut().zip(&buffers.radiance) {
                 *sum += *radiance;
             }
         }
         // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples.
-        sums.iter().map(|sum| *sum / self.settings.spp as f32).collect()
+        buffers.sums.iter_mut().for_each(|sum| *sum /= self.settings.spp as f32);
+        &buffers.sums
     }
 
     /// What each camera ray sees, into `radiance`: linear RGB and coverage.

@@ -2,7 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::math::{DAabb, DAffine3, DVec3, Vec2, Vec3, Vec4, is_traceable};
+use rayon::prelude::*;
+
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, is_traceable};
+
+/// Vertices or triangles that are worth a task of their own.
+const TASK: usize = 1 << 14;
 
 /// Triangles over shared vertices. Attribute lists are empty or as long as `positions`.
 #[derive(Clone, Debug, Default)]
@@ -34,21 +39,55 @@ impl Mesh {
 
     /// Stores f64 positions as f32 offsets from an origin, chosen by `choose_origin`.
     pub fn set_positions(&mut self, positions: &[DVec3]) {
-        let bounds = positions.iter().filter(|p| p.is_finite()).fold(DAabb::EMPTY, |all, &p| all.include(p));
-        self.origin = choose_origin(&bounds);
-        self.positions = Arc::new(positions.iter().map(|p| (p - self.origin).as_vec3()).collect());
+        let tasks = positions.par_chunks(TASK);
+        let bounds =
+            tasks.map(|part| part.iter().filter(|p| p.is_finite()).fold(DAabb::EMPTY, |all, &p| all.include(p)));
+        self.origin = choose_origin(&bounds.reduce(|| DAabb::EMPTY, DAabb::union));
+        let offset = |p: &DVec3| (p - self.origin).as_vec3();
+        self.positions = Arc::new(positions.par_iter().with_min_len(TASK).map(offset).collect());
     }
 
     /// The bounds of the traceable vertices under `transform`.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
-        let place = |p: &Vec3| transform.transform_point3(self.origin + p.as_dvec3());
-        self.positions.iter().filter(|&&p| is_traceable(p)).fold(DAabb::EMPTY, |all, p| all.include(place(p)))
+        let place = |p: Vec3| transform.transform_point3(self.origin + p.as_dvec3());
+        let tasks = self.positions.par_chunks(TASK);
+        let m = &transform.matrix3;
+        let keeps_axes = (0..3).all(|row| (0..3).filter(|&column| m.col(column)[row] != 0.0).count() == 1);
+        if !keeps_axes {
+            let bounds = tasks.map(|part| {
+                let traceable = part.iter().copied().filter(|&p| is_traceable(p));
+                traceable.map(place).fold(DAabb::EMPTY, DAabb::include)
+            });
+            return bounds.reduce(|| DAabb::EMPTY, DAabb::union);
+        }
+        // Each coordinate is then a monotone function of one coordinate, and its rounding is monotone too: the extremes
+        // are those of the extremes, at a fraction of the work.
+        let bounds = tasks.map(|part| Aabb::around(part.iter().copied().filter(|&p| is_traceable(p))));
+        let bounds = bounds.reduce(|| Aabb::EMPTY, Aabb::union);
+        if bounds.is_empty() {
+            return DAabb::EMPTY;
+        }
+        DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
+    }
+
+    /// Turns positions and normals, in place where nothing else holds them.
+    pub(crate) fn turn(&mut self, turn: &DMat3) {
+        self.origin = *turn * self.origin;
+        let turn = turn.as_mat3();
+        // Adding 0 makes one zero of the two.
+        let apply = |v: &mut Vec3| *v = turn * *v + Vec3::ZERO;
+        Arc::make_mut(&mut self.positions).par_iter_mut().with_min_len(TASK).for_each(apply);
+        self.normals.par_iter_mut().with_min_len(TASK).for_each(apply);
     }
 
     /// How many triangles have a corner that is NaN, infinite or too large to trace.
     pub fn untraceable_triangles(&self) -> usize {
+        // Where all vertices are fine, which is nearly always, nothing needs to be looked up.
+        if self.positions.par_chunks(TASK).all(|part| part.iter().all(|&p| is_traceable(p))) {
+            return 0;
+        }
         let bad = |&i: &u32| !is_traceable(self.positions[i as usize]);
-        self.triangles.iter().filter(|corners| corners.iter().any(bad)).count()
+        self.triangles.par_iter().with_min_len(TASK).filter(|corners| corners.iter().any(bad)).count()
     }
 
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
@@ -68,7 +107,7 @@ impl Mesh {
                 sums[corners[k] as usize] += normal * libm::atan2(a.cross(b).length(), a.dot(b));
             }
         }
-        self.normals = sums.into_iter().map(|n| n.normalize_or_zero().as_vec3()).collect();
+        self.normals = sums.into_par_iter().with_min_len(TASK).map(|n| n.normalize_or_zero().as_vec3()).collect();
     }
 }
 

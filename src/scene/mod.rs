@@ -20,7 +20,7 @@ pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};
 pub use texture::{Filter, Texture, Wrap};
 
-use crate::math::{DAabb, DAffine3, Vec3};
+use crate::math::{DAabb, DAffine3, DMat3, DVec3, Vec3};
 use crate::shape::Shape;
 
 /// Everything one file describes.
@@ -142,6 +142,33 @@ impl Scene {
         }
         for camera in &mut self.cameras {
             camera.transform(transform);
+        }
+    }
+
+    /// Gives meshes that are placed once, by a turn that only exchanges axes, the coordinates of the scene, so that
+    /// tracing needs no turned copy of them. Such a turn rounds nothing.
+    pub(crate) fn bake_turns(&mut self) {
+        let mut uses = vec![0; self.groups.len()];
+        self.instances.iter().for_each(|instance| uses[instance.group as usize] += 1);
+        for instance in self.instances.iter_mut().filter(|instance| uses[instance.group as usize] == 1) {
+            let turn = instance.transform.matrix3;
+            let entries = turn.to_cols_array();
+            // One entry of a row and of a column is 1 or -1, the others 0.
+            let exchanges =
+                entries.iter().all(|x| [-1.0, 0.0, 1.0].contains(x)) && turn * turn.transpose() == DMat3::IDENTITY;
+            let turns = exchanges && turn.determinant() > 0.0 && turn != DMat3::IDENTITY;
+            let range = &self.groups[instance.group as usize].geometries;
+            let geometries = &mut self.geometries[range.start as usize..range.end as usize];
+            let only_meshes = geometries.iter().all(|geometry| matches!(geometry, Geometry::Mesh(_)));
+            if !(turns && only_meshes && instance.transform.translation == DVec3::ZERO) {
+                continue;
+            }
+            for geometry in geometries {
+                if let Geometry::Mesh(mesh) = geometry {
+                    mesh.turn(&turn);
+                }
+            }
+            instance.transform = DAffine3::IDENTITY;
         }
     }
 }

@@ -94,9 +94,9 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
 
     let absolute = d.abs();
     let bounds = [
-        K * absolute.dot(permanent_cross(b, ea)),
-        K * absolute.dot(permanent_cross(c, eb)),
-        K * absolute.dot(permanent_cross(a, ec)),
+        ROUNDING * absolute.dot(permanent_cross(b, ea)),
+        ROUNDING * absolute.dot(permanent_cross(c, eb)),
+        ROUNDING * absolute.dot(permanent_cross(a, ec)),
     ];
     let positive = (0..3).any(|k| seen.volumes[k] > bounds[k]);
     let negative = (0..3).any(|k| seen.volumes[k] < -bounds[k]);
@@ -107,7 +107,7 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
 
     let normal = permanent_cross(eb, ec);
     // |t| (relative error of both) against an eighth of f32's precision; false for NaN too.
-    let t_error = K * (a.dot(normal) + absolute.dot(normal) * (seen.height / seen.slope).abs());
+    let t_error = ROUNDING * (a.dot(normal) + absolute.dot(normal) * (seen.height / seen.slope).abs());
     let is_precise = t_error <= seen.height.abs() * T_PRECISION;
     let hit = if is_precise && !undecided { seen.hit() } else { intersect_exactly(origin, d, corners)? };
     let t = hit.t as f32;
@@ -116,7 +116,7 @@ pub fn intersect(ray: &Ray, corners: &impl Corners) -> Option<TriangleHit> {
 
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
 /// the dot product; and the bound's own rounding.
-const K: f64 = gamma64(32);
+const ROUNDING: f64 = gamma64(32);
 
 /// A triangle as seen from the origin of a ray, in f64.
 struct Seen {

@@ -11,6 +11,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
 use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, gamma64, is_traceable};
 use crate::ray::{Hit, Ray};
@@ -183,12 +185,14 @@ impl Part {
     /// The box around the part's traceable primitives, in the part's own coordinates.
     pub fn bounds(&self) -> Aabb {
         match &self.primitives {
-            Primitives::Triangles { positions, triangles } => triangles
-                .iter()
-                .map(|corners| corners.map(|i| positions[i as usize]))
-                .filter(|corners| corners.iter().all(|&p| is_traceable(p)))
-                .flatten()
-                .fold(Aabb::EMPTY, Aabb::include),
+            Primitives::Triangles { positions, triangles } => {
+                let corners = |corners: &[u32; 3]| corners.map(|i| positions[i as usize]);
+                let bounds = triangles.par_chunks(1 << 14).map(|part| {
+                    let traceable = part.iter().map(corners).filter(|corners| corners.iter().all(|&p| is_traceable(p)));
+                    Aabb::around(traceable.flatten())
+                });
+                bounds.reduce(|| Aabb::EMPTY, Aabb::union)
+            }
             Primitives::Shapes(shapes) => shapes.iter().map(Shape::bounds).fold(Aabb::EMPTY, Aabb::union),
         }
     }
@@ -249,7 +253,8 @@ fn transformed(mesh: &Mesh, transform: &DAffine3) -> Arc<Vec<Vec3>> {
     if transform.matrix3 == DMat3::IDENTITY && origin == DVec3::ZERO {
         return Arc::clone(&mesh.positions);
     }
-    Arc::new(mesh.positions.iter().map(|p| (transform.matrix3 * p.as_dvec3() + origin).as_vec3()).collect())
+    let place = |p: &Vec3| (transform.matrix3 * p.as_dvec3() + origin).as_vec3();
+    Arc::new(mesh.positions.par_iter().with_min_len(1 << 14).map(place).collect())
 }
 
 /// Where zero of the world is put: at zero of the scene while f32 keeps the scene's shape there; else at the origin of

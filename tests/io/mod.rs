@@ -126,6 +126,20 @@ fn axes_and_units() {
 }
 
 #[test]
+fn a_turn_of_the_axes_copies_nothing() {
+    let text = "v 1 2 3\nv 4 5 6\nv 7 8 0\nvn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
+    let files = Files::one("a.obj", text);
+    let options = LoadOptions { up_axis: UpAxis::Z, ..LoadOptions::default() };
+    let scene = load(&files.path("a.obj"), &options).unwrap().0;
+    let expected = [[1.0, 3.0, -2.0], [4.0, 6.0, -5.0], [7.0, 0.0, -8.0]].map(Vec3::from);
+    assert_eq!(corners(meshes(&scene)[0]), [expected]);
+    assert_eq!(meshes(&scene)[0].normals[0], Vec3::new(0.0, 0.8, -0.6));
+    let world = twincast::World::new(&scene).unwrap();
+    let twincast::trace::Primitives::Triangles { positions, .. } = &world.parts[0].primitives else { panic!() };
+    assert!(std::sync::Arc::ptr_eq(positions, &meshes(&scene)[0].positions));
+}
+
+#[test]
 fn normals_on_request() {
     // A roof whose halves share no vertices: texture coordinates differ.
     let roof =

@@ -215,3 +215,64 @@ fn a_folder_as_a_library_is_refused() {
     let files = Files::one("a.obj", "f 1 2 3\n");
     refused(&files, "a.obj", "line 1", "past the last vertex, 0");
 }
+
+/// A file of several stretches, which are read apart: what holds from one to the next, and what is told of the last.
+#[test]
+fn large_files_are_read_as_small_ones() {
+    use std::fmt::Write;
+    const PATCHES: usize = 50_000;
+    let mut text = String::from("s 7\n");
+    for i in 0..PATCHES {
+        // From here on to far behind the next end of a stretch.
+        match i {
+            1000 => text += "o first\nusemtl a\ns off\n",
+            30_000 => text += "usemtl b\no second\n",
+            45_000 => text += "usemtl a\no third\n",
+            _ => {}
+        }
+        let x = i as f32;
+        write!(text, "v {x} 0 0\nv {x} 1 0 1 0 0\nv {x} 1 1\nv {x} 0 \\\n 1\n").unwrap();
+        let first = 4 * i + 1;
+        match i % 3 {
+            0 => writeln!(text, "f -4 -3 -2").unwrap(),
+            1 => writeln!(text, "f {first} {} {} {}", first + 1, first + 2, first + 3).unwrap(),
+            _ => writeln!(text, "f -2 -1 {first}").unwrap(),
+        }
+    }
+    assert!(text.len() > 2 << 20);
+    let files = Files::one("a.obj", &text);
+    let scene = files.load("a.obj").0;
+    let meshes = meshes(&scene);
+    // Before the first material, smooth; then a, b, flat.
+    let names: Vec<_> = meshes.iter().map(|mesh| mesh.name.as_str()).collect();
+    assert_eq!(names, ["", "first", "second"]);
+    let has_normals: Vec<_> = meshes.iter().map(|mesh| !mesh.normals.is_empty()).collect();
+    assert_eq!(has_normals, [true, false, false]);
+    let expected = |patches: &[std::ops::Range<usize>]| -> Vec<[Vec3; 3]> {
+        let patch = |i: usize| {
+            let [a, b, c, d] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[y, z]| Vec3::new(i as f32, y, z));
+            match i % 3 {
+                0 => vec![[a, b, c]],
+                1 => vec![[a, b, c], [a, c, d]],
+                _ => vec![[c, d, a]],
+            }
+        };
+        patches.iter().cloned().flatten().flat_map(patch).collect()
+    };
+    let empty = PATCHES..PATCHES;
+    let ranges = [[0..1000, empty.clone()], [1000..30_000, 45_000..PATCHES], [30_000..45_000, empty]];
+    for (mesh, ranges) in meshes.iter().zip(ranges) {
+        assert!(corners(mesh) == expected(&ranges), "{}", mesh.name);
+        // Every second corner of a patch is red.
+        for (position, color) in mesh.positions.iter().zip(&mesh.colors) {
+            let is_red = (position.y, position.z) == (1.0, 0.0);
+            assert_eq!(color.y == 0.0, is_red);
+        }
+    }
+    let lines = text.lines().count();
+    refused_bytes("a.obj", format!("{text}f 1 2 x\n"), &format!("line {}", lines + 1), "\"x\"");
+    refused_bytes("a.obj", format!("{text}f 1 2 200001\n"), &format!("line {}", lines + 1), "index 200001");
+    // Of two errors the first, though both stretches are read.
+    let two = format!("v x\n{text}v y\n");
+    refused_bytes("a.obj", two, "line 1", "v needs 3 numbers");
+}

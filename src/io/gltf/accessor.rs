@@ -1,11 +1,19 @@
 //! Accessors: typed views of buffers, checked once, then read by index.
 
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
 use super::Document;
 use super::schema::Accessor;
 use crate::io::Placeless;
+use crate::io::mapped::Mapped;
+use crate::io::records::Records;
 
 /// Most bytes that accessors without a buffer view, which are all zero, may stand for.
 const MOST_ZEROS: u64 = 1 << 28;
+
+/// Elements that are worth a task of their own.
+const LEAST_TASK: usize = 1 << 12;
 
 /// A checked accessor: every index below `count` can be read.
 pub(super) struct View<'a> {
@@ -15,6 +23,8 @@ pub(super) struct View<'a> {
     normalized: bool,
     /// Elements `stride` apart, from the first byte; None for zeros.
     base: Option<(&'a [u8], usize)>,
+    /// What the elements are mapped from.
+    file: Option<&'a Mapped<'a>>,
     /// Replaced elements: their rising indices, and their values.
     sparse: Option<(Vec<u32>, &'a [u8])>,
 }
@@ -122,7 +132,8 @@ impl<'a> View<'a> {
                 None
             }
         };
-        let mut view = Self { count, component, components, normalized: accessor.normalized, base, sparse: None };
+        let file = accessor.buffer_view.and_then(|view| document.view_file(view));
+        let mut view = Self { count, component, components, normalized: accessor.normalized, base, file, sparse: None };
         if let Some(sparse) = &accessor.sparse {
             if sparse.count > accessor.count {
                 return Err(("/sparse/count", format!("{} of only {} elements", sparse.count, accessor.count)));
@@ -174,6 +185,55 @@ impl<'a> View<'a> {
         std::array::from_fn(|k| {
             if k < self.components { self.component.read(&bytes[k * size..], self.normalized) } else { 0.0 }
         })
+    }
+
+    /// What becomes of the first `count` elements, which must be there.
+    pub(super) fn collect<const N: usize, T: Send>(&self, count: usize, make: impl Fn([f32; N]) -> T + Sync) -> Vec<T> {
+        let items = (0..count).into_par_iter().with_min_len(LEAST_TASK).map(|i| make(self.floats(i))).collect();
+        self.done();
+        items
+    }
+
+    /// All elements as vectors of three floats: a copy where they are stored so.
+    pub(super) fn vectors<T: Zeroable + Send>(&self, make: impl Fn([f32; 3]) -> T + Sync) -> Vec<T> {
+        match self.plain(Component::F32, 3, self.count) {
+            Some(records) => records.read(|bytes: &[u8; 12]| {
+                let float = |k: usize| f32::from_le_bytes([bytes[k], bytes[k + 1], bytes[k + 2], bytes[k + 3]]);
+                make([float(0), float(4), float(8)])
+            }),
+            None => self.collect(self.count, make),
+        }
+    }
+
+    /// All indices in threes, without what is left over; for an accessor for which [`View::is_index`] holds.
+    pub(super) fn triples(&self) -> Vec<[u32; 3]> {
+        let count = self.count / 3;
+        let packed = self.base.is_some_and(|(_, stride)| stride == 4);
+        match self.plain(Component::U32, 1, count).filter(|_| packed) {
+            Some(records) => Records { stride: 12, ..records }.read(|bytes: &[u8; 12]| {
+                let index = |k: usize| u32::from_le_bytes([bytes[k], bytes[k + 1], bytes[k + 2], bytes[k + 3]]);
+                [index(0), index(4), index(8)]
+            }),
+            None => {
+                let triple = |i: usize| [self.index(3 * i), self.index(3 * i + 1), self.index(3 * i + 2)];
+                let triples = (0..count).into_par_iter().with_min_len(LEAST_TASK).map(triple).collect();
+                self.done();
+                triples
+            }
+        }
+    }
+
+    /// `count` elements where they are all stored, with this type.
+    fn plain(&self, component: Component, components: usize, count: usize) -> Option<Records<'a>> {
+        let (bytes, stride) = self.base?;
+        let fits = self.component == component && self.components == components && self.sparse.is_none();
+        fits.then_some(Records { file: self.file, bytes, count, stride })
+    }
+
+    fn done(&self) {
+        if let (Some(file), Some((bytes, stride))) = (self.file, self.base) {
+            file.done(&bytes[..(self.count * stride).min(bytes.len())]);
+        }
     }
 
     /// The element `index`, below `count`, of an accessor for which [`View::is_index`] holds.

@@ -5,11 +5,14 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::Document;
 use super::accessor::View;
 use super::material::Materials;
 use super::schema::Primitive;
 use crate::error::{Result, Warning};
+use crate::io::compact::{compact, pick};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Geometry, Group, Mesh, Scene};
 
@@ -55,6 +58,9 @@ pub(super) fn groups(
     Ok(groups)
 }
 
+/// Corners or vertices that are worth a task of their own.
+const TASK: usize = 1 << 14;
+
 fn read(
     document: &Document<'_>,
     materials: &mut Materials<'_>,
@@ -84,10 +90,10 @@ fn read(
     let uvs = attribute(&format!("TEXCOORD_{}", texture_set.unwrap_or(0)), &["VEC2"])?;
     let colors = attribute("COLOR_0", &["VEC3", "VEC4"])?;
 
-    let corners: Vec<u32> = match primitive.indices {
+    let mut triangles: Vec<[u32; 3]> = match primitive.indices {
         None => {
             document.spend(pointer, positions.count as u64 * 4)?;
-            (0..positions.count as u32).collect()
+            triangles(mode, &(0..positions.count as u32).collect::<Vec<_>>())
         }
         Some(index) => {
             let indices = view(index, &["SCALAR"])?;
@@ -96,48 +102,52 @@ fn read(
                 return Err(document.error(format!("/accessors/{index}/componentType"), message));
             }
             document.spend(pointer, indices.count as u64 * 4)?;
-            let corners: Vec<u32> = (0..indices.count).map(|i| indices.index(i)).collect();
-            if let Some(at) = corners.iter().position(|&i| i as usize >= positions.count) {
-                let message = format!("index {} (element {at}) is past the {} vertices", corners[at], positions.count);
+            let triangles = match mode {
+                4 => indices.triples(),
+                _ => triangles(mode, &(0..indices.count).map(|i| indices.index(i)).collect::<Vec<_>>()),
+            };
+            let is_past = |&i: &u32| i as usize >= positions.count;
+            let tasks = triangles.as_flattened().par_chunks(TASK);
+            if let Some(past) = tasks.find_map_first(|part| part.iter().copied().find(is_past)) {
+                // Looked for only now, since corners of strips and fans belong to several triangles.
+                let at = (0..indices.count).position(|i| is_past(&indices.index(i))).unwrap_or_default();
+                let message = format!("index {past} (element {at}) is past the {} vertices", positions.count);
                 return Err(document.error(format!("/accessors/{index}"), message));
             }
-            corners
+            triangles
         }
     };
-    let (used, corners) = compact(corners, positions.count);
-    // Positions 12, normals 12, uvs 8, colours 16, and up to 12 a corner for triangles.
-    document.spend(pointer, used.len() as u64 * 48 + corners.len() as u64 * 12)?;
-    let each = || used.iter().map(|&i| i as usize);
-    let normal = |v: &View<'_>, i| DVec3::from(v.floats::<3>(i).map(f64::from)).normalize_or_zero().as_vec3();
+    let used = compact(triangles.as_flattened_mut(), positions.count);
+    // Positions 12, normals 12, uvs 8, colours 16, and 12 a triangle.
+    let count = used.as_ref().map_or(positions.count, Vec::len);
+    document.spend(pointer, count as u64 * 48 + triangles.len() as u64 * 12)?;
+    let normal = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero().as_vec3();
     // glTF's v points down, ours up.
-    let uv = |v: &View<'_>, i| Vec2::from(v.floats::<2>(i)) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
-    let color = |v: &View<'_>, i| {
-        let color = Vec4::from(v.floats::<4>(i));
-        if v.components() == 3 { color.with_w(1.0) } else { color }
+    let uv = |uv: [f32; 2]| Vec2::from(uv) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
+    let color = |v: &View<'_>, color: [f32; 4]| {
+        if v.components() == 3 { Vec4::from(color).with_w(1.0) } else { Vec4::from(color) }
     };
     Ok(Mesh {
-        positions: Arc::new(each().map(|i| Vec3::from(positions.floats::<3>(i))).collect()),
-        normals: normals.map_or(Vec::new(), |v| each().map(|i| normal(&v, i)).collect()),
-        uvs: uvs.map_or(Vec::new(), |v| each().map(|i| uv(&v, i)).collect()),
-        colors: colors.map_or(Vec::new(), |v| each().map(|i| color(&v, i)).collect()),
-        triangles: Arc::new(triangles(mode, &corners)),
+        positions: Arc::new(match &used {
+            None => positions.vectors(Vec3::from),
+            Some(used) => pick(used, |i| Vec3::from(positions.floats::<3>(i))),
+        }),
+        normals: normals.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, normal),
+            Some(used) => pick(used, |i| normal(v.floats(i))),
+        }),
+        uvs: uvs.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, uv),
+            Some(used) => pick(used, |i| uv(v.floats(i))),
+        }),
+        colors: colors.map_or(Vec::new(), |v| match &used {
+            None => v.collect(count, |c| color(&v, c)),
+            Some(used) => pick(used, |i| color(&v, v.floats(i))),
+        }),
+        triangles: Arc::new(triangles),
         material,
         ..Mesh::default()
     })
-}
-
-/// The vertices that are used, in rising order, and the corners as indices into those.
-fn compact(mut corners: Vec<u32>, count: usize) -> (Vec<u32>, Vec<u32>) {
-    let mut used = corners.clone();
-    used.sort_unstable();
-    used.dedup();
-    if used.len() < count {
-        for corner in &mut corners {
-            // Found always: `used` has every corner.
-            *corner = used.partition_point(|&i| i < *corner) as u32;
-        }
-    }
-    (used, corners)
 }
 
 /// Triangles of a list (4), a strip (5) or a fan (6); corners that do not complete one are dropped, as they are by
@@ -168,11 +178,5 @@ mod tests {
         assert_eq!(triangles(5, &[0, 1, 2, 3, 4]), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
         assert_eq!(triangles(6, &[9, 1, 2, 3]), [[1, 2, 9], [2, 3, 9]]);
         assert!([4, 5, 6].iter().all(|&mode| triangles(mode, &[]).is_empty() && triangles(mode, &[1, 2]).is_empty()));
-    }
-
-    #[test]
-    fn unused_vertices_are_left_out() {
-        assert_eq!(compact(vec![7, 3, 7, 9], 10), (vec![3, 7, 9], vec![1, 0, 1, 2]));
-        assert_eq!(compact(vec![1, 0, 2], 3), (vec![0, 1, 2], vec![1, 0, 2]));
     }
 }

@@ -17,7 +17,6 @@ mod phong;
 mod schema;
 mod uri;
 
-use std::borrow::Cow;
 use std::cell::Cell;
 use std::path::Path;
 
@@ -45,8 +44,22 @@ struct Document<'a> {
 
 /// The bytes of a buffer.
 enum Bytes<'a> {
-    Memory(Cow<'a, [u8]>),
-    File(Mapped),
+    /// A part of the GLB file.
+    Part(&'a Mapped<'a>, &'a [u8]),
+    /// A file of its own.
+    File(Mapped<'a>),
+    Memory(Vec<u8>),
+}
+
+impl Bytes<'_> {
+    /// The file that they are mapped from.
+    fn file(&self) -> Option<&Mapped<'_>> {
+        match self {
+            Self::Part(file, _) => Some(file),
+            Self::File(file) => Some(file),
+            Self::Memory(_) => None,
+        }
+    }
 }
 
 impl std::ops::Deref for Bytes<'_> {
@@ -54,15 +67,16 @@ impl std::ops::Deref for Bytes<'_> {
 
     fn deref(&self) -> &[u8] {
         match self {
-            Self::Memory(bytes) => bytes,
+            Self::Part(_, bytes) => bytes,
             Self::File(bytes) => bytes,
+            Self::Memory(bytes) => bytes,
         }
     }
 }
 
 /// Reads a glTF or GLB file.
-pub(super) fn load(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let parts = container::split(bytes).map_err(|(place, message)| Error::input(path, place, message))?;
+pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
+    let parts = container::split(file).map_err(|(place, message)| Error::input(path, place, message))?;
     let root: schema::Root = serde_json::from_slice(parts.json).map_err(|e| {
         let place = format!("line {}, column {}", e.line(), e.column());
         // The place is in the library's own message too.
@@ -79,10 +93,10 @@ pub(super) fn load(path: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Re
         taken: Cell::new(0),
         // Decoding makes data a few times larger, sharing between primitives a few times more; a file far beyond that
         // is made to exhaust memory.
-        most: (1 << 28) + 64 * bytes.len() as u64,
+        most: (1 << 28) + 64 * file.len() as u64,
     };
     for index in 0..document.root.buffers.len() {
-        let buffer = document.open_buffer(index, parts.binary)?;
+        let buffer = document.open_buffer(index, parts.binary.map(|bytes| (file, bytes)))?;
         document.most += 64 * buffer.len() as u64;
         document.buffers.push(buffer);
     }
@@ -133,19 +147,19 @@ impl<'a> Document<'a> {
         Err(self.error(pointer, format!("there is no {what} {index}; there are {count}")))
     }
 
-    fn open_buffer(&self, index: usize, binary: Option<&'a [u8]>) -> Result<Bytes<'a>> {
+    fn open_buffer(&self, index: usize, binary: Option<(&'a Mapped<'a>, &'a [u8])>) -> Result<Bytes<'a>> {
         let buffer = &self.root.buffers[index];
         let pointer = format!("/buffers/{index}/uri");
         let bytes = match (&buffer.uri, binary) {
             (Some(uri), _) => match uri::resolve(self.path, uri).map_err(|m| self.error(&pointer, m))? {
-                Target::Data(bytes) => Bytes::Memory(Cow::Owned(bytes)),
+                Target::Data(bytes) => Bytes::Memory(bytes),
                 Target::File(file) => {
                     let opened = Mapped::open(&file);
                     let say = |e| self.error(&pointer, format!("{}: {}", file.display(), system_message(&e)));
                     Bytes::File(opened.map_err(say)?)
                 }
             },
-            (None, Some(binary)) if index == 0 => Bytes::Memory(Cow::Borrowed(binary)),
+            (None, Some((file, bytes))) if index == 0 => Bytes::Part(file, bytes),
             (None, _) => return Err(self.error(pointer, "the buffer has neither a URI nor a binary chunk of a GLB")),
         };
         if buffer.byte_length > bytes.len() as u64 {
@@ -153,6 +167,11 @@ impl<'a> Document<'a> {
             return Err(self.error(format!("/buffers/{index}/byteLength"), message));
         }
         Ok(bytes)
+    }
+
+    /// The file that a buffer view is mapped from.
+    fn view_file(&self, index: usize) -> Option<&Mapped<'_>> {
+        self.root.buffer_views.get(index).and_then(|view| self.buffers.get(view.buffer)).and_then(Bytes::file)
     }
 
     /// The bytes of a buffer view, and its stride.

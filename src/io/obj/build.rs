@@ -2,95 +2,171 @@
 //!
 //! OBJ gives a corner three indices, a mesh has one: corners that agree in all three (and, where normals are computed,
 //! in their smoothing group) become one vertex. They are found by a chain of variants for each position, since almost
-//! every position has one or two; a hash table of triples would take thrice as long.
+//! every position has one or two; a hash table of triples would take thrice as long. Where a material's faces have
+//! neither texture coordinates nor normals, as most large files, positions are vertices as they are, and all is done in
+//! parallel.
 
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::mtl::Library;
-use super::{Corner, Face, NONE, Obj, Section};
+use super::statement::Polygon;
+use super::{NONE, Obj, Piece, Section};
 use crate::error::{Error, Result, Warning};
+use crate::io::compact::{compact, pick};
 use crate::io::polygon;
-use crate::math::{DAabb, DVec3, Vec2, Vec3};
+use crate::math::{DAabb, DVec3, Vec2, Vec3, Vec4};
+use crate::memory;
 use crate::scene::{Geometry, Mesh, Scene, choose_origin};
+
+/// Positions that are worth a task of their own.
+const TASK: usize = 1 << 14;
+
+/// Indices from 0 into positions, uvs and normals; the latter two may be [`NONE`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Corner([u32; 3]);
+
+/// The triangles of a section.
+enum Triangles {
+    /// Indices of positions, for faces that have nothing else.
+    Plain(Vec<[u32; 3]>),
+    /// By piece.
+    Detailed(Vec<Vec<Triangle>>),
+}
+
+struct Triangle {
+    corners: [Corner; 3],
+    smoothing: u32,
+}
 
 /// Sums of face normals: by position and smoothing group.
 type Smooth = HashMap<(u32, u32), DVec3>;
 
-/// Makes the scene: one mesh for each section that has faces.
+/// Makes the scene: one mesh for each section.
 pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut Vec<Warning>) -> Result<Scene> {
     let sections = std::mem::take(&mut obj.sections);
-    let mut triangles = Vec::new();
-    for section in &sections {
-        triangles.push(split(path, &obj, section)?);
-    }
-    let smooth = smooth_normals(&obj, &sections, &triangles);
+    let triangles: Vec<Triangles> = sections.iter().map(|section| split(path, &obj, section)).collect::<Result<_>>()?;
+    obj.faces = Vec::new();
+    let smooth = smooth_normals(&obj, &triangles);
     // One origin for all, so that vertices that meshes share stay equal.
-    let finite = obj.positions.iter().filter(|p| p.is_finite());
-    let origin = choose_origin(&finite.fold(DAabb::EMPTY, |all, &p| all.include(p)));
-    let mut chains = Chains::new(obj.positions.len());
+    let bounds = obj.positions.par_chunks(TASK).map(|part| {
+        let finite = part.iter().filter(|p| p.is_finite());
+        finite.fold(DAabb::EMPTY, |all, &p| all.include(p))
+    });
+    let origin = choose_origin(&bounds.reduce(|| DAabb::EMPTY, DAabb::union));
+    let is_plain = triangles.iter().all(|triangles| matches!(triangles, Triangles::Plain(_)));
+    let mut chains = Chains::new(if is_plain { 0 } else { obj.positions.len() });
     let mut geometries = Vec::new();
     let mut used = Vec::new();
     for (section, triangles) in sections.into_iter().zip(triangles) {
-        if section.faces.is_empty() {
-            continue;
-        }
         let material = geometries.len() as u32;
-        let mut mesh = mesh(&obj, &smooth, &section, &triangles, origin, &mut chains);
-        mesh.material = material;
+        let mesh = match triangles {
+            Triangles::Plain(triangles) => plain(&obj, triangles, origin),
+            Triangles::Detailed(pieces) => detailed(&obj, &smooth, &pieces, origin, &mut chains),
+        };
+        geometries.push(Geometry::Mesh(Mesh { name: section.name, material, ..mesh }));
         used.push(section.material);
-        geometries.push(Geometry::Mesh(mesh));
     }
     let (materials, textures) = library.resolve(path, used, !obj.colors.is_empty(), warnings)?;
     Ok(Scene { textures, ..Scene::from_geometries(geometries, materials) })
 }
 
-/// A triangle of a section: three of its corners, and the smoothing group of the face.
-struct Triangle {
-    corners: [u32; 3],
-    smoothing: u32,
-}
+impl Piece {
+    /// Whether its corners have positions and nothing else.
+    fn is_plain(&self, obj: &Obj) -> bool {
+        let attributes = &obj.faces[self.stretch].attributes;
+        let bare = attributes.is_empty() || attributes[self.corners.clone()].iter().all(|a| *a == [NONE; 2]);
+        bare && self.smoothing == 0
+    }
 
-fn split(path: &Path, obj: &Obj, section: &Section) -> Result<Vec<Triangle>> {
-    let mut triangles = Vec::with_capacity(section.faces.len());
-    let mut begin = 0;
-    let (mut around, mut parts) = (Vec::new(), Vec::new());
-    for &Face { corners, smoothing, line } in &section.faces {
-        if corners == 3 {
-            triangles.push(Triangle { corners: [begin, begin + 1, begin + 2], smoothing });
-        } else {
-            let polygon = &section.corners[begin as usize..(begin + corners) as usize];
+    /// Its faces with more than three corners.
+    fn polygons<'a>(&self, obj: &'a Obj) -> &'a [Polygon] {
+        let polygons = &obj.faces[self.stretch].polygons;
+        let until = |corner: usize| polygons.partition_point(|polygon| polygon.first < corner);
+        &polygons[until(self.corners.start)..until(self.corners.end)]
+    }
+
+    /// How many triangles its faces make.
+    fn triangle_count(&self, obj: &Obj) -> usize {
+        let polygons = self.polygons(obj);
+        let corners: usize = polygons.iter().map(|polygon| polygon.corners).sum();
+        (self.corners.len() - corners) / 3 + corners - 2 * polygons.len()
+    }
+
+    /// Gives `each` the triangles as indices into the stretch's corners.
+    fn triangles(&self, path: &Path, obj: &Obj, mut each: impl FnMut([usize; 3])) -> Result<()> {
+        let (mut at, mut around, mut parts) = (self.corners.start, Vec::new(), Vec::new());
+        let positions = &obj.faces[self.stretch].positions;
+        for &Polygon { first, corners, line } in self.polygons(obj) {
+            (at..first).step_by(3).for_each(|k| each([k, k + 1, k + 2]));
+            at = first + corners;
             around.clear();
-            around.extend(polygon.iter().map(|c| obj.positions[c.0[0] as usize]));
+            around.extend(positions[first..at].iter().map(|&i| obj.positions[i as usize]));
             parts.clear();
             polygon::triangulate(&around, &mut parts).ok_or_else(|| {
                 let message = format!("a face with {corners} corners is too concave to split; write smaller faces");
                 Error::input(path, format!("line {line}"), message)
             })?;
-            triangles.extend(parts.iter().map(|t| Triangle { corners: t.map(|k| begin + k), smoothing }));
+            parts.iter().for_each(|triangle| each(triangle.map(|k| first + k as usize)));
         }
-        begin += corners;
+        (at..self.corners.end).step_by(3).for_each(|k| each([k, k + 1, k + 2]));
+        Ok(())
     }
-    Ok(triangles)
+}
+
+fn split(path: &Path, obj: &Obj, section: &Section) -> Result<Triangles> {
+    let pieces = &section.pieces;
+    if pieces.iter().all(|piece| piece.is_plain(obj)) {
+        let counts: Vec<usize> = pieces.iter().map(|piece| piece.triangle_count(obj)).collect();
+        let mut triangles: Vec<[u32; 3]> = memory::zeroed(counts.iter().sum());
+        let mut rest = &mut triangles[..];
+        let slots: Vec<_> = counts.iter().map(|&count| rest.split_off_mut(..count).unwrap_or_default()).collect();
+        let tasks = pieces.par_iter().zip(slots).map(|(piece, slots)| {
+            let positions = &obj.faces[piece.stretch].positions;
+            let mut slots = slots.iter_mut();
+            piece.triangles(path, obj, |corners| {
+                if let Some(slot) = slots.next() {
+                    *slot = corners.map(|k| positions[k]);
+                }
+            })
+        });
+        tasks.collect::<Vec<_>>().into_iter().collect::<Result<()>>()?;
+        return Ok(Triangles::Plain(triangles));
+    }
+    let tasks = pieces.par_iter().map(|piece| {
+        let faces = &obj.faces[piece.stretch];
+        let corner = |k: usize| {
+            let [uv, normal] = faces.attributes.get(k).copied().unwrap_or([NONE; 2]);
+            Corner([faces.positions[k], uv, normal])
+        };
+        let mut triangles = Vec::with_capacity(piece.triangle_count(obj));
+        let smoothing = piece.smoothing;
+        piece.triangles(path, obj, |corners| triangles.push(Triangle { corners: corners.map(corner), smoothing }))?;
+        Ok(triangles)
+    });
+    tasks.collect::<Vec<_>>().into_iter().collect::<Result<_>>().map(Triangles::Detailed)
 }
 
 /// The normals of corners that have none in the file and lie in a smoothing group: at each position, the mean of the
 /// group's face normals, weighted by angle (Thürmer and Wüthrich 1998), over all materials.
-fn smooth_normals(obj: &Obj, sections: &[Section], triangles: &[Vec<Triangle>]) -> Smooth {
+fn smooth_normals(obj: &Obj, triangles: &[Triangles]) -> Smooth {
     let mut sums = Smooth::new();
-    for (section, triangles) in sections.iter().zip(triangles) {
-        for triangle in triangles.iter().filter(|t| t.smoothing != 0) {
-            let corners = triangle.corners.map(|k| section.corners[k as usize]);
-            let p = corners.map(|c| obj.positions[c.0[0] as usize]);
-            let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
-            for k in 0..3 {
-                if corners[k].0[2] == NONE {
-                    let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-                    let weighted = normal * libm::atan2(a.cross(b).length(), a.dot(b));
-                    let sum = sums.entry((corners[k].0[0], triangle.smoothing)).or_default();
-                    *sum += if weighted.is_finite() { weighted } else { DVec3::ZERO };
-                }
+    let detailed = triangles.iter().filter_map(|triangles| match triangles {
+        Triangles::Plain(_) => None,
+        Triangles::Detailed(pieces) => Some(pieces),
+    });
+    for Triangle { corners, smoothing } in detailed.flatten().flatten().filter(|t| t.smoothing != 0) {
+        let p = corners.map(|c| obj.positions[c.0[0] as usize]);
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        for k in 0..3 {
+            if corners[k].0[2] == NONE {
+                let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+                let weighted = normal * libm::atan2(a.cross(b).length(), a.dot(b));
+                let sum = sums.entry((corners[k].0[0], *smoothing)).or_default();
+                *sum += if weighted.is_finite() { weighted } else { DVec3::ZERO };
             }
         }
     }
@@ -135,22 +211,30 @@ impl Chains {
     }
 }
 
-fn mesh(
-    obj: &Obj,
-    smooth: &Smooth,
-    section: &Section,
-    triangles: &[Triangle],
-    origin: DVec3,
-    chains: &mut Chains,
-) -> Mesh {
+/// A mesh whose vertices are positions.
+fn plain(obj: &Obj, mut triangles: Vec<[u32; 3]>, origin: DVec3) -> Mesh {
+    let used = compact(triangles.as_flattened_mut(), obj.positions.len());
+    let position = |p: &DVec3| (p - origin).as_vec3();
+    let color = |c: &Vec3| c.extend(1.0);
+    let (positions, colors): (_, Vec<Vec4>) = match &used {
+        None => (
+            obj.positions.par_iter().with_min_len(TASK).map(position).collect(),
+            obj.colors.par_iter().with_min_len(TASK).map(color).collect(),
+        ),
+        Some(used) => (
+            pick(used, |i| position(&obj.positions[i])),
+            if obj.colors.is_empty() { Vec::new() } else { pick(used, |i| color(&obj.colors[i])) },
+        ),
+    };
+    Mesh { origin, colors, ..Mesh::new(positions, triangles) }
+}
+
+/// A mesh whose vertices are the variants of positions.
+fn detailed(obj: &Obj, smooth: &Smooth, pieces: &[Vec<Triangle>], origin: DVec3, chains: &mut Chains) -> Mesh {
     chains.start_section();
-    let indices = triangles.iter().map(|triangle| {
-        triangle.corners.map(|k| {
-            let corner = section.corners[k as usize];
-            // A corner with a normal of its own is the same vertex in every smoothing group.
-            let smoothing = if corner.0[2] == NONE { triangle.smoothing } else { 0 };
-            chains.vertex(corner, smoothing)
-        })
+    let indices = pieces.iter().flatten().map(|&Triangle { corners, smoothing }| {
+        // A corner with a normal of its own is the same vertex in every smoothing group.
+        corners.map(|corner| chains.vertex(corner, if corner.0[2] == NONE { smoothing } else { 0 }))
     });
     let indices: Vec<[u32; 3]> = indices.collect();
     let vertices = &chains.vertices;
@@ -164,7 +248,6 @@ fn mesh(
     let has_uvs = vertices.iter().any(|(c, ..)| c.0[1] != NONE);
     let uv = |c: &Corner| if c.0[1] == NONE { Vec2::ZERO } else { obj.uvs[c.0[1] as usize] };
     Mesh {
-        name: section.name.clone(),
         origin,
         positions: Arc::new(vertices.iter().map(|(c, ..)| position(c)).collect()),
         normals: if has_normals { vertices.iter().map(normal).collect() } else { Vec::new() },
@@ -175,6 +258,6 @@ fn mesh(
             vertices.iter().map(|(c, ..)| obj.colors[c.0[0] as usize].extend(1.0)).collect()
         },
         triangles: Arc::new(indices),
-        material: 0,
+        ..Mesh::default()
     }
 }

@@ -3,25 +3,37 @@
 use super::Items;
 use super::header::{Element, Scalar};
 use crate::io::Placeless;
+use crate::io::mapped::Mapped;
 use crate::io::text::{Words, number, quoted};
 
-pub(super) struct Ascii<'a>(Words<'a>);
+pub(super) struct Ascii<'a> {
+    file: &'a Mapped<'a>,
+    words: Words<'a>,
+    /// Bytes that the file has been told of.
+    told: usize,
+}
 
 impl<'a> Ascii<'a> {
-    /// The body, whose first line has the given number.
-    pub(super) fn new(body: &'a [u8], line: usize) -> Self {
-        Self(Words::new(body, line))
+    /// The body, which begins at the given byte of the file, in a line of the given number.
+    pub(super) fn new(file: &'a Mapped<'a>, begin: usize, line: usize) -> Self {
+        Self { file, words: Words::new(&file[begin..], line), told: begin }
     }
 }
 
 impl Items for Ascii<'_> {
     fn place(&self) -> String {
-        format!("line {}", self.0.line)
+        format!("line {}", self.words.line)
     }
 
     fn remaining(&self) -> usize {
         // The last word needs no space after it.
-        self.0.remaining() + 1
+        self.words.remaining() + 1
+    }
+
+    fn tell(&mut self) {
+        let read = self.file.len() - self.words.remaining();
+        self.file.done(&self.file[self.told..read]);
+        self.told = read;
     }
 
     fn least_size(&self, element: &Element) -> usize {
@@ -29,7 +41,7 @@ impl Items for Ascii<'_> {
     }
 
     fn scalar(&mut self, scalar: Scalar) -> Placeless<f64> {
-        let word = self.0.next().ok_or("the file ends before its last element")?;
+        let word = self.words.next().ok_or("the file ends before its last element")?;
         let value: f64 = number(word).ok_or_else(|| format!("{} is not a number", quoted(word)))?;
         // As the binary file would hold it.
         Ok(if scalar == Scalar::F32 { f64::from(value as f32) } else { value })

@@ -109,28 +109,33 @@ impl View {
     /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole tiles; `tracer` finds where the others
     /// start.
     pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
-        let primary = self.primary(side.next_multiple_of(TILE));
+        let side = side.next_multiple_of(TILE);
+        let mut primary = self.primary(side);
         let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
         if kinds.iter().any(|&kind| kind != Kind::Primary) {
             let mut hits = vec![None; primary.len()];
             tracer.closest_batch(&primary, &mut hits, Kind::Primary.batch(Width::One));
             let light = self.centre + self.frame(Vec3::new(2.0, 3.0, 1.0)) * self.radius;
             let mut random = Xorshift(12345);
-            for (ray, hit) in primary.iter().zip(&hits) {
+            // In the order of `embree_ref`, for the sake of the random numbers.
+            for (i, (ray, hit)) in primary.iter().zip(&hits).enumerate() {
                 let Some(hit) = hit else { continue };
                 let normal = normal(world, ray, hit);
                 let normal = if normal.dot(ray.direction) > 0.0 { normal * -1.0 } else { normal };
                 let point = ray.origin + ray.direction * hit.t + normal * (1e-4 * self.radius);
                 let direction = (random.in_ball().normalize() + normal * 1.001).normalize();
-                diffuse.push(Ray { tmax: FAR, ..Ray::new(point, direction) });
-                shadow.push(Ray { tmax: 0.999, ..Ray::new(point, light - point) });
+                let place = place_in_tiles(i, side);
+                diffuse.push((place, Ray { tmax: FAR, ..Ray::new(point, direction) }));
+                shadow.push((place, Ray { tmax: 0.999, ..Ray::new(point, light - point) }));
             }
         }
-        let mut sets = [Some(primary), Some(diffuse), Some(shadow)];
+        primary = in_order(primary.into_iter().enumerate().map(|(i, ray)| (place_in_tiles(i, side), ray)).collect());
+        let mut sets = [Some(primary), Some(in_order(diffuse)), Some(in_order(shadow))];
         let set = |&kind: &Kind| sets[kind as usize].take().map(|rays| RaySet { kind, rays });
         kinds.iter().filter_map(set).collect()
     }
 
+    /// Block by block, the blocks in rows across the picture.
     fn primary(&self, side: usize) -> Vec<Ray> {
         let eye = self.centre + self.eye;
         let forward = (self.centre - eye).normalize();
@@ -138,21 +143,29 @@ impl View {
         let up = right.cross(forward);
         let of = |pixel: usize| (pixel as f32 + 0.5) / side as f32 * 2.0;
         let mut rays = Vec::with_capacity(side * side);
-        let grid = |size: usize, step: usize| {
-            (0..size).step_by(step).flat_map(move |y| (0..size).step_by(step).map(move |x| (y, x)))
-        };
-        for ((tile_y, tile_x), (block_y, block_x)) in
-            grid(side, TILE).flat_map(|tile| grid(TILE, BLOCK).map(move |block| (tile, block)))
-        {
-            for (y, x) in grid(BLOCK, 1) {
-                let (x, y) = (tile_x + block_x + x, tile_y + block_y + y);
-                let (a, b) = ((of(x) - 1.0) * TANGENT, (1.0 - of(y)) * TANGENT);
+        for (block_y, block_x) in (0..side).step_by(BLOCK).flat_map(|y| (0..side).step_by(BLOCK).map(move |x| (y, x))) {
+            for (y, x) in (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (y, x))) {
+                let (a, b) = ((of(block_x + x) - 1.0) * TANGENT, (1.0 - of(block_y + y)) * TANGENT);
                 let direction = (forward + right * a + up * b).normalize();
                 rays.push(Ray { tmax: FAR, ..Ray::new(eye, direction) });
             }
         }
         rays
     }
+}
+
+/// Where a camera ray, by its number among blocks in rows, stands among blocks in tiles.
+fn place_in_tiles(ray: usize, side: usize) -> usize {
+    const ACROSS: usize = TILE / BLOCK;
+    let (block, within) = (ray / (BLOCK * BLOCK), ray % (BLOCK * BLOCK));
+    let (x, y) = (block % (side / BLOCK), block / (side / BLOCK));
+    let tile = y / ACROSS * (side / TILE) + x / ACROSS;
+    tile * TILE * TILE + (y % ACROSS * ACROSS + x % ACROSS) * BLOCK * BLOCK + within
+}
+
+fn in_order(mut rays: Vec<(usize, Ray)>) -> Vec<Ray> {
+    rays.sort_unstable_by_key(|(place, _)| *place);
+    rays.into_iter().map(|(_, ray)| ray).collect()
 }
 
 /// The unit normal of what was hit, of either sign.

@@ -12,32 +12,33 @@ pub(super) struct Block {
     pub corners: [[f32; LANES]; 9],
     pub primitive: [u32; LANES],
     pub part: [u32; LANES],
+    /// At least the largest component of an edge.
+    pub size: f32,
     /// A bit for every lane that has a triangle.
     pub lanes: u32,
 }
 
 impl Block {
     /// Without triangles.
-    pub const EMPTY: Self = Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], lanes: 0 };
+    pub const EMPTY: Self =
+        Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], size: 0.0, lanes: 0 };
 
     /// Adds a triangle, the fourth at most.
     #[inline(always)]
     pub fn push(&mut self, corners: [Vec3; 3], part: u32, primitive: u32) {
         let lane = self.lanes.trailing_ones() as usize % LANES;
-        self.set_corners(lane, corners);
-        self.primitive[lane] = primitive;
-        self.part[lane] = part;
-        self.lanes |= 1 << lane;
-    }
-
-    /// Moves a triangle.
-    #[inline(always)]
-    pub fn set_corners(&mut self, lane: usize, corners: [Vec3; 3]) {
         for (k, corner) in corners.into_iter().enumerate() {
             for axis in 0..3 {
                 self.corners[3 * k + axis][lane] = corner[axis];
             }
         }
+        let [a, b, c] = corners;
+        let size = (b - a).abs().max((c - b).abs()).max((a - c).abs()).max_element();
+        // Rounded up.
+        self.size = self.size.max(size * (1.0 + f32::EPSILON));
+        self.primitive[lane] = primitive;
+        self.part[lane] = part;
+        self.lanes |= 1 << lane;
     }
 
     /// The lanes that have a triangle.

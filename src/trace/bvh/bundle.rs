@@ -9,9 +9,11 @@
 //! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
 //! asked of the rays as they were given.
 
+use super::filter::largest_axis;
 use super::node::{Node, WIDTH};
 use super::query::Query;
 use super::simd::{Array, Group, Mask, Simd, Vector};
+use super::slab::load;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -173,14 +175,8 @@ impl Bundle {
     /// Everything that is derived from the directions.
     #[inline(always)]
     fn project<S: Simd>(&mut self) -> Fit {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.direction[axis].0[0].abs());
-        self.axis = if x > y && x > z {
-            0
-        } else if y > z {
-            1
-        } else {
-            2
-        };
+        let [x, y, z] = &self.direction;
+        self.axis = largest_axis(Vec3::new(x.0[0], y.0[0], z.0[0]).abs());
         let [p, q, along] = axes(self.axis);
         let splat = S::Wide::splat;
         let sign = splat(if self.is_turned { -1.0 } else { 1.0 });
@@ -241,6 +237,7 @@ impl Bundle {
             reciprocal: [0, 1].map(|i| [1.0 / self.low[i], 1.0 / self.high[i]]),
             forward: self.forward,
         };
+        let mut is_finite = true;
         for (i, axis) in axes.into_iter().enumerate() {
             let span = self.origin[axis].abs() + reach[axis];
             // Origin and box are subtracted (2 u of the span), the slope is off by 2 u, its reciprocal and the product
@@ -250,11 +247,9 @@ impl Bundle {
             slab.far_origin[i] = self.origin[axis] - pad;
             (slab.near[i], slab.far[i]) = if sign[i] > 0.0 { (axis, axis + 3) } else { (axis + 3, axis) };
             let steepest = slab.reciprocal.get(i).map_or(1.0, |[a, b]| a.abs().max(b.abs()));
-            if !(steepest * span < HUGE) {
-                return None;
-            }
+            is_finite &= steepest * span < HUGE;
         }
-        Some(slab)
+        is_finite.then_some(slab)
     }
 }
 
@@ -262,11 +257,6 @@ impl Bundle {
 #[inline(always)]
 pub(super) const fn axes(axis: usize) -> [usize; 3] {
     [(axis + 1) % 3, (axis + 2) % 3, axis]
-}
-
-#[inline(always)]
-fn load<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
-    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }
 
 #[inline(always)]

@@ -136,9 +136,8 @@ fn size<V: Vector>(p: [V; 3]) -> V {
 #[inline(always)]
 fn ends<S: Simd>(n: &[S::V4; 3], bundle: &Bundle) -> (S::V4, S::V4) {
     let (mut least, mut most) = (n[2], n[2]);
-    for i in 0..2 {
-        let a = n[i].mul(S::V4::splat(bundle.low[i]));
-        let b = n[i].mul(S::V4::splat(bundle.high[i]));
+    for (component, (low, high)) in n.iter().zip(bundle.low.into_iter().zip(bundle.high)) {
+        let (a, b) = (component.mul(S::V4::splat(low)), component.mul(S::V4::splat(high)));
         least = least.add(a.min(b));
         most = most.add(a.max(b));
     }

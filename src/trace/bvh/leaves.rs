@@ -7,6 +7,7 @@ use super::build::Record;
 use super::memory;
 use super::meshes::Meshes;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
+use super::simd::Simd;
 use crate::math::is_traceable;
 use crate::trace::Part;
 
@@ -76,8 +77,10 @@ impl Leaves {
             Self::Blocks(blocks) => blocks
                 .par_iter_mut()
                 .map(|block| {
-                    for lane in block.used() {
-                        block.set_corners(lane, meshes.of_part(block.part[lane]).corners(block.primitive[lane]));
+                    let old = std::mem::replace(block, Block::EMPTY);
+                    for lane in old.used() {
+                        let (part, primitive) = (old.part[lane], old.primitive[lane]);
+                        block.push(meshes.of_part(part).corners(primitive), part, primitive);
                     }
                     is_sound(block)
                 })
@@ -87,6 +90,15 @@ impl Leaves {
                 let count = numbers.blocks.len() as u32;
                 (0..count).into_par_iter().all(|index| is_sound(&numbers.block(index)))
             }
+        }
+    }
+
+    /// Has a block loaded that will be needed soon.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, index: u32) {
+        match self {
+            Self::Blocks(blocks) => S::prefetch(&blocks[index as usize]),
+            Self::Numbers(numbers) => S::prefetch(&numbers.blocks[index as usize]),
         }
     }
 

@@ -28,7 +28,7 @@ mod bundle;
 mod clusters;
 mod edges;
 mod filter;
-mod inside;
+mod found;
 mod isa;
 mod leaves;
 mod memory;
@@ -36,6 +36,7 @@ mod meshes;
 mod node;
 mod placements;
 mod preset;
+mod quad;
 mod query;
 mod refit;
 mod shapes;
@@ -55,11 +56,13 @@ use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, Affine3};
 use crate::ray::{Hit, Ray};
 use filter::Filter;
+use found::{Found, NONE};
 use placements::PlacementTree;
-use query::{Closest, Occluded, Query};
+use quad::widen;
+use query::{Closest, Occluded, Query, SOMETHING};
 use shapes::ShapeTree;
 use simd::Simd;
-use slab::SlabRay;
+use slab::{SlabRay, SlabRays};
 use triangles::TriangleTree;
 use walk::{Stack, Visit};
 
@@ -97,6 +100,9 @@ struct Through<'a> {
     instance: u32,
     to_world: &'a Affine3,
 }
+
+/// Blur of a ray in an object's coordinates: rounding it moves it by as much again as the slab test itself may err.
+const PLACED: f32 = 4.0;
 
 impl Bvh {
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
@@ -154,18 +160,6 @@ impl Bvh {
         self.isa
     }
 
-    /// One ray, from the root: the nearest hit, or just any.
-    #[inline(always)]
-    fn trace<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks) -> Option<Hit> {
-        if !ray.is_valid() {
-            return None;
-        }
-        let mut nearest = Nearest::new(ray);
-        self.fixed.trace::<S, Q>(ray, ray, None, &mut stacks.level, &mut nearest);
-        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
-        nearest.hit()
-    }
-
     /// Placed objects for one ray.
     #[inline(always)]
     fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
@@ -174,7 +168,7 @@ impl Bvh {
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
         let Stacks { upper, level: lower } = stacks;
-        walk::single::<S>(
+        walk::single::<S, Q>(
             upper,
             self.placements.tree(),
             &slab,
@@ -186,7 +180,7 @@ impl Bvh {
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };
                         let level = &self.objects[placement.object as usize];
-                        level.trace::<S, Q>(ray, &object_ray, Some(through), lower, nearest);
+                        level.trace_placed::<S, Q>(ray, &object_ray, through, lower, nearest);
                     }
                 }
                 Visit::after::<Q>(nearest)
@@ -194,40 +188,113 @@ impl Bvh {
         );
     }
 
-    /// Many rays, one after the other.
+    /// Many rays, one after the other; made ready, and their hits computed, several at a time.
     #[inline(always)]
-    fn trace_rays<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        for (ray, answer) in rays.iter().zip(answers) {
-            *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
+    fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
+        let triangles = &self.fixed.triangles;
+        let is_all = self.has_only_triangles();
+        // Rays, and the triangles that they hit for sure.
+        let (mut pending, mut ids, mut count) = ([0; 4], [NONE; 4], 0);
+        for first in (0..rays.len()).step_by(8) {
+            let some = &rays[first..rays.len().min(first + 8)];
+            let mut eight = [some[0]; 8];
+            eight[..some.len()].copy_from_slice(some);
+            let slabs = SlabRays::new::<S>(&eight, triangles.tree().reach());
+            for (i, ray) in some.iter().enumerate() {
+                let answer = &mut answers[first + i];
+                *answer = Q::MISS;
+                let Some((slab, filter)) = slabs.get(i) else { continue };
+                let mut found = self.fixed.find::<S, Q>(ray, &slab, &filter, &mut stacks.level);
+                if found.noted != NONE && Q::ANY {
+                    *answer = Q::answer(Some(SOMETHING));
+                    continue;
+                }
+                if found.noted != NONE && is_all {
+                    (pending[count % 4], ids[count % 4]) = (first + i, found.noted);
+                    count += 1;
+                    if count == 4 {
+                        count = 0;
+                        self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+                    }
+                    continue;
+                }
+                found.compute(triangles, ray);
+                let mut nearest = found.nearest;
+                if !(is_all || Q::ANY && nearest.hit().is_some()) {
+                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                }
+                *answer = Q::answer(nearest.hit());
+            }
         }
+        if count > 0 {
+            // The others are computed twice, or again.
+            for i in count..4 {
+                (pending[i], ids[i]) = (pending[0], ids[0]);
+            }
+            self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+        }
+    }
+
+    /// The hits of four rays, by number, with the triangles that are noted.
+    #[inline(always)]
+    fn compute_noted<S: Simd, Q: Query>(
+        &self,
+        pending: &[usize; 4],
+        ids: &[u32; 4],
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+    ) {
+        let [a, b, c, d] = pending.map(|i| &rays[i]);
+        let (oa, ob, oc, od) = (a.origin, b.origin, c.origin, d.origin);
+        let origin = [
+            widen::<S>(&[oa.x, ob.x, oc.x, od.x]),
+            widen::<S>(&[oa.y, ob.y, oc.y, od.y]),
+            widen::<S>(&[oa.z, ob.z, oc.z, od.z]),
+        ];
+        let (da, db, dc, dd) = (a.direction, b.direction, c.direction, d.direction);
+        let direction = [
+            widen::<S>(&[da.x, db.x, dc.x, dd.x]),
+            widen::<S>(&[da.y, db.y, dc.y, dd.y]),
+            widen::<S>(&[da.z, db.z, dc.z, dd.z]),
+        ];
+        let (_, hits) = self.fixed.triangles.hits::<S>(origin, direction, *ids);
+        for (i, hit) in pending.iter().zip(hits) {
+            answers[*i] = Q::answer(Some(hit));
+        }
+    }
+
+    /// Whether there are neither shapes nor placed objects.
+    fn has_only_triangles(&self) -> bool {
+        self.fixed.shapes.tree().is_empty() && self.placements.is_empty()
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
     #[inline(always)]
-    fn trace_bundles<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+    fn trace_bundles<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
         let mut scratch = tile::Scratch::new();
         let triangles = &self.fixed.triangles;
-        let is_all = self.fixed.shapes.tree().is_empty() && self.placements.is_empty();
+        let is_all = self.has_only_triangles();
         for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
             let is_empty = triangles.tree().is_empty();
             let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
-            let all = u64::MAX >> (bundle::RAYS - rays.len());
-            if traced == all && is_all {
-                continue;
+            if !is_all {
+                for (k, (ray, answer)) in rays.iter().zip(&mut *answers).enumerate() {
+                    let mut nearest = Nearest::new(ray);
+                    if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
+                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                        *answer = Q::answer(nearest.hit());
+                    }
+                }
             }
-            for (k, (ray, answer)) in rays.iter().zip(answers).enumerate() {
-                if traced >> k & 1 == 0 {
-                    *answer = Q::answer(self.trace::<S, Q>(ray, &mut stacks));
-                    continue;
-                }
-                let mut nearest = Nearest::new(ray);
-                if !is_all && Q::resume(&mut nearest, scratch.t[k], *answer) {
-                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
-                    self.enter_placements::<S, Q>(ray, &mut stacks, &mut nearest);
-                    *answer = Q::answer(nearest.hit());
-                }
+            // The others, in runs.
+            let mut rest = !traced & u64::MAX >> (bundle::RAYS - rays.len());
+            while rest != 0 {
+                let first = rest.trailing_zeros() as usize;
+                let end = first + (rest >> first).trailing_ones() as usize;
+                self.trace_rays::<S, Q>(stacks, &rays[first..end], &mut answers[first..end]);
+                rest &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
         }
     }
@@ -252,10 +319,11 @@ impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { bvh, rays, answers, batch } = self;
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
         if batch.coherent {
-            bvh.trace_bundles::<S, Q>(rays, answers);
+            bvh.trace_bundles::<S, Q>(&mut stacks, rays, answers);
         } else {
-            bvh.trace_rays::<S, Q>(rays, answers);
+            bvh.trace_rays::<S, Q>(&mut stacks, rays, answers);
         }
     }
 }
@@ -273,22 +341,42 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// `ray` is in the world; `local` is the same ray in this level's coordinates, where `through` is given rounded.
+    /// What `ray` hits among the triangles of this level, which is in the world; `slab` and `filter` are the ray, made
+    /// ready for them.
     #[inline(always)]
-    fn trace<S: Simd, Q: Query>(
+    fn find<S: Simd, Q: Query>(&self, ray: &Ray, slab: &SlabRay, filter: &Filter, stack: &mut Stack) -> Found {
+        let mut found = Found::new(ray);
+        if !self.triangles.tree().is_empty() {
+            walk::single::<S, Q>(
+                stack,
+                self.triangles.tree(),
+                slab,
+                found.limit,
+                #[inline(always)]
+                |first, count| {
+                    self.triangles.find_leaf::<S, Q>(first, count, ray, filter, &mut found);
+                    if Q::ANY && found.is_hit() { Visit::Stop } else { Visit::Until(found.limit) }
+                },
+            );
+        }
+        found
+    }
+
+    /// Offers what `ray` hits in this level placed by `through`; `local` is the same ray in this level's coordinates,
+    /// rounded.
+    #[inline(always)]
+    fn trace_placed<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
         local: &Ray,
-        through: Option<Through<'_>>,
+        through: Through<'_>,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        // Rounding the local ray moves it by as much again as the slab test itself may err.
-        let blur = if through.is_some() { 4.0 } else { 1.0 };
         if !self.triangles.tree().is_empty() {
-            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
-            let filter = Filter::new(local, blur);
-            walk::single::<S>(
+            let slab = SlabRay::new(local, self.triangles.tree().reach(), PLACED);
+            let filter = Filter::new(local, PLACED);
+            walk::single::<S, Q>(
                 stack,
                 self.triangles.tree(),
                 &slab,
@@ -300,7 +388,7 @@ impl Level {
                 },
             );
         }
-        self.trace_shapes::<S, Q>(local, through, blur, stack, nearest);
+        self.trace_shapes::<S, Q>(local, Some(through), PLACED, stack, nearest);
     }
 
     #[inline(always)]
@@ -315,7 +403,7 @@ impl Level {
         let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single::<S>(
+            walk::single::<S, Q>(
                 stack,
                 self.shapes.tree(),
                 &slab,

@@ -50,3 +50,6 @@ impl Query for Occluded {
         !answer
     }
 }
+
+/// That there is a hit, where nobody asks which, or where it is not computed yet.
+pub(super) const SOMETHING: Hit = Hit { t: f32::NAN, u: f32::NAN, v: f32::NAN, primitive: 0, geometry: 0, instance: 0 };

@@ -10,6 +10,7 @@
 //! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. What still overflows turns into a pad that
 //! lets everything pass.
 
+use super::filter::{Filter, Filters};
 use super::node::{Node, WIDTH};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -81,4 +82,92 @@ impl SlabRay {
         }
         (near.at_most(far).bits(), near.to_array())
     }
+}
+
+/// Rays made ready eight at a time.
+pub(super) struct SlabRays {
+    /// Of each axis: 1 / direction, and -origin / direction less and plus the pad.
+    reciprocal: [[f32; 8]; 3],
+    near_offset: [[f32; 8]; 3],
+    far_offset: [[f32; 8]; 3],
+    tmin: [f32; 8],
+    filters: Filters,
+    /// A bit for each ray that [is valid](Ray::is_valid).
+    valid: u32,
+}
+
+impl SlabRays {
+    /// As [`SlabRay::new`] for each of them, with no blur.
+    #[inline(always)]
+    pub fn new<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> Self {
+        let splat = S::V8::splat;
+        let zero = splat(0.0);
+        let [a, b, c, d, e, f, g, h] = rays;
+        let [x, y, z, dx, dy, dz, tmin, tmax] = S::transpose([
+            load::<S>(a),
+            load::<S>(b),
+            load::<S>(c),
+            load::<S>(d),
+            load::<S>(e),
+            load::<S>(f),
+            load::<S>(g),
+            load::<S>(h),
+        ]);
+        let (origin, direction) = ([x, y, z], [dx, dy, dz]);
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
+        let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
+        let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
+        let mut finite = zero;
+        let empty = [[0.0; 8]; 3];
+        let filters = Filters::new::<S>(origin, direction, tmin);
+        let mut slabs =
+            Self { reciprocal: empty, near_offset: empty, far_offset: empty, tmin: [0.0; 8], filters, valid: 0 };
+        for axis in 0..3 {
+            let d = direction[axis];
+            finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
+            let least = S::V8::select(d.less(zero), zero.sub(smallest), smallest);
+            let kept = S::V8::select(d.abs().less(smallest), least, d);
+            let reciprocal = splat(1.0).div(kept);
+            let steep = reciprocal.abs();
+            let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
+            let is_small = steep.mul(span[axis]).less(splat(HUGE));
+            let pad = S::V8::select(is_small, width, splat(f32::INFINITY));
+            let offset = zero.sub(origin[axis]).mul(reciprocal);
+            slabs.reciprocal[axis] = reciprocal.to_array();
+            slabs.near_offset[axis] = offset.sub(pad).to_array();
+            slabs.far_offset[axis] = offset.add(pad).to_array();
+        }
+        // Rounded down, for t is rounded before it is held against it.
+        let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE));
+        slabs.tmin = least.max(zero).to_array();
+        let in_range = zero.at_most(tmin).and(tmin.at_most(tmax));
+        let directed = splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
+        slabs.valid = in_range.and(directed).bits();
+        slabs
+    }
+
+    /// One of them, for nodes and for triangles, if it is valid.
+    #[inline(always)]
+    pub fn get(&self, ray: usize) -> Option<(SlabRay, Filter)> {
+        if self.valid >> ray & 1 == 0 {
+            return None;
+        }
+        let side = |axis: usize| if self.reciprocal[axis][ray] < 0.0 { axis + 3 } else { axis };
+        let of = |values: &[[f32; 8]; 3]| [values[0][ray], values[1][ray], values[2][ray]];
+        let slab = SlabRay {
+            reciprocal: of(&self.reciprocal),
+            near_offset: of(&self.near_offset),
+            far_offset: of(&self.far_offset),
+            near: [side(0), side(1), side(2)],
+            tmin: self.tmin[ray],
+        };
+        Some((slab, self.filters.get(ray)))
+    }
+}
+
+/// A ray as eight numbers, in the order of its fields.
+#[inline(always)]
+pub(super) fn load<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
+    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

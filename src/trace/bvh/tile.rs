@@ -10,7 +10,7 @@
 //!   of rays takes three scalar products.
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
-//!   and v of what was noted are computed four rays at a time ([`inside`]), with the bits that a single ray would get.
+//!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`]), with the bits that a single ray would get.
 
 use std::marker::PhantomData;
 
@@ -18,17 +18,15 @@ use super::block::LANES;
 use super::build::MAX_DEPTH;
 use super::bundle::{Boxes, Bundle, BundleSlab, Fit, PerRay, RAYS, SLACK, TINY};
 use super::edges::Edges;
-use super::inside::inside;
+use super::found::NONE;
 use super::node::WIDTH;
-use super::query::Query;
-use super::simd::{Group, Mask, Simd, Vector};
+use super::quad::widen;
+use super::query::{Query, SOMETHING};
+use super::simd::{Doubles, Group, Mask, Simd, Vector};
 use super::triangles::TriangleTree;
 use crate::math::Vec3;
-use crate::ray::{Hit, Ray};
+use crate::ray::Ray;
 use crate::trace::nearest::Nearest;
-
-/// No triangle is noted.
-const NONE: u32 = u32::MAX;
 
 /// Fewer rays than this are better traced one by one.
 const FEWEST: usize = 6;
@@ -46,13 +44,18 @@ struct Entry {
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
-    stack: [Entry; MAX_DEPTH * 7 + 8],
-    bundle: Bundle,
-    found: Found,
+    one: One,
     /// t of the closest hits of the last bundle.
     pub t: [f64; RAYS],
     /// Rays of one octant.
     part: [Ray; RAYS],
+}
+
+/// One bundle and its way.
+struct One {
+    stack: [Entry; MAX_DEPTH * 7 + 8],
+    bundle: Bundle,
+    found: Found,
 }
 
 /// What the rays of a bundle have hit so far.
@@ -90,13 +93,8 @@ impl Scratch {
             nearest: [Nearest::new(&ray); RAYS],
             computed: 0,
         };
-        Self {
-            stack: [Entry::default(); MAX_DEPTH * 7 + 8],
-            bundle: Bundle::new(),
-            found,
-            t: [0.0; RAYS],
-            part: [ray; RAYS],
-        }
+        let one = One { stack: [Entry::default(); MAX_DEPTH * 7 + 8], bundle: Bundle::new(), found };
+        Self { one, t: [0.0; RAYS], part: [ray; RAYS] }
     }
 }
 
@@ -110,12 +108,12 @@ pub(super) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
-    let Scratch { stack, bundle, found, t, part } = scratch;
+    let Scratch { one, t, part } = scratch;
     if let (Ok(rays), Ok(answers)) = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers))
     {
-        match bundle.fill::<S, Q>(rays) {
+        match one.bundle.fill::<S, Q>(rays) {
             Fit::Whole => {
-                let is_traced = whole::<S, Q>(stack, bundle, found, tree, rays, RAYS, answers, t);
+                let is_traced = one.trace::<S, Q>(tree, rays, RAYS, answers, t);
                 return if is_traced { u64::MAX } else { 0 };
             }
             Fit::Parts => {}
@@ -144,8 +142,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
         let last = part[count - 1];
         part[count..].fill(last);
         let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
-        if bundle.fill::<S, Q>(part) == Fit::Whole
-            && whole::<S, Q>(stack, bundle, found, tree, part, count, &mut part_answers, &mut part_t)
+        if one.bundle.fill::<S, Q>(part) == Fit::Whole
+            && one.trace::<S, Q>(tree, part, count, &mut part_answers, &mut part_t)
         {
             for (k, &i) in index[..count].iter().enumerate() {
                 (answers[usize::from(i)], t[usize::from(i)]) = (part_answers[k], part_t[k]);
@@ -156,33 +154,35 @@ pub(super) fn trace<S: Simd, Q: Query>(
     done
 }
 
-/// Traces a bundle of which the first `count` rays matter. False, and nothing done, where it is too steep for the tree.
-#[inline(always)]
-fn whole<S: Simd, Q: Query>(
-    stack: &mut [Entry],
-    bundle: &Bundle,
-    found: &mut Found,
-    tree: &TriangleTree,
-    rays: &[Ray; RAYS],
-    count: usize,
-    answers: &mut [Q::Answer; RAYS],
-    t: &mut [f64; RAYS],
-) -> bool {
-    let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
-    let groups = count.div_ceil(S::Wide::LANES);
-    match bundle.axis {
-        0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-        1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-        _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-    }
-    if Q::ANY {
-        for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
-            *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
+impl One {
+    /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
+    /// too steep for the tree.
+    #[inline(always)]
+    fn trace<S: Simd, Q: Query>(
+        &mut self,
+        tree: &TriangleTree,
+        rays: &[Ray; RAYS],
+        count: usize,
+        answers: &mut [Q::Answer; RAYS],
+        t: &mut [f64; RAYS],
+    ) -> bool {
+        let Self { stack, bundle, found } = self;
+        let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
+        let groups = count.div_ceil(S::Wide::LANES);
+        match bundle.axis {
+            0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+            1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+            _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
         }
-    } else {
-        found.finish::<S, Q>(tree, bundle, count, answers, t);
+        if Q::ANY {
+            for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
+                *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
+            }
+        } else {
+            found.finish::<S, Q>(tree, bundle, count, answers, t);
+        }
+        true
     }
-    true
 }
 
 impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
@@ -230,6 +230,11 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     }
                     stack[at] = child;
                     len += 1;
+                    if child.count == 0 {
+                        S::prefetch(tree.node(child.index));
+                    } else {
+                        self.tree.prefetch::<S>(child.index);
+                    }
                 }
             } else if self.visit::<S>(next) {
                 self.measure::<S>();
@@ -400,28 +405,16 @@ impl Found {
             let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
             // NONE is the largest number.
             let [a, b, c, d] = ids;
-            let some = a.min(b).min(c.min(d));
+            let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            if all != NONE {
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+                continue;
+            }
             if some != NONE {
                 // Lanes without a triangle compute something harmless.
-                let corners = gather(
-                    tree.corners(if a == NONE { some } else { a }),
-                    tree.corners(if b == NONE { some } else { b }),
-                    tree.corners(if c == NONE { some } else { c }),
-                    tree.corners(if d == NONE { some } else { d }),
-                );
-                let [x, y, z] = &bundle.direction;
-                let direction = [x.0.as_chunks().0[chunk], y.0.as_chunks().0[chunk], z.0.as_chunks().0[chunk]];
-                let inside = inside::<S>(bundle.origin, direction, &corners);
-                *t = inside.t;
-                for lane in 0..4 {
-                    if ids[lane] != NONE {
-                        let hit = tree.hit(ids[lane], inside.t32[lane], inside.u[lane], inside.v[lane]);
-                        answers[lane] = Q::answer(Some(hit));
-                    }
-                }
-            }
-            if a.max(b).max(c.max(d)) != NONE {
-                continue;
+                let or_some = |id: u32| if id == NONE { some } else { id };
+                let ids = [or_some(a), or_some(b), or_some(c), or_some(d)];
+                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
             }
             for lane in 0..4 {
                 let ray = 4 * chunk + lane;
@@ -435,15 +428,28 @@ impl Found {
     }
 }
 
-/// Component by component.
+/// Answers for the four rays of a chunk, each of which hits a triangle for sure.
+///
+/// What remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough. It is: the
+/// bounds on t' come from rounding in f32 and are half of t' apart at most. That of f64 is 2^29 times smaller, and 2^21
+/// times is wanted; both count some 50 roundings of the same products.
 #[inline(always)]
-fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; 4]; 9] {
-    let mut corners = [[0.0; 4]; 9];
-    for (i, corner) in corners.iter_mut().enumerate() {
-        *corner = [a[i], b[i], c[i], d[i]];
+fn answer_noted<S: Simd, Q: Query>(
+    tree: &TriangleTree,
+    bundle: &Bundle,
+    chunk: usize,
+    ids: [u32; 4],
+    t: &mut [f64; 4],
+    answers: &mut [Q::Answer; 4],
+) {
+    let [x, y, z] = &bundle.direction;
+    let lanes = |d: &PerRay| d.0.as_chunks().0[chunk];
+    let direction = [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))];
+    let [x, y, z] = bundle.origin;
+    let origin = [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())];
+    let (exact, hits) = tree.hits::<S>(origin, direction, ids);
+    *t = exact;
+    for (answer, hit) in answers.iter_mut().zip(hits) {
+        *answer = Q::answer(Some(hit));
     }
-    corners
 }
-
-/// That there is a hit, where nobody asks which.
-const SOMETHING: Hit = Hit { t: f32::NAN, u: f32::NAN, v: f32::NAN, primitive: 0, geometry: 0, instance: 0 };

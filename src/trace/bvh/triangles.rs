@@ -6,10 +6,13 @@ use super::block::{Block, LANES};
 use super::build::{self, presplit};
 use super::clusters;
 use super::filter::Filter;
+use super::found::Found;
 use super::leaves::Leaves;
 use super::meshes::Meshes;
 use super::node::Tree;
 use super::preset::{Options, Preset};
+use super::quad::{Numbers, Quad};
+use super::query::Query;
 use super::simd::Simd;
 use super::{PartId, Through, refit};
 use crate::error::Result;
@@ -103,12 +106,35 @@ impl TriangleTree {
         self.leaves.block(index, scratch)
     }
 
+    /// Has a block loaded that will be needed soon.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, index: u32) {
+        self.leaves.prefetch::<S>(index);
+    }
+
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
     }
 
-    /// Offers what `ray` (in the world) hits in a leaf; `filter` is of the ray in this level's coordinates.
+    /// Takes what `ray`, in the world as this level is, may hit in a leaf; `filter` is the ray's.
+    #[inline(always)]
+    pub fn find_leaf<S: Simd, Q: Query>(&self, first: u32, count: u8, ray: &Ray, filter: &Filter, found: &mut Found) {
+        for index in first..first + u32::from(count) {
+            let mut scratch = None;
+            let block = self.block(index, &mut scratch);
+            let candidates = filter.candidates::<S>(block, found.limit);
+            if candidates.lanes != 0 {
+                found.offer::<Q>(self, index, block, &candidates, ray);
+                if Q::ANY && found.is_hit() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Offers what `ray`, in the world, hits in a leaf of a placed object; `filter` is of the ray in this level's
+    /// coordinates.
     #[inline(always)]
     pub fn offer_leaf<S: Simd>(
         &self,
@@ -116,19 +142,36 @@ impl TriangleTree {
         count: u8,
         ray: &Ray,
         filter: &Filter,
-        through: Option<Through<'_>>,
+        through: Through<'_>,
         nearest: &mut Nearest,
     ) {
         for index in first..first + u32::from(count) {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
-            let mut candidates = filter.candidates::<S>(block);
-            while candidates != 0 {
-                let lane = candidates.trailing_zeros() as usize;
-                candidates &= candidates - 1;
-                self.offer(block, lane, ray, through, nearest);
+            let mut open = filter.candidates::<S>(block, nearest.limit()).lanes;
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize % LANES;
+                open &= open - 1;
+                self.offer(block, lane, ray, Some(through), nearest);
             }
         }
+    }
+
+    /// The hits of four rays, each of which hits a triangle for sure, and t in f64; `ids` as in [`Self::offer_one`].
+    ///
+    /// The caller knows that f64 is precise enough for what [`triangle::intersect`] would answer.
+    #[inline(always)]
+    pub fn hits<S: Simd>(&self, origin: [S::D4; 3], direction: [S::D4; 3], ids: [u32; LANES]) -> ([f64; 4], [Hit; 4]) {
+        let [a, b, c, d] = ids;
+        let corners = gather(self.corners(a), self.corners(b), self.corners(c), self.corners(d));
+        let Numbers { t, t32, u, v } = Quad::new::<S>(origin, direction, &corners).numbers();
+        let hits = [
+            self.hit(a, t32[0], u[0], v[0]),
+            self.hit(b, t32[1], u[1], v[1]),
+            self.hit(c, t32[2], u[2], v[2]),
+            self.hit(d, t32[3], u[3], v[3]),
+        ];
+        (t, hits)
     }
 
     /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.
@@ -140,7 +183,7 @@ impl TriangleTree {
 
     /// The corners of a triangle, numbered as in [`Self::offer_one`], one after the other.
     #[inline(always)]
-    pub fn corners(&self, id: u32) -> [f32; 9] {
+    fn corners(&self, id: u32) -> [f32; 9] {
         let mut scratch = None;
         let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
         let mut corners = [0.0; 9];
@@ -152,14 +195,15 @@ impl TriangleTree {
 
     /// A hit with a triangle, numbered as in [`Self::offer_one`].
     #[inline(always)]
-    pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
+    fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
         let (part, primitive) = self.leaves.number(id);
         let PartId { geometry, instance } = self.parts[part as usize];
         Hit { t, u, v, primitive, geometry, instance }
     }
 
+    /// The same of lane `lane` of a block, which may be placed.
     #[inline]
-    fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         let corners = block.triangle(lane);
         let part = self.parts[block.part[lane] as usize];
         let (hit, instance) = match through {
@@ -172,4 +216,14 @@ impl TriangleTree {
             nearest.offer(hit.t, Hit { t, u, v, primitive, geometry, instance });
         }
     }
+}
+
+/// Component by component.
+#[inline(always)]
+fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; LANES]; 9] {
+    let mut corners = [[0.0; LANES]; 9];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = [a[i], b[i], c[i], d[i]];
+    }
+    corners
 }

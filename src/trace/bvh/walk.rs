@@ -3,7 +3,7 @@
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
 use super::build::MAX_DEPTH;
-use super::node::{Tree, WIDTH};
+use super::node::{Node, Tree, WIDTH};
 use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -36,6 +36,11 @@ struct Entry {
 }
 
 impl Entry {
+    #[inline(always)]
+    fn child(node: &Node, near: &[f32; WIDTH], slot: usize) -> Self {
+        Self { near: near[slot], index: node.index[slot], count: node.count[slot] }
+    }
+
     const ROOT: Self = Self { near: 0.0, index: 0, count: 0 };
 }
 
@@ -59,6 +64,12 @@ impl Stack {
         Some(self.entries[self.len])
     }
 
+    #[inline(always)]
+    fn push(&mut self, entry: Entry) {
+        self.entries[self.len] = entry;
+        self.len += 1;
+    }
+
     /// Pushes so that of what came since `base` the nearest ends on top.
     #[inline(always)]
     fn insert(&mut self, base: usize, entry: Entry) {
@@ -72,9 +83,9 @@ impl Stack {
     }
 }
 
-/// Visits the leaves that the ray enters before `limit`, near ones first.
+/// Visits the leaves that the ray enters before `limit`; near ones first, if that matters to the query.
 #[inline(always)]
-pub(super) fn single<S: Simd>(
+pub(super) fn single<S: Simd, Q: Query>(
     stack: &mut Stack,
     tree: &Tree,
     ray: &SlabRay,
@@ -84,28 +95,38 @@ pub(super) fn single<S: Simd>(
     stack.len = 0;
     let mut next = Entry::ROOT;
     loop {
-        if next.count == 0 {
+        // Down to a leaf. Mostly one or two children are entered: each number has its own branch, which is predicted
+        // better than the length of a loop.
+        while next.count == 0 {
             let node = tree.node(next.index);
-            let (mut mask, near) = ray.enter::<S>(node, limit);
-            if mask != 0 {
-                let child = |i: usize| Entry { near: near[i], index: node.index[i], count: node.count[i] };
-                let first = mask.trailing_zeros() as usize % WIDTH;
-                mask &= mask - 1;
-                next = child(first);
-                // Mostly one or two children are entered: the nearest goes on, the other waits.
-                let base = stack.len;
-                while mask != 0 {
-                    let i = mask.trailing_zeros() as usize % WIDTH;
-                    mask &= mask - 1;
-                    let mut other = child(i);
-                    if other.near < next.near {
-                        std::mem::swap(&mut next, &mut other);
-                    }
-                    stack.insert(base, other);
-                }
+            let (mask, near) = ray.enter::<S>(node, limit);
+            if mask == 0 {
+                break;
+            }
+            let (first, rest) = lowest(mask);
+            next = Entry::child(node, &near, first);
+            if rest == 0 {
                 continue;
             }
-        } else {
+            let (second, rest) = lowest(rest);
+            let mut other = Entry::child(node, &near, second);
+            if other.near < next.near {
+                std::mem::swap(&mut next, &mut other);
+            }
+            let base = stack.len;
+            stack.push(other);
+            let mut rest = rest;
+            while rest != 0 {
+                let (slot, others) = lowest(rest);
+                rest = others;
+                let mut other = Entry::child(node, &near, slot);
+                if other.near < next.near {
+                    std::mem::swap(&mut next, &mut other);
+                }
+                if Q::ANY { stack.push(other) } else { stack.insert(base, other) }
+            }
+        }
+        if next.count != 0 {
             match leaf(next.index, next.count) {
                 Visit::Until(t) => limit = t,
                 Visit::Stop => return,
@@ -119,4 +140,10 @@ pub(super) fn single<S: Simd>(
             }
         };
     }
+}
+
+/// The lowest bit's place, and the other bits.
+#[inline(always)]
+fn lowest(mask: u32) -> (usize, u32) {
+    (mask.trailing_zeros() as usize % WIDTH, mask & (mask - 1))
 }

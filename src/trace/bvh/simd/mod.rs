@@ -28,6 +28,8 @@ pub(super) trait Simd {
     type D4: Doubles<F = Self::V4>;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
+    /// Has a value loaded that will be needed soon.
+    fn prefetch<T>(value: &T);
 }
 
 /// One truth a lane.
@@ -84,7 +86,7 @@ pub(super) trait Group: Vector {
 /// Four values of f64.
 pub(super) trait Doubles: Copy {
     /// As many f32.
-    type F;
+    type F: Array<4>;
     fn splat(value: f64) -> Self;
     /// Exact.
     fn widen(values: Self::F) -> Self;

@@ -13,6 +13,9 @@ impl Simd for Portable {
     type D4 = [f64; 4];
 
     #[inline(always)]
+    fn prefetch<T>(_: &T) {}
+
+    #[inline(always)]
     fn transpose(rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
         std::array::from_fn(
             #[inline(always)]

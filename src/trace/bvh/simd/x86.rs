@@ -19,6 +19,14 @@ impl Simd for Avx2 {
     type D4 = D4;
 
     #[inline(always)]
+    fn prefetch<T>(value: &T) {
+        for line in (0..size_of::<T>()).step_by(64) {
+            // A hint, and of memory that is there.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast::<i8>().add(line)) };
+        }
+    }
+
+    #[inline(always)]
     fn transpose(rows: [V8; 8]) -> [V8; 8] {
         let [V8(a), V8(b), V8(c), V8(d), V8(e), V8(f), V8(g), V8(h)] = rows;
         unsafe {

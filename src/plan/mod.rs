@@ -4,8 +4,12 @@
 //! any, texture coordinates where no texture is used, shading normals where no mesh in view of a light has them, the
 //! ambient term, lights that are black. The renderer reads the plan and never asks the scene again.
 
+mod build;
+
 use std::collections::BTreeSet;
 use std::fmt;
+
+pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
 use crate::scene::{Geometry, Light, Material, Scene};

@@ -1,0 +1,85 @@
+//! How well the tree is worth building, and whether there is the memory for it: flags, and what the plan makes of them.
+
+use clap::{Args, ValueEnum};
+
+use super::common::parse_bytes;
+use super::engine::BackendArg;
+use super::report::held_memory;
+use crate::error::{Error, Result};
+use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, Lighting, NotEnoughMemory, Plan};
+use crate::trace::bvh::Preset;
+
+/// Bytes that a picture takes for each pixel: four floats, once more while it is written.
+const BYTES_A_PIXEL: u64 = 32;
+
+#[derive(Debug, Args)]
+pub(super) struct BuildArgs {
+    /// How well the native tree is built; never changes a picture
+    #[arg(long, value_enum, default_value_t)]
+    build: Build,
+
+    /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    max_memory: Option<u64>,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Build {
+    /// As the number of rays and --max-memory suggest; -v tells
+    #[default]
+    Auto,
+    /// Soon ready, slower to trace
+    Fast,
+    /// In between
+    Default,
+    /// Slow to build, fastest to trace
+    High,
+    /// A third of the memory, slower to trace
+    Compact,
+}
+
+impl Build {
+    fn wanted(self) -> Option<Preset> {
+        match self {
+            Self::Auto => None,
+            Self::Fast => Some(Preset::Fast),
+            Self::Default => Some(Preset::Default),
+            Self::High => Some(Preset::High),
+            Self::Compact => Some(Preset::Compact),
+        }
+    }
+}
+
+impl BuildArgs {
+    /// How to build the native tree over so many triangles; none where only Embree renders.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] where there is not the memory for it.
+    pub(super) fn choose(
+        &self,
+        backend: BackendArg,
+        triangles: u64,
+        samples: u64,
+        pixels: u64,
+        plan: &Plan,
+    ) -> Result<Option<BuildChoice>> {
+        let shadow_lights = match &plan.lighting {
+            Lighting::Lights(lights) => lights.len() as u64,
+            Lighting::None | Lighting::Headlight => 0,
+        };
+        let embree = if backend == BackendArg::Native { 0 } else { triangles.saturating_mul(EMBREE_BYTES) };
+        let picture = pixels.saturating_mul(BYTES_A_PIXEL);
+        let request = BuildRequest {
+            triangles,
+            rays: samples.saturating_mul(1 + shadow_lights),
+            held: held_memory().unwrap_or(0).saturating_add(picture).saturating_add(embree),
+            max_memory: self.max_memory,
+            wanted: self.build.wanted(),
+        };
+        let refuse = |backend, problem: NotEnoughMemory| Error::Backend { backend, message: problem.to_string() };
+        if backend == BackendArg::Embree {
+            return request.fits().map(|()| None).map_err(|problem| refuse("embree", problem));
+        }
+        request.choose().map(Some).map_err(|problem| refuse("native", problem))
+    }
+}

@@ -1,0 +1,52 @@
+//! Leaving out vertices that no triangle uses.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+/// Corners or vertices that are worth a task of their own.
+const TASK: usize = 1 << 14;
+
+/// The vertices that are used, in rising order, and makes the corners indices into those; none, and leaves the corners as
+/// they are, where all `count` vertices are used.
+pub(super) fn compact(corners: &mut [u32], count: usize) -> Option<Vec<u32>> {
+    // A flag for each vertex costs no more than the corners do where there are no more vertices than corners; where
+    // there are, a small part of a shared list is used, and is sorted.
+    if corners.len() < count {
+        let mut used = corners.to_vec();
+        used.sort_unstable();
+        used.dedup();
+        for corner in corners {
+            // Found always: `used` has every corner.
+            *corner = used.partition_point(|&i| i < *corner) as u32;
+        }
+        return Some(used);
+    }
+    let is_used: Vec<AtomicBool> = (0..count).map(|_| AtomicBool::new(false)).collect();
+    corners.par_chunks(TASK).flatten_iter().for_each(|&i| is_used[i as usize].store(true, Ordering::Relaxed));
+    let is_used: Vec<bool> = is_used.into_iter().map(AtomicBool::into_inner).collect();
+    if is_used.iter().all(|&is_used| is_used) {
+        return None;
+    }
+    let used: Vec<u32> = (0..).zip(&is_used).filter(|(_, is_used)| **is_used).map(|(i, _)| i).collect();
+    let mut numbers = vec![0; count];
+    used.iter().zip(0..).for_each(|(&i, number)| numbers[i as usize] = number);
+    corners.par_iter_mut().with_min_len(TASK).for_each(|corner| *corner = numbers[*corner as usize]);
+    Some(used)
+}
+
+/// What becomes of the vertices with these indices.
+pub(super) fn pick<T: Send>(used: &[u32], make: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    used.par_iter().with_min_len(TASK).map(|&i| make(i as usize)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn unused_vertices_are_left_out() {
+        let compact = |mut corners: Vec<u32>, count| (super::compact(&mut corners, count), corners);
+        assert_eq!(compact(vec![7, 3, 7, 9], 10), (Some(vec![3, 7, 9]), vec![1, 0, 1, 2]));
+        assert_eq!(compact(vec![4, 1, 4, 2, 1], 5), (Some(vec![1, 2, 4]), vec![2, 0, 2, 1, 0]));
+        assert_eq!(compact(vec![1, 0, 2], 3), (None, vec![1, 0, 2]));
+    }
+}

@@ -1,0 +1,282 @@
+//! The statements of one stretch.
+
+use std::collections::HashMap;
+
+use super::stretch::Begin;
+use super::{NONE, Skipped};
+use crate::image::srgb;
+use crate::io::Placeless;
+use crate::io::text::{Lines, Words, name, number, quoted};
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// The places of a stretch's vertices in the file's lists.
+pub(super) struct Slots<'a> {
+    positions: &'a mut [DVec3],
+    uvs: &'a mut [Vec2],
+    normals: &'a mut [Vec3],
+}
+
+/// Corners of faces, and the shape of faces that are not triangles.
+#[derive(Default)]
+pub(super) struct Faces {
+    /// Indices from 0 into positions.
+    pub(super) positions: Vec<u32>,
+    /// For each corner, into texture coordinates and normals, or [`NONE`]; empty where no corner has any.
+    pub(super) attributes: Vec<[u32; 2]>,
+    /// Faces with more than three corners, in order.
+    pub(super) polygons: Vec<Polygon>,
+}
+
+/// A face with more than three corners.
+pub(super) struct Polygon {
+    /// Its first corner.
+    pub(super) first: usize,
+    pub(super) corners: usize,
+    pub(super) line: usize,
+}
+
+/// Faces under one state. What is none holds on from before.
+#[derive(Clone, Default)]
+pub(super) struct Run {
+    /// Indices into [`Part::names`].
+    pub(super) material: Option<u32>,
+    pub(super) name: Option<u32>,
+    pub(super) smoothing: Option<u32>,
+    /// Where it ends among the corners; it begins where the one before ends.
+    pub(super) end: usize,
+}
+
+/// What a stretch holds.
+#[derive(Default)]
+pub(super) struct Part {
+    /// How many.
+    pub(super) positions: usize,
+    /// Linear; empty, or up to the last that has a colour.
+    pub(super) colors: Vec<Vec3>,
+    pub(super) faces: Faces,
+    pub(super) runs: Vec<Run>,
+    /// Of materials, objects and groups.
+    pub(super) names: Vec<String>,
+    /// The highest index in a face, and its line: of positions, uvs and normals.
+    pub(super) highest: [Option<(u32, usize)>; 3],
+    /// Names of material libraries, and their lines.
+    pub(super) libraries: Vec<(usize, String)>,
+    pub(super) flat_elements: Skipped,
+    pub(super) small_faces: Skipped,
+    pub(super) unknown: Skipped,
+}
+
+impl<'a> Slots<'a> {
+    /// The places of all stretches, which begin as given, in lists of these lengths.
+    pub(super) fn divide(
+        mut positions: &'a mut [DVec3],
+        mut uvs: &'a mut [Vec2],
+        mut normals: &'a mut [Vec3],
+        begins: &[Begin],
+        counts: [usize; 3],
+    ) -> Vec<Self> {
+        let ends = begins.iter().skip(1).map(|begin| begin.counts).chain([counts]);
+        let lengths = begins.iter().zip(ends).map(|(begin, end)| [0, 1, 2].map(|k| end[k] - begin.counts[k]));
+        let slots = lengths.map(|[p, t, n]| Self {
+            positions: positions.split_off_mut(..p).unwrap_or_default(),
+            uvs: uvs.split_off_mut(..t).unwrap_or_default(),
+            normals: normals.split_off_mut(..n).unwrap_or_default(),
+        });
+        slots.collect()
+    }
+}
+
+/// A stretch while it is read.
+struct Reader<'a> {
+    slots: Slots<'a>,
+    /// Positions, texture coordinates and normals of the whole file so far.
+    counts: [usize; 3],
+    begin: Begin,
+    part: Part,
+    /// The faces that are being read.
+    run: Run,
+    known: HashMap<String, u32>,
+}
+
+impl Part {
+    /// Reads a stretch.
+    ///
+    /// # Errors
+    /// The line and what is wrong with it.
+    pub(super) fn read(text: &[u8], begin: &Begin, slots: Slots<'_>) -> Result<Self, (usize, String)> {
+        let (part, run, known) = (Self::default(), Run::default(), HashMap::new());
+        let mut reader = Reader { slots, counts: begin.counts, begin: *begin, part, run, known };
+        for (line, text) in Lines::new(text) {
+            let line = begin.line + line;
+            reader.statement(line, &text).map_err(|message| (line, message))?;
+        }
+        let Reader { mut part, run, counts, .. } = reader;
+        part.positions = counts[0] - begin.counts[0];
+        part.runs.push(run);
+        Ok(part)
+    }
+}
+
+impl Reader<'_> {
+    fn statement(&mut self, line: usize, text: &[u8]) -> Placeless<()> {
+        let mut words = Words::new(text, line);
+        let Some(keyword) = words.next() else { return Ok(()) };
+        match keyword {
+            b"v" => self.vertex(&mut words)?,
+            b"vt" => {
+                let u = words.number().ok_or("vt needs a number, the texture coordinate u")?;
+                let v = words.next().map_or(Some(0.0), number).ok_or("vt: v is not a number")?;
+                self.slots.uvs[self.counts[1] - self.begin.counts[1]] = Vec2::new(u, v);
+                self.counts[1] += 1;
+            }
+            b"vn" => {
+                let normal = three(&mut words).ok_or("vn needs 3 numbers, x y z")?;
+                self.slots.normals[self.counts[2] - self.begin.counts[2]] = normal.normalize_or_zero().as_vec3();
+                self.counts[2] += 1;
+            }
+            b"f" => self.face(line, &mut words)?,
+            b"o" | b"g" => {
+                let name = self.name(name(words.rest()));
+                self.change().name = Some(name);
+            }
+            b"s" => {
+                let group = match words.next() {
+                    None | Some(b"off") => 0,
+                    Some(b"on") => 1,
+                    Some(word) => number(word).ok_or_else(|| {
+                        format!("s {} is not a smoothing group; write a number, on or off", quoted(word))
+                    })?,
+                };
+                self.change().smoothing = Some(group);
+            }
+            b"usemtl" => {
+                let name = self.name(name(words.rest()));
+                self.change().material = Some(name);
+            }
+            b"mtllib" => {
+                let file = name(words.rest());
+                if self.part.libraries.iter().all(|(_, known)| *known != file) {
+                    self.part.libraries.push((line, file));
+                }
+            }
+            b"p" | b"l" => self.part.flat_elements.add(line, keyword),
+            _ if keyword.starts_with(b"#") => {}
+            _ => self.part.unknown.add(line, keyword),
+        }
+        Ok(())
+    }
+
+    /// The index of a name.
+    fn name(&mut self, name: String) -> u32 {
+        *self.known.entry(name).or_insert_with_key(|name| {
+            self.part.names.push(name.clone());
+            self.part.names.len() as u32 - 1
+        })
+    }
+
+    /// The state of the faces that follow.
+    fn change(&mut self) -> &mut Run {
+        let end = self.part.faces.positions.len();
+        let begin = self.part.runs.last().map_or(0, |run| run.end);
+        if end > begin {
+            self.part.runs.push(Run { end, ..self.run.clone() });
+            // What holds on is in the run before.
+            self.run = Run { end, ..Run::default() };
+        }
+        &mut self.run
+    }
+
+    /// `x y z`, `x y z w` or `x y z r g b`.
+    fn vertex(&mut self, words: &mut Words<'_>) -> Placeless<()> {
+        let position = three(words).ok_or("v needs 3 numbers, x y z")?;
+        let index = self.counts[0] - self.begin.counts[0];
+        self.slots.positions[index] = position;
+        self.counts[0] += 1;
+        let mut rest = [0.0f32; 3];
+        let mut count = 0;
+        for (value, word) in rest.iter_mut().zip(words.take_while(|word| !word.starts_with(b"#"))) {
+            *value = number(word).ok_or_else(|| format!("{} is not a number", quoted(word)))?;
+            count += 1;
+        }
+        if count == 3 {
+            self.part.colors.resize(index, Vec3::ONE);
+            self.part.colors.push(Vec3::from(rest.map(|c| srgb::decode(f64::from(c).clamp(0.0, 1.0)) as f32)));
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, line: usize, words: &mut Words<'_>) -> Placeless<()> {
+        let faces = &mut self.part.faces;
+        let first = faces.positions.len();
+        for word in words {
+            if word.starts_with(b"#") {
+                break;
+            }
+            let corner = corner(word, self.counts)?;
+            for (highest, index) in self.part.highest.iter_mut().zip(corner) {
+                if index != NONE && highest.is_none_or(|(i, _)| index > i) {
+                    *highest = Some((index, line));
+                }
+            }
+            let [position, attributes @ ..] = corner;
+            if attributes != [NONE; 2] {
+                faces.attributes.resize(faces.positions.len(), [NONE; 2]);
+                faces.attributes.push(attributes);
+            }
+            faces.positions.push(position);
+        }
+        let corners = faces.positions.len() - first;
+        if corners < 3 {
+            faces.positions.truncate(first);
+            faces.attributes.truncate(first);
+            self.part.small_faces.add(line, b"f");
+        } else if corners > 3 {
+            faces.polygons.push(Polygon { first, corners, line });
+        }
+        if !faces.attributes.is_empty() {
+            faces.attributes.resize(faces.positions.len(), [NONE; 2]);
+        }
+        self.run.end = faces.positions.len();
+        Ok(())
+    }
+}
+
+fn three(words: &mut Words<'_>) -> Option<DVec3> {
+    Some(DVec3::new(words.number()?, words.number()?, words.number()?))
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn`; indices count from 1, or from -1 backwards.
+fn corner(word: &[u8], counts: [usize; 3]) -> Placeless<[u32; 3]> {
+    let mut corner = [NONE; 3];
+    let mut parts = word.split(|&b| b == b'/');
+    for ((index, count), part) in corner.iter_mut().zip(counts).zip(&mut parts) {
+        if !part.is_empty() {
+            *index = resolve(part, count).map_err(|problem| format!("corner {}: {problem}", quoted(word)))?;
+        }
+    }
+    if corner[0] == NONE || parts.next().is_some() {
+        return Err(format!("corner {} is not of the form v, v/vt, v//vn or v/vt/vn", quoted(word)));
+    }
+    Ok(corner)
+}
+
+fn resolve(digits: &[u8], count: usize) -> Placeless<u32> {
+    // Nearly all are a few plain digits.
+    let plain = digits.len() < 10 && digits.iter().all(u8::is_ascii_digit);
+    let index: i64 = match plain {
+        true => digits.iter().fold(0, |value, digit| 10 * value + i64::from(digit - b'0')),
+        false => number(digits).ok_or("an index is not a whole number")?,
+    };
+    let from_zero = match index {
+        0 => return Err("index 0; OBJ counts from 1".into()),
+        1.. => index - 1,
+        _ => count as i64 + index,
+    };
+    if from_zero < 0 {
+        return Err(format!("index {index} is before the first; there are {count} so far"));
+    }
+    u32::try_from(from_zero)
+        .ok()
+        .filter(|&i| i != NONE)
+        .ok_or_else(|| format!("index {index} is past the last of {count}"))
+}

@@ -1,0 +1,200 @@
+//! How well the tree is worth building: seconds spent on triangles against seconds won on rays, within the memory there
+//! is.
+//!
+//! The model is linear: a preset costs so much for every triangle and every ray, and the cheapest whose memory fits is
+//! taken. Finer models (depth, occlusion, coherence) would need what only the finished tree tells, and move the limits
+//! by less than machines differ.
+
+use std::fmt;
+
+use crate::trace::bvh::Preset;
+
+/// Bytes that Embree holds for a triangle at most, while it builds and beside the mesh; measured on 20 million.
+pub const EMBREE_BYTES: u64 = 120;
+
+/// What decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildRequest {
+    /// Triangles as stored: those of an instanced mesh count once.
+    pub triangles: u64,
+    /// Rays that will be traced, at most.
+    pub rays: u64,
+    /// Bytes that the process holds before it builds, the meshes among them, and those it will need for the picture.
+    pub held: u64,
+    /// Bytes that it may hold at any time; none for no limit.
+    pub max_memory: Option<u64>,
+    /// The preset that was asked for; none to choose one.
+    pub wanted: Option<Preset>,
+}
+
+/// What was decided.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BuildChoice {
+    /// How to build.
+    pub preset: Preset,
+    /// An estimate of the most bytes the process will hold.
+    pub memory: u64,
+    /// Why, as half a sentence.
+    pub why: String,
+}
+
+/// No preset fits, or not the one that was asked for, or what was not chosen at all does not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotEnoughMemory {
+    /// The preset that needs least, or was asked for; none where nothing was to be chosen.
+    pub preset: Option<Preset>,
+    /// Bytes it would need.
+    pub needed: u64,
+    /// Bytes there may be.
+    pub limit: u64,
+}
+
+/// What a preset costs.
+struct Cost {
+    /// Nanoseconds to build a triangle, one thread.
+    build: f64,
+    /// Nanoseconds to trace a ray, one thread; a mixture of camera and shadow rays on a large mesh.
+    ray: f64,
+    /// Bytes a triangle of the finished tree.
+    tree: u64,
+    /// Bytes a triangle beside the tree while it is built.
+    building: u64,
+}
+
+/// Measured on terrains of 2 and 20 million triangles; of bytes, what no mesh tried exceeds. The time to build includes
+/// the system's for handing out the memory, which is why the compact tree is soon ready too. The differences decide:
+/// `Compact` pays below 2.2 rays a triangle, `High` above 170.
+const fn cost(preset: Preset) -> Cost {
+    match preset {
+        Preset::Fast => Cost { build: 260.0, ray: 220.0, tree: 66, building: 33 },
+        Preset::Default => Cost { build: 290.0, ray: 163.0, tree: 58, building: 40 },
+        // A third more references, and a tenth won on rays: an assumption.
+        Preset::High => Cost { build: 2500.0, ray: 150.0, tree: 84, building: 60 },
+        Preset::Compact => Cost { build: 210.0, ray: 200.0, tree: 16, building: 40 },
+    }
+}
+
+impl BuildRequest {
+    /// Bytes that the process will hold at most.
+    fn memory(&self, preset: Preset) -> u64 {
+        let Cost { tree, building, .. } = cost(preset);
+        self.held.saturating_add(self.triangles.saturating_mul(tree + building))
+    }
+
+    fn nanoseconds(&self, preset: Preset) -> f64 {
+        let Cost { build, ray, .. } = cost(preset);
+        build * self.triangles as f64 + ray * self.rays as f64
+    }
+
+    /// Whether what is held anyway fits.
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] where it does not.
+    pub fn fits(&self) -> Result<(), NotEnoughMemory> {
+        let (needed, limit) = (self.held, self.max_memory.unwrap_or(u64::MAX));
+        if needed <= limit { Ok(()) } else { Err(NotEnoughMemory { preset: None, needed, limit }) }
+    }
+
+    /// Chooses a preset.
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] where none fits within `max_memory`, or not the one that is wanted.
+    pub fn choose(&self) -> Result<BuildChoice, NotEnoughMemory> {
+        let limit = self.max_memory.unwrap_or(u64::MAX);
+        let allowed = |preset: &Preset| self.wanted.is_none_or(|wanted| wanted == *preset);
+        let cheaper = |a: &Preset, b: &Preset| self.nanoseconds(*a).total_cmp(&self.nanoseconds(*b));
+        let candidates = || Preset::ALL.into_iter().filter(allowed);
+        let Some(preset) = candidates().filter(|preset| self.memory(*preset) <= limit).min_by(cheaper) else {
+            let least = candidates().min_by_key(|preset| self.memory(*preset)).unwrap_or(Preset::Compact);
+            return Err(NotEnoughMemory { preset: Some(least), needed: self.memory(least), limit });
+        };
+        let unlimited = candidates().min_by(cheaper).unwrap_or(preset);
+        let why = if self.wanted.is_some() {
+            "asked for".to_owned()
+        } else if preset != unlimited {
+            format!("{} would take more memory than there may be", unlimited.name())
+        } else {
+            let rays = self.rays as f64 / self.triangles.max(1) as f64;
+            let judged = match preset {
+                Preset::Fast | Preset::Compact => "too few to pay for a better tree",
+                Preset::Default => "enough for a good tree, too few for the best",
+                Preset::High => "enough to pay for the best tree",
+            };
+            format!("{rays:.1} rays a triangle are {judged}")
+        };
+        Ok(BuildChoice { preset, memory: self.memory(preset), why })
+    }
+}
+
+impl fmt::Display for NotEnoughMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mega = |bytes: u64| bytes.div_ceil(1 << 20);
+        let Self { preset, needed, limit } = self;
+        let (needed, limit) = (mega(*needed), limit >> 20);
+        match preset {
+            Some(preset) => write!(f, "its {} build", preset.name())?,
+            None => write!(f, "its build")?,
+        }
+        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
+        match preset {
+            Some(Preset::Compact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
+            Some(_) => {
+                write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
+            }
+            None => write!(f, "give at least --max-memory {needed}M, or use --backend native, which may need less"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MESH: BuildRequest =
+        BuildRequest { triangles: 1_000_000, rays: 0, held: 500 << 20, max_memory: None, wanted: None };
+
+    fn preset(rays: u64, max_memory: Option<u64>) -> Option<Preset> {
+        BuildRequest { rays, max_memory, ..MESH }.choose().ok().map(|choice| choice.preset)
+    }
+
+    #[test]
+    fn rays_pay_for_triangles() {
+        use Preset::{Compact, Default, High};
+        // The limits follow from the costs: (290 - 210) / (200 - 163) and (2500 - 290) / (163 - 150).
+        let millions = [(0, Compact), (2, Compact), (3, Default), (169, Default), (171, High), (10_000, High)];
+        for (rays, expected) in millions {
+            assert_eq!(preset(rays * 1_000_000, None), Some(expected), "{rays}");
+        }
+        assert!(BuildRequest { triangles: 0, ..MESH }.choose().is_ok());
+        assert!(BuildRequest { triangles: u64::MAX, ..MESH }.choose().is_ok());
+    }
+
+    #[test]
+    fn memory_comes_first() {
+        use Preset::{Compact, Default, High};
+        let held = MESH.held;
+        let at = |rays, bytes: u64| preset(rays, Some(held + bytes * MESH.triangles));
+        let many = 1_000_000_000;
+        let chosen = [144, 143, 98, 97, 56, 55].map(|bytes| at(many, bytes));
+        assert_eq!(chosen, [Some(High), Some(Default), Some(Default), Some(Compact), Some(Compact), None]);
+        let error = BuildRequest { max_memory: Some(held), ..MESH }.choose().unwrap_err();
+        assert_eq!(error, NotEnoughMemory { preset: Some(Compact), needed: held + 56_000_000, limit: held });
+        let text = error.to_string();
+        let error = BuildRequest { max_memory: Some(held - 1), ..MESH }.fits().unwrap_err();
+        assert_eq!((error.needed, MESH.fits()), (held, Ok(())));
+        // What the message asks for is enough.
+        assert!(text.contains("limit of 500 MiB") && text.contains("--max-memory 554M"), "{text}");
+        assert!(preset(0, Some(554 << 20)).is_some() && preset(0, Some(553 << 20)).is_none());
+    }
+
+    #[test]
+    fn a_wish_is_kept_or_refused() {
+        for wanted in Preset::ALL {
+            let request = BuildRequest { wanted: Some(wanted), rays: 1 << 30, ..MESH };
+            let choice = request.choose().unwrap();
+            assert_eq!((choice.preset, choice.why.as_str()), (wanted, "asked for"));
+            let error = BuildRequest { max_memory: Some(choice.memory - 1), ..request }.choose().unwrap_err();
+            assert_eq!((error.preset, error.needed), (Some(wanted), choice.memory));
+        }
+    }
+}
