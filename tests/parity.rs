@@ -236,3 +236,44 @@ fn bundles() {
         }
     }
 }
+
+/// A tree fitted to moved vertices gives the hits of brute force; one for other triangles is refused.
+#[test]
+fn refitted_trees() {
+    let mut random = Random::new(3);
+    let before = scenes::bumpy_sphere(30, 0.2, 7);
+    let mut after = before.clone();
+    let moved = before.positions.iter().map(|p| *p * 1.5 + random.vec3() * 0.2 + Vec3::X).collect::<Vec<_>>();
+    after.positions = moved.into();
+    let rays = scenes::rays(2000, &after.positions.clone(), 5);
+    let [before, after] = [before, after].map(|mesh| World::new(&scenes::of_mesh(mesh)).expect("sound"));
+    let brute = Brute::new(&after);
+    let instanced = World::new(&scenes::instanced(5)).expect("sound");
+    for preset in Preset::ALL {
+        let mut bvh = Bvh::build_with(&before, preset.into());
+        bvh.refit(&after).expect("the same triangles");
+        let mut hits = 0;
+        for ray in &rays {
+            let expected = brute.closest(ray);
+            assert_eq!(bvh.closest(ray), expected, "{preset:?} {ray:?}");
+            assert_eq!(bvh.occluded(ray), expected.is_some());
+            hits += usize::from(expected.is_some());
+        }
+        assert!(hits > 500, "{hits} hits");
+        let error = bvh.refit(&instanced).expect_err("other objects");
+        assert!(error.to_string().contains("build the tree anew"), "{error}");
+        let fewer = World::new(&scenes::of_mesh(scenes::bumpy_sphere(29, 0.2, 7))).expect("sound");
+        assert!(bvh.refit(&fewer).is_err());
+
+        let mut broken = scenes::bumpy_sphere(30, 0.2, 7);
+        std::sync::Arc::make_mut(&mut broken.positions)[5] = Vec3::NAN;
+        let broken = World::new(&scenes::of_mesh(broken)).expect("sound");
+        assert!(Bvh::build_with(&before, preset.into()).refit(&broken).is_err(), "triangles that vanish");
+        assert!(Bvh::build_with(&broken, preset.into()).refit(&before).is_err(), "triangles that appear");
+
+        let mut bvh = Bvh::build_with(&instanced, preset.into());
+        bvh.refit(&instanced).expect("the same");
+        let fresh = Bvh::build_with(&instanced, preset.into());
+        assert!(rays.iter().all(|ray| bvh.closest(ray) == fresh.closest(ray)));
+    }
+}

@@ -41,11 +41,17 @@ impl Block {
         self.lanes |= 1 << lane;
     }
 
+    /// The lanes that have a triangle.
+    #[inline(always)]
+    pub fn used(&self) -> impl Iterator<Item = usize> + use<> {
+        let lanes = self.lanes;
+        (0..LANES).filter(move |lane| lanes >> lane & 1 != 0)
+    }
+
     /// The box around its triangles.
     #[inline(always)]
     pub fn bounds(&self) -> Aabb {
-        let lanes = (0..LANES).filter(|lane| self.lanes >> lane & 1 != 0);
-        Aabb::around(lanes.flat_map(|lane| self.triangle(lane)))
+        Aabb::around(self.used().flat_map(|lane| self.triangle(lane)))
     }
 
     #[inline(always)]

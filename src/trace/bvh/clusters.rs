@@ -14,8 +14,8 @@ use crate::trace::Part;
 /// Clusters that are made by one thread.
 const CHUNK: usize = 256;
 
-/// The tree over the traceable triangles of `parts`.
-pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
+/// The tree over the traceable triangles of `parts`, its leaves, and how many triangles these are.
+pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usize) {
     let meshes = Meshes::new(parts);
     let sorted = morton::sorted(&meshes);
     let lengths = morton::clusters(&sorted, WIDTH * LANES);
@@ -28,6 +28,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
     }
     let counts: Vec<usize> = chunks.iter().map(|(count, _)| *count).collect();
     let blocks = memory::fill(chunks, |(lengths, mut rest), room| {
+        options.report(rest.len());
         for &len in lengths {
             let (own, others) = rest.split_at(len);
             rest = others;
@@ -38,6 +39,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
             }
         }
     });
+    let count = sorted.len();
     drop(sorted);
 
     let mut first = 0;
@@ -55,8 +57,8 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves) {
     let item = |(index, node): (usize, &Node)| Record::new(&node.bounds(), 0, index as u32);
     let mut items = memory::with_capacity(nodes.len());
     items.par_extend(nodes.par_iter().enumerate().map(item));
-    let above = build::build(&mut items, 1, 1, options);
-    (above.over(&items, &mut nodes), Leaves::of_blocks(blocks))
+    let above = build::build(&mut items, 1, 1, &Options { progress: None, ..*options });
+    (above.over(&items, &mut nodes), Leaves::of_blocks(blocks), count)
 }
 
 /// The node over up to eight blocks, the first of which has the index `first`.

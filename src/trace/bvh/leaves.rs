@@ -8,6 +8,7 @@ use super::memory;
 use super::meshes::Meshes;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
 use super::simd::Simd;
+use crate::math::is_traceable;
 use crate::trace::Part;
 
 /// The blocks of a tree of triangles.
@@ -66,6 +67,29 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.block(index)),
+        }
+    }
+
+    /// Takes the corners of `meshes`, whose triangles are the same. Whether all of them can still be hit.
+    pub fn refit(&mut self, meshes: &Meshes) -> bool {
+        let is_sound = |block: &Block| block.used().flat_map(|lane| block.triangle(lane)).all(is_traceable);
+        match self {
+            Self::Blocks(blocks) => blocks
+                .par_iter_mut()
+                .map(|block| {
+                    let old = std::mem::replace(block, Block::EMPTY);
+                    for lane in old.used() {
+                        let (part, primitive) = (old.part[lane], old.primitive[lane]);
+                        block.push(meshes.of_part(part).corners(primitive), part, primitive);
+                    }
+                    is_sound(block)
+                })
+                .reduce(|| true, |a, b| a && b),
+            Self::Numbers(numbers) => {
+                numbers.meshes = meshes.clone();
+                let count = numbers.blocks.len() as u32;
+                (0..count).into_par_iter().all(|index| is_sound(&numbers.block(index)))
+            }
         }
     }
 

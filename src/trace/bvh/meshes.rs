@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::block::Block;
-use crate::math::Vec3;
+use crate::math::{Vec3, is_traceable};
 use crate::trace::{Part, Primitives};
 
 /// Meshes, shared with the scene.
+#[derive(Clone)]
 pub(super) struct Meshes {
     meshes: Vec<Mesh>,
     /// Of each part its mesh, if it is one.
@@ -14,6 +17,7 @@ pub(super) struct Meshes {
 }
 
 /// A mesh and its numbers.
+#[derive(Clone)]
 pub(super) struct Mesh {
     /// Number of its first triangle.
     pub first: u32,
@@ -26,10 +30,9 @@ impl Mesh {
     /// The corners of a triangle.
     #[inline(always)]
     pub fn corners(&self, primitive: u32) -> [Vec3; 3] {
-        self.triangles[primitive as usize].map(
-            #[inline(always)]
-            |corner| self.positions[corner as usize],
-        )
+        let [a, b, c] = self.triangles[primitive as usize];
+        let positions = &self.positions[..];
+        [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
 }
 
@@ -53,6 +56,15 @@ impl Meshes {
     /// All of them.
     pub fn iter(&self) -> impl Iterator<Item = &Mesh> {
         self.meshes.iter()
+    }
+
+    /// How many triangles can be hit.
+    pub fn traceable_count(&self) -> usize {
+        let of = |mesh: &Mesh| {
+            let is_traceable = |&i: &u32| mesh.corners(i).into_iter().all(is_traceable);
+            (0..mesh.triangles.len() as u32).into_par_iter().filter(is_traceable).count()
+        };
+        self.meshes.iter().map(of).sum()
     }
 
     /// Number of triangles.

@@ -4,10 +4,14 @@
 //! | --- | --- |
 //! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
 //! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
+//! | `preset` | what a tree is built for: speed of building, of tracing, or memory |
+//! | `clusters` | the fast preset: triangles along a curve |
+//! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `walk` | one ray, from the root to the leaves |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `leaves`, `meshes`, `memory` | where blocks are kept, or fetched from the mesh; large arrays |
 //! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
@@ -34,6 +38,7 @@ mod placements;
 mod preset;
 mod quad;
 mod query;
+mod refit;
 mod shapes;
 mod simd;
 mod slab;

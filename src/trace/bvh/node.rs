@@ -1,5 +1,7 @@
 //! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
 
+use rayon::prelude::*;
+
 use super::build::{NODE_COST, Record};
 use crate::math::{Aabb, Vec3};
 
@@ -123,6 +125,30 @@ impl Tree {
         }
         self.nodes.append(below);
         self
+    }
+
+    /// Computes all boxes again, from those of the leaves' `(first, count)`.
+    pub fn refit(&mut self, leaf: impl Fn(u32, u8) -> Aabb + Sync) {
+        self.nodes.par_iter_mut().for_each(|node| {
+            for slot in 0..WIDTH {
+                let (first, count) = (node.index[slot], node.count[slot]);
+                if count != 0 && count != NO_CHILD {
+                    node.set(slot, &leaf(first, count), first, count);
+                }
+            }
+        });
+        // Children come after their parents.
+        for index in (0..self.nodes.len()).rev() {
+            let (above, below) = self.nodes.split_at_mut(index + 1);
+            let node = &mut above[index];
+            for slot in 0..WIDTH {
+                if node.count[slot] == 0 {
+                    let child = node.index[slot];
+                    node.set(slot, &below[child as usize - index - 1].bounds(), child, 0);
+                }
+            }
+        }
+        self.bounds = self.nodes.first().map_or(Aabb::EMPTY, Node::bounds);
     }
 
     /// All nodes, so that leaves can be renamed.

@@ -10,7 +10,7 @@ pub enum Preset {
     /// Built by the surface area heuristic.
     #[default]
     Default,
-    /// Built slowest, for many rays: triangles that are much larger than their neighbours are referenced from several leaves.
+    /// Built slowest, for many rays: large triangles are referenced from several leaves.
     High,
     /// The default tree in least memory: leaves hold numbers of triangles, whose corners are fetched from the mesh.
     Compact,
@@ -38,8 +38,8 @@ pub struct Options<'a> {
     pub preset: Preset,
     /// What with; must be available. Neither the tree nor hits depend on it.
     pub isa: Isa,
-    /// Called from any thread with numbers of primitives that have found their place; they add up to all that can
-    /// be hit, stored ones and placed objects.
+    /// Called from any thread with numbers of primitives that have found their place. They add up to all that can be hit,
+    /// stored ones and placed objects; in the high preset to all references, up to 1.3 times as many.
     pub progress: Option<&'a (dyn Fn(u64) + Sync)>,
 }
 

@@ -1,43 +1,99 @@
 //! Leaves of triangles: blocks of four, rejected together ([`Filter`], [`Edges`]), decided one by one.
 
+use std::sync::Arc;
+
 use super::block::{Block, LANES};
-use super::build;
+use super::build::{self, presplit};
 use super::clusters;
 use super::filter::Filter;
 use super::found::Found;
 use super::leaves::Leaves;
+use super::meshes::Meshes;
 use super::node::Tree;
 use super::preset::{Options, Preset};
 use super::quad::{Numbers, Quad};
 use super::query::Query;
 use super::simd::Simd;
-use super::{PartId, Through};
+use super::{PartId, Through, refit};
+use crate::error::Result;
+use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Placed};
-use crate::trace::Part;
 use crate::trace::nearest::Nearest;
+use crate::trace::{Part, Primitives};
 
 /// All triangles of a level.
 pub(super) struct TriangleTree {
     tree: Tree,
     leaves: Leaves,
     parts: Vec<PartId>,
+    /// Of each part its triangles, if it is a mesh; shared with the scene.
+    topology: Vec<Option<Triangles>>,
+    /// Triangles that can be hit.
+    count: usize,
+}
+
+type Triangles = Arc<Vec<[u32; 3]>>;
+
+fn ids(part: &Part) -> PartId {
+    PartId { geometry: part.geometry, instance: part.instance }
+}
+
+fn triangles(part: &Part) -> Option<Triangles> {
+    match &part.primitives {
+        Primitives::Triangles { triangles, .. } => Some(Arc::clone(triangles)),
+        Primitives::Shapes(_) => None,
+    }
 }
 
 impl TriangleTree {
     /// Over the traceable triangles of `parts`.
     pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
-        let (tree, leaves) = match options.preset {
+        let (tree, leaves, count) = match options.preset {
             Preset::Fast => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
                 let mut items = build::triangle_items(parts);
+                let count = items.len();
+                if options.preset == Preset::High {
+                    items = presplit::presplit(&items, &Meshes::new(parts));
+                }
                 let mut tree = build::build(&mut items, LANES as u32, build::MAX_LEAF_BLOCKS, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
-                (tree, leaves)
+                (tree, leaves, count)
             }
         };
-        let parts = parts.iter().map(|part| PartId { geometry: part.geometry, instance: part.instance }).collect();
-        Self { tree, leaves, parts }
+        Self {
+            tree,
+            leaves,
+            parts: parts.iter().map(ids).collect(),
+            topology: parts.iter().map(triangles).collect(),
+            count,
+        }
+    }
+
+    /// Moves all triangles to where they are in `parts`.
+    ///
+    /// # Errors
+    /// Where there are others than those it was built for.
+    pub fn refit(&mut self, parts: &[Part]) -> Result<()> {
+        let is_same = |(part, old): (&Part, &Option<Triangles>)| match (triangles(part), old) {
+            (Some(new), Some(old)) => Arc::ptr_eq(&new, old) || new == *old,
+            (new, old) => new.is_none() && old.is_none(),
+        };
+        if parts.len() != self.topology.len() || !parts.iter().zip(&self.topology).all(is_same) {
+            return Err(refit::changed("other triangles"));
+        }
+        let meshes = Meshes::new(parts);
+        if !self.leaves.refit(&meshes) || meshes.traceable_count() != self.count {
+            return Err(refit::changed("other triangles that can be hit"));
+        }
+        let leaves = &self.leaves;
+        self.tree.refit(|first, count| {
+            let bounds = |index| leaves.block(index, &mut None).bounds();
+            (first..first + u32::from(count)).map(bounds).fold(Aabb::EMPTY, Aabb::union)
+        });
+        self.parts = parts.iter().map(ids).collect();
+        Ok(())
     }
 
     pub fn tree(&self) -> &Tree {

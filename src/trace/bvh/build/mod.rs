@@ -9,6 +9,7 @@
 //! | `sweep` | the best of all divisions, for small ones |
 //! | `children` | from one range to the eight children of a node |
 //! | `subtree`, `top` | by one thread, by all threads |
+//! | `presplit` | large triangles in several places: the high preset |
 //! | `morton` | neighbours along a curve: the fast preset |
 //!
 //! A node starts as one range of items; the child with the largest surface is split in two until there are eight or none is
@@ -23,6 +24,7 @@ mod bins;
 mod children;
 pub(super) mod lanes;
 pub(super) mod morton;
+pub(super) mod presplit;
 mod record;
 mod split;
 mod subtree;

@@ -38,6 +38,11 @@ impl Record {
         self.0[0] == f32::NEG_INFINITY
     }
 
+    /// The box.
+    pub fn bounds(&self) -> Aabb {
+        aabb(&self.0)
+    }
+
     /// Index in its part.
     #[inline(always)]
     pub fn primitive(&self) -> u32 {
@@ -54,7 +59,8 @@ impl Record {
 /// Half the surface of a box; without order for an empty one.
 #[inline(always)]
 pub(super) fn half_area(bounds: &[f32; 8]) -> f32 {
-    let [x, y, z] = [0, 1, 2].map(|axis| bounds[axis] + bounds[axis + 4]);
+    let &[a, b, c, _, d, e, f, _] = bounds;
+    let (x, y, z) = (a + d, b + e, c + f);
     y * (x + z) + z * x
 }
 
@@ -70,8 +76,9 @@ pub(in crate::trace::bvh) fn triangle_items(parts: &[Part]) -> Vec<Record> {
     let mut items = memory::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
     for (p, part) in parts.iter().enumerate() {
         let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
-        items.par_extend(triangles.par_iter().enumerate().map(|(i, corners)| {
-            let corners = corners.map(|i| positions[i as usize]);
+        let positions = &positions[..];
+        items.par_extend(triangles.par_iter().enumerate().map(|(i, &[a, b, c])| {
+            let corners = [positions[a as usize], positions[b as usize], positions[c as usize]];
             if corners.iter().all(|&corner| is_traceable(corner)) {
                 Record::new(&Aabb::around(corners), p as u32, i as u32)
             } else {

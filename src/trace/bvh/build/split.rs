@@ -24,7 +24,9 @@ impl Rule {
     #[inline(always)]
     pub fn blocks_of_four(&self, counts: &[u32; 4]) -> [f32; 4] {
         let shift = self.block.trailing_zeros();
-        counts.map(|count| ((count + self.block - 1) >> shift) as i32 as f32)
+        let [x, y, z, w] = *counts;
+        let blocks = |count: u32| ((count + self.block - 1) >> shift) as i32 as f32;
+        [blocks(x), blocks(y), blocks(z), blocks(w)]
     }
 }
 
@@ -59,10 +61,11 @@ impl Range {
     /// take another look at each of them.
     #[inline(always)]
     fn centres_within(&self, bounds: &[f32; 8]) -> [f32; 8] {
-        std::array::from_fn(
-            #[inline(always)]
-            |lane| self.centres[lane].min(2.0 * bounds[lane]),
-        )
+        let mut centres = self.centres;
+        for (centre, bound) in centres.iter_mut().zip(bounds) {
+            *centre = centre.min(2.0 * bound);
+        }
+        centres
     }
 
     #[inline(always)]
@@ -175,17 +178,16 @@ impl Split {
                 sides = [items[..split].iter().fold(sides[0], join), items[split..].iter().fold(sides[1], join)];
             }
         }
-        self.sides(range, split, sides.map(S::V8::to_array))
+        self.sides(range, split, [sides[0].to_array(), sides[1].to_array()])
     }
 
     /// The two sides of `range`, by the number of items of the left one and by their boxes.
     #[inline(always)]
     pub fn sides(&self, range: &Range, left_len: usize, bounds: [[f32; 8]; 2]) -> [Range; 2] {
         let len = left_len as u32;
-        let mut sides = bounds.map(
-            #[inline(always)]
-            |bounds| Range { first: range.first, len, bounds, centres: range.centres_within(&bounds) },
-        );
+        let [left, right] = bounds;
+        let side = |bounds: [f32; 8]| Range { first: range.first, len, bounds, centres: range.centres_within(&bounds) };
+        let mut sides = [side(left), side(right)];
         sides[1].first += len;
         sides[1].len = range.len - len;
         if let Cut::Plane { axis, at } = self.cut {

@@ -16,13 +16,9 @@ pub(super) const MOST: usize = RANKED;
 pub(super) fn best<S: Simd>(items: &[Record], rule: &Rule) -> Option<Split> {
     let n = items.len();
     let orders = sorted::<S>(items);
-    let at = |k: usize| {
-        let [x, y, z] = [0, 1, 2].map(
-            #[inline(always)]
-            |axis| S::V8::load(&items[usize::from(orders[axis][k])].0),
-        );
-        [x, y, z]
-    };
+    // Written out, for what is mapped over an array is not always compiled for the instruction set.
+    let item = |order: &[u8; MOST], k: usize| S::V8::load(&items[usize::from(order[k])].0);
+    let at = |k: usize| [item(&orders[0], k), item(&orders[1], k), item(&orders[2], k)];
     let join = |a: [S::V8; 3], b: [S::V8; 3]| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
     let mut right_areas = [[0.0; 4]; MOST];
     let mut right = [S::V8::splat(f32::NEG_INFINITY); 3];
