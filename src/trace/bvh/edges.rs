@@ -10,6 +10,10 @@
 //! | edge function | 46 u D L s: corner, edge, product, difference (8 u L s a component), the slopes, products and sums | 6 D b s |
 //! | slope d . N | 46 u D s^2 | 0 |
 //! | height A . N | 48 u L s^2 | 6 b s^2 |
+//!
+//! Where the bundle is turned, a ray's own origin is at its far end, most often on a surface. On which side of the plane
+//! it lies, t' is too coarse to tell, but C . N does, C being A less the ray's end: C is off by u L + b and small, N by
+//! 8 u s^2 a component, and product and sum by as much again.
 
 use super::block::LANES;
 use super::bundle::{Bundle, axes};
@@ -25,6 +29,11 @@ pub(super) struct Edges {
     pub near_height: [f32; LANES],
     pub far_height: [f32; LANES],
     pub edge_error: [f32; LANES],
+    /// The first corner relative to the bundle's origin, on the same axes as the normals.
+    pub corner: [[f32; LANES]; 3],
+    /// Error of a corner relative to a ray's own origin, and of a normal's component.
+    pub corner_error: [f32; LANES],
+    pub normal_error: [f32; LANES],
     /// A bit for every triangle that rays of the bundle may see from both sides, or too obliquely to bound t'.
     pub is_vague: u32,
 }
@@ -91,11 +100,15 @@ impl Edges {
         for (stored, normal) in stored.iter_mut().zip(&normals) {
             *stored = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
         }
+        let a = turned::<S, AXIS>(a, forward);
         let edges = Self {
             normals: stored,
             near_height: height.sub(height.mul(error)).to_array(),
             far_height: height.add(height.mul(error)).to_array(),
             edge_error: edge_error.to_array(),
+            corner: [a[0].to_array(), a[1].to_array(), a[2].to_array()],
+            corner_error: far.mul_add(splat(2.0 * u), splat(2.0 * bundle.blur)).to_array(),
+            normal_error: square.mul(splat(24.0 * u)).to_array(),
             is_vague: two_sided | !tame.bits(),
         };
         (!culled & 0b1111, edges)

@@ -16,7 +16,7 @@ use std::marker::PhantomData;
 
 use super::block::LANES;
 use super::build::MAX_DEPTH;
-use super::bundle::{Boxes, Bundle, BundleSlab, Fit, PerRay, RAYS, SLACK, TINY};
+use super::bundle::{Boxes, Bundle, BundleSlab, Fit, PerRay, RAYS, SLACK, TINY, axes};
 use super::edges::Edges;
 use super::found::NONE;
 use super::node::WIDTH;
@@ -324,6 +324,9 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     S::Wide::put_where(sure, id, &mut self.found.noted, group);
                     changed = true;
                 }
+                if open != 0 && self.bundle.is_turned {
+                    open &= !self.behind_starts::<S>(edges, lane, group);
+                }
             }
             while open != 0 {
                 let i = open.trailing_zeros() as usize;
@@ -332,6 +335,24 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
             }
         }
         changed
+    }
+
+    /// A bit for each ray of a group, in a turned bundle, that starts beyond the triangle's plane.
+    #[inline(always)]
+    fn behind_starts<S: Simd>(&self, edges: &Edges, lane: usize, group: usize) -> u32 {
+        let splat = S::Wide::splat;
+        let [p, q, along] = axes(AXIS);
+        let direction = &self.bundle.direction;
+        // The bundle's direction is the given one, turned round.
+        let x = splat(edges.corner[0][lane]).add(S::Wide::at(&direction[p], group));
+        let y = splat(edges.corner[1][lane]).add(S::Wide::at(&direction[q], group));
+        let z = S::Wide::at(&direction[along], group).mul_add(splat(self.bundle.forward), splat(edges.corner[2][lane]));
+        let n = normal::<S>(edges, 3, lane);
+        let side = x.mul(n[0]).add(y.mul(n[1])).add(z.mul(n[2]));
+        let size = x.abs().add(y.abs()).add(z.abs());
+        let steep = n[0].abs().add(n[1].abs()).add(n[2].abs());
+        let error = size.mul_add(splat(edges.normal_error[lane]), steep.mul(splat(edges.corner_error[lane])));
+        error.add(splat(TINY)).less(side).bits()
     }
 
     /// What the bounds leave open.
