@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::block::{Block, LANES};
 use super::build::{self, Record, morton};
 use super::leaves::Leaves;
-use super::memory;
 use super::meshes::Meshes;
 use super::node::{Node, Tree, WIDTH};
 use super::preset::Options;
+use super::room;
 use crate::trace::Part;
 
 /// Clusters that are made by one thread.
@@ -27,7 +27,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
         chunks.push((lengths.iter().map(|len| len.div_ceil(LANES)).sum(), (lengths, own)));
     }
     let counts: Vec<usize> = chunks.iter().map(|(count, _)| *count).collect();
-    let blocks = memory::fill(chunks, |(lengths, mut rest), room| {
+    let blocks = room::fill(chunks, |(lengths, mut rest), room| {
         options.report(rest.len());
         for &len in lengths {
             let (own, others) = rest.split_at(len);
@@ -47,7 +47,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
         first += count;
         (lengths.len(), (lengths, first - count))
     });
-    let mut nodes = memory::fill(chunks.collect(), |(lengths, mut first): (&[usize], usize), room| {
+    let mut nodes = room::fill(chunks.collect(), |(lengths, mut first): (&[usize], usize), room| {
         for &len in lengths {
             let count = len.div_ceil(LANES);
             room.push(node(&blocks[first..first + count], first as u32));
@@ -55,7 +55,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
         }
     });
     let item = |(index, node): (usize, &Node)| Record::new(&node.bounds(), 0, index as u32);
-    let mut items = memory::with_capacity(nodes.len());
+    let mut items = crate::memory::with_capacity(nodes.len());
     items.par_extend(nodes.par_iter().enumerate().map(item));
     let above = build::build(&mut items, 1, 1, &Options { progress: None, ..*options });
     (above.over(&items, &mut nodes), Leaves::of_blocks(blocks), count)

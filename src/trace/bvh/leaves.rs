@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::block::{Block, LANES};
 use super::build::Record;
-use super::memory;
 use super::meshes::Meshes;
 use super::node::{NO_CHILD, Node, Tree, WIDTH};
+use super::room;
 use super::simd::Simd;
 use crate::math::is_traceable;
 use crate::trace::Part;
@@ -130,7 +130,7 @@ fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) 
     let of_node = |node: &Node| node.count.map(count).iter().sum::<usize>();
     let chunks = tree.nodes_mut().par_chunks_mut(CHUNK);
     let counted = chunks.map(|nodes| (nodes.iter().map(of_node).sum(), nodes)).collect();
-    memory::fill(counted, |nodes, room| {
+    room::fill(counted, |nodes, room| {
         for node in nodes {
             for slot in 0..WIDTH {
                 let len = count(node.count[slot]);

@@ -11,7 +11,7 @@
 //! | `walk` | one ray, from the root to the leaves |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
-//! | `leaves`, `meshes`, `memory` | where blocks are kept, or fetched from the mesh; large arrays |
+//! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
 //!
@@ -31,7 +31,6 @@ mod filter;
 mod found;
 mod isa;
 mod leaves;
-mod memory;
 mod meshes;
 mod node;
 mod placements;
@@ -39,6 +38,7 @@ mod preset;
 mod quad;
 mod query;
 mod refit;
+mod room;
 mod shapes;
 mod simd;
 mod slab;

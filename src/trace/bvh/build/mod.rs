@@ -34,9 +34,9 @@ mod top;
 use rayon::prelude::*;
 
 use super::isa::{self, Isa};
-use super::memory;
 use super::node::{Node, Tree, WIDTH};
 use super::preset::Options;
+use super::room;
 use children::Children;
 pub(super) use children::{MAX_LEAF_BLOCKS, NODE_COST};
 pub(super) use record::{Record, triangle_items};
@@ -123,7 +123,7 @@ fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<N
     }
     let mut chunks = vec![(top.len(), (false, top))];
     chunks.extend(subtrees.into_iter().map(|(_, subtree)| (subtree.len(), (true, subtree))));
-    memory::fill(chunks, |(is_subtree, nodes): (bool, Vec<Node>), room| {
+    room::fill(chunks, |(is_subtree, nodes): (bool, Vec<Node>), room| {
         let base = if is_subtree { room.first as u32 } else { 0 };
         for mut node in nodes {
             for slot in 0..WIDTH {

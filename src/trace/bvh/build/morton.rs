@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
-use crate::trace::bvh::memory;
+use crate::memory;
 use crate::trace::bvh::meshes::{Mesh, Meshes};
 
 /// Bits of a code for each axis.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
-use crate::trace::bvh::memory;
+use crate::memory;
 use crate::trace::{Part, Primitives};
 
 /// A box as [-min, max]: one eight-wide maximum joins two of them (Fuetterling, Lojewski, Pfreundt, Hamann, Ebert 2017,

@@ -3,11 +3,13 @@
 //! A tree of a few million triangles is built in the time that the system takes to hand out its memory in pages of
 //! 4 KiB: see docs/PERFORMANCE.md. Collecting into one vector for each chunk and joining these, the safe alternative,
 //! writes everything twice and holds both copies for a while.
-#![allow(unsafe_code)] // A vector's length is set after it was filled in place; advice to the system.
+#![allow(unsafe_code)] // A vector's length is set after it was filled in place.
 
 use std::mem::MaybeUninit;
 
 use rayon::prelude::*;
+
+use crate::memory;
 
 /// Room for some values of an array, filled from the front.
 pub(super) struct Room<'a, T> {
@@ -38,7 +40,7 @@ impl<T> Room<'_, T> {
 /// Where a chunk writes another number of values than it was given with.
 pub(super) fn fill<T: Send, C: Send>(chunks: Vec<(usize, C)>, write: impl Fn(C, &mut Room<'_, T>) + Sync) -> Vec<T> {
     let len = chunks.iter().map(|(len, _)| len).sum();
-    let mut array = with_capacity(len);
+    let mut array = memory::with_capacity(len);
     let mut rest = &mut array.spare_capacity_mut()[..len];
     let mut jobs = Vec::with_capacity(chunks.len());
     let mut first = 0;
@@ -58,38 +60,12 @@ pub(super) fn fill<T: Send, C: Send>(chunks: Vec<(usize, C)>, write: impl Fn(C, 
     array
 }
 
-/// An empty vector with room for `capacity` values, in huge pages if there are many.
-pub(super) fn with_capacity<T>(capacity: usize) -> Vec<T> {
-    let mut array = Vec::with_capacity(capacity);
-    advise(&mut array);
-    array
-}
-
-/// Below this size, in bytes, pages of the usual size will do.
-const LARGE: usize = 4 << 20;
-
-/// Asks for huge pages before the memory is touched; the system may refuse.
-#[cfg(target_os = "linux")]
-fn advise<T>(array: &mut Vec<T>) {
-    const PAGE: usize = 4096;
-    let slots = array.spare_capacity_mut();
-    if size_of_val(slots) < LARGE {
-        return;
-    }
-    let begin = slots.as_mut_ptr() as usize;
-    let (low, high) = (begin.next_multiple_of(PAGE), (begin + size_of_val(slots)) / PAGE * PAGE);
-    // SAFETY: whole pages within memory that this vector owns; the advice changes no contents.
-    unsafe { libc::madvise(low as *mut libc::c_void, high - low, libc::MADV_HUGEPAGE) };
-}
-
-#[cfg(not(target_os = "linux"))]
-fn advise<T>(_: &mut Vec<T>) {
-    _ = LARGE;
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Enough for huge pages.
+    const MANY: usize = 4 << 20;
 
     #[test]
     fn chunks_stand_in_order() {
@@ -102,12 +78,12 @@ mod tests {
             }
         });
         assert_eq!(array, expected);
-        let large: Vec<u64> = fill(vec![(0, 0), (LARGE, 1)], |i, room| {
-            for k in 0..LARGE * i {
+        let large: Vec<u64> = fill(vec![(0, 0), (MANY, 1)], |i, room| {
+            for k in 0..MANY * i {
                 room.push(k as u64);
             }
         });
-        assert!(large.iter().copied().eq(0..LARGE as u64));
+        assert!(large.iter().copied().eq(0..MANY as u64));
     }
 
     #[test]
