@@ -1,0 +1,242 @@
+//! A bundle on its way through a tree: boxes for all rays, triangles for groups of them.
+
+use std::marker::PhantomData;
+
+use super::found::{DONE, Found};
+use crate::ray::Ray;
+use crate::trace::bvh::block::LANES;
+use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, RAYS, SLACK, TINY, axes};
+use crate::trace::bvh::edges::Edges;
+use crate::trace::bvh::node::WIDTH;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::triangles::TriangleTree;
+
+/// A child to be visited.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Entry {
+    /// Where the bundle enters it, at the earliest.
+    near: f32,
+    index: u32,
+    count: u8,
+    /// The first group with a ray that enters it.
+    first: u8,
+}
+
+/// A bundle on its way through a tree of triangles.
+pub(super) struct Walk<'a, Q, const AXIS: usize> {
+    tree: &'a TriangleTree,
+    rays: &'a [Ray; RAYS],
+    bundle: &'a Bundle,
+    found: &'a mut Found,
+    groups: usize,
+    /// The largest limit of all rays.
+    most: f32,
+    query: PhantomData<Q>,
+}
+
+impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
+    #[inline(always)]
+    pub fn new(
+        tree: &'a TriangleTree,
+        rays: &'a [Ray; RAYS],
+        bundle: &'a Bundle,
+        found: &'a mut Found,
+        groups: usize,
+    ) -> Self {
+        found.start(bundle);
+        Self { tree, rays, bundle, found, groups, most: 0.0, query: PhantomData }
+    }
+
+    #[inline(always)]
+    fn measure<S: Simd>(&mut self) {
+        let mut most = S::Wide::at(&self.found.limit, 0);
+        for group in 1..self.groups {
+            most = most.max(S::Wide::at(&self.found.limit, group));
+        }
+        self.most = most.largest();
+    }
+
+    #[inline(always)]
+    pub fn run<S: Simd>(mut self, stack: &mut [Entry], slab: &BundleSlab) {
+        self.measure::<S>();
+        let tree = self.tree.tree();
+        let mut len = 0;
+        let mut next = Entry::default();
+        loop {
+            if next.count == 0 {
+                let node = tree.node(next.index);
+                let (mut mask, near, boxes) = slab.enter::<S>(node, self.bundle.first, self.most);
+                let base = len;
+                while mask != 0 {
+                    let slot = mask.trailing_zeros() as usize % WIDTH;
+                    mask &= mask - 1;
+                    let Some(first) = self.first_group::<S>(&boxes, slot, next.first) else { continue };
+                    let child = Entry { near: near[slot], index: node.index[slot], count: node.count[slot], first };
+                    let mut at = len;
+                    while at > base && stack[at - 1].near < child.near {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
+                    }
+                    stack[at] = child;
+                    len += 1;
+                    if child.count == 0 {
+                        S::prefetch(tree.node(child.index));
+                    } else {
+                        self.tree.prefetch::<S>(child.index);
+                    }
+                }
+            } else if self.visit::<S>(next) {
+                self.measure::<S>();
+            }
+            next = loop {
+                if len == 0 {
+                    return;
+                }
+                len -= 1;
+                if stack[len].near <= self.most {
+                    break stack[len];
+                }
+            };
+        }
+    }
+
+    /// The first group, from `from` on, with a ray that enters the box.
+    #[inline(always)]
+    fn first_group<S: Simd>(&self, boxes: &Boxes, slot: usize, from: u8) -> Option<u8> {
+        let splat = S::Wide::splat;
+        let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
+        let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
+        for group in usize::from(from)..self.groups {
+            let p = S::Wide::at(&self.bundle.reciprocal[0], group);
+            let q = S::Wide::at(&self.bundle.reciprocal[1], group);
+            let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
+            let limit = S::Wide::at(&self.found.limit, group).min(far[2]);
+            let last = far[0].mul(p).min(far[1].mul(q)).min(limit);
+            if first.at_most(last).bits() != 0 {
+                return Some(group as u8);
+            }
+        }
+        None
+    }
+
+    /// Tests the blocks of a leaf; true where a limit has changed.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, leaf: Entry) -> bool {
+        let mut changed = false;
+        for index in leaf.index..leaf.index + u32::from(leaf.count) {
+            let mut scratch = None;
+            let block = self.tree.block(index, &mut scratch);
+            let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, self.most);
+            let mut lanes = lanes & block.lanes;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LANES;
+                lanes &= lanes - 1;
+                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, leaf.first);
+            }
+        }
+        changed
+    }
+
+    /// One triangle against the groups from `first` on.
+    #[inline(always)]
+    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, first: u8) -> bool {
+        let splat = S::Wide::splat;
+        let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
+        let bound = splat(edges.edge_error[lane]);
+        let below = splat(-edges.edge_error[lane]);
+        let is_vague = edges.is_vague >> lane & 1 != 0;
+        let (mut changed, first_t) = (false, splat(self.bundle.first));
+        for group in usize::from(first)..self.groups {
+            let p = S::Wide::at(&self.bundle.slope[0], group);
+            let q = S::Wide::at(&self.bundle.slope[1], group);
+            let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
+            let least = u.min(v).min(w);
+            let inside = below.at_most(least);
+            let mut open = inside.bits();
+            if is_vague {
+                // Where the bundle sees both sides, the signs must only agree.
+                open |= u.max(v).max(w).at_most(bound).bits();
+            } else if open != 0 {
+                let inverse = splat(1.0).div(along(&normal::<S>(edges, 3, lane), p, q));
+                let low = splat(edges.near_height[lane]).mul(inverse);
+                let high = splat(edges.far_height[lane]).mul(inverse);
+                let limit = S::Wide::at(&self.found.limit, group);
+                let before = S::Wide::at(&self.found.sure, group);
+                let in_range = high.less(before).and(S::Wide::at(&self.bundle.begin, group).less(low));
+                let sure = bound.less(least).and(in_range);
+                let outside = limit.less(low).or(high.less(first_t));
+                open = inside.without(sure).without(outside).bits();
+                if sure.bits() != 0 {
+                    let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
+                    S::Wide::select(sure, high, limit).put(&mut self.found.limit, group);
+                    S::Wide::select(sure, low, before).put(&mut self.found.sure, group);
+                    S::Wide::put_where(sure, id, &mut self.found.noted, group);
+                    changed = true;
+                }
+                if open != 0 && self.bundle.is_turned {
+                    open &= !self.behind_starts::<S>(edges, lane, group);
+                }
+            }
+            while open != 0 {
+                let i = open.trailing_zeros() as usize;
+                open &= open - 1;
+                changed |= self.decide(group * S::Wide::LANES + i, id);
+            }
+        }
+        changed
+    }
+
+    /// A bit for each ray of a group, in a turned bundle, that starts beyond the triangle's plane.
+    #[inline(always)]
+    fn behind_starts<S: Simd>(&self, edges: &Edges, lane: usize, group: usize) -> u32 {
+        let splat = S::Wide::splat;
+        let [p, q, along] = axes(AXIS);
+        let direction = &self.bundle.direction;
+        // The bundle's direction is the given one, turned round.
+        let x = splat(edges.corner[0][lane]).add(S::Wide::at(&direction[p], group));
+        let y = splat(edges.corner[1][lane]).add(S::Wide::at(&direction[q], group));
+        let z = S::Wide::at(&direction[along], group).mul_add(splat(self.bundle.forward), splat(edges.corner[2][lane]));
+        let n = normal::<S>(edges, 3, lane);
+        let side = x.mul(n[0]).add(y.mul(n[1])).add(z.mul(n[2]));
+        let size = x.abs().add(y.abs()).add(z.abs());
+        let steep = n[0].abs().add(n[1].abs()).add(n[2].abs());
+        let error = size.mul_add(splat(edges.normal_error[lane]), steep.mul(splat(edges.corner_error[lane])));
+        error.add(splat(TINY)).less(side).bits()
+    }
+
+    /// What the bounds leave open.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, ray: usize, id: u32) -> bool {
+        let Self { tree, rays, bundle, found, .. } = self;
+        if Q::ANY && found.limit.0[ray] < 0.0 {
+            return false;
+        }
+        found.compute(tree, rays, ray);
+        let before = found.nearest[ray].limit();
+        tree.offer_one(id, &rays[ray], &mut found.nearest[ray]);
+        let Some(hit) = found.nearest[ray].hit() else { return false };
+        if Q::ANY {
+            (found.sure.0[ray], found.limit.0[ray]) = (DONE, DONE);
+            return true;
+        }
+        let depth = bundle.depth.0[ray];
+        found.sure.0[ray] = hit.t.next_down() * depth * (1.0 - SLACK) - TINY;
+        found.limit.0[ray] = found.nearest[ray].limit() * depth * (1.0 + SLACK) + TINY;
+        found.nearest[ray].limit() < before
+    }
+}
+
+/// Normal k of one triangle, for each ray.
+#[inline(always)]
+fn normal<S: Simd>(edges: &Edges, k: usize, lane: usize) -> [S::Wide; 3] {
+    let [x, y, z] = &edges.normals[k];
+    [S::Wide::splat(x[lane]), S::Wide::splat(y[lane]), S::Wide::splat(z[lane])]
+}
+
+/// The scalar product with (p, q, 1).
+#[inline(always)]
+fn along<V: Vector>(n: &[V; 3], p: V, q: V) -> V {
+    p.mul_add(n[0], q.mul_add(n[1], n[2]))
+}
