@@ -11,6 +11,7 @@
 //! | `walk` | one ray, from the root to the leaves |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `leaves`, `meshes`, `memory` | where blocks are kept, or fetched from the mesh; large arrays |
 //! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
@@ -22,6 +23,7 @@
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
+mod all_hits;
 mod block;
 mod build;
 mod bundle;

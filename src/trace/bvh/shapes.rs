@@ -65,4 +65,23 @@ impl ShapeTree {
             }
         }
     }
+
+    /// Adds everything that `local` (the ray in this level's coordinates) hits in a leaf, with t in f64.
+    #[inline]
+    pub fn gather_leaf(
+        &self,
+        first: u32,
+        count: u8,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        hits: &mut Vec<(f64, Hit)>,
+    ) {
+        for Entry { shape, primitive, part } in &self.entries[first as usize..first as usize + usize::from(count)] {
+            let instance = through.map_or(part.instance, |through| through.instance);
+            hits.extend(shape.intersect_all(local).map(|hit| {
+                let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
+                (hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance })
+            }));
+        }
+    }
 }

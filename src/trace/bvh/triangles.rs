@@ -106,6 +106,12 @@ impl TriangleTree {
         self.leaves.block(index, scratch)
     }
 
+    /// The ids of a part, as blocks number them.
+    #[inline(always)]
+    pub fn part(&self, part: u32) -> PartId {
+        self.parts[part as usize]
+    }
+
     /// Has a block loaded that will be needed soon.
     #[inline(always)]
     pub fn prefetch<S: Simd>(&self, index: u32) {
