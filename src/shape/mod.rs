@@ -4,6 +4,7 @@
 //! [`bounds`](Shape::bounds) and [`intersect`](Shape::intersect) for the native leaves and for Embree's user geometry
 //! alike. A closed family is an enum and not a trait object: the compiler lists every place a new shape must reach.
 
+pub mod closest;
 pub mod crossing;
 mod sphere;
 pub mod triangle;

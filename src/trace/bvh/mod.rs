@@ -12,6 +12,7 @@
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
+//! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `leaves`, `meshes`, `memory` | where blocks are kept, or fetched from the mesh; large arrays |
 //! | `block`, `filter` | four triangles together, and what a single ray rejects of them |
 //! | `simd`, `isa` | the same code compiled twice, for AVX2 and for any processor |
@@ -27,6 +28,7 @@ mod all_hits;
 mod block;
 mod build;
 mod bundle;
+mod closest_point;
 mod clusters;
 mod edges;
 mod filter;
@@ -48,6 +50,7 @@ mod tile;
 mod triangles;
 mod walk;
 
+pub use closest_point::ClosestPoint;
 pub use isa::Isa;
 pub use preset::{Options, Preset};
 
