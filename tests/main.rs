@@ -11,6 +11,7 @@ mod io;
 mod layering;
 mod mutation;
 mod parity;
+mod queries;
 mod references;
 mod render;
 mod scenes;

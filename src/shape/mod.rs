@@ -4,6 +4,8 @@
 //! [`bounds`](Shape::bounds) and [`intersect`](Shape::intersect) for the native leaves and for Embree's user geometry
 //! alike. A closed family is an enum and not a trait object: the compiler lists every place a new shape must reach.
 
+pub mod closest;
+pub mod crossing;
 mod sphere;
 pub mod triangle;
 
@@ -40,6 +42,13 @@ impl Shape {
     pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
         match self {
             Self::Sphere(sphere) => sphere.intersect(ray),
+        }
+    }
+
+    /// Every intersection with `tmin <= t <= tmax`; an even number over the whole line.
+    pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
+        match self {
+            Self::Sphere(sphere) => sphere.intersect_all(ray),
         }
     }
 

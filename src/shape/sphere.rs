@@ -29,11 +29,23 @@ impl Sphere {
     }
 
     /// The nearest intersection with `tmin <= t <= tmax`, in f64.
+    pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
+        self.intersect_all(ray).next()
+    }
+
+    /// Both intersections, the nearer first, where `tmin <= t <= tmax`; a tangent has the same one twice.
+    pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
+        let valid = |t: &f64| (ray.tmin..=ray.tmax).contains(&(*t as f32)) && (*t as f32).is_finite();
+        let hit = |t: f64| ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) };
+        self.roots(ray).into_iter().flatten().filter(valid).map(hit)
+    }
+
+    /// Where the ray's line enters and leaves, in f64.
     ///
     /// The discriminant is taken from the distance between the centre and the ray's line, not from the difference of
     /// two large squares, and the roots without cancellation (Haines, Günther, Akenine-Möller 2019, *Precision
     /// improvements for ray/sphere intersection*, Ray Tracing Gems ch. 7).
-    pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
+    fn roots(&self, ray: &Ray) -> Option<[f64; 2]> {
         let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let f = origin - self.centre.as_dvec3();
         let r = f64::from(self.radius);
@@ -47,16 +59,7 @@ impl Sphere {
         let q = b + (a * discriminant).sqrt().copysign(b);
         // q is 0 only for a ray that starts on the sphere and touches it.
         let (t0, t1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
-        let (near, far) = if t0 <= t1 { (t0, t1) } else { (t1, t0) };
-        let valid = |t: f64| (ray.tmin..=ray.tmax).contains(&(t as f32)) && (t as f32).is_finite();
-        let t = if valid(near) {
-            near
-        } else if valid(far) {
-            far
-        } else {
-            return None;
-        };
-        Some(ShapeHit { t, uv: self.uv(origin + d * t) })
+        Some(if t0 <= t1 { [t0, t1] } else { [t1, t0] })
     }
 
     /// The unit normal, outwards, at `point` on the surface.

@@ -5,10 +5,11 @@
 //! while refitting (Kopta, Ize, Spjut, Brunvand, Davis, Kensler 2012, *Fast, effective BVH updates for animated
 //! scenes*), the alternative, would change the tree's layout under a cached file.
 
+use super::Bvh;
+use super::level::Level;
 use super::placements::PlacementTree;
 use super::preset::Options;
 use super::shapes::ShapeTree;
-use super::{Bvh, Level};
 use crate::error::{Error, Result};
 use crate::math::Aabb;
 use crate::trace::{Part, World};

@@ -1,9 +1,10 @@
 //! Leaves of shapes that are not triangles.
 
+use super::PartId;
 use super::build::{self, Record};
+use super::level::Through;
 use super::node::Tree;
 use super::preset::Options;
-use super::{PartId, Through};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
 use crate::trace::nearest::Nearest;
@@ -63,6 +64,25 @@ impl ShapeTree {
                 let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
                 nearest.offer(hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance });
             }
+        }
+    }
+
+    /// Adds everything that `local` (the ray in this level's coordinates) hits in a leaf, with t in f64.
+    #[inline]
+    pub fn gather_leaf(
+        &self,
+        first: u32,
+        count: u8,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        hits: &mut Vec<(f64, Hit)>,
+    ) {
+        for Entry { shape, primitive, part } in &self.entries[first as usize..first as usize + usize::from(count)] {
+            let instance = through.map_or(part.instance, |through| through.instance);
+            hits.extend(shape.intersect_all(local).map(|hit| {
+                let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
+                (hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance })
+            }));
         }
     }
 }

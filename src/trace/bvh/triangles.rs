@@ -8,13 +8,14 @@ use super::clusters;
 use super::filter::Filter;
 use super::found::Found;
 use super::leaves::Leaves;
+use super::level::Through;
 use super::meshes::Meshes;
 use super::node::Tree;
 use super::preset::{Options, Preset};
 use super::quad::{Numbers, Quad};
 use super::query::Query;
 use super::simd::Simd;
-use super::{PartId, Through, refit};
+use super::{PartId, refit};
 use crate::error::Result;
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
@@ -104,6 +105,12 @@ impl TriangleTree {
     #[inline(always)]
     pub fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         self.leaves.block(index, scratch)
+    }
+
+    /// The ids of a part, as blocks number them.
+    #[inline(always)]
+    pub fn part(&self, part: u32) -> PartId {
+        self.parts[part as usize]
     }
 
     /// Has a block loaded that will be needed soon.

@@ -1,0 +1,223 @@
+//! All hits of a ray, in one traversal.
+//!
+//! Hits in the interior of triangles count as they come. Those on edges and in corners are gathered, and of the triangles of
+//! a part that touch there, in the same place and in the same sense, as many count as the ray crosses when it is moved
+//! aside ([`crate::shape::crossing`]): the lowest ids. The place is the edge or the corner itself, by the positions of
+//! its ends, not the t, which is rounded differently in each triangle; so no tolerance is needed, walls may be arbitrarily
+//! thin, and meshes whose triangles share positions but no indices are served alike.
+
+use super::Bvh;
+use super::batch::Stacks;
+use super::block::LANES;
+use super::filter::Filter;
+use super::isa::{self, Kernel};
+use super::level::{Level, PLACED, Through};
+use super::query::Closest;
+use super::simd::Simd;
+use super::slab::SlabRay;
+use super::triangles::TriangleTree;
+use super::walk::Stack;
+use super::walk::{self, Visit};
+use crate::math::Vec3;
+use crate::ray::{Hit, Ray};
+use crate::shape::crossing::{self, Crossing, Touch};
+use crate::shape::triangle::Placed;
+
+impl Bvh {
+    /// All hits of `ray` with `tmin <= t <= tmax`, into `hits`, which is cleared first: ordered by t (in f64, before it
+    /// is rounded), then by id.
+    ///
+    /// Each crossing counts once. A closed mesh is hit an even number of times from outside and an odd number from inside,
+    /// also by a ray through its edges and corners. There the lowest id among the triangles that touch stands for
+    /// each crossing, of those that are crossed in the same sense (inwards, or outwards). A ray that only touches an edge or
+    /// a corner counts as two crossings, in and out, or as none: as if it were moved aside by next to nothing in x, and if
+    /// that leaves it there in y, then z. So a ray may have a closest hit and no crossing. Spheres are crossed twice, also
+    /// where the ray is a tangent.
+    ///
+    /// Triangles that coincide count each. The ends of the range are held against every triangle's own t, rounded to
+    /// f32: parity is that of the range where no edge lies within that rounding of its ends.
+    pub fn all_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+        hits.clear();
+        if ray.is_valid() {
+            let mut gathered = Gathered::default();
+            isa::dispatch(self.isa, Gather { bvh: self, ray, gathered: &mut gathered });
+            gathered.finish(hits);
+        }
+    }
+}
+
+/// What was found, with t in f64.
+#[derive(Default)]
+struct Gathered {
+    interior: Vec<(f64, Hit)>,
+    /// On edges and in corners of triangles.
+    touching: Vec<Touching>,
+    shapes: Vec<(f64, Hit)>,
+}
+
+/// A hit on an edge or in a corner.
+struct Touching {
+    t: f64,
+    hit: Hit,
+    /// The bits of the corner's position, twice, or of the positions of the edge's ends, the lower first; in the
+    /// coordinates of the part.
+    place: [[u32; 3]; 2],
+    is_leaving: bool,
+    is_crossed: bool,
+}
+
+impl Touching {
+    /// Equal for those that share a crossing.
+    fn group(&self) -> (u32, u32, [[u32; 3]; 2], bool) {
+        (self.hit.instance, self.hit.geometry, self.place, self.is_leaving)
+    }
+}
+
+/// The ends of an edge, or a corner, as keys.
+fn place(corners: &[Vec3; 3], touch: &Touch) -> [[u32; 3]; 2] {
+    // Adding 0 makes one zero of the two.
+    let key = |k: usize| (corners[k] + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut ends = (0..3).filter(|&k| touch.between[k]).map(key);
+    let first = ends.next().unwrap_or_default();
+    let second = ends.next().unwrap_or(first);
+    [first.min(second), first.max(second)]
+}
+
+impl Gathered {
+    fn take(&mut self, corners: &[Vec3; 3], crossing: Crossing, (primitive, geometry, instance): (u32, u32, u32)) {
+        let Crossing { hit: found, touch } = crossing;
+        let t = found.t;
+        let hit = Hit { t: t as f32, u: found.u as f32, v: found.v as f32, primitive, geometry, instance };
+        match touch {
+            None => self.interior.push((t, hit)),
+            Some(touch) => {
+                let Touch { is_leaving, is_crossed, .. } = touch;
+                self.touching.push(Touching { t, hit, place: place(corners, &touch), is_leaving, is_crossed });
+            }
+        }
+    }
+
+    /// Of each group of touching triangles as many as are crossed; then all in order.
+    fn finish(mut self, hits: &mut Vec<Hit>) {
+        let by_place = |a: &Touching, b: &Touching| (a.group(), a.hit.id()).cmp(&(b.group(), b.hit.id()));
+        self.touching.sort_unstable_by(by_place);
+        // Triangles that were cut come once from each of their boxes.
+        self.touching.dedup_by_key(|touching| touching.hit.id());
+        let mut all = self.interior;
+        for group in self.touching.chunk_by(|a, b| a.group() == b.group()) {
+            let crossings = group.iter().filter(|touching| touching.is_crossed).count();
+            all.extend(group[..crossings].iter().map(|touching| (touching.t, touching.hit)));
+        }
+        let in_order = |a: &(f64, Hit), b: &(f64, Hit)| a.0.total_cmp(&b.0).then(a.1.id().cmp(&b.1.id()));
+        all.sort_unstable_by(in_order);
+        all.dedup_by_key(|(_, hit)| hit.id());
+        // After that: a sphere is hit twice under one id.
+        all.append(&mut self.shapes);
+        all.sort_by(in_order);
+        hits.extend(all.iter().map(|(_, hit)| *hit));
+    }
+}
+
+/// The traversal, for one instruction set at a time.
+struct Gather<'a> {
+    bvh: &'a Bvh,
+    ray: &'a Ray,
+    gathered: &'a mut Gathered,
+}
+
+impl Kernel for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, ray, gathered } = self;
+        let Stacks { mut upper, mut level } = Stacks { upper: Stack::new(), level: Stack::new() };
+        bvh.fixed.gather::<S>(ray, ray, None, &mut level, gathered);
+        if bvh.placements.is_empty() {
+            return;
+        }
+        let slab = SlabRay::new(ray, bvh.placements.reach(), 1.0);
+        let limit = limit(ray);
+        walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |first, count| {
+            for placement in bvh.placements.leaf(first, count) {
+                let local = placement.object_ray(ray);
+                if local.is_valid() {
+                    let through = Through { instance: placement.instance, to_world: &placement.to_world };
+                    let object = &bvh.objects[placement.object as usize];
+                    object.gather::<S>(ray, &local, Some(through), &mut level, gathered);
+                }
+            }
+            Visit::Until(limit)
+        });
+    }
+}
+
+/// One step on: t is rounded to f32 before it is held against tmax.
+fn limit(ray: &Ray) -> f32 {
+    ray.tmax.next_up()
+}
+
+impl Level {
+    /// What `ray`, in the world, hits in this level; `local` is the same ray in this level's coordinates, rounded.
+    #[inline(always)]
+    fn gather<S: Simd>(
+        &self,
+        ray: &Ray,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        stack: &mut Stack,
+        gathered: &mut Gathered,
+    ) {
+        let blur = if through.is_some() { PLACED } else { 1.0 };
+        let limit = limit(ray);
+        if !self.triangles.tree().is_empty() {
+            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
+            let filter = Filter::new(local, blur);
+            walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |first, count| {
+                self.triangles.gather_leaf::<S>(first, count, ray, &filter, through, gathered);
+                Visit::Until(limit)
+            });
+        }
+        if !self.shapes.tree().is_empty() {
+            let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
+            walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |first, count| {
+                self.shapes.gather_leaf(first, count, local, through, &mut gathered.shapes);
+                Visit::Until(limit)
+            });
+        }
+    }
+}
+
+impl TriangleTree {
+    #[inline(always)]
+    fn gather_leaf<S: Simd>(
+        &self,
+        first: u32,
+        count: u8,
+        ray: &Ray,
+        filter: &Filter,
+        through: Option<Through<'_>>,
+        gathered: &mut Gathered,
+    ) {
+        for index in first..first + u32::from(count) {
+            let mut scratch = None;
+            let block = self.block(index, &mut scratch);
+            let mut open = filter.candidates::<S>(block, limit(ray)).lanes;
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize % LANES;
+                open &= open - 1;
+                let corners = block.triangle(lane);
+                let part = self.part(block.part[lane]);
+                let (found, instance) = match through {
+                    None => (crossing::crossing(ray, &corners), part.instance),
+                    Some(Through { instance, to_world }) => {
+                        (crossing::crossing(ray, &Placed { corners, to_world }), instance)
+                    }
+                };
+                if let Some(found) = found {
+                    gathered.take(&corners, found, (block.primitive[lane], part.geometry, instance));
+                }
+            }
+        }
+    }
+}
