@@ -47,7 +47,7 @@ pub(super) struct BenchArgs {
     )]
     modes: Vec<ModeArg>,
 
-    /// Camera rays to a side, in whole blocks of 4 x 4; every other ray starts where they hit
+    /// Camera rays to a side, in whole tiles of 8 x 8; every other ray starts where they hit
     #[arg(long, value_name = "N", default_value_t = SIDE as u32, value_parser = clap::value_parser!(u32).range(4..=16_384))]
     size: u32,
 
@@ -100,7 +100,7 @@ enum ModeArg {
     Default,
     /// Native, built fastest
     NativeFast,
-    /// Native, with spatial splits
+    /// Native, built best: large triangles are cut up beforehand
     NativeHigh,
     /// Native, in least memory
     NativeCompact,

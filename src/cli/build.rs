@@ -34,7 +34,7 @@ enum Build {
     Default,
     /// Slow to build, fastest to trace
     High,
-    /// A third of the memory, slower to trace
+    /// A fifth of the memory, slower to trace
     Compact,
 }
 
