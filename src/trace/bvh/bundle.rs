@@ -13,7 +13,7 @@ use super::filter::largest_axis;
 use super::node::{Node, WIDTH};
 use super::query::Query;
 use super::simd::{Array, Group, Mask, Simd, Vector};
-use super::slab::load;
+use super::slab::columns;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -122,17 +122,7 @@ impl Bundle {
         let (mut apart, mut size) = (zero, zero);
         let (mut in_range, mut latest) = (u32::MAX, zero);
         for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
-            let [a, b, c, d, e, f, g, h] = rays;
-            let [x, y, z, dx, dy, dz, tmin, tmax] = S::transpose([
-                load::<S>(a),
-                load::<S>(b),
-                load::<S>(c),
-                load::<S>(d),
-                load::<S>(e),
-                load::<S>(f),
-                load::<S>(g),
-                load::<S>(h),
-            ]);
+            let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
             let (origin, direction) = ([x, y, z], [dx, dy, dz]);
             for axis in 0..3 {
                 store::<S>(&mut self.direction[axis], i, direction[axis]);

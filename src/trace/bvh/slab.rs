@@ -102,17 +102,7 @@ impl SlabRays {
     pub fn new<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> Self {
         let splat = S::V8::splat;
         let zero = splat(0.0);
-        let [a, b, c, d, e, f, g, h] = rays;
-        let [x, y, z, dx, dy, dz, tmin, tmax] = S::transpose([
-            load::<S>(a),
-            load::<S>(b),
-            load::<S>(c),
-            load::<S>(d),
-            load::<S>(e),
-            load::<S>(f),
-            load::<S>(g),
-            load::<S>(h),
-        ]);
+        let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
         let (origin, direction) = ([x, y, z], [dx, dy, dz]);
         let largest = dx.abs().max(dy.abs()).max(dz.abs());
         let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
@@ -166,8 +156,23 @@ impl SlabRays {
     }
 }
 
-/// A ray as eight numbers, in the order of its fields.
+/// Eight rays, field by field: origin, direction, tmin, tmax.
 #[inline(always)]
-pub(super) fn load<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
+pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8] {
+    // Written out: a closure mapped over the array may miss the instruction set.
+    S::transpose([
+        row::<S>(a),
+        row::<S>(b),
+        row::<S>(c),
+        row::<S>(d),
+        row::<S>(e),
+        row::<S>(f),
+        row::<S>(g),
+        row::<S>(h),
+    ])
+}
+
+#[inline(always)]
+fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
     S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::x86::{Avx2, D4, V4, V8};
+use super::x86::{Avx2, D4, V4, V8, lanewise};
 use super::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
@@ -54,16 +54,6 @@ impl Mask for M16 {
     fn bits(self) -> u32 {
         self.0.into()
     }
-}
-
-/// A function of two vectors by its intrinsic, as a method.
-macro_rules! lanewise {
-    ($($name:ident: $intrinsic:ident;)*) => {
-        $(#[inline(always)]
-        fn $name(self, other: Self) -> Self {
-            Self(unsafe { $intrinsic(self.0, other.0) })
-        })*
-    };
 }
 
 impl Vector for V16 {

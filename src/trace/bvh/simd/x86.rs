@@ -9,6 +9,17 @@ use std::arch::x86_64::*;
 use super::{Array, Doubles, Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
+/// A function of two vectors by its intrinsic, as a method.
+macro_rules! lanewise {
+    ($($name:ident: $intrinsic:ident;)*) => {
+        $(#[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            Self(unsafe { $intrinsic(self.0, other.0) })
+        })*
+    };
+}
+pub(super) use lanewise;
+
 /// AVX2 and FMA.
 pub struct Avx2;
 
@@ -63,16 +74,6 @@ pub struct V8(pub __m256);
 /// Four f64.
 #[derive(Clone, Copy)]
 pub struct D4(__m256d);
-
-/// A function of two vectors by its intrinsic, as a method.
-macro_rules! lanewise {
-    ($($name:ident: $intrinsic:ident;)*) => {
-        $(#[inline(always)]
-        fn $name(self, other: Self) -> Self {
-            Self(unsafe { $intrinsic(self.0, other.0) })
-        })*
-    };
-}
 
 /// All bits of a lane of four, or none.
 #[derive(Clone, Copy)]

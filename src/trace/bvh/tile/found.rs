@@ -94,9 +94,9 @@ impl Found {
 
 /// Answers for the four rays of a chunk, each of which hits a triangle for sure.
 ///
-/// What remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough. It is: the
-/// bounds on t' come from rounding in f32 and are half of t' apart at most. That of f64 is 2^29 times smaller, and 2^21
-/// times is wanted; both count some 50 roundings of the same products.
+/// What remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough. It is: where
+/// a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::super::edges::Edges)). f64
+/// rounds 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50 roundings of the same products.
 #[inline(always)]
 fn answer_noted<S: Simd, Q: Query>(
     tree: &TriangleTree,
