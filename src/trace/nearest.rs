@@ -12,6 +12,9 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
+    /// Nothing, within no range.
+    pub const NONE: Self = Self { t: f64::INFINITY, limit: 0.0, hit: None };
+
     /// Nothing yet, within the ray's range.
     pub fn new(ray: &Ray) -> Self {
         // One step on: t is rounded to f32 before it is held against tmax.

@@ -7,7 +7,6 @@
 //! thin, and meshes whose triangles share positions but no indices are served alike.
 
 use super::Bvh;
-use super::batch::Stacks;
 use super::block::LANES;
 use super::filter::Filter;
 use super::isa::{self, Kernel};
@@ -132,7 +131,7 @@ impl Kernel for Gather<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { bvh, ray, gathered } = self;
-        let Stacks { mut upper, mut level } = Stacks { upper: Stack::new(), level: Stack::new() };
+        let (mut upper, mut level) = (Stack::new(), Stack::new());
         bvh.fixed.gather::<S>(ray, ray, None, &mut level, gathered);
         if bvh.placements.is_empty() {
             return;

@@ -1,11 +1,12 @@
 //! Many rays: in bundles where they are bundles, else one by one, made ready and computed several at a time.
 
+use super::flight::{self, Flight};
 use super::found::NONE;
 use super::level::Through;
 use super::quad::widen;
 use super::query::{Query, SOMETHING};
 use super::simd::Simd;
-use super::slab::{SlabRay, SlabRays};
+use super::slab::SlabRay;
 use super::walk::{self, Stack, Visit};
 use super::{Bvh, bundle, isa, tile};
 use crate::ray::Ray;
@@ -16,6 +17,7 @@ use crate::trace::nearest::Nearest;
 pub(super) struct Stacks {
     pub upper: Stack,
     pub level: Stack,
+    pub flight: Flight,
 }
 
 impl Bvh {
@@ -30,12 +32,17 @@ impl Bvh {
 
     /// Placed objects for one ray.
     #[inline(always)]
-    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+    fn enter_placements<S: Simd, Q: Query>(
+        &self,
+        ray: &Ray,
+        upper: &mut Stack,
+        lower: &mut Stack,
+        nearest: &mut Nearest,
+    ) {
         if self.placements.is_empty() || Q::ANY && nearest.hit().is_some() {
             return;
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
-        let Stacks { upper, level: lower } = stacks;
         walk::single::<S, Q>(
             upper,
             self.placements.tree(),
@@ -56,45 +63,42 @@ impl Bvh {
         );
     }
 
-    /// Many rays, one after the other; made ready, and their hits computed, several at a time.
+    /// Many rays, in flight together; hits are computed several at a time.
     #[inline(always)]
     fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
         let triangles = &self.fixed.triangles;
         let is_all = self.has_only_triangles();
         // Rays, and the triangles that they hit for sure.
         let (mut pending, mut ids, mut count) = ([0; 4], [NONE; 4], 0);
-        for first in (0..rays.len()).step_by(8) {
-            let some = &rays[first..rays.len().min(first + 8)];
-            let mut eight = [some[0]; 8];
-            eight[..some.len()].copy_from_slice(some);
-            let slabs = SlabRays::new::<S>(&eight, triangles.tree().reach());
-            for (i, ray) in some.iter().enumerate() {
-                let answer = &mut answers[first + i];
-                *answer = Q::MISS;
-                let Some((slab, filter)) = slabs.get(i) else { continue };
-                let mut found = self.fixed.find::<S, Q>(ray, &slab, &filter, &mut stacks.level);
-                if found.noted != NONE && Q::ANY {
-                    *answer = Q::answer(Some(SOMETHING));
-                    continue;
-                }
-                if found.noted != NONE && is_all {
-                    (pending[count % 4], ids[count % 4]) = (first + i, found.noted);
+        answers.fill(Q::MISS);
+        let Stacks { flight, upper, level } = stacks;
+        flight::trace::<S, Q>(
+            flight,
+            triangles,
+            rays,
+            #[inline(always)]
+            |i, found| {
+                let is_noted = found.is_noted();
+                if is_noted && Q::ANY {
+                    answers[i] = Q::answer(Some(SOMETHING));
+                } else if is_noted && is_all {
+                    (pending[count % 4], ids[count % 4]) = (i, found.noted);
                     count += 1;
                     if count == 4 {
                         count = 0;
                         self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
                     }
-                    continue;
+                } else if found.is_hit() || !is_all {
+                    let ray = &rays[i];
+                    let mut nearest = found.nearest(triangles, ray);
+                    if !(is_all || Q::ANY && nearest.hit().is_some()) {
+                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, level, &mut nearest);
+                        self.enter_placements::<S, Q>(ray, upper, level, &mut nearest);
+                    }
+                    answers[i] = Q::answer(nearest.hit());
                 }
-                found.compute(triangles, ray);
-                let mut nearest = found.nearest;
-                if !(is_all || Q::ANY && nearest.hit().is_some()) {
-                    self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
-                    self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
-                }
-                *answer = Q::answer(nearest.hit());
-            }
-        }
+            },
+        );
         if count > 0 {
             // The others are computed twice, or again.
             for i in count..4 {
@@ -151,7 +155,7 @@ impl Bvh {
                     let mut nearest = Nearest::new(ray);
                     if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
                         self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
-                        self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                        self.enter_placements::<S, Q>(ray, &mut stacks.upper, &mut stacks.level, &mut nearest);
                         *answer = Q::answer(nearest.hit());
                     }
                 }
@@ -182,7 +186,7 @@ impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { bvh, rays, answers, batch } = self;
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new(), flight: Flight::new() };
         if batch.coherent {
             bvh.trace_bundles::<S, Q>(&mut stacks, rays, answers);
         } else {

@@ -1,15 +1,15 @@
-//! Four triangles, laid out component by component for four-wide arithmetic.
+//! Eight triangles, laid out component by component for eight-wide arithmetic.
 
 use crate::math::{Aabb, Vec3};
 
 /// Triangles in a block.
-pub(super) const LANES: usize = 4;
+pub(super) const LANES: usize = 8;
 
-/// Four triangles, component by component.
+/// Eight triangles, component by component.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// Component i of corner k is `corners[3 * k + i]`.
-    pub corners: [[f32; LANES]; 9],
+    /// Component by component: that of the first corners, the second, the third.
+    pub corners: [[[f32; LANES]; 3]; 3],
     pub primitive: [u32; LANES],
     pub part: [u32; LANES],
     /// At least the largest component of an edge.
@@ -21,15 +21,15 @@ pub(super) struct Block {
 impl Block {
     /// Without triangles.
     pub const EMPTY: Self =
-        Self { corners: [[0.0; LANES]; 9], primitive: [0; LANES], part: [0; LANES], size: 0.0, lanes: 0 };
+        Self { corners: [[[0.0; LANES]; 3]; 3], primitive: [0; LANES], part: [0; LANES], size: 0.0, lanes: 0 };
 
-    /// Adds a triangle, the fourth at most.
+    /// Adds a triangle, the eighth at most.
     #[inline(always)]
     pub fn push(&mut self, corners: [Vec3; 3], part: u32, primitive: u32) {
         let lane = self.lanes.trailing_ones() as usize % LANES;
         for (k, corner) in corners.into_iter().enumerate() {
             for axis in 0..3 {
-                self.corners[3 * k + axis][lane] = corner[axis];
+                self.corners[axis][k][lane] = corner[axis];
             }
         }
         let [a, b, c] = corners;
@@ -56,7 +56,7 @@ impl Block {
 
     #[inline(always)]
     pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
-        let [ax, ay, az, bx, by, bz, cx, cy, cz] = &self.corners;
+        let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = &self.corners;
         [
             Vec3::new(ax[lane], ay[lane], az[lane]),
             Vec3::new(bx[lane], by[lane], bz[lane]),

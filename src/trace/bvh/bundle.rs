@@ -235,7 +235,8 @@ impl Bundle {
             let pad = sign[i] * (8.0 * UNIT_ROUNDOFF * span + self.blur);
             slab.near_origin[i] = self.origin[axis] + pad;
             slab.far_origin[i] = self.origin[axis] - pad;
-            (slab.near[i], slab.far[i]) = if sign[i] > 0.0 { (axis, axis + 3) } else { (axis + 3, axis) };
+            (slab.near[i], slab.far[i]) =
+                if sign[i] > 0.0 { (2 * axis, 2 * axis + 1) } else { (2 * axis + 1, 2 * axis) };
             let steepest = slab.reciprocal.get(i).map_or(1.0, |[a, b]| a.abs().max(b.abs()));
             is_finite &= steepest * span < HUGE;
         }

@@ -41,8 +41,12 @@ pub(super) struct Edges {
 impl Edges {
     /// Also a bit for every triangle that some ray of the bundle may hit before `most`. `AXIS` is the bundle's.
     #[inline(always)]
-    pub fn new<S: Simd, const AXIS: usize>(corners: &[[f32; LANES]; 9], bundle: &Bundle, most: f32) -> (u32, Self) {
-        let splat = S::V4::splat;
+    pub fn new<S: Simd, const AXIS: usize>(
+        corners: &[[[f32; LANES]; 3]; 3],
+        bundle: &Bundle,
+        most: f32,
+    ) -> (u32, Self) {
+        let splat = S::V8::splat;
         let [x, y, z] = bundle.origin;
         let origin = [splat(x), splat(y), splat(z)];
         let (pa, pb, pc) = (corner::<S>(corners, 0), corner::<S>(corners, 1), corner::<S>(corners, 2));
@@ -72,9 +76,9 @@ impl Edges {
         let zero = splat(0.0);
         let front = slope_error.less(least_slope);
         let back = most_slope.less(zero.sub(slope_error));
-        let two_sided = !front.or(back).bits() & 0b1111;
+        let two_sided = !front.or(back).bits() & 0b1111_1111;
         // Turned so that the slope is positive.
-        let sign = S::V4::select(back, splat(-1.0), splat(1.0));
+        let sign = S::V8::select(back, splat(-1.0), splat(1.0));
         for normal in &mut normals {
             *normal = [normal[0].mul(sign), normal[1].mul(sign), normal[2].mul(sign)];
         }
@@ -111,20 +115,20 @@ impl Edges {
             normal_error: square.mul(splat(24.0 * u)).to_array(),
             is_vague: two_sided | !tame.bits(),
         };
-        (!culled & 0b1111, edges)
+        (!culled & 0b1111_1111, edges)
     }
 }
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
 
 #[inline(always)]
-fn corner<S: Simd>(corners: &[[f32; LANES]; 9], k: usize) -> [S::V4; 3] {
-    [S::V4::load(&corners[3 * k]), S::V4::load(&corners[3 * k + 1]), S::V4::load(&corners[3 * k + 2])]
+fn corner<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], k: usize) -> [S::V8; 3] {
+    [S::V8::load(&corners[0][k]), S::V8::load(&corners[1][k]), S::V8::load(&corners[2][k])]
 }
 
 /// On the bundle's axes, the third turned forward.
 #[inline(always)]
-fn turned<S: Simd, const AXIS: usize>(n: [S::V4; 3], forward: S::V4) -> [S::V4; 3] {
+fn turned<S: Simd, const AXIS: usize>(n: [S::V8; 3], forward: S::V8) -> [S::V8; 3] {
     let [p, q, along] = axes(AXIS);
     [n[p], n[q], n[along].mul(forward)]
 }
@@ -136,7 +140,7 @@ fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
 
 #[inline(always)]
 fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
-    [p[1].mul(q[2]).sub(p[2].mul(q[1])), p[2].mul(q[0]).sub(p[0].mul(q[2])), p[0].mul(q[1]).sub(p[1].mul(q[0]))]
+    [p[1].mul_sub(q[2], p[2].mul(q[1])), p[2].mul_sub(q[0], p[0].mul(q[2])), p[0].mul_sub(q[1], p[1].mul(q[0]))]
 }
 
 /// The largest magnitude of a component.
@@ -147,10 +151,10 @@ fn size<V: Vector>(p: [V; 3]) -> V {
 
 /// The least and the largest scalar product with a direction of the bundle.
 #[inline(always)]
-fn ends<S: Simd>(n: &[S::V4; 3], bundle: &Bundle) -> (S::V4, S::V4) {
+fn ends<S: Simd>(n: &[S::V8; 3], bundle: &Bundle) -> (S::V8, S::V8) {
     let (mut least, mut most) = (n[2], n[2]);
     for (component, (low, high)) in n.iter().zip(bundle.low.into_iter().zip(bundle.high)) {
-        let (a, b) = (component.mul(S::V4::splat(low)), component.mul(S::V4::splat(high)));
+        let (a, b) = (component.mul(S::V8::splat(low)), component.mul(S::V8::splat(high)));
         least = least.add(a.min(b));
         most = most.add(a.max(b));
     }

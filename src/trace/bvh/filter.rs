@@ -3,7 +3,7 @@
 //! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
 //! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it
 //! only rejects: a triangle falls out when two edge functions have opposite signs by more than their rounding error, or
-//! when t is out of range by more than its own. What remains goes to the exact test.
+//! when t is out of range by more than its own. What remains is noted where there is no doubt, else goes to the exact test.
 //!
 //! With u = 2^-24, a triangle that is hit has its corners, after the shear, within S = (1 + k) s of the ray, s being the
 //! largest component of its edges and k <= 1 of the shear; so no component of a corner relative to the origin is larger
@@ -11,7 +11,7 @@
 //! two roundings, a product and a subtraction), an edge function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by
 //! three such errors. A triangle that is not hit may be bounded wrongly, to no harm.
 
-use super::block::Block;
+use super::block::{Block, LANES};
 use super::bundle::axes;
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -20,7 +20,7 @@ use crate::ray::Ray;
 /// A ray made ready for the f32 reject test.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filter {
-    /// Axes such that the direction is largest along the third.
+    /// The axis along which the direction is largest, before it the two that follow it.
     axes: [usize; 3],
     /// Origin, in the order of `axes`.
     origin: [f32; 3],
@@ -47,12 +47,22 @@ pub(super) struct Candidates {
     /// A bit for those that it hits without doubt, at a t between `low` and `high`, and so that t, u and v can be computed
     /// in f64.
     pub sure: u32,
-    pub low: [f32; 4],
-    pub high: [f32; 4],
+    pub low: [f32; LANES],
+    pub high: [f32; LANES],
+}
+
+impl Candidates {
+    const NONE: Self = Self { lanes: 0, sure: 0, low: [0.0; LANES], high: [0.0; LANES] };
 }
 
 /// Slack of t for its own rounding and that of products with it.
 const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+
+/// Of a sheared component, for a ray that is not rounded itself.
+const ERROR: f32 = 9.0 * UNIT_ROUNDOFF;
+
+/// Against underflow.
+const TINY: f32 = 1e-36;
 
 impl Filter {
     /// `blur` is by how much more than its own rounding the ray may be off (1: not at all).
@@ -70,68 +80,91 @@ impl Filter {
             along: direction[z],
             shorten: reciprocal.abs(),
             begin: ray.tmin * direction[z].abs() * (1.0 - SLACK),
-            error: 9.0 * UNIT_ROUNDOFF * blur,
+            error: ERROR * blur,
             blur: if blur > 1.0 { ray.origin.abs().max_element() } else { 0.0 },
         }
+    }
+
+    /// One of those that are made ready together, by its fields.
+    #[inline(always)]
+    pub fn of_eight(
+        axes: [usize; 3],
+        origin: [f32; 3],
+        shear: [f32; 2],
+        [width, along, shorten, begin]: [f32; 4],
+    ) -> Self {
+        Self { axes, origin, shear, width, along, shorten, begin, error: ERROR, blur: 0.0 }
     }
 
     /// The triangles that the ray may hit up to `limit`.
     #[inline(always)]
     pub fn candidates<S: Simd>(&self, block: &Block, limit: f32) -> Candidates {
-        let splat = S::V4::splat;
+        let splat = S::V8::splat;
         let [kx, ky, kz] = self.axes;
-        let mut x = [splat(0.0); 3];
-        let mut y = [splat(0.0); 3];
-        let mut z = [splat(0.0); 3];
+        let (cx, cy, cz) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
+        let (ox, oy, oz) = (splat(self.origin[0]), splat(self.origin[1]), splat(self.origin[2]));
+        let (sx, sy) = (splat(self.shear[0]), splat(self.shear[1]));
+        // From the corners to the origin, not the other way round: that spares loads.
+        let mut x = [ox; 3];
+        let mut y = [oy; 3];
+        let mut z = [oz; 3];
         for k in 0..3 {
-            let px = S::V4::load(&block.corners[3 * k + kx]).sub(splat(self.origin[0]));
-            let py = S::V4::load(&block.corners[3 * k + ky]).sub(splat(self.origin[1]));
-            z[k] = S::V4::load(&block.corners[3 * k + kz]).sub(splat(self.origin[2]));
-            x[k] = z[k].mul_add(splat(self.shear[0]), px);
-            y[k] = z[k].mul_add(splat(self.shear[1]), py);
+            z[k] = oz.sub(S::V8::load(&cz[k]));
+            x[k] = z[k].mul_add(sx, ox.sub(S::V8::load(&cx[k])));
+            y[k] = z[k].mul_add(sy, oy.sub(S::V8::load(&cy[k])));
         }
         let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
-        let deep = z[0].abs().max(z[1].abs()).max(z[2].abs());
-        let error = splat(self.error);
         let reach = self.width * block.size;
-        let e = deep.mul_add(error, splat((reach + self.blur) * self.error));
-        let wide = e.add(splat(reach));
-        // More than wanted, for the rounding of the bound; a constant against underflow.
-        let bound = wide.mul_add(e.mul_add(splat(5.0), wide.mul(splat(6.0 * UNIT_ROUNDOFF))), splat(1e-36));
+        let deep = z[0].abs().add(splat(block.size));
+        // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
+        // less than e.
+        let e = deep.mul_add(splat(self.error), splat((reach + self.blur) * self.error));
+        let bound = e.add(splat(reach)).mul(e).mul_add(splat(6.0), splat(TINY));
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let zero = splat(0.0);
         // Whatever overflowed is not rejected.
-        let outside = least.add(bound).less(zero).and(zero.less(most.sub(bound)));
-        let passed = !outside.bits() & block.lanes;
-        let mut candidates = Candidates { lanes: passed, sure: 0, low: [0.0; 4], high: [0.0; 4] };
+        let passed = !bound.less(most.min(zero.sub(least))).bits() & block.lanes;
         if passed == 0 || self.blur > 0.0 {
-            return candidates;
+            return Candidates { lanes: passed, ..Candidates::NONE };
         }
         // t |along| = depth / determinant, both multiplied by the determinant.
         let determinant = u.add(v).add(w);
         let size = determinant.abs();
-        let square = determinant.mul(determinant);
-        let depth = u.mul(z[0]).add(v.mul(z[1])).add(w.mul(z[2]));
-        let depth = depth.mul(determinant).mul(splat(1.0f32.copysign(self.along)));
         let error = bound.mul_add(splat(4.0), size.mul(splat(SLACK))).mul(size);
-        let depth_error = error.mul(deep).add(splat(f32::MIN_POSITIVE));
+        let square = determinant.mul(determinant);
+        let (least_square, most_square) = (square.sub(error), square.add(error));
+        let begin = least_square.mul(splat(self.begin));
+        let end = most_square.mul(splat(limit * self.along.abs() * (1.0 + SLACK)));
+        let turn = determinant.mul(splat(1.0f32.copysign(self.along)));
+        let depth = zero.sub(u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2])))).mul(turn);
+        let depth_error = error.mul_add(deep, splat(f32::MIN_POSITIVE));
         let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
-        let before = far.less(square.sub(error).mul(splat(self.begin)));
-        let behind = square.add(error).mul(splat(limit * self.along.abs() * (1.0 + SLACK))).less(near);
-        candidates.lanes = passed & !before.or(behind).bits();
-        if candidates.lanes == 0 {
-            return candidates;
+        let mut lanes = passed & !far.less(begin).or(end.less(near)).bits();
+        let four = splat(4.0);
+        let is_precise = depth_error.mul(four).less(depth);
+        if lanes & !is_precise.bits() != 0 {
+            // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
+            // That rarely, corners are better loaded again than kept: the black box keeps them from being kept.
+            let corners = std::hint::black_box(&block.corners);
+            let (height, height_error) = height::<S>([&corners[kx], &corners[ky], &corners[kz]], [ox, oy, oz]);
+            let (depth, depth_error) = (height.mul(turn), height_error.mul_add(size, splat(f32::MIN_POSITIVE)));
+            let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
+            lanes &= !far.less(begin).or(end.less(near)).bits();
+        }
+        if lanes == 0 {
+            return Candidates::NONE;
         }
         // Precise to a quarter in f32 is more than enough in f64, unless the origin all but touches the triangle: both
         // count the same products of components, but f64 is wanted 2^18 times as precise, and is 2^29 times.
-        let four = splat(4.0);
-        let precise = error.mul(four).less(square).and(depth_error.mul(four).less(depth));
+        let precise = error.mul(four).less(square).and(is_precise);
         let apart = splat(block.size / 32.0).less(deep);
-        let inside = bound.less(least).or(most.less(zero.sub(bound)));
-        candidates.sure = inside.and(precise).and(apart).bits();
-        candidates.low = near.div(square.add(error)).mul(splat(self.shorten * (1.0 - SLACK))).to_array();
-        candidates.high = far.div(square.sub(error)).mul(splat(self.shorten * (1.0 + SLACK))).to_array();
-        candidates
+        let inside = bound.less(least.max(zero.sub(most)));
+        Candidates {
+            lanes,
+            sure: inside.and(precise).and(apart).bits(),
+            low: near.div(most_square).mul(splat(self.shorten * (1.0 - SLACK))).to_array(),
+            high: far.div(least_square).mul(splat(self.shorten * (1.0 + SLACK))).to_array(),
+        }
     }
 }
 
@@ -147,77 +180,79 @@ pub(super) fn largest_axis(v: Vec3) -> usize {
     }
 }
 
-/// Filters of rays that are made ready eight at a time.
-pub(super) struct Filters {
-    axis: [usize; 8],
-    origin: [[f32; 8]; 3],
-    shear: [[f32; 8]; 2],
-    width: [f32; 8],
-    along: [f32; 8],
-    shorten: [f32; 8],
-    begin: [f32; 8],
+/// Filters of eight rays with no blur, field by field.
+pub(super) struct Filters<V> {
+    /// As bits of numbers.
+    pub axes: [V; 3],
+    pub origin: [V; 3],
+    pub shear: [V; 2],
+    pub width: V,
+    pub along: V,
+    pub shorten: V,
+    pub begin: V,
 }
 
-impl Filters {
-    /// As [`Filter::new`] for each of them, with no blur.
+impl<V: Vector> Filters<V> {
+    /// As [`Filter::new`] for each of them.
     #[inline(always)]
-    pub fn new<S: Simd>(origin: [S::V8; 3], direction: [S::V8; 3], tmin: S::V8) -> Self {
-        let splat = S::V8::splat;
+    pub fn new(origin: [V; 3], direction: [V; 3], tmin: V) -> Self {
         let [dx, dy, dz] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
         let is_x = dy.less(dx).and(dz.less(dx));
         let is_y = dz.less(dy).without(is_x);
         // What stands at the axis, and at those after it.
-        let along = pick::<S>(is_x, is_y, direction, 0);
-        let reciprocal = splat(1.0).div(along);
-        let negative = splat(0.0).sub(reciprocal);
-        let shear =
-            [pick::<S>(is_x, is_y, direction, 1).mul(negative), pick::<S>(is_x, is_y, direction, 2).mul(negative)];
-        let mut axis = [2; 8];
-        let (x, y) = (is_x.bits(), is_y.bits());
-        for (i, axis) in axis.iter_mut().enumerate() {
-            *axis = 2 - (y >> i & 1) as usize - 2 * (x >> i & 1) as usize;
-        }
+        let along = pick(is_x, is_y, direction, 0);
+        let reciprocal = V::splat(1.0).div(along);
+        let negative = V::splat(0.0).sub(reciprocal);
+        let shear = [pick(is_x, is_y, direction, 1).mul(negative), pick(is_x, is_y, direction, 2).mul(negative)];
+        let numbers = [V::splat(f32::from_bits(0)), V::splat(f32::from_bits(1)), V::splat(f32::from_bits(2))];
         Self {
-            axis,
-            origin: [
-                pick::<S>(is_x, is_y, origin, 1).to_array(),
-                pick::<S>(is_x, is_y, origin, 2).to_array(),
-                pick::<S>(is_x, is_y, origin, 0).to_array(),
-            ],
-            width: shear[0].abs().max(shear[1].abs()).add(splat(1.0)).to_array(),
-            shear: [shear[0].to_array(), shear[1].to_array()],
-            along: along.to_array(),
-            shorten: reciprocal.abs().to_array(),
-            begin: tmin.mul(along.abs()).mul(splat(1.0 - SLACK)).to_array(),
-        }
-    }
-
-    /// One of them.
-    #[inline(always)]
-    pub fn get(&self, ray: usize) -> Filter {
-        Filter {
-            axes: axes(self.axis[ray] % 3),
-            origin: [self.origin[0][ray], self.origin[1][ray], self.origin[2][ray]],
-            shear: [self.shear[0][ray], self.shear[1][ray]],
-            width: self.width[ray],
-            along: self.along[ray],
-            shorten: self.shorten[ray],
-            begin: self.begin[ray],
-            error: 9.0 * UNIT_ROUNDOFF,
-            blur: 0.0,
+            axes: [pick(is_x, is_y, numbers, 1), pick(is_x, is_y, numbers, 2), pick(is_x, is_y, numbers, 0)],
+            origin: [pick(is_x, is_y, origin, 1), pick(is_x, is_y, origin, 2), pick(is_x, is_y, origin, 0)],
+            width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
+            shear,
+            along,
+            shorten: reciprocal.abs(),
+            begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
         }
     }
 }
 
 /// The component `next` places after the axis that each lane's masks name.
 #[inline(always)]
-fn pick<S: Simd>(is_x: <S::V8 as Vector>::Mask, is_y: <S::V8 as Vector>::Mask, v: [S::V8; 3], next: usize) -> S::V8 {
-    let of_yz = S::V8::select(is_y, v[(1 + next) % 3], v[(2 + next) % 3]);
-    S::V8::select(is_x, v[next % 3], of_yz)
+fn pick<V: Vector>(is_x: V::Mask, is_y: V::Mask, v: [V; 3], next: usize) -> V {
+    V::select(is_x, v[next % 3], V::select(is_y, v[(1 + next) % 3], v[(2 + next) % 3]))
 }
 
 /// The edge function of the edge from corner `a` to corner `b`, each of which is at (x, y).
 #[inline(always)]
 fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
-    x[a].mul(y[b]).sub(y[a].mul(x[b]))
+    x[a].mul_sub(y[b], y[a].mul(x[b]))
+}
+
+/// Twice the area times the distance of the origin from the plane: the normal's product with p, which leads from the first
+/// corner to the origin; and its error. Let u = 2^-24 and N be the normal with all signs positive. Edges err by u,
+/// the normal by 4 u N, p by u, and the scalar product by another 3 u N p.
+#[inline(always)]
+fn height<S: Simd>(corners: [&[[f32; LANES]; 3]; 3], origin: [S::V8; 3]) -> (S::V8, S::V8) {
+    let tiny = S::V8::splat(TINY);
+    let [(bx, cx), (by, cy), (bz, cz)] = [edges::<S>(corners[0]), edges::<S>(corners[1]), edges::<S>(corners[2])];
+    let [cx0, cy0, cz0] = corners;
+    let p =
+        [origin[0].sub(S::V8::load(&cx0[0])), origin[1].sub(S::V8::load(&cy0[0])), origin[2].sub(S::V8::load(&cz0[0]))];
+    let height = by.mul_sub(cz, bz.mul(cy)).mul(p[0]);
+    let height = bz.mul_sub(cx, bx.mul(cz)).mul_add(p[1], height);
+    let height = bx.mul_sub(cy, by.mul(cx)).mul_add(p[2], height);
+    let (bx, by, bz) = (bx.abs(), by.abs(), bz.abs());
+    let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
+    let sum = by.mul_add(cz, bz.mul_add(cy, tiny)).mul(p[0].abs());
+    let sum = bz.mul_add(cx, bx.mul_add(cz, tiny)).mul_add(p[1].abs(), sum);
+    let sum = bx.mul_add(cy, by.mul_add(cx, tiny)).mul_add(p[2].abs(), sum);
+    (height, sum.mul_add(S::V8::splat(12.0 * UNIT_ROUNDOFF), S::V8::splat(f32::MIN_POSITIVE)))
+}
+
+/// From the first corner to the others, along one axis.
+#[inline(always)]
+fn edges<S: Simd>(corners: &[[f32; LANES]; 3]) -> (S::V8, S::V8) {
+    let a = S::V8::load(&corners[0]);
+    (S::V8::load(&corners[1]).sub(a), S::V8::load(&corners[2]).sub(a))
 }

@@ -15,6 +15,7 @@ use crate::trace::nearest::Nearest;
 pub(super) const NONE: u32 = u32::MAX;
 
 /// The state of one ray.
+#[derive(Clone, Copy)]
 pub(super) struct Found {
     /// No hit beyond this is wanted; rounded up.
     pub limit: f32,
@@ -22,21 +23,32 @@ pub(super) struct Found {
     sure: f32,
     /// Found without doubt, but not computed yet: block and lane.
     pub noted: u32,
-    /// What was computed, if `noted` is [`NONE`].
-    pub nearest: Nearest,
+    /// Whether anything was computed.
+    is_computed: bool,
+    /// That, if `noted` is [`NONE`].
+    nearest: Nearest,
 }
 
 impl Found {
+    /// Nothing.
+    pub const NONE: Self = Self { limit: 0.0, sure: 0.0, noted: NONE, is_computed: false, nearest: Nearest::NONE };
+
+    /// Nothing yet, up to the ray's tmax, and that rounded up.
     #[inline(always)]
-    pub fn new(ray: &Ray) -> Self {
-        let nearest = Nearest::new(ray);
-        Self { limit: nearest.limit(), sure: ray.tmax, noted: NONE, nearest }
+    pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
+        (self.sure, self.limit, self.noted, self.is_computed) = (tmax, limit, NONE, false);
+    }
+
+    /// Whether a hit is noted, but not computed.
+    #[inline(always)]
+    pub fn is_noted(&self) -> bool {
+        self.noted != NONE
     }
 
     /// Whether there is any hit.
     #[inline(always)]
     pub fn is_hit(&self) -> bool {
-        self.noted != NONE || self.nearest.hit().is_some()
+        self.noted != NONE || self.is_computed && self.nearest.hit().is_some()
     }
 
     /// Takes the candidates of block `index`; all of them in the world.
@@ -74,22 +86,25 @@ impl Found {
     #[cold]
     #[inline(never)]
     fn decide(&mut self, tree: &TriangleTree, block: &Block, lane: usize, ray: &Ray) {
-        self.compute(tree, ray);
-        tree.offer(block, lane, ray, None, &mut self.nearest);
-        self.limit = self.nearest.limit();
-        if let Some(hit) = self.nearest.hit() {
+        let mut nearest = self.nearest(tree, ray);
+        tree.offer(block, lane, ray, None, &mut nearest);
+        self.limit = nearest.limit();
+        if let Some(hit) = nearest.hit() {
             self.sure = hit.t.next_down();
         }
+        (self.nearest, self.is_computed, self.noted) = (nearest, true, NONE);
     }
 
-    /// Computes what is noted.
-    pub fn compute(&mut self, tree: &TriangleTree, ray: &Ray) {
-        let id = std::mem::replace(&mut self.noted, NONE);
-        if id != NONE {
+    /// The nearest of all, computed.
+    pub fn nearest(&self, tree: &TriangleTree, ray: &Ray) -> Nearest {
+        let mut nearest = Nearest::new(ray);
+        if self.noted != NONE {
             // It is nearer than whatever was computed before.
-            self.nearest = Nearest::new(ray);
-            tree.offer_one(id, ray, &mut self.nearest);
-            debug_assert!(self.nearest.hit().is_some(), "what is noted is hit without doubt");
+            tree.offer_one(self.noted, ray, &mut nearest);
+            debug_assert!(nearest.hit().is_some(), "what is noted is hit without doubt");
+        } else if self.is_computed {
+            nearest = self.nearest;
         }
+        nearest
     }
 }

@@ -25,6 +25,36 @@ pub(super) struct Numbers {
     meshes: Meshes,
 }
 
+/// Blocks by their numbers.
+pub(super) trait Blocks {
+    /// Block `index`; `scratch` is where it may be put together.
+    fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    /// Where in memory it is.
+    fn address<S: Simd>(&self, index: u32) -> *const u8;
+}
+
+impl Blocks for [Block] {
+    #[inline(always)]
+    fn block<'a>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
+        &self[index as usize]
+    }
+    #[inline(always)]
+    fn address<S: Simd>(&self, index: u32) -> *const u8 {
+        S::address(self, index)
+    }
+}
+
+impl Blocks for Numbers {
+    #[inline(always)]
+    fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        scratch.insert(self.read(index))
+    }
+    #[inline(always)]
+    fn address<S: Simd>(&self, index: u32) -> *const u8 {
+        S::address(&self.blocks, index)
+    }
+}
+
 /// Fills a block's lanes that have no triangle.
 const NONE: u32 = u32::MAX;
 
@@ -66,7 +96,7 @@ impl Leaves {
     pub fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
-            Self::Numbers(numbers) => scratch.insert(numbers.block(index)),
+            Self::Numbers(numbers) => scratch.insert(numbers.read(index)),
         }
     }
 
@@ -88,7 +118,7 @@ impl Leaves {
             Self::Numbers(numbers) => {
                 numbers.meshes = meshes.clone();
                 let count = numbers.blocks.len() as u32;
-                (0..count).into_par_iter().all(|index| is_sound(&numbers.block(index)))
+                (0..count).into_par_iter().all(|index| is_sound(&numbers.read(index)))
             }
         }
     }
@@ -97,8 +127,8 @@ impl Leaves {
     #[inline(always)]
     pub fn prefetch<S: Simd>(&self, index: u32) {
         match self {
-            Self::Blocks(blocks) => S::prefetch(&blocks[index as usize]),
-            Self::Numbers(numbers) => S::prefetch(&numbers.blocks[index as usize]),
+            Self::Blocks(blocks) => S::prefetch(S::address(blocks, index)),
+            Self::Numbers(numbers) => S::prefetch(S::address(&numbers.blocks, index)),
         }
     }
 
@@ -143,7 +173,7 @@ fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) 
 
 impl Numbers {
     #[inline]
-    fn block(&self, index: u32) -> Block {
+    fn read(&self, index: u32) -> Block {
         let mut block = Block::EMPTY;
         for &number in self.blocks[index as usize].iter().filter(|&&number| number != NONE) {
             self.meshes.push(&mut block, number);

@@ -1,7 +1,6 @@
 //! Everything in one coordinate system: that of the world, or that of an object which is placed in it.
 
 use super::filter::Filter;
-use super::found::Found;
 use super::preset::Options;
 use super::query::Query;
 use super::shapes::ShapeTree;
@@ -37,27 +36,6 @@ impl Level {
 
     pub fn bounds(&self) -> Aabb {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
-    }
-
-    /// What `ray` hits among the triangles of this level, which is in the world; `slab` and `filter` are the ray, made
-    /// ready for them.
-    #[inline(always)]
-    pub fn find<S: Simd, Q: Query>(&self, ray: &Ray, slab: &SlabRay, filter: &Filter, stack: &mut Stack) -> Found {
-        let mut found = Found::new(ray);
-        if !self.triangles.tree().is_empty() {
-            walk::single::<S, Q>(
-                stack,
-                self.triangles.tree(),
-                slab,
-                found.limit,
-                #[inline(always)]
-                |leaf| {
-                    self.triangles.find_leaf::<S, Q>(leaf, ray, filter, &mut found);
-                    if Q::ANY && found.is_hit() { Visit::Stop } else { Visit::Until(found.limit) }
-                },
-            );
-        }
-        found
     }
 
     /// Offers what `ray` hits in this level placed by `through`; `local` is the same ray in this level's coordinates,

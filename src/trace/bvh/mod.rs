@@ -36,6 +36,7 @@ mod closest_point;
 mod clusters;
 mod edges;
 mod filter;
+mod flight;
 mod found;
 mod isa;
 mod leaves;

@@ -55,13 +55,21 @@ impl Child {
     /// A leaf's first block.
     #[inline(always)]
     pub fn first(self) -> u32 {
-        self.0 & (1 << Self::COUNT_SHIFT) - 1
+        self.0 & ((1 << Self::COUNT_SHIFT) - 1)
     }
 
     /// A leaf's number of blocks.
     #[inline(always)]
     pub fn count(self) -> u32 {
         (self.0 >> Self::COUNT_SHIFT) % Self::MOST + 1
+    }
+
+    /// What is left of a leaf without its first block.
+    #[inline(always)]
+    pub fn rest(self) -> Option<Self> {
+        let is_more = (self.0 >> Self::COUNT_SHIFT) % Self::MOST != 0;
+        // One block fewer, from the next on.
+        is_more.then_some(Self(self.0.wrapping_sub((1 << Self::COUNT_SHIFT) - 1)))
     }
 
     /// A leaf's blocks.
@@ -75,7 +83,7 @@ impl Child {
 #[repr(C, align(64))]
 #[derive(Clone, Debug)]
 pub(super) struct Node {
-    /// Of each child: min x, y, z, max x, y, z.
+    /// Of each child: min x, max x, min y, max y, min z, max z.
     pub bounds: [[f32; WIDTH]; 6],
     pub child: [Child; WIDTH],
     /// Of each leaf its number of items, where several are in a block. Only while the tree is made.
@@ -86,14 +94,14 @@ impl Node {
     /// A node without children.
     pub fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { bounds: [low, low, low, high, high, high], child: [Child::NONE; WIDTH], items: [0; WIDTH] }
+        Self { bounds: [low, high, low, high, low, high], child: [Child::NONE; WIDTH], items: [0; WIDTH] }
     }
 
     /// Fills one slot.
     pub fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
         for axis in 0..3 {
-            self.bounds[axis][slot] = bounds.min[axis];
-            self.bounds[axis + 3][slot] = bounds.max[axis];
+            self.bounds[2 * axis][slot] = bounds.min[axis];
+            self.bounds[2 * axis + 1][slot] = bounds.max[axis];
         }
         self.child[slot] = child;
     }
@@ -112,9 +120,9 @@ impl Node {
     /// The box of one slot.
     pub fn child_bounds(&self, slot: usize) -> Aabb {
         let corner = |first: usize| {
-            Vec3::new(self.bounds[first][slot], self.bounds[first + 1][slot], self.bounds[first + 2][slot])
+            Vec3::new(self.bounds[first][slot], self.bounds[first + 2][slot], self.bounds[first + 4][slot])
         };
-        Aabb { min: corner(0), max: corner(3) }
+        Aabb { min: corner(0), max: corner(1) }
     }
 }
 
@@ -137,6 +145,12 @@ impl Tree {
     #[inline(always)]
     pub fn node(&self, child: Child) -> &Node {
         &self.nodes[child.node() as usize]
+    }
+
+    /// All nodes.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// Whether there is nothing to hit.

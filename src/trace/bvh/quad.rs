@@ -22,7 +22,7 @@ pub(super) struct Numbers {
 }
 
 impl<D: Doubles> Quad<D> {
-    /// Component i of corner k is `corners[3 * k + i]`.
+    /// As in a block: component by component, corner by corner.
     #[inline(always)]
     pub fn new<S: Simd<D4 = D>>(origin: [D; 3], direction: [D; 3], corners: &[[f32; 4]; 9]) -> Self {
         let (pa, pb, pc) = (corner::<S>(corners, 0), corner::<S>(corners, 1), corner::<S>(corners, 2));
@@ -52,7 +52,7 @@ pub(super) fn widen<S: Simd>(values: &[f32; 4]) -> S::D4 {
 
 #[inline(always)]
 fn corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize) -> [S::D4; 3] {
-    [widen::<S>(&corners[3 * k]), widen::<S>(&corners[3 * k + 1]), widen::<S>(&corners[3 * k + 2])]
+    [widen::<S>(&corners[k]), widen::<S>(&corners[3 + k]), widen::<S>(&corners[6 + k])]
 }
 
 #[inline(always)]

@@ -11,7 +11,7 @@
 //! lets everything pass.
 
 use super::filter::{Filter, Filters};
-use super::node::{Node, WIDTH};
+use super::node::Node;
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -24,8 +24,8 @@ pub(super) struct SlabRay {
     near_offset: [f32; 3],
     /// -origin / direction, plus the pad.
     far_offset: [f32; 3],
-    /// Which of a node's six bounds is met first, by axis.
-    near: [usize; 3],
+    /// On each axis 1 if a box's upper side is met first, else 0.
+    side: [u32; 3],
     /// Rounded down, for t is rounded before it is held against it; not below 0.
     tmin: f32,
 }
@@ -48,7 +48,7 @@ impl SlabRay {
             reciprocal: [0.0; 3],
             near_offset: [0.0; 3],
             far_offset: [0.0; 3],
-            near: [0; 3],
+            side: [0; 3],
             tmin: if ray.tmin > 0.0 { ray.tmin.next_down() } else { 0.0 },
         };
         for axis in 0..3 {
@@ -61,99 +61,118 @@ impl SlabRay {
             slab.reciprocal[axis] = reciprocal;
             slab.near_offset[axis] = offset - pad;
             slab.far_offset[axis] = offset + pad;
-            slab.near[axis] = if reciprocal < 0.0 { axis + 3 } else { axis };
+            slab.side[axis] = u32::from(reciprocal < 0.0);
         }
         slab
     }
 
-    /// The children the ray may hit something in, up to `limit`, as a bit mask; and where it enters each,
-    /// not below 0.
+    /// The children the ray may hit something in, up to `limit`; and where it enters each, not below 0.
     #[inline(always)]
-    pub fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (u32, [f32; WIDTH]) {
+    pub fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
         let mut near = S::V8::splat(self.tmin);
         let mut far = S::V8::splat(limit);
         for axis in 0..3 {
-            let first = S::V8::load(&node.bounds[self.near[axis]]);
-            let second = S::V8::load(&node.bounds[if self.near[axis] < 3 { axis + 3 } else { axis }]);
+            let side = self.side[axis] as usize % 2;
+            let first = S::V8::load(&node.bounds[2 * axis + side]);
+            let second = S::V8::load(&node.bounds[2 * axis + 1 - side]);
             let reciprocal = S::V8::splat(self.reciprocal[axis]);
             // The accumulator second, so that a NaN (infinity less infinity) is passed over.
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);
             far = second.mul_add(reciprocal, S::V8::splat(self.far_offset[axis])).min(far);
         }
-        (near.at_most(far).bits(), near.to_array())
+        (near.at_most(far), near)
     }
 }
 
-/// Rays made ready eight at a time.
-pub(super) struct SlabRays {
-    /// Of each axis: 1 / direction, and -origin / direction less and plus the pad.
-    reciprocal: [[f32; 8]; 3],
-    near_offset: [[f32; 8]; 3],
-    far_offset: [[f32; 8]; 3],
-    tmin: [f32; 8],
-    filters: Filters,
-    /// A bit for each ray that [is valid](Ray::is_valid).
-    valid: u32,
+/// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
+#[derive(Clone, Copy)]
+pub(super) struct ReadyRay {
+    rows: [[f32; 8]; 4],
 }
 
-impl SlabRays {
-    /// As [`SlabRay::new`] for each of them, with no blur.
+impl ReadyRay {
+    /// None.
+    pub const NONE: Self = Self { rows: [[0.0; 8]; 4] };
+
     #[inline(always)]
-    pub fn new<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> Self {
-        let splat = S::V8::splat;
-        let zero = splat(0.0);
-        let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
-        let (origin, direction) = ([x, y, z], [dx, dy, dz]);
-        let largest = dx.abs().max(dy.abs()).max(dz.abs());
-        let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
-        let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
-        let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
-        let mut finite = zero;
-        let empty = [[0.0; 8]; 3];
-        let filters = Filters::new::<S>(origin, direction, tmin);
-        let mut slabs =
-            Self { reciprocal: empty, near_offset: empty, far_offset: empty, tmin: [0.0; 8], filters, valid: 0 };
-        for axis in 0..3 {
-            let d = direction[axis];
-            finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
-            let least = S::V8::select(d.less(zero), zero.sub(smallest), smallest);
-            let kept = S::V8::select(d.abs().less(smallest), least, d);
-            let reciprocal = splat(1.0).div(kept);
-            let steep = reciprocal.abs();
-            let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
-            let is_small = steep.mul(span[axis]).less(splat(HUGE));
-            let pad = S::V8::select(is_small, width, splat(f32::INFINITY));
-            let offset = zero.sub(origin[axis]).mul(reciprocal);
-            slabs.reciprocal[axis] = reciprocal.to_array();
-            slabs.near_offset[axis] = offset.sub(pad).to_array();
-            slabs.far_offset[axis] = offset.add(pad).to_array();
+    pub fn slab(&self) -> SlabRay {
+        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, ..], _, [x, y, z, ..]] = self.rows;
+        SlabRay {
+            reciprocal: [rx, ry, rz],
+            near_offset: [nx, ny, nz],
+            far_offset: [fx, fy, fz],
+            side: [x.to_bits(), y.to_bits(), z.to_bits()],
+            tmin,
         }
-        // Rounded down, for t is rounded before it is held against it.
-        let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE));
-        slabs.tmin = least.max(zero).to_array();
-        let in_range = zero.at_most(tmin).and(tmin.at_most(tmax));
-        let directed = splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
-        slabs.valid = in_range.and(directed).bits();
-        slabs
     }
 
-    /// One of them, for nodes and for triangles, if it is valid.
     #[inline(always)]
-    pub fn get(&self, ray: usize) -> Option<(SlabRay, Filter)> {
-        if self.valid >> ray & 1 == 0 {
-            return None;
-        }
-        let side = |axis: usize| if self.reciprocal[axis][ray] < 0.0 { axis + 3 } else { axis };
-        let of = |values: &[[f32; 8]; 3]| [values[0][ray], values[1][ray], values[2][ray]];
-        let slab = SlabRay {
-            reciprocal: of(&self.reciprocal),
-            near_offset: of(&self.near_offset),
-            far_offset: of(&self.far_offset),
-            near: [side(0), side(1), side(2)],
-            tmin: self.tmin[ray],
-        };
-        Some((slab, self.filters.get(ray)))
+    pub fn filter(&self) -> Filter {
+        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], _] = self.rows;
+        let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
+        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin])
     }
+
+    /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.
+    #[inline(always)]
+    pub fn end(&self) -> [f32; 2] {
+        let [.., tmax, limit] = self.rows[2];
+        [tmax, limit]
+    }
+}
+
+/// As [`SlabRay::new`] and [`Filter::new`] for eight rays, with no blur; and a bit for each that
+/// [is valid](Ray::is_valid).
+#[inline(always)]
+pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> ([ReadyRay; 8], u32) {
+    let splat = S::V8::splat;
+    let zero = splat(0.0);
+    let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
+    let (origin, direction) = ([x, y, z], [dx, dy, dz]);
+    let largest = dx.abs().max(dy.abs()).max(dz.abs());
+    let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
+    let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
+    let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
+    let mut finite = zero;
+    let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
+    for axis in 0..3 {
+        let d = direction[axis];
+        finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
+        let is_negative = d.less(zero);
+        let least = S::V8::select(is_negative, zero.sub(smallest), smallest);
+        let kept = S::V8::select(d.abs().less(smallest), least, d);
+        let reciprocal = splat(1.0).div(kept);
+        let steep = reciprocal.abs();
+        let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
+        let is_small = steep.mul(span[axis]).less(splat(HUGE));
+        let pad = S::V8::select(is_small, width, splat(f32::INFINITY));
+        let offset = zero.sub(origin[axis]).mul(reciprocal);
+        (reciprocals[axis], near[axis], far[axis]) = (reciprocal, offset.sub(pad), offset.add(pad));
+        sides[axis] = S::V8::select(is_negative, splat(f32::from_bits(1)), zero);
+    }
+    // Rounded down, for t is rounded before it is held against it.
+    let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
+    let filter = Filters::new(origin, direction, tmin);
+    let [rx, ry, rz] = reciprocals;
+    let [nx, ny, nz] = near;
+    let [fx, fy, fz] = far;
+    let [x, y, z] = filter.origin;
+    let first = S::transpose([rx, ry, rz, least, nx, ny, nz, filter.begin]);
+    let second = S::transpose([fx, fy, fz, filter.width, x, y, z, filter.shorten]);
+    let [p, q] = filter.shear;
+    let [kx, ky, kz] = filter.axes;
+    // Rounded up, for t is rounded before it is held against it.
+    let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
+    let third = S::transpose([p, q, filter.along, kx, ky, kz, tmax, limit]);
+    let fourth = S::transpose([sides[0], sides[1], sides[2], zero, zero, zero, zero, zero]);
+    let mut ready = [ReadyRay::NONE; 8];
+    for i in 0..8 {
+        let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];
+        ready[i] = ReadyRay { rows };
+    }
+    let in_range = zero.at_most(tmin).and(tmin.at_most(tmax));
+    let directed = splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
+    (ready, in_range.and(directed).bits())
 }
 
 /// Eight rays, field by field: origin, direction, tmin, tmax.

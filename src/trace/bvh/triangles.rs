@@ -6,14 +6,12 @@ use super::block::{Block, LANES};
 use super::build::{self, presplit};
 use super::clusters;
 use super::filter::Filter;
-use super::found::Found;
 use super::leaves::Leaves;
 use super::level::Through;
 use super::meshes::Meshes;
 use super::node::{Child, Tree};
 use super::preset::{Options, Preset};
 use super::quad::{Numbers, Quad};
-use super::query::Query;
 use super::simd::Simd;
 use super::{PartId, refit};
 use crate::error::Result;
@@ -119,25 +117,13 @@ impl TriangleTree {
         self.leaves.prefetch::<S>(index);
     }
 
+    pub fn leaves(&self) -> &Leaves {
+        &self.leaves
+    }
+
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
-    }
-
-    /// Takes what `ray`, in the world as this level is, may hit in a leaf; `filter` is the ray's.
-    #[inline(always)]
-    pub fn find_leaf<S: Simd, Q: Query>(&self, leaf: Child, ray: &Ray, filter: &Filter, found: &mut Found) {
-        for index in leaf.blocks() {
-            let mut scratch = None;
-            let block = self.block(index, &mut scratch);
-            let candidates = filter.candidates::<S>(block, found.limit);
-            if candidates.lanes != 0 {
-                found.offer::<Q>(self, index, block, &candidates, ray);
-                if Q::ANY && found.is_hit() {
-                    return;
-                }
-            }
-        }
     }
 
     /// Offers what `ray`, in the world, hits in a leaf of a placed object; `filter` is of the ray in this level's
@@ -167,7 +153,7 @@ impl TriangleTree {
     ///
     /// The caller knows that f64 is precise enough for what [`triangle::intersect`] would answer.
     #[inline(always)]
-    pub fn hits<S: Simd>(&self, origin: [S::D4; 3], direction: [S::D4; 3], ids: [u32; LANES]) -> ([f64; 4], [Hit; 4]) {
+    pub fn hits<S: Simd>(&self, origin: [S::D4; 3], direction: [S::D4; 3], ids: [u32; 4]) -> ([f64; 4], [Hit; 4]) {
         let [a, b, c, d] = ids;
         let corners = gather(self.corners(a), self.corners(b), self.corners(c), self.corners(d));
         let Numbers { t, t32, u, v } = Quad::new::<S>(origin, direction, &corners).numbers();
@@ -187,13 +173,13 @@ impl TriangleTree {
         self.offer(self.block(id / LANES as u32, &mut scratch), id as usize % LANES, ray, None, nearest);
     }
 
-    /// The corners of a triangle, numbered as in [`Self::offer_one`], one after the other.
+    /// The corners of a triangle, numbered as in [`Self::offer_one`], in the order of a block.
     #[inline(always)]
     fn corners(&self, id: u32) -> [f32; 9] {
         let mut scratch = None;
         let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
         let mut corners = [0.0; 9];
-        for (corner, component) in corners.iter_mut().zip(&block.corners) {
+        for (corner, component) in corners.iter_mut().zip(block.corners.as_flattened()) {
             *corner = component[lane];
         }
         corners
@@ -226,8 +212,8 @@ impl TriangleTree {
 
 /// Component by component.
 #[inline(always)]
-fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; LANES]; 9] {
-    let mut corners = [[0.0; LANES]; 9];
+fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; 4]; 9] {
+    let mut corners = [[0.0; 4]; 9];
     for (i, corner) in corners.iter_mut().enumerate() {
         *corner = [a[i], b[i], c[i], d[i]];
     }

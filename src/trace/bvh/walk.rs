@@ -5,7 +5,7 @@
 use super::build::MAX_DEPTH;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::query::Query;
-use super::simd::Simd;
+use super::simd::{Array, Mask, Simd};
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
 
@@ -99,6 +99,7 @@ pub(super) fn single<S: Simd, Q: Query>(
         while !next.child.is_leaf() {
             let node = tree.node(next.child);
             let (mask, near) = ray.enter::<S>(node, limit);
+            let (mask, near) = (mask.bits(), near.to_array());
             if mask == 0 {
                 break;
             }

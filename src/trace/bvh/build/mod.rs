@@ -45,7 +45,7 @@ use subtree::{Parent, SubtreeKernel, Task};
 use top::Shared;
 
 /// Levels a tree can have: the stack of a walk is made for it.
-pub(super) const MAX_DEPTH: usize = 40;
+pub(super) const MAX_DEPTH: usize = 36;
 
 /// From this level on ranges are cut into halves, a node into eighths: 12 more levels hold 2^36 items.
 const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;

@@ -8,6 +8,7 @@ use std::arch::x86_64::*;
 use super::x86::{Avx2, D4, V4, V8, lanewise};
 use super::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::node::Child;
 
 /// AVX-512 F, VL, DQ and BW.
 pub struct Avx512;
@@ -19,8 +20,19 @@ impl Simd for Avx512 {
     type D4 = D4;
 
     #[inline(always)]
-    fn prefetch<T>(value: &T) {
-        Avx2::prefetch(value);
+    fn prefetch(address: *const u8) {
+        Avx2::prefetch(address);
+    }
+
+    #[inline(always)]
+    fn far_to_near(
+        near: V8,
+        mask: <V8 as Vector>::Mask,
+        child: &[Child; 8],
+        sorted_near: &mut [u32; 8],
+        sorted_child: &mut [Child; 8],
+    ) {
+        Avx2::far_to_near(near, mask, child, sorted_near, sorted_child);
     }
 
     #[inline(always)]
@@ -73,6 +85,10 @@ impl Vector for V16 {
     #[inline(always)]
     fn mul_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm512_fmsub_ps(self.0, factor.0, subtrahend.0) })
     }
     #[inline(always)]
     fn abs(self) -> Self {

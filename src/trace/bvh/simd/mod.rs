@@ -19,6 +19,7 @@ pub(super) use x86::{Avx2, V8};
 
 use super::build::lanes::Boxes;
 use super::bundle::{PerRay, RAYS};
+use super::node::Child;
 
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {
@@ -32,8 +33,22 @@ pub(super) trait Simd {
     type D4: Doubles<F = Self::V4>;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
-    /// Has a value loaded that will be needed soon.
-    fn prefetch<T>(value: &T);
+    /// Children that the mask names, the farthest first, by where they are entered (not below 0); then the others. Of `near`
+    /// the lowest three bits are lost.
+    fn far_to_near(
+        near: Self::V8,
+        mask: <Self::V8 as Vector>::Mask,
+        child: &[Child; 8],
+        sorted_near: &mut [u32; 8],
+        sorted_child: &mut [Child; 8],
+    );
+    /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
+    fn prefetch(address: *const u8);
+    /// Where a value is, or would be.
+    #[inline(always)]
+    fn address<T>(values: &[T], index: u32) -> *const u8 {
+        values.as_ptr().wrapping_add(index as usize).cast()
+    }
 }
 
 /// One truth a lane.
@@ -56,6 +71,8 @@ pub(super) trait Vector: Copy {
     fn div(self, other: Self) -> Self;
     /// self * factor + summand, rounded once or twice.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
+    /// self * factor - subtrahend, rounded once or twice.
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn abs(self) -> Self;

@@ -2,6 +2,7 @@
 
 use super::{Array, Doubles, Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::node::Child;
 
 /// Plain arrays.
 pub struct Portable;
@@ -13,7 +14,28 @@ impl Simd for Portable {
     type D4 = [f64; 4];
 
     #[inline(always)]
-    fn prefetch<T>(_: &T) {}
+    fn prefetch(_: *const u8) {}
+
+    #[inline(always)]
+    fn far_to_near(
+        near: [f32; 8],
+        mask: Bits,
+        child: &[Child; 8],
+        sorted_near: &mut [u32; 8],
+        sorted_child: &mut [Child; 8],
+    ) {
+        let mut len = 0;
+        for slot in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0) {
+            let key = near[slot].to_bits() & !7;
+            let mut at = len;
+            while at > 0 && sorted_near[at - 1] < key {
+                (sorted_near[at], sorted_child[at]) = (sorted_near[at - 1], sorted_child[at - 1]);
+                at -= 1;
+            }
+            (sorted_near[at], sorted_child[at]) = (key, child[slot]);
+            len += 1;
+        }
+    }
 
     #[inline(always)]
     fn transpose(rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
@@ -92,6 +114,10 @@ impl<const N: usize> Vector for [f32; N] {
     fn mul_add(self, factor: Self, summand: Self) -> Self {
         // Not f32::mul_add: without the instruction that is a call.
         self.mul(factor).add(summand)
+    }
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
+        self.mul(factor).sub(subtrahend)
     }
     #[inline(always)]
     fn abs(self) -> Self {

@@ -8,6 +8,7 @@ use std::arch::x86_64::*;
 
 use super::{Array, Doubles, Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::node::Child;
 
 /// A function of two vectors by its intrinsic, as a method.
 macro_rules! lanewise {
@@ -30,10 +31,42 @@ impl Simd for Avx2 {
     type D4 = D4;
 
     #[inline(always)]
-    fn prefetch<T>(value: &T) {
-        for line in (0..size_of::<T>()).step_by(64) {
-            // A hint, and of memory that is there.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast::<i8>().add(line)) };
+    fn prefetch(address: *const u8) {
+        for line in 0..4 {
+            // A hint, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(64 * line).cast()) };
+        }
+    }
+
+    #[inline(always)]
+    fn far_to_near(near: V8, mask: M8, child: &[Child; 8], sorted_near: &mut [u32; 8], sorted_child: &mut [Child; 8]) {
+        unsafe {
+            // Numbers not below 0 are ordered as their bits are.
+            let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let keys = _mm256_or_si256(_mm256_and_si256(_mm256_castps_si256(near.0), _mm256_set1_epi32(!7)), slots);
+            let named = mask.bits() as usize;
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[named % 256]));
+            let mut keys = _mm256_permutevar8x32_epi32(keys, order);
+            if named.count_ones() <= 2 {
+                keys = exchange::<0b10>(keys, _mm256_shuffle_epi32::<0b11_10_00_01>(keys));
+            } else {
+                let lanes = _mm256_set1_epi32(named.count_ones() as i32);
+                keys = _mm256_or_si256(keys, _mm256_cmpgt_epi32(_mm256_add_epi32(slots, _mm256_set1_epi32(1)), lanes));
+                // Batcher 1968, Sorting networks and their applications: bitonic, all comparators one way.
+                keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
+                keys = exchange::<0b1100_1100>(keys, _mm256_shuffle_epi32::<0b00_01_10_11>(keys));
+                keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
+                if named.count_ones() > 4 {
+                    let reverse = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
+                    keys = exchange::<0b1111_0000>(keys, _mm256_permutevar8x32_epi32(keys, reverse));
+                    keys = exchange::<0b1100_1100>(keys, _mm256_shuffle_epi32::<0b01_00_11_10>(keys));
+                    keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
+                }
+            }
+            _mm256_storeu_si256(sorted_near.as_mut_ptr().cast(), keys);
+            // The lowest three bits choose.
+            let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(child.as_ptr().cast()), keys);
+            _mm256_storeu_si256(sorted_child.as_mut_ptr().cast(), children);
         }
     }
 
@@ -60,6 +93,39 @@ impl Simd for Avx2 {
                 V8(_mm256_permute2f128_ps::<0x31>(p3, q3)),
             ]
         }
+    }
+}
+
+/// For each set of lanes an order, a byte a lane, in which they come first.
+const NAMED_FIRST: [i64; 256] = {
+    let mut orders = [0; 256];
+    let mut named = 0;
+    while named < 256 {
+        let (mut lane, mut place) = (0, 0);
+        while lane < 8 {
+            if named >> lane & 1 != 0 {
+                orders[named] |= (lane as i64) << (8 * place);
+                place += 1;
+            }
+            lane += 1;
+        }
+        // What follows repeats the first of them, which leaves one alone in its place.
+        let first = orders[named] & 7;
+        while place < 8 {
+            orders[named] |= first << (8 * place);
+            place += 1;
+        }
+        named += 1;
+    }
+    orders
+};
+
+/// Of each pair of lanes the smaller value goes to the one that is named.
+#[inline(always)]
+unsafe fn exchange<const SMALLER: i32>(keys: __m256i, partners: __m256i) -> __m256i {
+    unsafe {
+        let (most, least) = (_mm256_max_epi32(keys, partners), _mm256_min_epi32(keys, partners));
+        _mm256_blend_epi32::<SMALLER>(most, least)
     }
 }
 
@@ -132,6 +198,10 @@ impl Vector for V4 {
         Self(unsafe { _mm_fmadd_ps(self.0, factor.0, summand.0) })
     }
     #[inline(always)]
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         Self(unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self.0) })
     }
@@ -193,6 +263,10 @@ impl Vector for V8 {
     #[inline(always)]
     fn mul_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, subtrahend.0) })
     }
     #[inline(always)]
     fn abs(self) -> Self {

@@ -86,7 +86,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     if entry.child.is_leaf() {
                         self.tree.prefetch::<S>(entry.child.first());
                     } else {
-                        S::prefetch(tree.node(entry.child));
+                        S::prefetch(S::address(tree.nodes(), entry.child.node()));
                     }
                 }
             } else if self.visit::<S>(next) {
