@@ -24,7 +24,8 @@ Examples:
   twincast bench terrain1000 architecture --json
   twincast bench terrain3162 --modes default,fast,robust --threads 2")]
 pub(super) struct BenchArgs {
-    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys)
+    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
+    /// placements of one mesh)
     #[arg(value_name = "SCENE", default_value = "terrain1000")]
     scenes: Vec<String>,
 
@@ -33,7 +34,13 @@ pub(super) struct BenchArgs {
     up_axis: UpAxis,
 
     /// Kinds of rays
-    #[arg(long, value_name = "KIND,...", value_enum, value_delimiter = ',', default_value = "primary,diffuse,shadow")]
+    #[arg(
+        long,
+        value_name = "KIND,...",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "primary,diffuse,shadow,pixel"
+    )]
     rays: Vec<RaysArg>,
 
     /// Modes: native's default, native-fast, native-high, native-compact; Embree's fast, robust, compact, and high (quality,
@@ -78,9 +85,14 @@ enum IsaArg {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum RaysArg {
+    /// From the camera
     Primary,
+    /// From what the camera sees, in random directions
     Diffuse,
+    /// From what the camera sees to a point light
     Shadow,
+    /// From the camera, made from pixels within the time; all others are made before
+    Pixel,
 }
 
 #[cfg(feature = "embree")]
@@ -90,6 +102,7 @@ impl RaysArg {
             Self::Primary => Kind::Primary,
             Self::Diffuse => Kind::Diffuse,
             Self::Shadow => Kind::Shadow,
+            Self::Pixel => Kind::Pixel,
         }
     }
 }

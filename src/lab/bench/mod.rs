@@ -4,7 +4,8 @@
 //! | --- | --- |
 //! | `subject` | the scenes: a file on a floor, or a mesh made by rule |
 //! | `rays` | camera, diffuse and shadow rays, as `benches/embree_ref.cpp` makes them |
-//! | `run` | builds and passes over the rays, in turn; answers compared first |
+//! | `pixel_loop` | camera rays made within the time, by the renderer's own loop |
+//! | `run`, `answers` | builds and passes over the rays, in turn; answers compared first |
 //! | `report` | rates, ratios, the table |
 //!
 //! Rates move by 15 % from run to run on a shared machine, so only ratios within a run count: every engine is timed
@@ -14,6 +15,8 @@
 //! What Embree reaches here is itself held to what a plain C++ client gets out of it (`make bench-fair`): beating a
 //! weakened Embree would prove nothing.
 
+mod answers;
+mod pixel_loop;
 mod rays;
 mod report;
 mod run;
