@@ -142,6 +142,7 @@ use with_embree::bench;
 
 #[cfg(feature = "embree")]
 mod with_embree {
+    use std::sync::{Arc, OnceLock};
     use std::time::Instant;
 
     use serde::Serialize;
@@ -152,7 +153,7 @@ mod with_embree {
     use crate::lab::bench::{Built, Contender, Setup, Subject};
     use crate::trace::World;
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
-    use crate::trace::embree::{Embree, Options, Quality};
+    use crate::trace::embree::{self, Embree, Options, Quality};
 
     /// Every mode, native first.
     const MODES: [ModeArg; 8] = [
@@ -180,11 +181,6 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let contenders: Vec<_> = MODES
-            .into_iter()
-            .filter(|mode| args.modes.contains(mode))
-            .map(|mode| contender(mode, threads, isa))
-            .collect();
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
@@ -193,6 +189,9 @@ mod with_embree {
             let (subject, warnings) = Subject::new(name, args.up_axis.axis())?;
             warn(&warnings);
             interrupt::check()?;
+            let costs = Arc::default();
+            let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
+            let contenders: Vec<_> = modes.map(|mode| contender(mode, threads, isa, &costs)).collect();
             let setup = Setup {
                 subject: &subject,
                 contenders: &contenders,
@@ -224,13 +223,13 @@ mod with_embree {
     }
 
     /// An engine as it is set up in `mode`.
-    fn contender(mode: ModeArg, threads: usize, isa: Isa) -> Contender {
+    fn contender(mode: ModeArg, threads: usize, isa: Isa, costs: &Arc<TreeCosts>) -> Contender {
         let avx2_at_most = isa == Isa::Avx2;
         let medium = Options { robust: false, threads: Some(threads), avx2_at_most, ..Options::default() };
-        let embree = |mode, options: Options| Contender {
-            backend: "embree",
-            mode,
-            build: Box::new(move |world| build_embree(world, &options)),
+        let embree = |mode, options: Options| {
+            let costs = Arc::clone(costs);
+            let build = Box::new(move |world: &World| build_embree(world, &options, &costs));
+            Contender { backend: "embree", mode, build }
         };
         let native = |preset: Preset| Contender {
             backend: "native",
@@ -257,9 +256,27 @@ mod with_embree {
     }
 
     /// Only what Embree itself does is charged to it: neither our copies of the triangles for it, nor their bytes.
-    fn build_embree(world: &World, options: &Options) -> Result<Built> {
+    fn build_embree(world: &World, options: &Options, costs: &TreeCosts) -> Result<Built> {
+        let sah_cost = Some(costs.of(world, options)?);
         let embree = Embree::new(world, options)?;
         let (seconds, bytes) = (embree.commit_time().as_secs_f64(), embree.tree_bytes());
-        Ok(Built { seconds, bytes, sah_cost: None, tracer: Box::new(embree) })
+        Ok(Built { seconds, bytes, sah_cost, tracer: Box::new(embree) })
+    }
+
+    /// What Embree's trees of one scene cost, by quality. Each takes another build, so it is found once.
+    #[derive(Default)]
+    struct TreeCosts {
+        medium: OnceLock<f64>,
+        high: OnceLock<f64>,
+    }
+
+    impl TreeCosts {
+        fn of(&self, world: &World, options: &Options) -> Result<f64> {
+            let known = if options.quality == Quality::High { &self.high } else { &self.medium };
+            match known.get() {
+                Some(&cost) => Ok(cost),
+                None => embree::sah_cost(world, options, Bvh::NODE_COST).map(|cost| *known.get_or_init(|| cost)),
+            }
+        }
     }
 }
