@@ -1,5 +1,7 @@
 //! `twincast bench`: native and Embree against the clock, in turn.
 
+use std::path::PathBuf;
+
 use clap::{Args, ValueEnum};
 
 use super::common::UpAxis;
@@ -21,7 +23,7 @@ use crate::lab::bench::SIDE;
 Examples:
   twincast bench bunny.obj
   twincast bench scan.obj --up-axis z --rays primary,shadow --repeat 9
-  twincast bench terrain1000 architecture --json
+  twincast bench terrain1000 architecture instances --json --chart rates.svg
   twincast bench terrain3162 --modes default,fast,robust --threads 2")]
 pub(super) struct BenchArgs {
     /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
@@ -73,6 +75,16 @@ pub(super) struct BenchArgs {
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
     json: bool,
+
+    /// Draw the rates: bars from zero with their ranges, for each scene and kind of ray
+    #[arg(long, value_name = "FILE.svg", value_parser = parse_chart)]
+    chart: Option<PathBuf>,
+}
+
+fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    let is_svg = path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("svg"));
+    if is_svg { Ok(path) } else { Err("a chart is an SVG file: give a name that ends in .svg".to_owned()) }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -142,15 +154,16 @@ use with_embree::bench;
 
 #[cfg(feature = "embree")]
 mod with_embree {
+    use std::path::PathBuf;
     use std::sync::{Arc, OnceLock};
     use std::time::Instant;
 
     use serde::Serialize;
 
     use super::{BenchArgs, IsaArg, ModeArg};
-    use crate::cli::{interrupt, progress, say, warn};
+    use crate::cli::{interrupt, outputs, progress, say, warn};
     use crate::error::{Error, Result};
-    use crate::lab::bench::{Built, Contender, Setup, Subject};
+    use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::trace::World;
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Options, Quality};
@@ -169,6 +182,8 @@ mod with_embree {
 
     pub(super) fn bench(args: &BenchArgs) -> Result<()> {
         let cancel = interrupt::install()?;
+        let files: Vec<PathBuf> = args.scenes.iter().map(PathBuf::from).filter(|path| path.exists()).collect();
+        outputs::check(&[], &args.chart, &files)?;
         let threads = match args.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
@@ -211,11 +226,24 @@ mod with_embree {
             }
             reports.push(report);
         }
+        if let Some(path) = &args.chart {
+            outputs::write_text(path, &chart(&reports, &notes(isa)?))?;
+        }
         match &reports[..] {
             _ if !args.json => Ok(()),
             [report] => say_json(report),
             reports => say_json(&reports),
         }
+    }
+
+    /// What was measured on what.
+    fn notes(isa: Isa) -> Result<Vec<String>> {
+        let embree = Embree::new(&World::default(), &Options::default())?.version();
+        let most = isa.name().to_uppercase();
+        Ok(vec![
+            format!("{}, instructions up to {most}", processor()),
+            format!("Twincast {}, native: watertight and exact. Embree {embree}", env!("CARGO_PKG_VERSION")),
+        ])
     }
 
     fn say_json(document: &impl Serialize) -> Result<()> {

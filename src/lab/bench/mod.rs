@@ -7,6 +7,8 @@
 //! | `pixel_loop` | camera rays made within the time, by the renderer's own loop |
 //! | `run`, `answers` | builds and passes over the rays, in turn; answers compared first |
 //! | `report` | rates, ratios, the table |
+//! | `chart`, `svg` | the rates as a picture |
+//! | `machine` | what they were measured on |
 //!
 //! Rates move by 15 % from run to run on a shared machine, so only ratios within a run count: every engine is timed
 //! within the same second as its rivals, again and again, and a ratio is the median of those of each turn. Timing one
@@ -16,12 +18,17 @@
 //! weakened Embree would prove nothing.
 
 mod answers;
+mod chart;
+mod machine;
 mod pixel_loop;
 mod rays;
 mod report;
 mod run;
 mod subject;
+mod svg;
 
+pub use chart::chart;
+pub use machine::processor;
 pub use rays::{BLOCK, Kind, RaySet, SIDE, View};
 pub use report::{BuildRow, Ratio, Report, Spread, TraversalRow};
 pub use run::{AnyTracer, Build, Built, Contender, Setup, WIDTHS};
