@@ -1,5 +1,7 @@
 //! The upper level: a tree over placed objects.
 
+use std::ops::Range;
+
 use super::build::{self, Record};
 use super::node::Tree;
 use super::preset::Options;
@@ -40,8 +42,8 @@ impl PlacementTree {
 
     /// The placements of a leaf.
     #[inline]
-    pub fn leaf(&self, first: u32, count: u8) -> &[Placement] {
-        &self.placements[first as usize..first as usize + usize::from(count)]
+    pub fn leaf(&self, items: Range<u32>) -> &[Placement] {
+        &self.placements[items.start as usize..items.end as usize]
     }
 
     /// Memory it holds, in bytes.
