@@ -25,7 +25,8 @@ run() {
     for mode in fast robust; do
         "$work/embree_ref" "$scene" "$mode" medium "$up" | sed -nE \
             "s/.*\"kind\":\"([a-z]+)\",\"width\":([0-9]+),.*\"mrays_per_s\":([0-9.]+).*/plain $mode \1 \2 \3/p"
-        "$twincast" bench "$scene" --up-axis "$up" --modes "$mode" --repeat 3 --json |
+        "$twincast" bench "$scene" --up-axis "$up" --modes "$mode" \
+            --rays primary,diffuse,shadow --repeat 3 --json |
             grep -oE '\{"backend":"embree","mode"[^{]*"mrays_per_s":\{[^}]*' | sed -nE \
             's/.*"mode":"([a-z]+)","width":([0-9]+),"kind":"([a-z]+)".*"max":([0-9.e+-]+).*/twincast \1 \3 \2 \4/p'
     done

@@ -11,7 +11,7 @@ use twincast::{Batch, Error, Hit, Ray, Tracer, World};
 fn hits(subject: &Subject) -> [usize; 3] {
     let bvh = Bvh::build(&subject.world);
     let sets = subject.view.rays(&subject.world, &bvh, &Kind::ALL, SIDE);
-    assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL);
+    assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL[..3], "the prepared ones");
     let counts: Vec<usize> = sets
         .iter()
         .map(|set| {
@@ -65,9 +65,14 @@ fn a_subject_is_a_rule_or_a_file() {
         |name| Subject::new(name, UpAxis::Y).map(|(s, _)| (s.world.primitive_count(), s.stored_triangles()));
     assert_eq!(triangles("terrain7").unwrap(), (98, 98));
     assert_eq!(triangles("architecture3").unwrap(), (3 * 4140 + 2, 3 * 4140 + 2), "on a floor");
-    for name in ["terrain0", "terrain", "terrain999999999", "architecture-1", "no-such.obj"] {
-        assert_eq!(triangles(name).unwrap_err().exit_code(), 3, "{name}");
+    assert_eq!(triangles("instances5").unwrap(), (5 * 8192 + 2, 8192 + 2), "one mesh, and a floor");
+    assert_eq!(triangles("instances1").unwrap(), (8192 + 2, 8192 + 2));
+    for name in ["terrain0", "terrain", "terrain999999999", "architecture-1", "instances0", "no-such.obj"] {
+        let error = triangles(name).unwrap_err();
+        assert!(error.exit_code() == 3 && error.to_string().starts_with(name), "{error}");
     }
+    let error = triangles("terrain20001").unwrap_err().to_string();
+    assert_eq!(error, "terrain20001: must be terrainN with N from 1 to 20000");
     let folder = tempfile::tempdir().unwrap();
     let point = folder.path().join("point.obj");
     std::fs::write(&point, "v 1 2 3\nf 1 1 1\n").unwrap();
@@ -132,7 +137,7 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
         assert_eq!(builds[1]["mtris_per_s"]["median"], 0.0016, "800 in half a second");
         assert_eq!(builds[2]["bytes_per_triangle"], 10.0);
         let traversal = json["traversal"].as_array().unwrap();
-        assert_eq!(traversal.len(), 3 * 3 * 3);
+        assert_eq!(traversal.len(), 3 * 3 * 4);
         for row in traversal {
             let mut keys: Vec<_> = row.as_object().unwrap().keys().map(String::as_str).collect();
             keys.sort_unstable();
@@ -143,10 +148,13 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
             assert!(same.clone().count() == 9 && same.clone().all(|other| other["hits"] == row["hits"]));
         }
         let ratios = json["ratios"].as_array().unwrap();
-        assert_eq!(ratios.iter().map(|ratio| &ratio["kind"]).collect::<Vec<_>>(), ["primary", "diffuse", "shadow"]);
+        assert_eq!(
+            ratios.iter().map(|ratio| &ratio["kind"]).collect::<Vec<_>>(),
+            ["primary", "diffuse", "shadow", "pixel"]
+        );
         assert!(ratios.iter().all(|r| r["over_embree_robust"].is_number() && r["over_embree_fast"].is_number()));
         assert_eq!(json.as_object().unwrap().len(), 6, "and nothing else: {json}");
-        assert_eq!(report.verdicts.len(), 3);
+        assert_eq!(report.verdicts.len(), 4);
     }
 }
 

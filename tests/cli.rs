@@ -314,17 +314,26 @@ fn a_benchmark_prints_a_table_or_one_document() {
     }
     assert!(!table.contains("diffuse"), "{table}");
 
-    let output = twincast(
-        &[&["bench", "terrain20", "architecture1", "--json", "--modes", "default,robust"][..], &quick].concat(),
-    );
+    let chart = folder.path("rates.svg");
+    let both = ["bench", "terrain20", "architecture1", "--json", "--modes", "default,robust", "--chart", &chart];
+    let output = twincast(&[&both[..], &quick].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
+    let drawn = std::fs::read_to_string(&chart).expect("a chart");
+    for words in ["<svg ", "terrain20: 800 triangles, 2 threads", "architecture1: 4,142 triangles", "</svg>"] {
+        assert!(drawn.contains(words), "{words} in {drawn}");
+    }
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
     assert_eq!((&document[0]["triangles"], &document[1]["triangles"]), (&800.into(), &4142.into()));
     for report in document.as_array().expect("one of each scene") {
-        assert_eq!(report["traversal"].as_array().map(Vec::len), Some(2 * 3 * 3), "engines, widths, kinds");
+        assert_eq!(report["traversal"].as_array().map(Vec::len), Some(2 * 3 * 4), "engines, widths, kinds");
         assert!(report["ratios"][2]["over_embree_robust"].as_f64().is_some_and(|ratio| ratio > 0.0), "{report}");
         assert!(report["ratios"][2]["over_embree_fast"].is_null(), "{report}");
+        let cost = |engine: usize| report["builds"][engine]["sah_cost"].as_f64().expect("a cost");
+        assert!(cost(0) > 1.0 && cost(0) < 1.05 * cost(1), "{report}");
     }
+    let refused = |chart: &str| twincast(&[&["bench", &scene, "--chart", chart][..], &quick].concat()).status.code();
+    assert_eq!(refused(&folder.path("no/folder.svg")), Some(4), "before anything is measured");
+    assert_eq!(refused(&folder.path("rates.png")), Some(2));
     assert_eq!(twincast(&["bench", "terrain0"]).status.code(), Some(3), "neither a terrain nor a file");
 }
 

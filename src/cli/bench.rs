@@ -1,5 +1,7 @@
 //! `twincast bench`: native and Embree against the clock, in turn.
 
+use std::path::PathBuf;
+
 use clap::{Args, ValueEnum};
 
 use super::common::UpAxis;
@@ -21,10 +23,11 @@ use crate::lab::bench::SIDE;
 Examples:
   twincast bench bunny.obj
   twincast bench scan.obj --up-axis z --rays primary,shadow --repeat 9
-  twincast bench terrain1000 architecture --json
+  twincast bench terrain1000 architecture instances --json --chart rates.svg
   twincast bench terrain3162 --modes default,fast,robust --threads 2")]
 pub(super) struct BenchArgs {
-    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys)
+    /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
+    /// placements of one mesh)
     #[arg(value_name = "SCENE", default_value = "terrain1000")]
     scenes: Vec<String>,
 
@@ -33,7 +36,13 @@ pub(super) struct BenchArgs {
     up_axis: UpAxis,
 
     /// Kinds of rays
-    #[arg(long, value_name = "KIND,...", value_enum, value_delimiter = ',', default_value = "primary,diffuse,shadow")]
+    #[arg(
+        long,
+        value_name = "KIND,...",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "primary,diffuse,shadow,pixel"
+    )]
     rays: Vec<RaysArg>,
 
     /// Modes: native's default, native-fast, native-high, native-compact; Embree's fast, robust, compact, and high (quality,
@@ -66,6 +75,16 @@ pub(super) struct BenchArgs {
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
     json: bool,
+
+    /// Draw the rates: bars from zero with their ranges, for each scene and kind of ray
+    #[arg(long, value_name = "FILE.svg", value_parser = parse_chart)]
+    chart: Option<PathBuf>,
+}
+
+fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    let is_svg = path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("svg"));
+    if is_svg { Ok(path) } else { Err("a chart is an SVG file: give a name that ends in .svg".to_owned()) }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -78,9 +97,14 @@ enum IsaArg {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum RaysArg {
+    /// From the camera
     Primary,
+    /// From what the camera sees, in random directions
     Diffuse,
+    /// From what the camera sees to a point light
     Shadow,
+    /// From the camera, made from pixels within the time; all others are made before
+    Pixel,
 }
 
 #[cfg(feature = "embree")]
@@ -90,6 +114,7 @@ impl RaysArg {
             Self::Primary => Kind::Primary,
             Self::Diffuse => Kind::Diffuse,
             Self::Shadow => Kind::Shadow,
+            Self::Pixel => Kind::Pixel,
         }
     }
 }
@@ -129,17 +154,19 @@ use with_embree::bench;
 
 #[cfg(feature = "embree")]
 mod with_embree {
+    use std::path::PathBuf;
+    use std::sync::{Arc, OnceLock};
     use std::time::Instant;
 
     use serde::Serialize;
 
     use super::{BenchArgs, IsaArg, ModeArg};
-    use crate::cli::{interrupt, progress, say, warn};
+    use crate::cli::{interrupt, outputs, progress, say, warn};
     use crate::error::{Error, Result};
-    use crate::lab::bench::{Built, Contender, Setup, Subject};
+    use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::trace::World;
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
-    use crate::trace::embree::{Embree, Options, Quality};
+    use crate::trace::embree::{self, Embree, Options, Quality};
 
     /// Every mode, native first.
     const MODES: [ModeArg; 8] = [
@@ -155,6 +182,8 @@ mod with_embree {
 
     pub(super) fn bench(args: &BenchArgs) -> Result<()> {
         let cancel = interrupt::install()?;
+        let files: Vec<PathBuf> = args.scenes.iter().map(PathBuf::from).filter(|path| path.exists()).collect();
+        outputs::check(&[], &args.chart, &files)?;
         let threads = match args.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
@@ -167,11 +196,6 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let contenders: Vec<_> = MODES
-            .into_iter()
-            .filter(|mode| args.modes.contains(mode))
-            .map(|mode| contender(mode, threads, isa))
-            .collect();
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
@@ -180,6 +204,9 @@ mod with_embree {
             let (subject, warnings) = Subject::new(name, args.up_axis.axis())?;
             warn(&warnings);
             interrupt::check()?;
+            let costs = Arc::default();
+            let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
+            let contenders: Vec<_> = modes.map(|mode| contender(mode, threads, isa, &costs)).collect();
             let setup = Setup {
                 subject: &subject,
                 contenders: &contenders,
@@ -199,6 +226,9 @@ mod with_embree {
             }
             reports.push(report);
         }
+        if let Some(path) = &args.chart {
+            outputs::write_text(path, &chart(&reports, &notes(isa)?))?;
+        }
         match &reports[..] {
             _ if !args.json => Ok(()),
             [report] => say_json(report),
@@ -206,18 +236,28 @@ mod with_embree {
         }
     }
 
+    /// What was measured on what.
+    fn notes(isa: Isa) -> Result<Vec<String>> {
+        let embree = Embree::new(&World::default(), &Options::default())?.version();
+        let most = isa.name().to_uppercase();
+        Ok(vec![
+            format!("{}, instructions up to {most}", processor()),
+            format!("Twincast {}, native: watertight and exact. Embree {embree}", env!("CARGO_PKG_VERSION")),
+        ])
+    }
+
     fn say_json(document: &impl Serialize) -> Result<()> {
         say(serde_json::to_string(document).map_err(|error| Error::output("<stdout>", error.to_string()))?)
     }
 
     /// An engine as it is set up in `mode`.
-    fn contender(mode: ModeArg, threads: usize, isa: Isa) -> Contender {
+    fn contender(mode: ModeArg, threads: usize, isa: Isa, costs: &Arc<TreeCosts>) -> Contender {
         let avx2_at_most = isa == Isa::Avx2;
         let medium = Options { robust: false, threads: Some(threads), avx2_at_most, ..Options::default() };
-        let embree = |mode, options: Options| Contender {
-            backend: "embree",
-            mode,
-            build: Box::new(move |world| build_embree(world, &options)),
+        let embree = |mode, options: Options| {
+            let costs = Arc::clone(costs);
+            let build = Box::new(move |world: &World| build_embree(world, &options, &costs));
+            Contender { backend: "embree", mode, build }
         };
         let native = |preset: Preset| Contender {
             backend: "native",
@@ -244,9 +284,27 @@ mod with_embree {
     }
 
     /// Only what Embree itself does is charged to it: neither our copies of the triangles for it, nor their bytes.
-    fn build_embree(world: &World, options: &Options) -> Result<Built> {
+    fn build_embree(world: &World, options: &Options, costs: &TreeCosts) -> Result<Built> {
+        let sah_cost = Some(costs.of(world, options)?);
         let embree = Embree::new(world, options)?;
         let (seconds, bytes) = (embree.commit_time().as_secs_f64(), embree.tree_bytes());
-        Ok(Built { seconds, bytes, sah_cost: None, tracer: Box::new(embree) })
+        Ok(Built { seconds, bytes, sah_cost, tracer: Box::new(embree) })
+    }
+
+    /// What Embree's trees of one scene cost, by quality. Each takes another build, so it is found once.
+    #[derive(Default)]
+    struct TreeCosts {
+        medium: OnceLock<f64>,
+        high: OnceLock<f64>,
+    }
+
+    impl TreeCosts {
+        fn of(&self, world: &World, options: &Options) -> Result<f64> {
+            let known = if options.quality == Quality::High { &self.high } else { &self.medium };
+            match known.get() {
+                Some(&cost) => Ok(cost),
+                None => embree::sah_cost(world, options, Bvh::NODE_COST).map(|cost| *known.get_or_init(|| cost)),
+            }
+        }
     }
 }

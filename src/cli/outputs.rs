@@ -44,10 +44,15 @@ pub(super) fn write_pictures(paths: &[PathBuf], picture: &Image, metadata: &Meta
 
 /// Writes a JSON document.
 pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
-    let failed = |error: &dyn std::fmt::Display| Error::output(path, error.to_string());
-    let mut text = serde_json::to_string_pretty(document).map_err(|error| failed(&error))?;
+    let mut text = serde_json::to_string_pretty(document).map_err(|error| Error::output(path, error.to_string()))?;
     text.push('\n');
-    output::write_atomically(path, |part| std::fs::write(part, &text).map_err(|error| failed(&error)))
+    write_text(path, &text)
+}
+
+/// Writes a text.
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
+    let write = |part: &Path| std::fs::write(part, text).map_err(|error| Error::output(path, error.to_string()));
+    output::write_atomically(path, write)
 }
 
 #[cfg(test)]

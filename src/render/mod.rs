@@ -10,7 +10,8 @@ pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
 pub use tiles::TileOrder;
@@ -145,22 +146,43 @@ impl<'a> Renderer<'a> {
     pub fn render<T: Tracer>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let film = Film::new(self.settings.width, self.settings.height)?;
+        self.each_tile(|tile, buffers| {
+            if cancelled() {
+                return ControlFlow::Break(());
+            }
+            film.put(tile, self.tile(tracer, tile, buffers));
+            if let Some(on_tile) = control.on_tile {
+                on_tile(tile.len() as u64);
+            }
+            ControlFlow::Continue(())
+        });
+        if cancelled() { Err(Error::Interrupted) } else { Ok(film.into_image()) }
+    }
+
+    /// How many camera rays of the whole picture hit something. The same loop as [`Renderer::render`] on the same pool, from pixels
+    /// to hits, without what follows: what an engine is worth to a renderer can be measured with it.
+    pub fn count_hits<T: Tracer + ?Sized>(&self, tracer: &T) -> u64 {
+        let sum = AtomicU64::new(0);
+        self.each_tile(|tile, buffers| {
+            sum.fetch_add(self.tile_hits(tracer, tile, buffers), Ordering::Relaxed);
+            ControlFlow::Continue(())
+        });
+        sum.into_inner()
+    }
+
+    /// Calls `work` with each tile, on all threads of rayon's current pool, until it breaks off.
+    fn each_tile(&self, work: impl Fn(&Tile, &mut Buffers) -> ControlFlow<()> + Sync) {
         let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile_order);
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
         rayon::broadcast(|_| {
             let mut buffers = Buffers::default();
             while let Some(tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if cancelled() {
+                if work(tile, &mut buffers).is_break() {
                     return;
-                }
-                film.put(tile, self.tile(tracer, tile, &mut buffers));
-                if let Some(on_tile) = control.on_tile {
-                    on_tile(tile.len() as u64);
                 }
             }
         });
-        if cancelled() { Err(Error::Interrupted) } else { Ok(film.into_image()) }
     }
 
     /// One pixel, the same to the bit as in the whole picture. A tracer that records what it is asked learns every ray

@@ -40,14 +40,11 @@ struct Lit {
 impl Renderer<'_> {
     /// The pixels of a tile, in the order of [`Tile::pixels`].
     pub(super) fn tile<'b, T: Tracer>(&self, tracer: &T, tile: &Tile, buffers: &'b mut Buffers) -> &'b [Vec4] {
-        buffers.patterns.clear();
-        buffers.patterns.extend(tile.pixels().map(|(x, y)| self.sampler.pattern(x, y)));
+        self.begin(tile, buffers);
         buffers.sums.clear();
         buffers.sums.resize(tile.len(), Vec4::ZERO);
         for sample in 0..self.settings.spp {
-            let ray = |pixel| self.pinhole.ray(self.sampler.place(pixel, sample));
-            buffers.rays.clear();
-            buffers.rays.extend(buffers.patterns.iter().map(ray));
+            self.camera_hits(tracer, sample, buffers);
             self.radiance(tracer, buffers);
             for (sum, radiance) in buffers.sums.iter_mut().zip(&buffers.radiance) {
                 *sum += *radiance;
@@ -58,13 +55,35 @@ impl Renderer<'_> {
         &buffers.sums
     }
 
-    /// What each camera ray sees, into `radiance`: linear RGB and coverage.
-    fn radiance<T: Tracer>(&self, tracer: &T, buffers: &mut Buffers) {
-        let Buffers { rays, hits, radiance, lit, .. } = buffers;
+    /// How many camera rays of a tile hit something.
+    pub(super) fn tile_hits<T: Tracer + ?Sized>(&self, tracer: &T, tile: &Tile, buffers: &mut Buffers) -> u64 {
+        self.begin(tile, buffers);
+        let hits = (0..self.settings.spp).map(|sample| {
+            self.camera_hits(tracer, sample, buffers);
+            buffers.hits.iter().flatten().count() as u64
+        });
+        hits.sum()
+    }
+
+    /// What all samples of a pixel have in common, for each pixel of a tile.
+    fn begin(&self, tile: &Tile, buffers: &mut Buffers) {
+        buffers.patterns.clear();
+        buffers.patterns.extend(tile.pixels().map(|(x, y)| self.sampler.pattern(x, y)));
+    }
+
+    /// One sample of each pixel: its camera ray, and what that hits.
+    fn camera_hits<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
+        let Buffers { patterns, rays, hits, .. } = buffers;
+        rays.clear();
+        rays.extend(patterns.iter().map(|pixel| self.pinhole.ray(self.sampler.place(pixel, sample))));
         hits.clear();
         hits.resize(rays.len(), None);
         tracer.closest_batch(rays, hits, self.settings.batch);
+    }
 
+    /// What each camera ray sees, into `radiance`: linear RGB and coverage.
+    fn radiance<T: Tracer>(&self, tracer: &T, buffers: &mut Buffers) {
+        let Buffers { rays, hits, radiance, lit, .. } = buffers;
         let behind = self.plan.background.map_or(Vec4::ZERO, |color| color.extend(1.0));
         radiance.clear();
         lit.clear();

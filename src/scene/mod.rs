@@ -9,6 +9,7 @@ mod light;
 mod material;
 mod mesh;
 mod procedural;
+mod rocks;
 mod texture;
 
 pub use camera::Camera;
@@ -18,6 +19,7 @@ pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};
+pub use rocks::rocks;
 pub use texture::{Filter, Texture, Wrap};
 
 use crate::math::{DAabb, DAffine3, DMat3, DVec3, Vec3};

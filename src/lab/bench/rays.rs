@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::io::UpAxis;
 use crate::math::{DAabb, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
+use crate::scene::Camera;
 use crate::trace::{Batch, Primitives, Tracer, Width, World};
 
 /// Camera rays to a side, where figures are to be compared with those of `embree_ref`.
@@ -33,11 +34,13 @@ pub enum Kind {
     Diffuse,
     /// From a surface to the light; whether anything is hit, not what.
     Shadow,
+    /// From the camera, made from pixels within the time that is measured; all others are made before.
+    Pixel,
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Primary, Self::Diffuse, Self::Shadow];
+    /// All of them, in the order of the reports.
+    pub const ALL: [Self; 4] = [Self::Primary, Self::Diffuse, Self::Shadow, Self::Pixel];
 
     /// As in the reports.
     pub const fn name(self) -> &'static str {
@@ -45,6 +48,7 @@ impl Kind {
             Self::Primary => "primary",
             Self::Diffuse => "diffuse",
             Self::Shadow => "shadow",
+            Self::Pixel => "pixel",
         }
     }
 
@@ -106,13 +110,20 @@ impl View {
             .map(|(x, z)| self.centre + self.frame(Vec3::new(x, 0.0, z) * (4.0 * self.radius)) + bottom)
     }
 
-    /// Rays of each kind of `kinds`, made of `side` x `side` camera rays, whole tiles; `tracer` finds where the others
-    /// start.
+    /// The same view for a renderer; None where the bounds are too small or too large to be looked at.
+    pub fn camera(&self, zero: DVec3) -> Option<Camera> {
+        let target = zero + self.centre.as_dvec3();
+        let fov = 2.0 * libm::atan(f64::from(TANGENT));
+        Camera::look_at(target + self.eye.as_dvec3(), target, self.frame(Vec3::Y).as_dvec3(), fov)
+    }
+
+    /// Rays of each kind of `kinds` but [`Kind::Pixel`], made of `side` x `side` camera rays, whole tiles; `tracer` finds
+    /// where the others start.
     pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
         let side = side.next_multiple_of(TILE);
         let mut primary = self.primary(side);
         let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
-        if kinds.iter().any(|&kind| kind != Kind::Primary) {
+        if kinds.contains(&Kind::Diffuse) || kinds.contains(&Kind::Shadow) {
             let mut hits = vec![None; primary.len()];
             tracer.closest_batch(&primary, &mut hits, Kind::Primary.batch(Width::One));
             let light = self.centre + self.frame(Vec3::new(2.0, 3.0, 1.0)) * self.radius;
@@ -130,7 +141,7 @@ impl View {
             }
         }
         primary = in_order(primary.into_iter().enumerate().map(|(i, ray)| (place_in_tiles(i, side), ray)).collect());
-        let mut sets = [Some(primary), Some(in_order(diffuse)), Some(in_order(shadow))];
+        let mut sets = [Some(primary), Some(in_order(diffuse)), Some(in_order(shadow)), None];
         let set = |&kind: &Kind| sets[kind as usize].take().map(|rays| RaySet { kind, rays });
         kinds.iter().filter_map(set).collect()
     }

@@ -1,25 +1,21 @@
 //! The measurement: build in turn, compare, trace in turn.
 
-use std::hint::black_box;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::answers::{Answers, CHUNK, Room};
+use super::pixel_loop::PixelLoop;
 use super::rays::{Kind, RaySet};
 use super::report::{BuildRow, Ratio, Report, Spread, TraversalRow, Verdict};
 use super::subject::Subject;
 use crate::error::{Error, Result};
 use crate::lab::{Class, Paired};
-use crate::ray::{Hit, Ray};
-use crate::trace::{Batch, Tracer, Width, World};
+use crate::trace::{Tracer, Width, World};
 
 /// The widths that are measured.
 pub const WIDTHS: [Width; 3] = [Width::One, Width::Eight, Width::Sixteen];
-
-/// Rays handed to an engine at a time: enough for it to sort or regroup them, few enough that rays and answers stay in
-/// the second-level cache.
-const CHUNK: usize = 4096;
 
 /// An engine in one of its modes.
 pub struct Contender {
@@ -90,12 +86,17 @@ impl Setup<'_> {
             let Some(first) = self.position("native", None).or(self.contenders.first().map(|_| 0)) else {
                 return Err(Error::Usage("no engine to measure".to_owned()));
             };
-            let sets = self.subject.view.rays(&self.subject.world, &*tracers[first], self.kinds, self.side);
+            let pixels = PixelLoop::new(self.subject, self.side)?;
+            let prepared = self.subject.view.rays(&self.subject.world, &*tracers[first], self.kinds, self.side);
+            let mut prepared = prepared.into_iter();
             let (mut traversal, mut verdicts) = (Vec::new(), Vec::new());
-            for set in &sets {
-                let (hits, verdict) = self.compare(set, &tracers, first)?;
+            for &kind in self.kinds {
+                let of_pixels = || RaySet { kind, rays: pixels.rays() };
+                let set = if kind == Kind::Pixel { Some(of_pixels()) } else { prepared.next() };
+                let Some(set) = set else { continue };
+                let (hits, verdict) = self.compare(&set, &tracers, first)?;
                 verdicts.extend(verdict.map(|verdict| (set.kind, verdict)));
-                traversal.extend(self.trace(set, &tracers, &hits)?);
+                traversal.extend(self.trace(&set, &pixels, &tracers, &hits)?);
             }
             Ok(Report {
                 scene: self.subject.name.clone(),
@@ -180,7 +181,13 @@ impl Setup<'_> {
     }
 
     /// Times every engine at every width, in turn, `repeat` times.
-    fn trace(&self, set: &RaySet, tracers: &[AnyTracer], hits: &[[u64; WIDTHS.len()]]) -> Result<Vec<TraversalRow>> {
+    fn trace(
+        &self,
+        set: &RaySet,
+        pixels: &PixelLoop<'_>,
+        tracers: &[AnyTracer],
+        hits: &[[u64; WIDTHS.len()]],
+    ) -> Result<Vec<TraversalRow>> {
         let mut turns = vec![[const { Vec::new() }; WIDTHS.len()]; tracers.len()];
         for turn in 0..self.repeat {
             for (w, width) in WIDTHS.into_iter().enumerate() {
@@ -188,7 +195,10 @@ impl Setup<'_> {
                     // There and back, so that nobody is always the first.
                     let i = if turn % 2 == 0 { k } else { tracers.len() - 1 - k };
                     let start = Instant::now();
-                    let count = self.pass(set, &*tracers[i], set.kind.batch(width));
+                    let count = match set.kind {
+                        Kind::Pixel => pixels.pass(&*tracers[i], width),
+                        Kind::Primary | Kind::Diffuse | Kind::Shadow => self.pass(set, &*tracers[i], width),
+                    };
                     turns[i][w].push(set.rays.len() as f64 / start.elapsed().as_secs_f64().max(1e-9) / 1e6);
                     if count != hits[i][w] {
                         let Contender { backend, mode, .. } = self.contenders[i];
@@ -215,8 +225,9 @@ impl Setup<'_> {
         Ok(rows.collect())
     }
 
-    /// Traces all rays and counts the hits.
-    fn pass(&self, set: &RaySet, tracer: &dyn Tracer, batch: Batch) -> u64 {
+    /// Traces prepared rays and counts the hits.
+    fn pass(&self, set: &RaySet, tracer: &dyn Tracer, width: Width) -> u64 {
+        let batch = set.kind.batch(width);
         if self.threads == 1 {
             let mut room = Room::new();
             return set.rays.chunks(CHUNK).map(|rays| room.chunk(set.kind, rays, tracer, batch)).sum();
@@ -235,68 +246,5 @@ impl Setup<'_> {
         }
         let cancelled = self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
         if cancelled { Err(Error::Interrupted) } else { Ok(()) }
-    }
-}
-
-/// Room for the answers to a chunk, used again and again so that it stays in the cache.
-struct Room {
-    hits: Vec<Option<Hit>>,
-    occluded: Vec<bool>,
-}
-
-impl Room {
-    fn new() -> Self {
-        Self { hits: vec![None; CHUNK], occluded: vec![false; CHUNK] }
-    }
-
-    /// Traces up to [`CHUNK`] rays and counts the hits.
-    fn chunk(&mut self, kind: Kind, rays: &[Ray], tracer: &dyn Tracer, batch: Batch) -> u64 {
-        let count = match kind {
-            Kind::Primary | Kind::Diffuse => {
-                let hits = &mut self.hits[..rays.len()];
-                tracer.closest_batch(rays, hits, batch);
-                black_box(&*hits).iter().filter(|hit| hit.is_some()).count()
-            }
-            Kind::Shadow => {
-                let occluded = &mut self.occluded[..rays.len()];
-                tracer.occluded_batch(rays, occluded, batch);
-                black_box(&*occluded).iter().filter(|occluded| **occluded).count()
-            }
-        };
-        count as u64
-    }
-}
-
-/// The answers to all rays of a set.
-#[derive(PartialEq)]
-enum Answers {
-    Closest(Vec<Option<Hit>>),
-    Occluded(Vec<bool>),
-}
-
-impl Answers {
-    /// Asks in the chunks that are timed.
-    fn of(set: &RaySet, tracer: &dyn Tracer, batch: Batch) -> Self {
-        let rays = set.rays.par_chunks(CHUNK);
-        match set.kind {
-            Kind::Primary | Kind::Diffuse => {
-                let mut hits = vec![None; set.rays.len()];
-                rays.zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| tracer.closest_batch(rays, hits, batch));
-                Self::Closest(hits)
-            }
-            Kind::Shadow => {
-                let mut occluded = vec![false; set.rays.len()];
-                let chunks = rays.zip(occluded.par_chunks_mut(CHUNK));
-                chunks.for_each(|(rays, occluded)| tracer.occluded_batch(rays, occluded, batch));
-                Self::Occluded(occluded)
-            }
-        }
-    }
-
-    fn hits(&self) -> u64 {
-        match self {
-            Self::Closest(hits) => hits.iter().flatten().count() as u64,
-            Self::Occluded(occluded) => occluded.iter().filter(|occluded| **occluded).count() as u64,
-        }
     }
 }

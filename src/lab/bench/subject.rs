@@ -6,7 +6,7 @@ use super::rays::View;
 use crate::error::{Error, Result, Warning};
 use crate::io::{self, LoadOptions, UpAxis};
 use crate::math::DAffine3;
-use crate::scene::{self, Geometry, Group, Instance, Material, Mesh, Scene, choose_origin};
+use crate::scene::{self, Camera, Geometry, Group, Instance, Material, Mesh, Scene, choose_origin};
 use crate::trace::{Primitives, World};
 
 /// Triangles of the largest terrain: 2 n^2 at this n are 800 million.
@@ -15,15 +15,23 @@ const LARGEST_TERRAIN: u32 = 20_000;
 const LARGEST_BUILDING: u32 = 100_000;
 /// Storeys where none are given: 198,720 triangles.
 const STOREYS: u32 = 48;
+/// Most placements: a placement takes 300 bytes or so, whatever is placed.
+const MOST_INSTANCES: u32 = 10_000_000;
+/// Placements where no number is given: 20.5 million triangles as placed.
+const INSTANCES: u32 = 2500;
 
 /// A scene ready to be traced, and where it is looked at from.
 pub struct Subject {
     /// As it was asked for.
     pub name: String,
     /// The scene, floor and all.
+    pub scene: Scene,
+    /// The same as engines take it.
     pub world: World,
-    /// The camera.
+    /// What is looked at, and from where.
     pub view: View,
+    /// The same for a renderer.
+    pub camera: Camera,
 }
 
 /// A scene that no file holds.
@@ -31,43 +39,51 @@ pub struct Subject {
 enum Procedural {
     Terrain(u32),
     Architecture(u32),
+    Instances(u32),
 }
 
 impl Procedural {
-    /// By its name: `terrain1000`, `architecture`, `architecture500`.
-    fn parse(name: &str) -> Option<Self> {
-        let number = |digits: &str, largest: u32| digits.parse().ok().filter(|n| (1..=largest).contains(n));
-        if let Some(digits) = name.strip_prefix("terrain") {
-            return number(digits, LARGEST_TERRAIN).map(Self::Terrain);
-        }
-        match name.strip_prefix("architecture")? {
-            "" => Some(Self::Architecture(STOREYS)),
-            digits => number(digits, LARGEST_BUILDING).map(Self::Architecture),
-        }
+    /// By its name: `terrain1000`, `architecture`, `architecture500`, `instances`, `instances100`. None for any other name.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a number that is missing or out of range.
+    fn parse(name: &str) -> Result<Option<Self>> {
+        let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let digits = &name[letters.len()..];
+        let (rule, otherwise, largest): (fn(u32) -> Self, _, _) = match letters {
+            "terrain" => (Self::Terrain, None, LARGEST_TERRAIN),
+            "architecture" => (Self::Architecture, Some(STOREYS), LARGEST_BUILDING),
+            "instances" => (Self::Instances, Some(INSTANCES), MOST_INSTANCES),
+            _ => return Ok(None),
+        };
+        let number = if digits.is_empty() { otherwise } else { digits.parse().ok() };
+        let odd = || Error::input(name, "", format!("must be {letters}N with N from 1 to {largest}"));
+        number.filter(|n| (1..=largest).contains(n)).map(rule).map(Some).ok_or_else(odd)
     }
 
-    fn mesh(self) -> Mesh {
+    fn scene(self) -> Scene {
+        let of_mesh = |mesh| Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
         match self {
-            Self::Terrain(n) => scene::terrain(n),
-            Self::Architecture(n) => scene::architecture(n),
+            Self::Terrain(n) => of_mesh(scene::terrain(n)),
+            Self::Architecture(n) => of_mesh(scene::architecture(n)),
+            Self::Instances(n) => scene::rocks(n),
         }
     }
 }
 
 impl Subject {
-    /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), or a file.
+    /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), `instances`
+    /// or `instancesN` (N placements of one mesh), or a file.
     /// All but terrains stand on a floor, two triangles at the bottom of their bounds.
     ///
     /// `up` says which axis of a *file* points up; nothing is turned, the camera stands accordingly.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that cannot be used or has nothing to look at, and those of [`World::new`].
+    /// [`Error::Input`] for a number out of range, for a file that cannot be used or has nothing to look at, and those of
+    /// [`World::new`].
     pub fn new(name: &str, up: UpAxis) -> Result<(Self, Vec<Warning>)> {
-        let (mut scene, warnings, up, is_terrain) = match Procedural::parse(name) {
-            Some(rule) => {
-                let scene = Scene::from_geometries(vec![Geometry::Mesh(rule.mesh())], vec![Material::default()]);
-                (scene, Vec::new(), UpAxis::Y, matches!(rule, Procedural::Terrain(_)))
-            }
+        let (mut scene, warnings, up, is_terrain) = match Procedural::parse(name)? {
+            Some(rule) => (rule.scene(), Vec::new(), UpAxis::Y, matches!(rule, Procedural::Terrain(_))),
             None => {
                 let (scene, warnings) = io::load(Path::new(name), &LoadOptions::default())?;
                 (scene, warnings, up, false)
@@ -84,7 +100,9 @@ impl Subject {
         }
         let world = World::new(&scene)?;
         let view = View::new(&bounds, world.centre, up, is_terrain);
-        Ok((Self { name: name.to_owned(), world, view }, warnings))
+        let odd = || Error::input(name, "", "is too small or too large to be looked at");
+        let camera = view.camera(world.centre).ok_or_else(odd)?;
+        Ok((Self { name: name.to_owned(), scene, world, view, camera }, warnings))
     }
 
     /// Triangles as stored: those of an object that is placed twice count once.

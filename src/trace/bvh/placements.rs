@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::build::{self, Record};
-use super::node::{Child, Tree};
+use super::node::Tree;
 use super::preset::Options;
 use crate::math::{Aabb, Vec3};
 use crate::trace::Placement;
@@ -22,7 +22,8 @@ impl PlacementTree {
             (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
         };
         let mut items: Vec<Record> = placements.iter().enumerate().filter_map(item).collect();
-        let tree = build::build(&mut items, 1, Child::MOST, options);
+        // A leaf for each: to enter an object costs many times what the test of its box does.
+        let tree = build::build(&mut items, 1, 1, options);
         Self { tree, placements: items.iter().map(|item| placements[item.primitive() as usize].clone()).collect() }
     }
 

@@ -1,7 +1,8 @@
 //! Intel Embree (Wald, Woop, Benthin, Johnson, Ernst 2014, *Embree: a kernel framework for efficient CPU ray tracing*).
 //!
 //! [`Embree`] is the engine; below it, `device` owns what every scene shares, `scene` builds and commits, `packet`
-//! lays rays out as Embree wants them and `query` asks. Versions 3.13 and 4 are served by one source: the bindings are
+//! lays rays out as Embree wants them and `query` asks; `sah` measures the trees
+//! that Embree's `builder` makes. Versions 3.13 and 4 are served by one source: the bindings are
 //! made from the header that is installed, and the two layouts of a hit are told apart by their size alone.
 //!
 //! A scene under construction and a committed one are different types, so that a query on an uncommitted scene, which
@@ -12,9 +13,11 @@
 //! correctly rounded, so a hit at exactly `tmin` or `tmax` may be missed, and at equal t any of the primitives may be
 //! named.
 
+mod builder;
 mod device;
 mod packet;
 mod query;
+mod sah;
 mod scene;
 mod sys;
 
@@ -30,6 +33,7 @@ use packet::{Active, Answer, Packet, RayHits, Rays, SingleRay, SingleRayHit};
 use query::{Mode, PacketQuery, Packets};
 use scene::{Scene, SceneBuilder};
 
+pub use sah::sah_cost;
 pub use sys::VERSION;
 
 /// How Embree builds and what it may trade.
@@ -55,7 +59,7 @@ impl Default for Options {
 }
 
 /// How good a tree the build makes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quality {
     /// Fast to build: sorted along a space-filling curve.
     Low,
