@@ -1,12 +1,15 @@
 //! Four triangles, laid out component by component for four-wide arithmetic.
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::math::{Aabb, Vec3};
 
 /// Triangles in a block.
 pub(super) const LANES: usize = 4;
 
 /// Four triangles, component by component.
-#[derive(Clone, Debug)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Block {
     /// Component i of corner k is `corners[3 * k + i]`.
     pub corners: [[f32; LANES]; 9],

@@ -9,19 +9,20 @@ use super::node::{NO_CHILD, Node, Tree, WIDTH};
 use super::room;
 use super::simd::Simd;
 use crate::math::is_traceable;
+use crate::memory::Array;
 use crate::trace::Part;
 
 /// The blocks of a tree of triangles.
 pub(super) enum Leaves {
     /// 45 bytes a triangle where blocks are full.
-    Blocks(Vec<Block>),
+    Blocks(Array<Block>),
     /// 4 bytes a triangle, but to reach a corner takes two steps through memory.
     Numbers(Numbers),
 }
 
 /// Blocks of triangle numbers.
 pub(super) struct Numbers {
-    blocks: Vec<[u32; LANES]>,
+    blocks: Array<[u32; LANES]>,
     meshes: Meshes,
 }
 
@@ -43,10 +44,9 @@ impl Leaves {
                 }
                 block
             };
-            let blocks = blocks(tree, items, block);
-            return Self::Numbers(Numbers { blocks, meshes });
+            return Self::of_numbers(blocks(tree, items, block), meshes);
         }
-        Self::Blocks(blocks(tree, items, |items| {
+        Self::of_blocks(blocks(tree, items, |items| {
             let mut block = Block::EMPTY;
             for item in items {
                 let (part, primitive) = (item.part(), item.primitive());
@@ -57,8 +57,13 @@ impl Leaves {
     }
 
     /// Blocks that leaves name already.
-    pub fn of_blocks(blocks: Vec<Block>) -> Self {
-        Self::Blocks(blocks)
+    pub fn of_blocks(blocks: impl Into<Array<Block>>) -> Self {
+        Self::Blocks(blocks.into())
+    }
+
+    /// Blocks of numbers of `meshes`' triangles.
+    pub fn of_numbers(blocks: impl Into<Array<[u32; LANES]>>, meshes: Meshes) -> Self {
+        Self::Numbers(Numbers { blocks: blocks.into(), meshes })
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
@@ -75,6 +80,7 @@ impl Leaves {
         let is_sound = |block: &Block| block.used().flat_map(|lane| block.triangle(lane)).all(is_traceable);
         match self {
             Self::Blocks(blocks) => blocks
+                .make_mut()
                 .par_iter_mut()
                 .map(|block| {
                     let old = std::mem::replace(block, Block::EMPTY);

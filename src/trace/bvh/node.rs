@@ -1,9 +1,11 @@
 //! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
 use crate::math::{Aabb, Vec3};
+use crate::memory::Array;
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
@@ -13,7 +15,7 @@ pub(super) const NO_CHILD: u8 = u8::MAX;
 
 /// Eight children: 256 bytes, four cache lines.
 #[repr(C, align(64))]
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Node {
     /// Of each child: min x, y, z, max x, y, z.
     pub bounds: [[f32; WIDTH]; 6],
@@ -21,13 +23,28 @@ pub(super) struct Node {
     pub index: [u32; WIDTH],
     /// 0 for an inner child, [`NO_CHILD`] for none, else the leaf's number of items.
     pub count: [u8; WIDTH],
+    /// What fills the fourth line: zeros, so that a node is its bytes.
+    pub unused: [u8; 24],
+}
+
+/// What a slot of a node names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Child {
+    None,
+    /// A node, by its index.
+    Node(u32),
+    /// So many items from the first on.
+    Leaf {
+        first: u32,
+        count: u8,
+    },
 }
 
 impl Node {
     /// A node without children.
     pub fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { bounds: [low, low, low, high, high, high], index: [0; WIDTH], count: [NO_CHILD; WIDTH] }
+        Self { bounds: [low, low, low, high, high, high], index: [0; WIDTH], count: [NO_CHILD; WIDTH], unused: [0; 24] }
     }
 
     /// Fills one slot.
@@ -38,6 +55,15 @@ impl Node {
         }
         self.index[slot] = index;
         self.count[slot] = count;
+    }
+
+    /// What a slot names.
+    pub fn child(&self, slot: usize) -> Child {
+        match (self.index[slot], self.count[slot]) {
+            (index, 0) => Child::Node(index),
+            (_, NO_CHILD) => Child::None,
+            (first, count) => Child::Leaf { first, count },
+        }
     }
 
     /// The box around all children.
@@ -55,18 +81,24 @@ impl Node {
 }
 
 /// A tree over items of any kind; leaves name ranges of them.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Tree {
     /// The root is the first; empty for no items.
-    nodes: Vec<Node>,
+    nodes: Array<Node>,
     bounds: Aabb,
 }
 
 impl Tree {
     /// Of nodes of which the first is the root.
-    pub fn new(nodes: Vec<Node>) -> Self {
+    pub fn new(nodes: impl Into<Array<Node>>) -> Self {
+        let nodes = nodes.into();
         let bounds = nodes.first().map_or(Aabb::EMPTY, Node::bounds);
         Self { nodes, bounds }
+    }
+
+    /// All of them; the root is the first.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// One node.
@@ -113,9 +145,10 @@ impl Tree {
     }
 
     /// This tree, whose leaves name one of `items` each, with nodes in their place: the item's primitive is the node's index.
-    pub fn over(mut self, items: &[Record], below: &mut Vec<Node>) -> Self {
-        let base = self.nodes.len() as u32;
-        for node in &mut self.nodes {
+    pub fn over(self, items: &[Record], below: &mut Vec<Node>) -> Self {
+        let mut nodes = self.nodes.into_vec();
+        let base = nodes.len() as u32;
+        for node in &mut nodes {
             for slot in 0..WIDTH {
                 if node.count[slot] == 1 {
                     node.index[slot] = base + items[node.index[slot] as usize].primitive();
@@ -123,13 +156,14 @@ impl Tree {
                 }
             }
         }
-        self.nodes.append(below);
-        self
+        nodes.append(below);
+        Self { nodes: nodes.into(), bounds: self.bounds }
     }
 
     /// Computes all boxes again, from those of the leaves' `(first, count)`.
     pub fn refit(&mut self, leaf: impl Fn(u32, u8) -> Aabb + Sync) {
-        self.nodes.par_iter_mut().for_each(|node| {
+        let nodes = self.nodes.make_mut();
+        nodes.par_iter_mut().for_each(|node| {
             for slot in 0..WIDTH {
                 let (first, count) = (node.index[slot], node.count[slot]);
                 if count != 0 && count != NO_CHILD {
@@ -138,8 +172,8 @@ impl Tree {
             }
         });
         // Children come after their parents.
-        for index in (0..self.nodes.len()).rev() {
-            let (above, below) = self.nodes.split_at_mut(index + 1);
+        for index in (0..nodes.len()).rev() {
+            let (above, below) = nodes.split_at_mut(index + 1);
             let node = &mut above[index];
             for slot in 0..WIDTH {
                 if node.count[slot] == 0 {
@@ -153,6 +187,6 @@ impl Tree {
 
     /// All nodes, so that leaves can be renamed.
     pub fn nodes_mut(&mut self) -> &mut [Node] {
-        &mut self.nodes
+        self.nodes.make_mut()
     }
 }

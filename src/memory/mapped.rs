@@ -14,7 +14,7 @@ use std::path::Path;
 use memmap2::{Mmap, UncheckedAdvice};
 
 /// What is told how many bytes have been read, from any thread.
-pub(super) type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
+pub(crate) type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
 
 /// The bytes of a file.
 pub(crate) struct Mapped<'a> {
@@ -50,7 +50,7 @@ impl<'a> Mapped<'a> {
     }
 
     /// The same file, which tells of the bytes that are read.
-    pub(super) fn watched(self, on_bytes: Option<OnBytes<'a>>) -> Self {
+    pub(crate) fn watched(self, on_bytes: Option<OnBytes<'a>>) -> Self {
         Self { on_bytes, ..self }
     }
 
