@@ -21,7 +21,7 @@ pub(crate) struct Array<T> {
 
 enum Owner<T> {
     Memory(Vec<T>),
-    File(Arc<Mapped<'static>>),
+    File(#[expect(dead_code, reason = "held, so that the mapping lives as long")] Arc<Mapped<'static>>),
 }
 
 impl<T> Array<T> {

@@ -75,6 +75,46 @@ impl Leaves {
         }
     }
 
+    /// How many blocks there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Blocks(blocks) => blocks.len(),
+            Self::Numbers(numbers) => numbers.blocks.len(),
+        }
+    }
+
+    /// The blocks as they lie in memory.
+    pub fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Blocks(blocks) => bytemuck::cast_slice(blocks),
+            Self::Numbers(numbers) => bytemuck::cast_slice(&numbers.blocks),
+        }
+    }
+
+    /// The numbers of a block's triangles; none where it is not a block of triangles of `meshes`, as it would be made.
+    pub fn numbers(&self, index: u32, meshes: &Meshes) -> Option<impl Iterator<Item = u32> + use<>> {
+        let (numbers, count) = match self {
+            Self::Blocks(blocks) => {
+                let block = blocks.get(index as usize)?;
+                let (mut numbers, mut again) = ([NONE; LANES], Block::EMPTY);
+                for lane in block.used() {
+                    numbers[lane] = meshes.checked_number(block.part[lane], block.primitive[lane])?;
+                    meshes.push(&mut again, numbers[lane]);
+                }
+                let is_same = bytemuck::bytes_of(&again) == bytemuck::bytes_of(block);
+                is_same.then_some((numbers, again.used().count()))?
+            }
+            Self::Numbers(own) => {
+                let numbers = *own.blocks.get(index as usize)?;
+                let count = numbers.iter().take_while(|&&number| number != NONE).count();
+                let (used, rest) = numbers.split_at(count);
+                let is_one = |&number: &u32| (number as usize) < meshes.triangle_count();
+                (used.iter().all(is_one) && rest.iter().all(|&number| number == NONE)).then_some((numbers, count))?
+            }
+        };
+        (count > 0).then(|| numbers.into_iter().take(count))
+    }
+
     /// Takes the corners of `meshes`, whose triangles are the same. Whether all of them can still be hit.
     pub fn refit(&mut self, meshes: &Meshes) -> bool {
         let is_sound = |block: &Block| block.used().flat_map(|lane| block.triangle(lane)).all(is_traceable);

@@ -84,6 +84,12 @@ impl Meshes {
         self.of_part(part).first + primitive
     }
 
+    /// The number of a triangle, if there is one by these names.
+    pub fn checked_number(&self, part: u32, primitive: u32) -> Option<u32> {
+        let mesh = self.meshes.get(*self.of_part.get(part as usize)? as usize)?;
+        (mesh.part == part && (primitive as usize) < mesh.triangles.len()).then(|| mesh.first + primitive)
+    }
+
     /// The mesh of a triangle, and the triangle's index in it.
     #[inline(always)]
     pub fn find(&self, number: u32) -> (&Mesh, u32) {
