@@ -91,9 +91,10 @@ impl Leaves {
         }
     }
 
-    /// The numbers of a block's triangles; none where it is not a block of triangles of `meshes`, as it would be made.
-    pub fn numbers(&self, index: u32, meshes: &Meshes) -> Option<impl Iterator<Item = u32> + use<>> {
-        let (numbers, count) = match self {
+    /// The numbers of a block's triangles, and how many there are; none where it is not a block of triangles of `meshes` as it
+    /// would be made.
+    pub fn numbers(&self, index: u32, meshes: &Meshes) -> Option<([u32; LANES], usize)> {
+        let (numbers, is_sound) = match self {
             Self::Blocks(blocks) => {
                 let block = blocks.get(index as usize)?;
                 let (mut numbers, mut again) = ([NONE; LANES], Block::EMPTY);
@@ -101,18 +102,17 @@ impl Leaves {
                     numbers[lane] = meshes.checked_number(block.part[lane], block.primitive[lane])?;
                     meshes.push(&mut again, numbers[lane]);
                 }
-                let is_same = bytemuck::bytes_of(&again) == bytemuck::bytes_of(block);
-                is_same.then_some((numbers, again.used().count()))?
+                (numbers, bytemuck::bytes_of(&again) == bytemuck::bytes_of(block))
             }
             Self::Numbers(own) => {
-                let numbers = *own.blocks.get(index as usize)?;
-                let count = numbers.iter().take_while(|&&number| number != NONE).count();
-                let (used, rest) = numbers.split_at(count);
-                let is_one = |&number: &u32| (number as usize) < meshes.triangle_count();
-                (used.iter().all(is_one) && rest.iter().all(|&number| number == NONE)).then_some((numbers, count))?
+                let (numbers, most) = (*own.blocks.get(index as usize)?, meshes.triangle_count());
+                (numbers, numbers.iter().all(|&number| number == NONE || (number as usize) < most))
             }
         };
-        (count > 0).then(|| numbers.into_iter().take(count))
+        let count = numbers.iter().filter(|&&number| number != NONE).count();
+        // The used lanes come first.
+        let is_sound = is_sound && count > 0 && numbers[..count].iter().all(|&n| n != NONE);
+        is_sound.then_some((numbers, count))
     }
 
     /// Takes the corners of `meshes`, whose triangles are the same. Whether all of them can still be hit.

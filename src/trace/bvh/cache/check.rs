@@ -17,9 +17,10 @@
 use std::result::Result;
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 
+use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::math::{Aabb, is_traceable};
+use crate::math::{Aabb, Vec3, is_traceable};
 use crate::trace::Part;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::build::{MAX_DEPTH, MAX_LEAF_BLOCKS, presplit, triangle_items};
@@ -109,9 +110,30 @@ impl Counts {
     }
 }
 
+/// What a thread has counted, and leaves whose triangles it looks up together: which corners they have first, where
+/// these are next. One by one, each triangle would wait for memory twice.
+#[derive(Default)]
+struct Work {
+    counts: Counts,
+    leaves: Vec<Leaf>,
+    numbers: Vec<u32>,
+    /// Of each number.
+    corners: Vec<[u32; 3]>,
+}
+
+/// A leaf, and where its numbers end.
+struct Leaf {
+    node: usize,
+    bounds: Aabb,
+    end: usize,
+}
+
+/// Triangles that are looked up together, about.
+const BATCH: usize = 256;
+
 impl Pass<'_> {
     fn check_nodes(&self, first: usize, nodes: &[Node]) -> Result<Counts, String> {
-        let mut counts = Counts::default();
+        let mut work = Work::default();
         for (index, node) in (first..).zip(nodes) {
             for slot in 0..WIDTH {
                 let bounds = node.child_bounds(slot);
@@ -124,12 +146,16 @@ impl Pass<'_> {
                 }
                 match node.child(slot) {
                     Child::None => {}
-                    Child::Node(child) => self.check_child(index, &bounds, child, &mut counts)?,
-                    Child::Leaf { first, count } => self.check_leaf(index, &bounds, first, count, &mut counts)?,
+                    Child::Node(child) => self.check_child(index, &bounds, child, &mut work.counts)?,
+                    Child::Leaf { first, count } => self.check_leaf(index, bounds, first, count, &mut work)?,
                 }
             }
+            if work.numbers.len() >= BATCH {
+                self.check_corners(&mut work)?;
+            }
         }
-        Ok(counts)
+        self.check_corners(&mut work)?;
+        Ok(work.counts)
     }
 
     fn check_child(&self, index: usize, bounds: &Aabb, child: u32, counts: &mut Counts) -> Result<(), String> {
@@ -143,39 +169,50 @@ impl Pass<'_> {
         Ok(())
     }
 
-    fn check_leaf(
-        &self,
-        index: usize,
-        bounds: &Aabb,
-        first: u32,
-        count: u8,
-        counts: &mut Counts,
-    ) -> Result<(), String> {
+    fn check_leaf(&self, node: usize, bounds: Aabb, first: u32, count: u8, work: &mut Work) -> Result<(), String> {
         let end = u64::from(first) + u64::from(count);
         if u32::from(count) > MAX_LEAF_BLOCKS || end > self.blocks.len() as u64 {
-            return Err(format!("has in node {index} a leaf of {count} blocks from {first} on, which are not there"));
+            return Err(format!("has in node {node} a leaf of {count} blocks from {first} on, which are not there"));
         }
         for block in first..first + u32::from(count) {
             self.blocks[block as usize].store(1, Relaxed);
             let numbers = self.leaves.numbers(block, self.meshes);
-            let numbers = numbers.ok_or_else(|| format!("has a block {block} that is not of this mesh"))?;
-            for number in numbers {
-                counts.triangles += 1;
-                let (mesh, primitive) = self.meshes.find(number);
-                let corners = mesh.corners(primitive);
-                if !corners.into_iter().all(is_traceable) {
-                    return Err(format!("has in block {block} a triangle that cannot be hit"));
-                }
-                if contains(bounds, &Aabb::around(corners)) {
+            let (numbers, count) = numbers.ok_or_else(|| format!("has a block {block} that is not of this mesh"))?;
+            work.numbers.extend_from_slice(&numbers[..count]);
+        }
+        work.counts.blocks += usize::from(count);
+        work.leaves.push(Leaf { node, bounds, end: work.numbers.len() });
+        Ok(())
+    }
+
+    /// That leaves hold their triangles.
+    fn check_corners(&self, work: &mut Work) -> Result<(), String> {
+        let Work { counts, leaves, numbers, corners } = work;
+        corners.clear();
+        corners.extend(numbers.iter().map(|&number| {
+            let (mesh, primitive) = self.meshes.find(number);
+            mesh.triangles[primitive as usize]
+        }));
+        let mut first = 0;
+        for Leaf { node, bounds, end } in leaves.drain(..) {
+            for (&number, corners) in numbers[first..end].iter().zip(&corners[first..end]) {
+                let positions = &self.meshes.find(number).0.positions;
+                let corners = corners.map(|corner| positions[corner as usize]);
+                // The box is finite, so what it holds is.
+                if holds(&bounds, corners) {
                     self.triangles[number as usize].store(1, Relaxed);
+                } else if !corners.into_iter().all(is_traceable) {
+                    return Err(format!("has in a leaf of node {node} a triangle that cannot be hit"));
                 } else if self.cut {
-                    counts.pieces.push((number, *bounds));
+                    counts.pieces.push((number, bounds));
                 } else {
-                    return Err(format!("has in node {index} a box that does not hold its triangles"));
+                    return Err(format!("has in node {node} a box that does not hold its triangles"));
                 }
             }
+            first = end;
         }
-        counts.blocks += usize::from(count);
+        counts.triangles += numbers.len();
+        numbers.clear();
         Ok(())
     }
 
@@ -239,7 +276,18 @@ impl Pass<'_> {
     }
 }
 
-/// Written so that NaN gives false.
+/// Whether all corners are in a box; false for NaN.
+#[inline(always)]
+fn holds(bounds: &Aabb, [a, b, c]: [Vec3; 3]) -> bool {
+    // Vectors of a register each, and one branch: this is asked of every triangle.
+    let (min, max) = (Vec3A::from(bounds.min), Vec3A::from(bounds.max));
+    let [a, b, c] = [Vec3A::from(a), Vec3A::from(b), Vec3A::from(c)];
+    let above = min.cmple(a) & min.cmple(b) & min.cmple(c);
+    let below = max.cmpge(a) & max.cmpge(b) & max.cmpge(c);
+    (above & below).all()
+}
+
+/// False for NaN.
 fn contains(outer: &Aabb, inner: &Aabb) -> bool {
     outer.min.cmple(inner.min).all() && outer.max.cmpge(inner.max).all()
 }

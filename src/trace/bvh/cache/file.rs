@@ -1,7 +1,7 @@
 //! The file: a header, a table, and arrays, each with its digest.
 //!
 //! ```text
-//! header        64 + 32 bytes, see `Header`
+//! header        72 bytes: see `Header`
 //! table         of each array its length in bytes and its digest
 //! arrays        in order, each at the next multiple of 64, zeros between
 //! ```
