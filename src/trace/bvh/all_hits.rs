@@ -12,6 +12,7 @@ use super::block::LANES;
 use super::filter::Filter;
 use super::isa::{self, Kernel};
 use super::level::{Level, PLACED, Through};
+use super::node::Child;
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -138,8 +139,8 @@ impl Kernel for Gather<'_> {
         }
         let slab = SlabRay::new(ray, bvh.placements.reach(), 1.0);
         let limit = limit(ray);
-        walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |first, count| {
-            for placement in bvh.placements.leaf(first, count) {
+        walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |leaf| {
+            for placement in bvh.placements.leaf(leaf.blocks()) {
                 let local = placement.object_ray(ray);
                 if local.is_valid() {
                     let through = Through { instance: placement.instance, to_world: &placement.to_world };
@@ -173,15 +174,15 @@ impl Level {
         if !self.triangles.tree().is_empty() {
             let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(local, blur);
-            walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |first, count| {
-                self.triangles.gather_leaf::<S>(first, count, ray, &filter, through, gathered);
+            walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |leaf| {
+                self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
                 Visit::Until(limit)
             });
         }
         if !self.shapes.tree().is_empty() {
             let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
-            walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |first, count| {
-                self.shapes.gather_leaf(first, count, local, through, &mut gathered.shapes);
+            walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |leaf| {
+                self.shapes.gather_leaf(leaf, local, through, &mut gathered.shapes);
                 Visit::Until(limit)
             });
         }
@@ -192,14 +193,13 @@ impl TriangleTree {
     #[inline(always)]
     fn gather_leaf<S: Simd>(
         &self,
-        first: u32,
-        count: u8,
+        leaf: Child,
         ray: &Ray,
         filter: &Filter,
         through: Option<Through<'_>>,
         gathered: &mut Gathered,
     ) {
-        for index in first..first + u32::from(count) {
+        for index in leaf.blocks() {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
             let mut open = filter.candidates::<S>(block, limit(ray)).lanes;

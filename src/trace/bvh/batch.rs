@@ -42,8 +42,8 @@ impl Bvh {
             &slab,
             nearest.limit(),
             #[inline(always)]
-            |first, count| {
-                for placement in self.placements.leaf(first, count) {
+            |leaf| {
+                for placement in self.placements.leaf(leaf.blocks()) {
                     let object_ray = placement.object_ray(ray);
                     if object_ray.is_valid() {
                         let through = Through { instance: placement.instance, to_world: &placement.to_world };

@@ -12,7 +12,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::Bvh;
-use super::node::{NO_CHILD, Tree, WIDTH};
+use super::node::{Child, Tree};
 use super::triangles::TriangleTree;
 use crate::math::{Aabb, DVec3, Vec3, gamma64};
 use crate::shape::closest::{TrianglePoint, closest_point};
@@ -75,9 +75,7 @@ struct Waiting {
     /// The distance of its box, squared.
     near: f64,
     level: Level,
-    index: u32,
-    /// 0 for a node, else the leaf's number of items.
-    count: u8,
+    child: Child,
 }
 
 /// The nearest is the greatest: [`BinaryHeap`] has that on top.
@@ -140,18 +138,18 @@ impl<'a> Search<'a> {
                 return;
             }
             match waiting {
-                Waiting { level, index, count: 0, .. } => self.push_children(level, index),
-                Waiting { level: Level::Placements, index, count, .. } => {
-                    (index..index + u32::from(count)).for_each(|index| self.push_root(Level::Placed(index)));
+                Waiting { level, child, .. } if !child.is_leaf() => self.push_children(level, child),
+                Waiting { level: Level::Placements, child, .. } => {
+                    child.blocks().for_each(|index| self.push_root(Level::Placed(index)));
                 }
-                Waiting { level, index, count, .. } => self.offer_leaf(level, index, count),
+                Waiting { level, child, .. } => self.offer_leaf(level, child),
             }
         }
     }
 
     /// The placement with this index among the leaves of the upper tree.
     fn placement(&self, index: u32) -> &'a Placement {
-        &self.bvh.placements.leaf(index, 1)[0]
+        &self.bvh.placements.leaf(index..index + 1)[0]
     }
 
     fn triangles(&self, level: Level) -> Option<&'a TriangleTree> {
@@ -169,18 +167,18 @@ impl<'a> Search<'a> {
     fn push_root(&mut self, level: Level) {
         let tree = self.tree(level);
         if !tree.is_empty() {
-            self.push(level, tree.bounds(), 0, 0);
+            self.push(level, tree.bounds(), Child::ROOT);
         }
     }
 
-    fn push_children(&mut self, level: Level, index: u32) {
-        let node = self.tree(level).node(index);
-        for slot in (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD) {
-            self.push(level, node.child_bounds(slot), node.index[slot], node.count[slot]);
+    fn push_children(&mut self, level: Level, parent: Child) {
+        let node = self.tree(level).node(parent);
+        for (slot, child) in node.children() {
+            self.push(level, node.child_bounds(slot), child);
         }
     }
 
-    fn push(&mut self, level: Level, bounds: Aabb, index: u32, count: u8) {
+    fn push(&mut self, level: Level, bounds: Aabb, child: Child) {
         let bounds = match level {
             Level::Placed(placement) => self.placement(placement).bounds(bounds),
             Level::Fixed | Level::Placements => bounds,
@@ -188,13 +186,13 @@ impl<'a> Search<'a> {
         let outside = (bounds.min.as_dvec3() - self.point).max(self.point - bounds.max.as_dvec3()).max(DVec3::ZERO);
         let near = outside.length_squared();
         if near <= self.limit {
-            self.queue.push(Waiting { near, level, index, count });
+            self.queue.push(Waiting { near, level, child });
         }
     }
 
-    fn offer_leaf(&mut self, level: Level, first: u32, count: u8) {
+    fn offer_leaf(&mut self, level: Level, leaf: Child) {
         let Some(triangles) = self.triangles(level) else { return };
-        for index in first..first + u32::from(count) {
+        for index in leaf.blocks() {
             let mut scratch = None;
             let block = triangles.block(index, &mut scratch);
             for lane in block.used() {

@@ -6,7 +6,7 @@ use super::block::{Block, LANES};
 use super::build::{self, Record, morton};
 use super::leaves::Leaves;
 use super::meshes::Meshes;
-use super::node::{Node, Tree, WIDTH};
+use super::node::{Child, Node, Tree, WIDTH};
 use super::preset::Options;
 use super::room;
 use crate::trace::Part;
@@ -65,7 +65,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
 fn node(blocks: &[Block], first: u32) -> Node {
     let mut node = Node::empty();
     for (slot, block) in blocks.iter().enumerate() {
-        node.set(slot, &block.bounds(), first + slot as u32, 1);
+        node.set(slot, &block.bounds(), Child::leaf(first + slot as u32, 1));
     }
     node
 }

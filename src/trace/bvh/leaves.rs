@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::block::{Block, LANES};
 use super::build::Record;
 use super::meshes::Meshes;
-use super::node::{NO_CHILD, Node, Tree, WIDTH};
+use super::node::{Child, Node, Tree, WIDTH};
 use super::room;
 use super::simd::Simd;
 use crate::math::is_traceable;
@@ -172,22 +172,16 @@ impl Leaves {
 
 /// One block for each four items of a leaf.
 fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) -> T + Sync) -> Vec<T> {
-    let count = |count: u8| if count == NO_CHILD { 0 } else { usize::from(count).div_ceil(LANES) };
-    let of_node = |node: &Node| node.count.map(count).iter().sum::<usize>();
+    let of_node = |node: &Node| node.items.iter().map(|&items| usize::from(items).div_ceil(LANES)).sum::<usize>();
     let chunks = tree.nodes_mut().par_chunks_mut(CHUNK);
     let counted = chunks.map(|nodes| (nodes.iter().map(of_node).sum(), nodes)).collect();
     room::fill(counted, |nodes, room| {
         for node in nodes {
-            for slot in 0..WIDTH {
-                let len = count(node.count[slot]);
-                if len > 0 {
-                    let first = node.index[slot] as usize;
-                    node.index[slot] = (room.first + room.len()) as u32;
-                    items[first..first + usize::from(node.count[slot])]
-                        .chunks(LANES)
-                        .for_each(|items| room.push(block(items)));
-                    node.count[slot] = len as u8;
-                }
+            for slot in (0..WIDTH).filter(|&slot| node.items[slot] > 0) {
+                let child = &mut node.child[slot];
+                let items = &items[child.first() as usize..][..usize::from(node.items[slot])];
+                *child = Child::leaf((room.first + room.len()) as u32, child.count());
+                items.chunks(LANES).for_each(|items| room.push(block(items)));
             }
         }
     })

@@ -52,8 +52,8 @@ impl Level {
                 slab,
                 found.limit,
                 #[inline(always)]
-                |first, count| {
-                    self.triangles.find_leaf::<S, Q>(first, count, ray, filter, &mut found);
+                |leaf| {
+                    self.triangles.find_leaf::<S, Q>(leaf, ray, filter, &mut found);
                     if Q::ANY && found.is_hit() { Visit::Stop } else { Visit::Until(found.limit) }
                 },
             );
@@ -81,8 +81,8 @@ impl Level {
                 &slab,
                 nearest.limit(),
                 #[inline(always)]
-                |first, count| {
-                    self.triangles.offer_leaf::<S>(first, count, ray, &filter, through, nearest);
+                |leaf| {
+                    self.triangles.offer_leaf::<S>(leaf, ray, &filter, through, nearest);
                     Visit::after::<Q>(nearest)
                 },
             );
@@ -108,8 +108,8 @@ impl Level {
                 &slab,
                 nearest.limit(),
                 #[inline(always)]
-                |first, count| {
-                    self.shapes.offer_leaf(first, count, local, through, nearest);
+                |leaf| {
+                    self.shapes.offer_leaf(leaf, local, through, nearest);
                     Visit::after::<Q>(nearest)
                 },
             );

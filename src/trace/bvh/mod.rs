@@ -62,6 +62,8 @@ pub use closest_point::ClosestPoint;
 pub use isa::Isa;
 pub use preset::{Options, Preset};
 
+use std::ops::Range;
+
 use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
@@ -130,13 +132,13 @@ impl Bvh {
     /// much as its own tree, by the area of its box in the world. 0 for an empty scene.
     pub fn sah_cost(&self) -> f64 {
         let of = |level: &Level| {
-            let tests = |_: u32, count: u8| f64::from(count);
+            let tests = |items: Range<u32>| items.len() as f64;
             level.triangles.tree().cost(tests) + level.shapes.tree().cost(tests)
         };
         let objects: Vec<f64> =
             self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
-        let placed = self.placements.tree().cost(|first, count| {
-            let costs = self.placements.leaf(first, count).iter().map(|placement| objects[placement.object as usize]);
+        let placed = self.placements.tree().cost(|items| {
+            let costs = self.placements.leaf(items).iter().map(|placement| objects[placement.object as usize]);
             costs.sum()
         });
         let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));

@@ -1,5 +1,7 @@
 //! The tree: nodes of eight boxes, laid out component by component for eight-wide arithmetic.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -10,8 +12,66 @@ use crate::memory::Array;
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
 
-/// Marks a child slot without a child; its box is empty, so that no ray enters it.
-pub(super) const NO_CHILD: u8 = u8::MAX;
+/// What is in a slot of a node: another node, or a leaf's blocks; in one word, so that one instruction reorders eight.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Child(pub u32);
+
+impl Child {
+    /// Nothing; its box is empty, so that no ray enters it.
+    pub const NONE: Self = Self(u32::MAX);
+    /// The first node.
+    pub const ROOT: Self = Self(0);
+    /// Blocks that a leaf can hold. From 1 to 8 rates hardly differ; with 1 a triangle takes a quarter more memory.
+    pub const MOST: u32 = 4;
+    /// Blocks, or items before blocks are made of them, that leaves can name.
+    pub const NAMES: usize = (1 << Self::COUNT_SHIFT) - 1;
+
+    /// Set for a leaf.
+    const LEAF: u32 = 1 << 31;
+    /// Two bits: the number of blocks, less one.
+    const COUNT_SHIFT: u32 = 29;
+
+    pub fn inner(node: u32) -> Self {
+        debug_assert!(node < Self::LEAF);
+        Self(node)
+    }
+
+    /// `count` blocks from `first` on.
+    pub fn leaf(first: u32, count: u32) -> Self {
+        debug_assert!((1..=Self::MOST).contains(&count) && (first as usize) < Self::NAMES);
+        Self(Self::LEAF | (count - 1) << Self::COUNT_SHIFT | first)
+    }
+
+    #[inline(always)]
+    pub fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    /// Of one that is no leaf, its node.
+    #[inline(always)]
+    pub fn node(self) -> u32 {
+        self.0
+    }
+
+    /// A leaf's first block.
+    #[inline(always)]
+    pub fn first(self) -> u32 {
+        self.0 & (1 << Self::COUNT_SHIFT) - 1
+    }
+
+    /// A leaf's number of blocks.
+    #[inline(always)]
+    pub fn count(self) -> u32 {
+        (self.0 >> Self::COUNT_SHIFT) % Self::MOST + 1
+    }
+
+    /// A leaf's blocks.
+    #[inline(always)]
+    pub fn blocks(self) -> Range<u32> {
+        self.first()..self.first() + self.count()
+    }
+}
 
 /// Eight children: 256 bytes, four cache lines.
 #[repr(C, align(64))]
@@ -19,51 +79,34 @@ pub(super) const NO_CHILD: u8 = u8::MAX;
 pub(super) struct Node {
     /// Of each child: min x, y, z, max x, y, z.
     pub bounds: [[f32; WIDTH]; 6],
-    /// Of an inner child its node; of a leaf its first item.
-    pub index: [u32; WIDTH],
-    /// 0 for an inner child, [`NO_CHILD`] for none, else the leaf's number of items.
-    pub count: [u8; WIDTH],
+    pub child: [Child; WIDTH],
+    /// Of each leaf its number of items, where several are in a block. Only while the tree is made.
+    pub items: [u8; WIDTH],
     /// What fills the fourth line: zeros, so that a node is its bytes.
     pub unused: [u8; 24],
-}
-
-/// What a slot of a node names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Child {
-    None,
-    /// A node, by its index.
-    Node(u32),
-    /// So many items from the first on.
-    Leaf {
-        first: u32,
-        count: u8,
-    },
 }
 
 impl Node {
     /// A node without children.
     pub fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { bounds: [low, low, low, high, high, high], index: [0; WIDTH], count: [NO_CHILD; WIDTH], unused: [0; 24] }
+        let bounds = [low, low, low, high, high, high];
+        Self { bounds, child: [Child::NONE; WIDTH], items: [0; WIDTH], unused: [0; 24] }
     }
 
     /// Fills one slot.
-    pub fn set(&mut self, slot: usize, bounds: &Aabb, index: u32, count: u8) {
+    pub fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
         for axis in 0..3 {
             self.bounds[axis][slot] = bounds.min[axis];
             self.bounds[axis + 3][slot] = bounds.max[axis];
         }
-        self.index[slot] = index;
-        self.count[slot] = count;
+        self.child[slot] = child;
     }
 
-    /// What a slot names.
-    pub fn child(&self, slot: usize) -> Child {
-        match (self.index[slot], self.count[slot]) {
-            (index, 0) => Child::Node(index),
-            (_, NO_CHILD) => Child::None,
-            (first, count) => Child::Leaf { first, count },
-        }
+    /// The slots that have a child, and these.
+    #[inline]
+    pub fn children(&self) -> impl Iterator<Item = (usize, Child)> {
+        self.child.into_iter().enumerate().filter(|&(_, child)| child != Child::NONE)
     }
 
     /// The box around all children.
@@ -101,10 +144,10 @@ impl Tree {
         &self.nodes
     }
 
-    /// One node.
+    /// The node that a child is.
     #[inline(always)]
-    pub fn node(&self, index: u32) -> &Node {
-        &self.nodes[index as usize]
+    pub fn node(&self, child: Child) -> &Node {
+        &self.nodes[child.node() as usize]
     }
 
     /// Whether there is nothing to hit.
@@ -130,14 +173,12 @@ impl Tree {
     }
 
     /// The surface area heuristic's cost, in half areas times tests: each node counts [`NODE_COST`], a leaf what `leaf` says of its
-    /// `(first, count)`.
-    pub fn cost(&self, leaf: impl Fn(u32, u8) -> f64) -> f64 {
+    /// blocks.
+    pub fn cost(&self, leaf: impl Fn(Range<u32>) -> f64) -> f64 {
         let root = f64::from(NODE_COST) * f64::from(self.bounds.half_area());
         self.nodes.iter().fold(root, |sum, node| {
-            let slots = (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD);
-            let cost = slots.map(|slot| {
-                let tests =
-                    if node.count[slot] == 0 { f64::from(NODE_COST) } else { leaf(node.index[slot], node.count[slot]) };
+            let cost = node.children().map(|(slot, child)| {
+                let tests = if child.is_leaf() { leaf(child.blocks()) } else { f64::from(NODE_COST) };
                 tests * f64::from(node.child_bounds(slot).half_area())
             });
             sum + cost.sum::<f64>()
@@ -148,26 +189,23 @@ impl Tree {
     pub fn over(self, items: &[Record], below: &mut Vec<Node>) -> Self {
         let mut nodes = self.nodes.into_vec();
         let base = nodes.len() as u32;
-        for node in &mut nodes {
-            for slot in 0..WIDTH {
-                if node.count[slot] == 1 {
-                    node.index[slot] = base + items[node.index[slot] as usize].primitive();
-                    node.count[slot] = 0;
-                }
+        for child in nodes.iter_mut().flat_map(|node| &mut node.child) {
+            if child.is_leaf() && *child != Child::NONE {
+                *child = Child::inner(base + items[child.first() as usize].primitive());
             }
         }
         nodes.append(below);
         Self { nodes: nodes.into(), bounds: self.bounds }
     }
 
-    /// Computes all boxes again, from those of the leaves' `(first, count)`.
-    pub fn refit(&mut self, leaf: impl Fn(u32, u8) -> Aabb + Sync) {
+    /// Computes all boxes again, from those of the leaves' blocks.
+    pub fn refit(&mut self, leaf: impl Fn(Range<u32>) -> Aabb + Sync) {
         let nodes = self.nodes.make_mut();
         nodes.par_iter_mut().for_each(|node| {
             for slot in 0..WIDTH {
-                let (first, count) = (node.index[slot], node.count[slot]);
-                if count != 0 && count != NO_CHILD {
-                    node.set(slot, &leaf(first, count), first, count);
+                let child = node.child[slot];
+                if child.is_leaf() && child != Child::NONE {
+                    node.set(slot, &leaf(child.blocks()), child);
                 }
             }
         });
@@ -176,9 +214,9 @@ impl Tree {
             let (above, below) = nodes.split_at_mut(index + 1);
             let node = &mut above[index];
             for slot in 0..WIDTH {
-                if node.count[slot] == 0 {
-                    let child = node.index[slot];
-                    node.set(slot, &below[child as usize - index - 1].bounds(), child, 0);
+                let child = node.child[slot];
+                if !child.is_leaf() {
+                    node.set(slot, &below[child.node() as usize - index - 1].bounds(), child);
                 }
             }
         }

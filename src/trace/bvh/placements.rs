@@ -1,7 +1,9 @@
 //! The upper level: a tree over placed objects.
 
+use std::ops::Range;
+
 use super::build::{self, Record};
-use super::node::Tree;
+use super::node::{Child, Tree};
 use super::preset::Options;
 use crate::math::{Aabb, Vec3};
 use crate::trace::Placement;
@@ -20,7 +22,7 @@ impl PlacementTree {
             (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
         };
         let mut items: Vec<Record> = placements.iter().enumerate().filter_map(item).collect();
-        let tree = build::build(&mut items, 1, build::MAX_LEAF_BLOCKS, options);
+        let tree = build::build(&mut items, 1, Child::MOST, options);
         Self { tree, placements: items.iter().map(|item| placements[item.primitive() as usize].clone()).collect() }
     }
 
@@ -39,8 +41,8 @@ impl PlacementTree {
 
     /// The placements of a leaf.
     #[inline]
-    pub fn leaf(&self, first: u32, count: u8) -> &[Placement] {
-        &self.placements[first as usize..first as usize + usize::from(count)]
+    pub fn leaf(&self, items: Range<u32>) -> &[Placement] {
+        &self.placements[items.start as usize..items.end as usize]
     }
 
     /// Memory it holds, in bytes.

@@ -3,7 +3,7 @@
 use super::PartId;
 use super::build::{self, Record};
 use super::level::Through;
-use super::node::Tree;
+use super::node::{Child, Tree};
 use super::preset::Options;
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
@@ -36,7 +36,7 @@ impl ShapeTree {
                 }
             }
         }
-        let tree = build::build(&mut items, 1, build::MAX_LEAF_BLOCKS, options);
+        let tree = build::build(&mut items, 1, Child::MOST, options);
         let entry = |item: &Record| {
             let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };
@@ -55,10 +55,16 @@ impl ShapeTree {
         self.tree.bytes() + size_of_val(&self.entries[..])
     }
 
+    #[inline]
+    fn leaf(&self, leaf: Child) -> &[Entry] {
+        let items = leaf.blocks();
+        &self.entries[items.start as usize..items.end as usize]
+    }
+
     /// Offers what `local` (the ray in this level's coordinates) hits in a leaf.
     #[inline]
-    pub fn offer_leaf(&self, first: u32, count: u8, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
-        for Entry { shape, primitive, part } in &self.entries[first as usize..first as usize + usize::from(count)] {
+    pub fn offer_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+        for Entry { shape, primitive, part } in self.leaf(leaf) {
             if let Some(hit) = shape.intersect(local) {
                 let instance = through.map_or(part.instance, |through| through.instance);
                 let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
@@ -69,15 +75,8 @@ impl ShapeTree {
 
     /// Adds everything that `local` (the ray in this level's coordinates) hits in a leaf, with t in f64.
     #[inline]
-    pub fn gather_leaf(
-        &self,
-        first: u32,
-        count: u8,
-        local: &Ray,
-        through: Option<Through<'_>>,
-        hits: &mut Vec<(f64, Hit)>,
-    ) {
-        for Entry { shape, primitive, part } in &self.entries[first as usize..first as usize + usize::from(count)] {
+    pub fn gather_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, hits: &mut Vec<(f64, Hit)>) {
+        for Entry { shape, primitive, part } in self.leaf(leaf) {
             let instance = through.map_or(part.instance, |through| through.instance);
             hits.extend(shape.intersect_all(local).map(|hit| {
                 let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);

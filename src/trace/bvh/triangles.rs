@@ -10,7 +10,7 @@ use super::found::Found;
 use super::leaves::Leaves;
 use super::level::Through;
 use super::meshes::Meshes;
-use super::node::Tree;
+use super::node::{Child, Tree};
 use super::preset::{Options, Preset};
 use super::quad::{Numbers, Quad};
 use super::query::Query;
@@ -58,7 +58,7 @@ impl TriangleTree {
                 if options.preset == Preset::High {
                     items = presplit::presplit(&items, &Meshes::new(parts));
                 }
-                let mut tree = build::build(&mut items, LANES as u32, build::MAX_LEAF_BLOCKS, options);
+                let mut tree = build::build(&mut items, LANES as u32, Child::MOST, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
                 (tree, leaves, count)
             }
@@ -94,9 +94,9 @@ impl TriangleTree {
             return Err(refit::changed("other triangles that can be hit"));
         }
         let leaves = &self.leaves;
-        self.tree.refit(|first, count| {
+        self.tree.refit(|blocks| {
             let bounds = |index| leaves.block(index, &mut None).bounds();
-            (first..first + u32::from(count)).map(bounds).fold(Aabb::EMPTY, Aabb::union)
+            blocks.map(bounds).fold(Aabb::EMPTY, Aabb::union)
         });
         self.parts = parts.iter().map(ids).collect();
         Ok(())
@@ -140,8 +140,8 @@ impl TriangleTree {
 
     /// Takes what `ray`, in the world as this level is, may hit in a leaf; `filter` is the ray's.
     #[inline(always)]
-    pub fn find_leaf<S: Simd, Q: Query>(&self, first: u32, count: u8, ray: &Ray, filter: &Filter, found: &mut Found) {
-        for index in first..first + u32::from(count) {
+    pub fn find_leaf<S: Simd, Q: Query>(&self, leaf: Child, ray: &Ray, filter: &Filter, found: &mut Found) {
+        for index in leaf.blocks() {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
             let candidates = filter.candidates::<S>(block, found.limit);
@@ -159,14 +159,13 @@ impl TriangleTree {
     #[inline(always)]
     pub fn offer_leaf<S: Simd>(
         &self,
-        first: u32,
-        count: u8,
+        leaf: Child,
         ray: &Ray,
         filter: &Filter,
         through: Through<'_>,
         nearest: &mut Nearest,
     ) {
-        for index in first..first + u32::from(count) {
+        for index in leaf.blocks() {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
             let mut open = filter.candidates::<S>(block, nearest.limit()).lanes;

@@ -3,7 +3,7 @@
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
 use super::build::MAX_DEPTH;
-use super::node::{Node, Tree, WIDTH};
+use super::node::{Child, Node, Tree, WIDTH};
 use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -27,21 +27,20 @@ impl Visit {
 }
 
 /// A child to be visited.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Entry {
     /// Where the ray enters it.
     near: f32,
-    index: u32,
-    count: u8,
+    child: Child,
 }
 
 impl Entry {
     #[inline(always)]
     fn child(node: &Node, near: &[f32; WIDTH], slot: usize) -> Self {
-        Self { near: near[slot], index: node.index[slot], count: node.count[slot] }
+        Self { near: near[slot], child: node.child[slot] }
     }
 
-    const ROOT: Self = Self { near: 0.0, index: 0, count: 0 };
+    const ROOT: Self = Self { near: 0.0, child: Child::ROOT };
 }
 
 /// Every level of the tree leaves at most seven siblings waiting.
@@ -55,7 +54,7 @@ pub(super) struct Stack {
 
 impl Stack {
     pub fn new() -> Self {
-        Self { entries: [Entry::default(); STACK], len: 0 }
+        Self { entries: [Entry::ROOT; STACK], len: 0 }
     }
 
     #[inline(always)]
@@ -90,15 +89,15 @@ pub(super) fn single<S: Simd, Q: Query>(
     tree: &Tree,
     ray: &SlabRay,
     mut limit: f32,
-    mut leaf: impl FnMut(u32, u8) -> Visit,
+    mut leaf: impl FnMut(Child) -> Visit,
 ) {
     stack.len = 0;
     let mut next = Entry::ROOT;
     loop {
         // Down to a leaf. Mostly one or two children are entered: each number has its own branch, which is predicted
         // better than the length of a loop.
-        while next.count == 0 {
-            let node = tree.node(next.index);
+        while !next.child.is_leaf() {
+            let node = tree.node(next.child);
             let (mask, near) = ray.enter::<S>(node, limit);
             if mask == 0 {
                 break;
@@ -126,8 +125,8 @@ pub(super) fn single<S: Simd, Q: Query>(
                 if Q::ANY { stack.push(other) } else { stack.insert(base, other) }
             }
         }
-        if next.count != 0 {
-            match leaf(next.index, next.count) {
+        if next.child.is_leaf() {
+            match leaf(next.child) {
                 Visit::Until(t) => limit = t,
                 Visit::Stop => return,
             }

@@ -7,9 +7,6 @@ use crate::trace::bvh::node::WIDTH;
 /// Cost of visiting a node, in tests of a block. Measured: from 1 to 4 rates hardly differ, bytes do.
 pub(in crate::trace::bvh) const NODE_COST: f32 = 2.0;
 
-/// Most blocks in a leaf, where nothing speaks against it.
-pub(in crate::trace::bvh) const MAX_LEAF_BLOCKS: u32 = 4;
-
 /// How ranges are divided: by one thread or by several.
 pub(super) trait Splitter {
     /// The best way to divide `range`.

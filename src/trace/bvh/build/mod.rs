@@ -34,11 +34,11 @@ mod top;
 use rayon::prelude::*;
 
 use super::isa::{self, Isa};
-use super::node::{Node, Tree, WIDTH};
+use super::node::{Child, Node, Tree};
 use super::preset::Options;
 use super::room;
 use children::Children;
-pub(super) use children::{MAX_LEAF_BLOCKS, NODE_COST};
+pub(super) use children::NODE_COST;
 pub(super) use record::{Record, triangle_items};
 use split::Rule;
 use subtree::{Parent, SubtreeKernel, Task};
@@ -54,12 +54,13 @@ const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;
 const TASK: u32 = 1 << 14;
 
 /// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
-/// `block`, a power of two, is how many items are tested together, `most` how many blocks a leaf may hold.
+/// `block`, a power of two, is how many items are tested together, `most` how many such blocks a leaf may hold, up to
+/// [`Child::MOST`].
 ///
 /// # Panics
-/// With more than 2^32 - 1 items.
+/// With more than [`Child::NAMES`] items.
 pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Options<'_>) -> Tree {
-    assert!(u32::try_from(items.len()).is_ok(), "more primitives than 32-bit indices can name");
+    assert!(items.len() <= Child::NAMES, "more primitives than leaves can name");
     if items.is_empty() {
         return Tree::new(Vec::new());
     }
@@ -104,7 +105,7 @@ fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(
         point(&mut nodes, parent, index);
         shared.halve = task.depth >= CUT_DEPTH;
         let children = Children::new(task.range, task.split, rule, &mut shared);
-        subtree::emit(&children, &mut nodes);
+        subtree::emit(&children, rule, &mut nodes);
         for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
             let parent = Parent { node: index, slot: slot as u32 };
             open.push((Some(parent), Task { range: child.range, depth: task.depth + 1, split: child.split }));
@@ -126,8 +127,8 @@ fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<N
     room::fill(chunks, |(is_subtree, nodes): (bool, Vec<Node>), room| {
         let base = if is_subtree { room.first as u32 } else { 0 };
         for mut node in nodes {
-            for slot in 0..WIDTH {
-                node.index[slot] += if node.count[slot] == 0 { base } else { 0 };
+            for child in node.child.iter_mut().filter(|child| !child.is_leaf()) {
+                *child = Child::inner(base + child.node());
             }
             room.push(node);
         }
@@ -137,7 +138,7 @@ fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<N
 /// Lets a child's slot name its node.
 fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
     if let Some(Parent { node, slot }) = parent {
-        nodes[node as usize].index[slot as usize] = index;
+        nodes[node as usize].child[slot as usize] = Child::inner(index);
     }
 }
 
@@ -145,7 +146,6 @@ fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
 mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    use super::super::node::NO_CHILD;
     use super::*;
     use crate::math::{Aabb, Vec3};
 
@@ -164,17 +164,16 @@ mod tests {
     }
 
     /// The box around a subtree, which every box above it must equal; marks its items.
-    fn check(tree: &Tree, items: &[Record], index: u32, block: u32, seen: &mut [bool]) -> Aabb {
-        let node = tree.node(index);
+    fn check(tree: &Tree, items: &[Record], node: Child, block: u32, seen: &mut [bool]) -> Aabb {
+        let node = tree.node(node);
         let mut all = Aabb::EMPTY;
-        for slot in (0..WIDTH).filter(|&slot| node.count[slot] != NO_CHILD) {
-            let inside = if node.count[slot] == 0 {
-                check(tree, items, node.index[slot], block, seen)
+        for (slot, child) in node.children() {
+            let inside = if !child.is_leaf() {
+                check(tree, items, child, block, seen)
             } else {
-                assert!(u32::from(node.count[slot]) <= block * MAX_LEAF_BLOCKS);
-                let first = node.index[slot] as usize;
-                let leaf = &items[first..first + node.count[slot] as usize];
-                leaf.iter().fold(Aabb::EMPTY, |sum, item| {
+                let len = usize::from(node.items[slot]);
+                assert_eq!(child.count(), (len as u32).div_ceil(block));
+                items[child.first() as usize..][..len].iter().fold(Aabb::EMPTY, |sum, item| {
                     assert_eq!(item.part(), 7);
                     assert!(!std::mem::replace(&mut seen[item.primitive() as usize], true), "in one leaf only");
                     sum.union(record::aabb(&item.0))
@@ -195,10 +194,10 @@ mod tests {
             let reported = AtomicU64::new(0);
             let progress = |count| _ = reported.fetch_add(count, Ordering::Relaxed);
             let tree =
-                build(&mut items, block, MAX_LEAF_BLOCKS, &Options { progress: Some(&progress), ..Options::default() });
+                build(&mut items, block, Child::MOST, &Options { progress: Some(&progress), ..Options::default() });
             assert_eq!(reported.into_inner(), u64::from(count));
             let mut seen = vec![false; items.len()];
-            check(&tree, &items, 0, block, &mut seen);
+            check(&tree, &items, Child::ROOT, block, &mut seen);
             assert!(seen.iter().all(|&seen| seen), "{count} items");
         }
     }
@@ -208,7 +207,7 @@ mod tests {
         let build = |isa, threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             let mut items = items(60_000, 0.02);
-            let tree = pool.install(|| build(&mut items, 4, MAX_LEAF_BLOCKS, &Options { isa, ..Options::default() }));
+            let tree = pool.install(|| build(&mut items, 4, Child::MOST, &Options { isa, ..Options::default() }));
             let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
             (format!("{tree:?}"), numbers)
         };

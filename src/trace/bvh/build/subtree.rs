@@ -7,7 +7,7 @@ use super::record::{Record, aabb};
 use super::split::{Range, Rule, Split};
 use super::sweep;
 use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::node::Node;
+use crate::trace::bvh::node::{self, Node};
 use crate::trace::bvh::simd::Simd;
 
 /// A subtree to be built.
@@ -46,12 +46,12 @@ impl Kernel for SubtreeKernel<'_> {
         while let Some((parent, Task { range, depth, split })) = open.pop() {
             let index = nodes.len() as u32;
             if index > 0 {
-                nodes[parent.node as usize].index[parent.slot as usize] = index;
+                nodes[parent.node as usize].child[parent.slot as usize] = node::Child::inner(index);
             }
             let mut splitter =
                 Local::<S> { rule, items, base, halve: depth >= CUT_DEPTH, isa: std::marker::PhantomData };
             let children = Children::new(range, split, rule, &mut splitter);
-            emit(&children, &mut nodes);
+            emit(&children, rule, &mut nodes);
             // The first child last, so that it comes next and follows its parent in memory.
             for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
                 let parent = Parent { node: index, slot: slot as u32 };
@@ -64,11 +64,17 @@ impl Kernel for SubtreeKernel<'_> {
 
 /// Appends the node of these children, without the indices of its inner ones.
 #[inline(always)]
-pub(super) fn emit(children: &Children, nodes: &mut Vec<Node>) {
+pub(super) fn emit(children: &Children, rule: &Rule, nodes: &mut Vec<Node>) {
     let mut node = Node::empty();
     for (slot, child) in children.iter() {
-        let (first, count) = if child.is_leaf { (child.range.first, child.range.len as u8) } else { (0, 0) };
-        node.set(slot, &aabb(&child.range.bounds), first, count);
+        let Range { first, len, .. } = child.range;
+        // An inner child's node is not known yet.
+        let mut below = node::Child::ROOT;
+        if child.is_leaf {
+            below = node::Child::leaf(first, len.div_ceil(rule.block));
+            node.items[slot] = len as u8;
+        }
+        node.set(slot, &aabb(&child.range.bounds), below);
     }
     nodes.push(node);
 }

@@ -14,6 +14,7 @@
 //! triangles, by all threads. Marks are plain stores and counts are compared in the end, for atomic exchanges took as
 //! long as everything else.
 
+use std::ops::Range;
 use std::result::Result;
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 
@@ -22,8 +23,7 @@ use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
 use crate::trace::Part;
-use crate::trace::bvh::block::LANES;
-use crate::trace::bvh::build::{MAX_DEPTH, MAX_LEAF_BLOCKS, presplit, triangle_items};
+use crate::trace::bvh::build::{MAX_DEPTH, presplit, triangle_items};
 use crate::trace::bvh::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::{Child, Node, Tree, WIDTH};
@@ -42,7 +42,7 @@ type Piece = (u32, Aabb);
 /// What is wrong.
 pub(super) fn check(tree: &Tree, leaves: &Leaves, parts: &[Part], meshes: &Meshes, cut: bool) -> Result<usize, String> {
     let nodes = tree.nodes();
-    if nodes.len() >= ROOT as usize || leaves.len() > u32::MAX as usize / LANES {
+    if nodes.len() >= ROOT as usize || leaves.len() > Child::NAMES {
         return Err("has more nodes or blocks than can be numbered".to_owned());
     }
     let pass = Pass {
@@ -136,18 +136,18 @@ impl Pass<'_> {
         let mut work = Work::default();
         for (index, node) in (first..).zip(nodes) {
             for slot in 0..WIDTH {
-                let bounds = node.child_bounds(slot);
-                let is_sound = match node.child(slot) {
-                    Child::None => bounds == Aabb::EMPTY,
+                let (child, bounds) = (node.child[slot], node.child_bounds(slot));
+                let is_sound = match child {
+                    Child::NONE => bounds == Aabb::EMPTY,
                     _ => is_traceable(bounds.min) && is_traceable(bounds.max),
                 };
                 if !is_sound {
                     return Err(format!("has an impossible box in node {index}"));
                 }
-                match node.child(slot) {
-                    Child::None => {}
-                    Child::Node(child) => self.check_child(index, &bounds, child, &mut work.counts)?,
-                    Child::Leaf { first, count } => self.check_leaf(index, bounds, first, count, &mut work)?,
+                match child {
+                    Child::NONE => {}
+                    leaf if leaf.is_leaf() => self.check_leaf(index, bounds, leaf.blocks(), &mut work)?,
+                    inner => self.check_child(index, &bounds, inner.node(), &mut work.counts)?,
                 }
             }
             if work.numbers.len() >= BATCH {
@@ -169,18 +169,17 @@ impl Pass<'_> {
         Ok(())
     }
 
-    fn check_leaf(&self, node: usize, bounds: Aabb, first: u32, count: u8, work: &mut Work) -> Result<(), String> {
-        let end = u64::from(first) + u64::from(count);
-        if u32::from(count) > MAX_LEAF_BLOCKS || end > self.blocks.len() as u64 {
-            return Err(format!("has in node {node} a leaf of {count} blocks from {first} on, which are not there"));
+    fn check_leaf(&self, node: usize, bounds: Aabb, blocks: Range<u32>, work: &mut Work) -> Result<(), String> {
+        if blocks.end as usize > self.blocks.len() {
+            return Err(format!("has in node {node} a leaf of blocks {blocks:?}, which are not there"));
         }
-        for block in first..first + u32::from(count) {
+        work.counts.blocks += blocks.len();
+        for block in blocks {
             self.blocks[block as usize].store(1, Relaxed);
             let numbers = self.leaves.numbers(block, self.meshes);
             let (numbers, count) = numbers.ok_or_else(|| format!("has a block {block} that is not of this mesh"))?;
             work.numbers.extend_from_slice(&numbers[..count]);
         }
-        work.counts.blocks += usize::from(count);
         work.leaves.push(Leaf { node, bounds, end: work.numbers.len() });
         Ok(())
     }

@@ -48,7 +48,7 @@ impl Scratch {
     pub fn new() -> Self {
         let ray = Ray::new(Vec3::ZERO, Vec3::X);
         let found = Found::new();
-        let one = One { stack: [Entry::default(); MAX_DEPTH * 7 + 8], bundle: Bundle::new(), found };
+        let one = One { stack: [Entry::ROOT; MAX_DEPTH * 7 + 8], bundle: Bundle::new(), found };
         Self { one, t: [0.0; RAYS], part: [ray; RAYS] }
     }
 }

@@ -7,20 +7,23 @@ use crate::ray::Ray;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::edges::Edges;
-use crate::trace::bvh::node::WIDTH;
+use crate::trace::bvh::node::{Child, WIDTH};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::triangles::TriangleTree;
 
 /// A child to be visited.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
     near: f32,
-    index: u32,
-    count: u8,
+    child: Child,
     /// The first group with a ray that enters it.
     first: u8,
+}
+
+impl Entry {
+    pub const ROOT: Self = Self { near: 0.0, child: Child::ROOT, first: 0 };
 }
 
 /// A bundle on its way through a tree of triangles.
@@ -62,28 +65,28 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
         self.measure::<S>();
         let tree = self.tree.tree();
         let mut len = 0;
-        let mut next = Entry::default();
+        let mut next = Entry::ROOT;
         loop {
-            if next.count == 0 {
-                let node = tree.node(next.index);
+            if !next.child.is_leaf() {
+                let node = tree.node(next.child);
                 let (mut mask, near, boxes) = slab.enter::<S>(node, self.bundle.first, self.most);
                 let base = len;
                 while mask != 0 {
                     let slot = mask.trailing_zeros() as usize % WIDTH;
                     mask &= mask - 1;
                     let Some(first) = self.first_group::<S>(&boxes, slot, next.first) else { continue };
-                    let child = Entry { near: near[slot], index: node.index[slot], count: node.count[slot], first };
+                    let entry = Entry { near: near[slot], child: node.child[slot], first };
                     let mut at = len;
-                    while at > base && stack[at - 1].near < child.near {
+                    while at > base && stack[at - 1].near < entry.near {
                         stack[at] = stack[at - 1];
                         at -= 1;
                     }
-                    stack[at] = child;
+                    stack[at] = entry;
                     len += 1;
-                    if child.count == 0 {
-                        S::prefetch(tree.node(child.index));
+                    if entry.child.is_leaf() {
+                        self.tree.prefetch::<S>(entry.child.first());
                     } else {
-                        self.tree.prefetch::<S>(child.index);
+                        S::prefetch(tree.node(entry.child));
                     }
                 }
             } else if self.visit::<S>(next) {
@@ -124,7 +127,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
     #[inline(always)]
     fn visit<S: Simd>(&mut self, leaf: Entry) -> bool {
         let mut changed = false;
-        for index in leaf.index..leaf.index + u32::from(leaf.count) {
+        for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
             let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, self.most);
