@@ -17,6 +17,8 @@
 mod check;
 mod digest;
 mod file;
+#[cfg(test)]
+mod tests;
 
 use std::fs;
 use std::path::{Path, PathBuf};
