@@ -15,8 +15,11 @@ use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 
 #[derive(Debug, Args)]
 pub(super) struct CacheArgs {
-    /// Folder where built native trees are kept, a file each, to be read the next time; made if missing. A damaged or
-    /// foreign file is named, ignored and rewritten; none must be changed while in use. Never changes a picture
+    /// Folder where built native trees are kept, to be read the next time; never changes a picture
+    ///
+    /// It is made if it is missing. Each mesh and --build has its own file, which is checked against the mesh before it is
+    /// used: one that is damaged or foreign is named, ignored and rewritten. Files must not be changed while in use, and
+    /// may be deleted at any other time.
     #[arg(long = "cache", value_name = "DIR")]
     folder: Option<PathBuf>,
 }

@@ -28,6 +28,7 @@ Examples:
   twincast render bunny.glb -o bunny.png
   twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
+  twincast render large.ply --cache ~/.cache/twincast -o large.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
