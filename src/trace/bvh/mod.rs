@@ -99,6 +99,7 @@ impl Bvh {
     /// # Panics
     /// Where this processor does not have `options.isa`.
     pub fn build_with(world: &World, options: Options<'_>) -> Self {
+        options.isa.demand();
         let build = |parts: &[Part]| TriangleTree::build(parts, &options);
         let triangles = levels(world).into_iter().map(build).collect();
         Self::over(triangles, world, &options)
@@ -107,7 +108,7 @@ impl Bvh {
     /// Of the trees over the triangles of each of [`levels`]; the others are built.
     fn over(triangles: Vec<TriangleTree>, world: &World, options: &Options<'_>) -> Self {
         let Options { preset, isa, .. } = *options;
-        assert!(isa.is_available(), "{isa:?} is not available on this processor");
+        isa.demand();
         let parts = levels(world);
         assert_eq!(triangles.len(), parts.len(), "a tree a level");
         let level = |(triangles, parts)| Level::new(triangles, parts, options);

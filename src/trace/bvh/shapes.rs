@@ -75,7 +75,13 @@ impl ShapeTree {
 
     /// Adds everything that `local` (the ray in this level's coordinates) hits in a leaf, with t in f64.
     #[inline]
-    pub fn gather_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, hits: &mut Vec<(f64, Hit)>) {
+    pub fn gather_leaf(
+        &self,
+        leaf: Child,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        hits: &mut Vec<(f64, Hit)>,
+    ) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
             let instance = through.map_or(part.instance, |through| through.instance);
             hits.extend(shape.intersect_all(local).map(|hit| {
