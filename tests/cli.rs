@@ -54,6 +54,7 @@ fn help_names_every_command_and_flag() {
         "--stats",
         "--packet",
         "--tile-order",
+        "--cache",
         "--background",
         "--verbose",
         "--quiet",
@@ -237,6 +238,68 @@ fn builds_never_change_a_picture_and_memory_is_kept() {
     assert_eq!((output.status.code(), message.lines().count()), (Some(3), 1), "{message}");
     assert!(message.contains("compact build") && message.contains("give at least --max-memory"), "{message}");
     assert!(!std::fs::exists(folder.path("none.exr")).unwrap());
+}
+
+#[test]
+fn trees_are_kept_in_a_folder() {
+    let folder = Folder::new();
+    let kept = folder.path("kept/trees");
+    let expected = folder.render("expected.exr", &[]);
+    assert!(expected.status.success());
+    let render = |more: &[&str]| {
+        let output = folder.render("out.exr", &[&["--cache", &kept, "-v"], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert_eq!(folder.picture("out.exr"), folder.picture("expected.exr"), "{more:?}");
+        (text(&output.stdout), text(&output.stderr))
+    };
+    let stats = folder.path("stats.json");
+    for (words, more) in [("written", &["--stats", &stats][..]), ("read", &["-t", "1"]), ("read", &["-t", "3"])] {
+        let (summary, warnings) = render(more);
+        assert!(summary.contains(&format!("cache     {words} {kept}")) && warnings.is_empty(), "{summary}{warnings}");
+    }
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(stats).unwrap()).expect("JSON");
+    assert_eq!(stats["engines"][0]["cache"]["used"], "written", "{stats}");
+
+    let files: Vec<_> = std::fs::read_dir(&kept).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let [file] = &files[..] else { panic!("one file: {files:?}") };
+    let bytes = std::fs::read(file).unwrap();
+    std::fs::write(file, &bytes[..bytes.len() / 2]).unwrap();
+    let (summary, warning) = render(&[]);
+    assert_eq!(warning.lines().count(), 1, "{warning}");
+    assert!(warning.starts_with("warning: ") && warning.contains(file.to_str().unwrap()), "{warning}");
+    assert!(warning.contains("ignored, to be written anew") && summary.contains("written"), "{warning}{summary}");
+    assert_eq!(std::fs::read(file).unwrap(), bytes);
+
+    // Another tree, and another mesh.
+    assert!(render(&["--build", "fast"]).0.contains("written"));
+    std::fs::write(folder.path("scene.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let output = folder.render("other.exr", &["--cache", &kept, "-v"]);
+    assert!(text(&output.stdout).contains("written") && output.stderr.is_empty(), "{}", text(&output.stdout));
+    assert_eq!(std::fs::read_dir(&kept).unwrap().count(), 3);
+}
+
+#[test]
+fn a_folder_for_trees_that_cannot_be_made_ends_with_4_before_the_work() {
+    let folder = Folder::new();
+    let output = folder.render("out.exr", &["--cache", &folder.path("scene.obj")]);
+    let message = text(&output.stderr);
+    assert_eq!((output.status.code(), message.lines().count()), (Some(4), 1), "{message}");
+    assert!(message.contains("scene.obj") && !std::fs::exists(folder.path("out.exr")).unwrap(), "{message}");
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn embree_alone_keeps_no_tree() {
+    let folder = Folder::new();
+    let output = folder.render("out.exr", &["--cache", &folder.path("kept"), "--backend", "embree"]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert!(!std::fs::exists(folder.path("kept")).unwrap());
+    let (scene, kept) = (folder.path("scene.obj"), folder.path("kept"));
+    for _ in 0..2 {
+        let output = twincast(&["compare", &scene, "--cache", &kept, "--size", "20x20", "--random", "1000"]);
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+    }
+    assert_eq!(std::fs::read_dir(&kept).unwrap().count(), 1);
 }
 
 #[test]

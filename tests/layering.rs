@@ -29,8 +29,7 @@ const UNSAFE: &[&str] = &[
     "trace/bvh/build/lanes.rs",
     "trace/bvh/room.rs",
     "image/oiio.rs",
-    "io/mapped.rs",
-    "memory.rs",
+    "memory/",
 ];
 
 fn source() -> PathBuf {

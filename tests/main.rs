@@ -2,6 +2,7 @@
 
 mod allocation;
 mod bench;
+mod cache;
 mod cli;
 mod compare;
 #[cfg(feature = "embree")]

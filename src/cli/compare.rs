@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::cache::CacheArgs;
 use super::common::{CameraArgs, SceneArgs, Size};
 use super::engine::BackendArg;
 use crate::error::Result;
@@ -42,6 +43,9 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 
+    #[command(flatten)]
+    cache: CacheArgs,
+
     /// Print the counts as one JSON document, and nothing else
     #[arg(long)]
     json: bool,
@@ -63,19 +67,20 @@ fn compare(_: &CompareArgs) -> Result<()> {
 
 #[cfg(feature = "embree")]
 fn compare(args: &CompareArgs) -> Result<()> {
-    use super::{interrupt, outputs, progress, say, warn};
+    use super::{cache, interrupt, outputs, progress, say, warn};
     use crate::error::Error;
     use crate::image::Metadata;
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer, Settings};
     use crate::trace::brute::Brute;
-    use crate::trace::bvh::Bvh;
+    use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
     use crate::trace::{Tracer, World};
 
     let diff = args.diff.as_slice();
     outputs::check(diff, None, [&args.scene.scene])?;
+    let cache = args.cache.open(BackendArg::Both)?;
     let cancel = interrupt::install()?;
     let (scene, warnings) = args.scene.load()?;
     warn(&warnings);
@@ -86,7 +91,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let world = World::new(&scene)?;
     let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
-    let native = Bvh::build(&world);
+    let (native, _) = cache::bvh(cache.as_ref(), &world, bvh::Options::default());
     let embree = Embree::new(&world, &Options::default())?;
     let brute = (world.primitive_count() < BRUTE_LIMIT).then(|| Brute::new(&world));
     interrupt::check()?;

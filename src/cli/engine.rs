@@ -6,11 +6,11 @@ use std::time::Instant;
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 
-use super::{interrupt, progress};
+use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::render::{Control, Counted, Renderer};
-use crate::trace::bvh::{self, Bvh, Preset};
+use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
 use crate::trace::{Tracer, Width, World};
 
 /// Which engine renders.
@@ -56,6 +56,8 @@ pub(super) struct Pass {
     pub(super) bytes: usize,
     pub(super) camera_rays: u64,
     pub(super) shadow_rays: u64,
+    /// What became of the native tree's file.
+    pub(super) cache: Option<CacheReport>,
 }
 
 /// What both engines were made to render.
@@ -67,6 +69,8 @@ pub(super) struct Job<'a> {
     pub(super) quiet: bool,
     /// How well the native tree is worth building.
     pub(super) build: Preset,
+    /// Where native trees are kept.
+    pub(super) cache: Option<&'a Cache>,
 }
 
 /// What came of it.
@@ -97,8 +101,14 @@ impl Job<'_> {
         let bar = progress::bar(stored + self.world.placements.len() as u64, "building", self.quiet);
         let placed = |count| bar.inc(count);
         let options = bvh::Options { preset: self.build, progress: Some(&placed), ..bvh::Options::default() };
-        let build = || Ok(Bvh::build_with(self.world, options));
-        self.pass(&bar, build, |_| "native (BVH)".to_owned(), Bvh::bytes)
+        let mut report = None;
+        let build = || {
+            let (bvh, kept) = cache::bvh(self.cache, self.world, options);
+            report = kept;
+            Ok(bvh)
+        };
+        let (bvh, pass) = self.pass(&bar, build, |_| "native (BVH)".to_owned(), Bvh::bytes)?;
+        Ok((bvh, Pass { cache: report, ..pass }))
     }
 
     #[cfg(feature = "embree")]
@@ -154,7 +164,8 @@ impl Job<'_> {
 
         let (camera_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
         let bytes = bytes(&tracer);
-        let pass = Pass { engine, image: image?, build_seconds, render_seconds, bytes, camera_rays, shadow_rays };
+        let image = image?;
+        let pass = Pass { engine, image, build_seconds, render_seconds, bytes, camera_rays, shadow_rays, cache: None };
         Ok((tracer, pass))
     }
 }

@@ -5,6 +5,7 @@
 
 mod bench;
 mod build;
+mod cache;
 mod common;
 mod compare;
 mod completions;

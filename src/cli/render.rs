@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::build::BuildArgs;
+use super::cache::CacheArgs;
 use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
@@ -27,6 +28,7 @@ Examples:
   twincast render bunny.glb -o bunny.png
   twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
+  twincast render large.ply --cache ~/.cache/twincast -o large.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -78,6 +80,9 @@ pub(super) struct RenderArgs {
 
     #[command(flatten)]
     build: BuildArgs,
+
+    #[command(flatten)]
+    cache: CacheArgs,
 
     /// Order of the tiles; never changes a picture
     #[arg(long, value_enum, default_value_t)]
@@ -135,6 +140,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         &args.stats,
         [Some(&args.scene.scene), args.reference.as_ref()].into_iter().flatten(),
     )?;
+    let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
@@ -175,6 +181,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
+            cache: cache.as_ref(),
         };
         let outcome = job.run(args.backend)?;
         let picture = &outcome.passes[0];
@@ -264,6 +271,9 @@ impl RenderArgs {
             let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
             summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
             if self.verbose {
+                if let Some(cache) = &engine.cache {
+                    summary.line("cache", cache);
+                }
                 let Rays { camera, shadow } = &engine.rays;
                 let speed = engine.rays_per_second / 1e6;
                 let (camera, shadow) = (grouped(*camera), grouped(*shadow));

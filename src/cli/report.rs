@@ -4,6 +4,7 @@ use std::fmt::{self, Write};
 
 use serde::Serialize;
 
+use super::cache::CacheStats;
 use super::engine::Pass;
 
 /// What `--stats` writes. Times are seconds, sizes bytes.
@@ -35,6 +36,9 @@ pub(super) struct EngineStats {
     pub(super) bytes: usize,
     /// Of the triangles as stored: those of an instanced mesh count once.
     pub(super) bytes_per_triangle: Option<f64>,
+    /// What became of the native tree's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) cache: Option<CacheStats>,
 }
 
 /// Rays by kind.
@@ -56,6 +60,7 @@ impl EngineStats {
             rays,
             bytes: pass.bytes,
             bytes_per_triangle: (stored > 0).then(|| pass.bytes as f64 / stored as f64),
+            cache: pass.cache.as_ref().map(CacheStats::new),
         }
     }
 }

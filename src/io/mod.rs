@@ -8,7 +8,6 @@
 mod check;
 mod compact;
 mod gltf;
-mod mapped;
 mod obj;
 mod ply;
 mod polygon;
@@ -21,10 +20,10 @@ mod weld;
 use std::path::Path;
 use std::sync::Arc;
 
-use self::mapped::Mapped;
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
+use crate::memory::Mapped;
 use crate::scene::{Geometry, Mesh, Scene};
 
 /// How a file is understood.

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::mapped::Mapped;
 use crate::memory;
+use crate::memory::Mapped;
 
 /// Records a task: about a megabyte.
 const TASK: usize = 1 << 16;

@@ -8,11 +8,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::mapped::Mapped;
 use super::text::{Words, quoted};
 use super::weld::{Weld, weld};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
+use crate::memory::Mapped;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 
 const HEADER: usize = 84;

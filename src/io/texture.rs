@@ -6,10 +6,10 @@ use std::path::Path;
 use image::error::ImageError;
 use image::{ImageReader, Limits};
 
-use super::mapped::Mapped;
 use crate::error::{Error, Result};
 use crate::io::Placeless;
 use crate::math::Vec2;
+use crate::memory::Mapped;
 use crate::scene::Texture;
 
 /// Longest side, in pixels.

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::Document;
 use super::schema::Accessor;
 use crate::io::Placeless;
-use crate::io::mapped::Mapped;
 use crate::io::records::Records;
+use crate::memory::Mapped;
 
 /// Most bytes that accessors without a buffer view, which are all zero, may stand for.
 const MOST_ZEROS: u64 = 1 << 28;

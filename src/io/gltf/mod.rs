@@ -21,9 +21,9 @@ use std::cell::Cell;
 use std::path::Path;
 
 use self::uri::Target;
-use super::mapped::Mapped;
 use super::{Placeless, system_message};
 use crate::error::{Error, Result, Warning};
+use crate::memory::Mapped;
 use crate::scene::Scene;
 
 /// The extensions that are honoured; a file that requires another is refused.

@@ -21,11 +21,11 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use self::statement::{Faces, Part, Slots};
-use super::mapped::Mapped;
 use super::text::quoted;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::memory;
+use crate::memory::Mapped;
 use crate::scene::Scene;
 
 /// Stands for an index that is not given.

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result, Warning};
 use crate::io::Placeless;
 use crate::io::text::{Lines, Words, name, number, quoted};
-use crate::io::{mapped::Mapped, system_message, texture};
+use crate::io::{system_message, texture};
 use crate::math::{Vec2, Vec3};
+use crate::memory::Mapped;
 use crate::scene::{Material, Texture, Wrap};
 
 /// The materials of all MTL files that one OBJ file names; the first of a name counts.

@@ -3,8 +3,8 @@
 use super::Items;
 use super::header::{Element, Scalar};
 use crate::io::Placeless;
-use crate::io::mapped::Mapped;
 use crate::io::text::{Words, number, quoted};
+use crate::memory::Mapped;
 
 pub(super) struct Ascii<'a> {
     file: &'a Mapped<'a>,

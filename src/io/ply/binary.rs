@@ -6,9 +6,9 @@ use super::Items;
 use super::header::{Element, Scalar};
 use super::vertices::{Layout, Positions, Vertices};
 use crate::io::Placeless;
-use crate::io::mapped::Mapped;
 use crate::io::records::Records;
 use crate::math::Vec3;
+use crate::memory::Mapped;
 
 /// Values, big-endian or little-endian.
 pub(super) struct Binary<'a, const BIG: bool> {

@@ -22,8 +22,8 @@ use self::header::{Element, Encoding, Header, Scalar};
 use self::vertices::{Layout, Positions, Vertices};
 use crate::error::{Error, Result, Warning};
 use crate::io::Placeless;
-use crate::io::mapped::Mapped;
 use crate::math::Vec3;
+use crate::memory::Mapped;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 
 /// Items that are read one by one until the file is told.

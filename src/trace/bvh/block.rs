@@ -1,12 +1,15 @@
 //! Eight triangles, laid out component by component for eight-wide arithmetic.
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::math::{Aabb, Vec3};
 
 /// Triangles in a block.
 pub(super) const LANES: usize = 8;
 
 /// Eight triangles, component by component.
-#[derive(Clone, Debug)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Block {
     /// Component by component: that of the first corners, the second, the third.
     pub corners: [[[f32; LANES]; 3]; 3],

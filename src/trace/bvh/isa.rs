@@ -32,6 +32,11 @@ impl Isa {
         }
     }
 
+    /// Panics where this processor does not have it.
+    pub(super) fn demand(self) {
+        assert!(self.is_available(), "{self:?} is not available on this processor");
+    }
+
     /// Whether this processor has it.
     #[cfg(target_arch = "x86_64")]
     pub fn is_available(self) -> bool {

@@ -9,19 +9,20 @@ use super::node::{Child, Node, Tree, WIDTH};
 use super::room;
 use super::simd::Simd;
 use crate::math::is_traceable;
+use crate::memory::Array;
 use crate::trace::Part;
 
 /// The blocks of a tree of triangles.
 pub(super) enum Leaves {
     /// 45 bytes a triangle where blocks are full.
-    Blocks(Vec<Block>),
+    Blocks(Array<Block>),
     /// 4 bytes a triangle, but to reach a corner takes two steps through memory.
     Numbers(Numbers),
 }
 
 /// Blocks of triangle numbers.
 pub(super) struct Numbers {
-    blocks: Vec<[u32; LANES]>,
+    blocks: Array<[u32; LANES]>,
     meshes: Meshes,
 }
 
@@ -73,10 +74,9 @@ impl Leaves {
                 }
                 block
             };
-            let blocks = blocks(tree, items, block);
-            return Self::Numbers(Numbers { blocks, meshes });
+            return Self::of_numbers(blocks(tree, items, block), meshes);
         }
-        Self::Blocks(blocks(tree, items, |items| {
+        Self::of_blocks(blocks(tree, items, |items| {
             let mut block = Block::EMPTY;
             for item in items {
                 let (part, primitive) = (item.part(), item.primitive());
@@ -87,8 +87,13 @@ impl Leaves {
     }
 
     /// Blocks that leaves name already.
-    pub fn of_blocks(blocks: Vec<Block>) -> Self {
-        Self::Blocks(blocks)
+    pub fn of_blocks(blocks: impl Into<Array<Block>>) -> Self {
+        Self::Blocks(blocks.into())
+    }
+
+    /// Blocks of numbers of `meshes`' triangles.
+    pub fn of_numbers(blocks: impl Into<Array<[u32; LANES]>>, meshes: Meshes) -> Self {
+        Self::Numbers(Numbers { blocks: blocks.into(), meshes })
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
@@ -100,11 +105,52 @@ impl Leaves {
         }
     }
 
+    /// How many blocks there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Blocks(blocks) => blocks.len(),
+            Self::Numbers(numbers) => numbers.blocks.len(),
+        }
+    }
+
+    /// The blocks as they lie in memory.
+    pub fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Blocks(blocks) => bytemuck::cast_slice(blocks),
+            Self::Numbers(numbers) => bytemuck::cast_slice(&numbers.blocks),
+        }
+    }
+
+    /// The numbers of a block's triangles, and how many there are; none where it is not a block of triangles of `meshes` as it
+    /// would be made.
+    pub fn numbers(&self, index: u32, meshes: &Meshes) -> Option<([u32; LANES], usize)> {
+        let (numbers, is_sound) = match self {
+            Self::Blocks(blocks) => {
+                let block = blocks.get(index as usize)?;
+                let (mut numbers, mut again) = ([NONE; LANES], Block::EMPTY);
+                for lane in block.used() {
+                    numbers[lane] = meshes.checked_number(block.part[lane], block.primitive[lane])?;
+                    meshes.push(&mut again, numbers[lane]);
+                }
+                (numbers, bytemuck::bytes_of(&again) == bytemuck::bytes_of(block))
+            }
+            Self::Numbers(own) => {
+                let (numbers, most) = (*own.blocks.get(index as usize)?, meshes.triangle_count());
+                (numbers, numbers.iter().all(|&number| number == NONE || (number as usize) < most))
+            }
+        };
+        let count = numbers.iter().filter(|&&number| number != NONE).count();
+        // The used lanes come first.
+        let is_sound = is_sound && count > 0 && numbers[..count].iter().all(|&n| n != NONE);
+        is_sound.then_some((numbers, count))
+    }
+
     /// Takes the corners of `meshes`, whose triangles are the same. Whether all of them can still be hit.
     pub fn refit(&mut self, meshes: &Meshes) -> bool {
         let is_sound = |block: &Block| block.used().flat_map(|lane| block.triangle(lane)).all(is_traceable);
         match self {
             Self::Blocks(blocks) => blocks
+                .make_mut()
                 .par_iter_mut()
                 .map(|block| {
                     let old = std::mem::replace(block, Block::EMPTY);

@@ -30,8 +30,9 @@ pub(super) struct Through<'a> {
 pub(super) const PLACED: f32 = 4.0;
 
 impl Level {
-    pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
-        Self { triangles: TriangleTree::build(parts, options), shapes: ShapeTree::build(parts, options) }
+    /// Of a tree over the triangles of `parts`; that over their shapes, of which there are few, is built.
+    pub fn new(triangles: TriangleTree, parts: &[Part], options: &Options<'_>) -> Self {
+        Self { triangles, shapes: ShapeTree::build(parts, options) }
     }
 
     pub fn bounds(&self) -> Aabb {

@@ -14,6 +14,8 @@ pub(super) struct Meshes {
     meshes: Vec<Mesh>,
     /// Of each part its mesh, if it is one.
     of_part: Vec<u32>,
+    /// Triangles of all.
+    count: usize,
 }
 
 /// A mesh and its numbers.
@@ -39,7 +41,7 @@ impl Mesh {
 impl Meshes {
     /// Those among `parts`, which have fewer than 2^32 triangles together.
     pub fn new(parts: &[Part]) -> Self {
-        let mut all = Self { meshes: Vec::new(), of_part: vec![0; parts.len()] };
+        let mut all = Self { meshes: Vec::new(), of_part: vec![0; parts.len()], count: 0 };
         let mut first = 0;
         for (part, description) in parts.iter().enumerate() {
             let Primitives::Triangles { positions, triangles } = &description.primitives else { continue };
@@ -50,6 +52,7 @@ impl Meshes {
             first += len;
         }
         assert!(u32::try_from(first).is_ok(), "more triangles than 32-bit indices can name");
+        all.count = first;
         all
     }
 
@@ -69,7 +72,7 @@ impl Meshes {
 
     /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
-        self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
+        self.count
     }
 
     /// The mesh that a part is.
@@ -82,6 +85,12 @@ impl Meshes {
     #[inline(always)]
     pub fn number(&self, part: u32, primitive: u32) -> u32 {
         self.of_part(part).first + primitive
+    }
+
+    /// The number of a triangle, if there is one by these names.
+    pub fn checked_number(&self, part: u32, primitive: u32) -> Option<u32> {
+        let mesh = self.meshes.get(*self.of_part.get(part as usize)? as usize)?;
+        (mesh.part == part && (primitive as usize) < mesh.triangles.len()).then(|| mesh.first + primitive)
     }
 
     /// The mesh of a triangle, and the triangle's index in it.

@@ -6,6 +6,7 @@
 //! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
 //! | `preset` | what a tree is built for: speed of building, of tracing, or memory |
 //! | `clusters` | the fast preset: triangles along a curve |
+//! | `cache` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `walk` | one ray, from the root to the leaves |
@@ -32,6 +33,7 @@ mod batch;
 mod block;
 mod build;
 mod bundle;
+mod cache;
 mod closest_point;
 mod clusters;
 mod edges;
@@ -56,18 +58,20 @@ mod tile;
 mod triangles;
 mod walk;
 
+pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;
 pub use preset::{Options, Preset};
 
 use std::ops::Range;
 
-use super::{Batch, Tracer, World};
+use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
 use level::Level;
 use placements::PlacementTree;
 use query::{Closest, Occluded};
+use triangles::TriangleTree;
 
 /// The native tracer.
 pub struct Bvh {
@@ -99,13 +103,25 @@ impl Bvh {
     /// # Panics
     /// Where this processor does not have `options.isa`.
     pub fn build_with(world: &World, options: Options<'_>) -> Self {
-        let Options { preset, isa, .. } = options;
-        assert!(isa.is_available(), "{isa:?} is not available on this processor");
-        let level = |parts: &Range<usize>| Level::build(&world.parts[parts.clone()], &options);
-        let objects: Vec<Level> = world.objects.iter().map(level).collect();
+        options.isa.demand();
+        let build = |parts: &[Part]| TriangleTree::build(parts, &options);
+        let triangles = levels(world).into_iter().map(build).collect();
+        Self::over(triangles, world, &options)
+    }
+
+    /// Of the trees over the triangles of each of [`levels`]; the others are built.
+    fn over(triangles: Vec<TriangleTree>, world: &World, options: &Options<'_>) -> Self {
+        let Options { preset, isa, .. } = *options;
+        isa.demand();
+        let parts = levels(world);
+        assert_eq!(triangles.len(), parts.len(), "a tree a level");
+        let level = |(triangles, parts)| Level::new(triangles, parts, options);
+        let mut levels = triangles.into_iter().zip(parts).map(level);
+        let fixed = levels.next().expect("the fixed parts are a level");
+        let objects: Vec<Level> = levels.collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds, &options);
-        Self { fixed: level(&world.fixed), objects, placements, preset, isa }
+        let placements = PlacementTree::build(&world.placements, &bounds, options);
+        Self { fixed, objects, placements, preset, isa }
     }
 
     /// Memory the trees hold, in bytes.
@@ -143,6 +159,12 @@ impl Bvh {
     pub fn isa(&self) -> Isa {
         self.isa
     }
+}
+
+/// The parts of each level: the fixed ones, then those of each object.
+fn levels(world: &World) -> Vec<&[Part]> {
+    let ranges = std::iter::once(&world.fixed).chain(&world.objects);
+    ranges.map(|parts| &world.parts[parts.clone()]).collect()
 }
 
 fn area(bounds: Aabb) -> f64 {

@@ -2,17 +2,19 @@
 
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
 use crate::math::{Aabb, Vec3};
+use crate::memory::Array;
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
 
 /// What is in a slot of a node: another node, or a leaf's blocks; in one word, so that one instruction reorders eight.
 #[repr(transparent)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Child(pub u32);
 
 impl Child {
@@ -81,20 +83,23 @@ impl Child {
 
 /// Eight children: 256 bytes, four cache lines.
 #[repr(C, align(64))]
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Node {
     /// Of each child: min x, max x, min y, max y, min z, max z.
     pub bounds: [[f32; WIDTH]; 6],
     pub child: [Child; WIDTH],
     /// Of each leaf its number of items, where several are in a block. Only while the tree is made.
     pub items: [u8; WIDTH],
+    /// What fills the fourth line: zeros, so that a node is its bytes.
+    pub unused: [u8; 24],
 }
 
 impl Node {
     /// A node without children.
     pub fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { bounds: [low, high, low, high, low, high], child: [Child::NONE; WIDTH], items: [0; WIDTH] }
+        let bounds = [low, high, low, high, low, high];
+        Self { bounds, child: [Child::NONE; WIDTH], items: [0; WIDTH], unused: [0; 24] }
     }
 
     /// Fills one slot.
@@ -127,30 +132,31 @@ impl Node {
 }
 
 /// A tree over items of any kind; leaves name ranges of them.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Tree {
     /// The root is the first; empty for no items.
-    nodes: Vec<Node>,
+    nodes: Array<Node>,
     bounds: Aabb,
 }
 
 impl Tree {
     /// Of nodes of which the first is the root.
-    pub fn new(nodes: Vec<Node>) -> Self {
+    pub fn new(nodes: impl Into<Array<Node>>) -> Self {
+        let nodes = nodes.into();
         let bounds = nodes.first().map_or(Aabb::EMPTY, Node::bounds);
         Self { nodes, bounds }
+    }
+
+    /// All of them; the root is the first.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// The node that a child is.
     #[inline(always)]
     pub fn node(&self, child: Child) -> &Node {
         &self.nodes[child.node() as usize]
-    }
-
-    /// All nodes.
-    #[inline(always)]
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
     }
 
     /// Whether there is nothing to hit.
@@ -189,20 +195,22 @@ impl Tree {
     }
 
     /// This tree, whose leaves name one of `items` each, with nodes in their place: the item's primitive is the node's index.
-    pub fn over(mut self, items: &[Record], below: &mut Vec<Node>) -> Self {
-        let base = self.nodes.len() as u32;
-        for child in self.nodes.iter_mut().flat_map(|node| &mut node.child) {
+    pub fn over(self, items: &[Record], below: &mut Vec<Node>) -> Self {
+        let mut nodes = self.nodes.into_vec();
+        let base = nodes.len() as u32;
+        for child in nodes.iter_mut().flat_map(|node| &mut node.child) {
             if child.is_leaf() && *child != Child::NONE {
                 *child = Child::inner(base + items[child.first() as usize].primitive());
             }
         }
-        self.nodes.append(below);
-        self
+        nodes.append(below);
+        Self { nodes: nodes.into(), bounds: self.bounds }
     }
 
     /// Computes all boxes again, from those of the leaves' blocks.
     pub fn refit(&mut self, leaf: impl Fn(Range<u32>) -> Aabb + Sync) {
-        self.nodes.par_iter_mut().for_each(|node| {
+        let nodes = self.nodes.make_mut();
+        nodes.par_iter_mut().for_each(|node| {
             for slot in 0..WIDTH {
                 let child = node.child[slot];
                 if child.is_leaf() && child != Child::NONE {
@@ -211,8 +219,8 @@ impl Tree {
             }
         });
         // Children come after their parents.
-        for index in (0..self.nodes.len()).rev() {
-            let (above, below) = self.nodes.split_at_mut(index + 1);
+        for index in (0..nodes.len()).rev() {
+            let (above, below) = nodes.split_at_mut(index + 1);
             let node = &mut above[index];
             for slot in 0..WIDTH {
                 let child = node.child[slot];
@@ -226,6 +234,6 @@ impl Tree {
 
     /// All nodes, so that leaves can be renamed.
     pub fn nodes_mut(&mut self) -> &mut [Node] {
-        &mut self.nodes
+        self.nodes.make_mut()
     }
 }

@@ -61,6 +61,11 @@ impl TriangleTree {
                 (tree, leaves, count)
             }
         };
+        Self::new(parts, tree, leaves, count)
+    }
+
+    /// A tree over `count` triangles, all that can be hit of `parts`.
+    pub fn new(parts: &[Part], tree: Tree, leaves: Leaves, count: usize) -> Self {
         Self {
             tree,
             leaves,
@@ -97,6 +102,11 @@ impl TriangleTree {
 
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// Triangles that can be hit.
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.

@@ -1,10 +1,16 @@
-//! Room for large arrays, on huge pages where the system has them.
+//! Memory that is large: arrays on huge pages, files mapped, and arrays that are either.
 //!
 //! An array of hundreds of megabytes on pages of 4 kB costs a fault for each page when it is first written, and misses
 //! of the translation buffer whenever it is read out of order. Measured on a virtual machine, first writing 360 MB takes
 //! 0.18 s on small pages and 0.04 s on huge ones. Linux gives huge pages on request (`madvise`), which is all that is
-//! unsafe here; elsewhere nothing is asked.
+//! unsafe in this file; elsewhere nothing is asked.
 #![allow(unsafe_code)] // One system call, which changes no byte.
+
+mod array;
+mod mapped;
+
+pub(crate) use array::Array;
+pub(crate) use mapped::Mapped;
 
 use bytemuck::Zeroable;
 

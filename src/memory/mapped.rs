@@ -14,7 +14,7 @@ use std::path::Path;
 use memmap2::{Mmap, UncheckedAdvice};
 
 /// What is told how many bytes have been read, from any thread.
-pub(super) type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
+pub(crate) type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
 
 /// The bytes of a file.
 pub(crate) struct Mapped<'a> {
@@ -44,13 +44,14 @@ impl<'a> Mapped<'a> {
         // SAFETY: the mapping is private and read-only, and `Mmap` keeps it alive as long as the slice. That nobody
         // shortens or rewrites the file meanwhile is left to whoever runs the program, as with every program that maps
         // its input: shortening ends it with SIGBUS, and rewriting can give other numbers, which the loaders' checks
-        // (made on values they have copied out, or through bounds-checked indexing) keep from doing harm.
+        // (made on values they have copied out, or through bounds-checked indexing) keep from doing harm; a tree that is
+        // used where it lies is only indexed with bounds checked, too.
         let map = unsafe { Mmap::map(&file)? };
         Ok(Self { map: Some(map), on_bytes: None })
     }
 
     /// The same file, which tells of the bytes that are read.
-    pub(super) fn watched(self, on_bytes: Option<OnBytes<'a>>) -> Self {
+    pub(crate) fn watched(self, on_bytes: Option<OnBytes<'a>>) -> Self {
         Self { on_bytes, ..self }
     }
 
