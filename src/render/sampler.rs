@@ -40,8 +40,12 @@ impl Sampler {
 
     /// What the samples of a pixel have in common, computed once for all of them.
     pub fn pattern(&self, x: u32, y: u32) -> Pattern {
-        let hash = if self.spp == 1 { [0; 4] } else { self.hash(x, y, 0, PATTERN) };
-        let [order, columns, rows, _] = hash;
+        if self.spp == 1 {
+            // Not hashed, nor divided: every pixel has the same.
+            let (order, columns, rows) = (Key::ONLY, Key::ONLY, Key::ONLY);
+            return Pattern { x, y, order, columns, rows };
+        }
+        let [order, columns, rows, _] = self.hash(x, y, 0, PATTERN);
         Pattern {
             x,
             y,
@@ -87,6 +91,9 @@ struct Key {
 }
 
 impl Key {
+    /// The permutation of one element.
+    const ONLY: Self = Self { bits: 0, turn: 0 };
+
     const fn new(bits: u32, length: u32) -> Self {
         Self { bits, turn: bits % length }
     }

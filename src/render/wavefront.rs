@@ -14,6 +14,9 @@ use crate::trace::Tracer;
 use super::sampler::Pattern;
 use super::{Renderer, tiles::Tile};
 
+/// Camera rays that are made at a time: enough for vectors of any width, few enough for registers and a little stack.
+const LANES: usize = 16;
+
 /// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
 pub(super) struct Buffers {
@@ -74,9 +77,14 @@ impl Renderer<'_> {
     /// One sample of each pixel: its camera ray, and what that hits.
     fn camera_hits<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         let Buffers { patterns, rays, hits, .. } = buffers;
+        let place = |pixel: &Pattern| self.sampler.place(pixel, sample);
         rays.clear();
-        rays.extend(patterns.iter().map(|pixel| self.pinhole.ray(self.sampler.place(pixel, sample))));
-        hits.clear();
+        let (groups, rest) = patterns.as_chunks::<LANES>();
+        for group in groups {
+            rays.extend_from_slice(&self.pinhole.rays(&group.each_ref().map(place)));
+        }
+        rays.extend(rest.iter().map(|pixel| self.pinhole.ray(place(pixel))));
+        // Not cleared: every answer is written.
         hits.resize(rays.len(), None);
         tracer.closest_batch(rays, hits, self.settings.batch);
     }
