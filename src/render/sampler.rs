@@ -39,6 +39,9 @@ impl Sampler {
     }
 
     /// What the samples of a pixel have in common, computed once for all of them.
+    // Inlined, with `place`: a pattern that came back from a call would be copied by loads wider than the stores that made
+    // it, which wait for those.
+    #[inline]
     pub fn pattern(&self, x: u32, y: u32) -> Pattern {
         if self.spp == 1 {
             // Not hashed, nor divided: every pixel has the same.
@@ -57,12 +60,14 @@ impl Sampler {
 
     /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples. The pixel's
     /// middle for a single sample.
+    #[inline]
     pub fn place(&self, pixel: &Pattern, sample: u32) -> DVec2 {
         let corner = DVec2::new(f64::from(pixel.x), f64::from(pixel.y));
         corner + self.within(pixel, sample)
     }
 
     /// The same within the unit square.
+    #[inline]
     fn within(&self, pixel: &Pattern, sample: u32) -> DVec2 {
         if self.spp == 1 {
             return DVec2::splat(0.5);

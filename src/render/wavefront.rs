@@ -78,14 +78,17 @@ impl Renderer<'_> {
     fn camera_hits<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         let Buffers { patterns, rays, hits, .. } = buffers;
         let place = |pixel: &Pattern| self.sampler.place(pixel, sample);
-        rays.clear();
+        // Neither is cleared: every one of them is written.
+        rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
+        hits.resize(patterns.len(), None);
         let (groups, rest) = patterns.as_chunks::<LANES>();
-        for group in groups {
-            rays.extend_from_slice(&self.pinhole.rays(&group.each_ref().map(place)));
+        let (ray_groups, ray_rest) = rays.as_chunks_mut::<LANES>();
+        for (group, rays) in groups.iter().zip(ray_groups) {
+            *rays = self.pinhole.rays(&group.each_ref().map(place));
         }
-        rays.extend(rest.iter().map(|pixel| self.pinhole.ray(place(pixel))));
-        // Not cleared: every answer is written.
-        hits.resize(rays.len(), None);
+        for (pixel, ray) in rest.iter().zip(ray_rest) {
+            *ray = self.pinhole.ray(place(pixel));
+        }
         tracer.closest_batch(rays, hits, self.settings.batch);
     }
 
