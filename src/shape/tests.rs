@@ -1,0 +1,174 @@
+//! Every shape against exact arithmetic, on rays made to be difficult.
+
+use super::*;
+use crate::lab::exact_shapes::crossings;
+use crate::lab::rays::Random;
+use crate::math::Mat3;
+
+/// One of each kind, of about the size 1, near zero; points that rays are aimed at: corners, rims, poles.
+fn sample(kind: usize, random: &mut Random) -> (Shape, Vec<Vec3>) {
+    let v = |random: &mut Random| random.vector();
+    // On a grid, so that rays along the axes touch exactly.
+    let is_grid = [0, 2, 5, 7].contains(&kind);
+    let centre = if is_grid { (v(random) * 8.0).round() / 8.0 } else { v(random) };
+    let radius = if is_grid { (1 + random.below(8)) as f32 / 8.0 } else { 0.05 + random.unit() };
+    let (shape, mut targets) = match kind {
+        0 => (Shape::Sphere(Sphere { centre, radius }), vec![centre + Vec3::X * radius, centre - Vec3::Z * radius]),
+        1 => (Shape::Plane(Plane::new(centre, v(random)).unwrap()), vec![centre]),
+        2 => (Shape::Disk(Disk::new(centre, Vec3::Y, radius).unwrap()), vec![centre + Vec3::X * radius]),
+        3 => (Shape::Disk(Disk::new(centre, v(random), radius).unwrap()), vec![centre]),
+        4 => {
+            let (p, q) = (v(random), v(random));
+            let cuboid = Cuboid::new(p.min(q), p.max(q)).unwrap();
+            (Shape::Cuboid(cuboid), vec![p, q, Vec3::new(p.x, q.y, p.z), Vec3::new(q.x, q.y, p.z)])
+        }
+        5 | 6 => {
+            let (base, apex) = (centre, if kind == 5 { centre + Vec3::Y } else { v(random) });
+            let capped = random.below(2) == 0;
+            let cylinder = Cylinder::new(base, apex, radius, capped).unwrap();
+            (Shape::Cylinder(cylinder), vec![base, apex, base + Vec3::X * radius, base - Vec3::Z * radius])
+        }
+        7 | 8 => {
+            let (base, apex) = (centre, if kind == 7 { centre + Vec3::Y } else { v(random) });
+            let apex_radius = if random.below(2) == 0 { 0.0 } else { random.unit() };
+            let cone = Cone::new(base, radius, apex, apex_radius, random.below(2) == 0).unwrap();
+            (Shape::Cone(cone), vec![base, apex, base + Vec3::X * radius, base - Vec3::Z * radius])
+        }
+        9 => {
+            let axes = Mat3::from_cols(v(random), v(random), v(random));
+            (Shape::Ellipsoid(Ellipsoid::new(centre, axes).unwrap()), vec![centre + axes.x_axis])
+        }
+        10 => {
+            // Flat, concave, with corners on a grid: many are in a row.
+            let corners =
+                [(0, 0), (2, 0), (2, 1), (3, 0), (4, 0), (4, 3), (3, 3), (3, 1), (2, 2), (1, 2), (1, 1), (0, 1)];
+            let corners: Vec<Vec3> = corners.map(|(x, y)| Vec3::new(x as f32 / 4.0, y as f32 / 4.0, 0.25)).to_vec();
+            (Shape::Polygon(Arc::new(Polygon::new(corners.clone()).unwrap())), corners)
+        }
+        _ => {
+            // A star in a plane at random, so that its corners are off it by their rounding.
+            let n = 5 + random.below(30) as usize;
+            let (x, y) = (v(random), v(random));
+            let corner = |i: usize| {
+                let angle = i as f32 / n as f32 * std::f32::consts::TAU;
+                centre + (x * angle.cos() + y * angle.sin()) * (0.3 + 0.7 * random.unit())
+            };
+            let corners: Vec<Vec3> = (0..n).map(corner).collect();
+            (Shape::Polygon(Arc::new(Polygon::new(corners.clone()).unwrap())), corners)
+        }
+    };
+    targets.push(centre);
+    (shape, targets)
+}
+
+const KINDS: usize = 12;
+
+/// The same shape, times a power of two, which rounds nothing.
+fn scaled(shape: &Shape, s: f32) -> Shape {
+    match shape {
+        Shape::Sphere(x) => Shape::Sphere(Sphere { centre: x.centre * s, radius: x.radius * s }),
+        Shape::Plane(x) => Shape::Plane(Plane { point: x.point * s, ..*x }),
+        Shape::Disk(x) => Shape::Disk(Disk { centre: x.centre * s, radius: x.radius * s, ..*x }),
+        Shape::Cuboid(x) => Shape::Cuboid(Cuboid { min: x.min * s, max: x.max * s }),
+        Shape::Cylinder(x) => {
+            Shape::Cylinder(Cylinder { base: x.base * s, apex: x.apex * s, radius: x.radius * s, ..*x })
+        }
+        Shape::Cone(x) => Shape::Cone(Cone {
+            base: x.base * s,
+            apex: x.apex * s,
+            base_radius: x.base_radius * s,
+            apex_radius: x.apex_radius * s,
+            ..*x
+        }),
+        Shape::Ellipsoid(x) => Shape::Ellipsoid(Ellipsoid { centre: x.centre * s, axes: x.axes * s }),
+        Shape::Polygon(x) => {
+            Shape::Polygon(Arc::new(Polygon::new(x.corners().iter().map(|p| *p * s).collect()).unwrap()))
+        }
+    }
+}
+
+/// A ray at a shape with these targets: aimed at them, past them by a hair, along axes through them, from inside, at random.
+fn nasty(targets: &[Vec3], random: &mut Random) -> Ray {
+    let target = targets[random.below(targets.len() as u64) as usize];
+    let other = targets[random.below(targets.len() as u64) as usize];
+    let far = [0.3, 3.0, 3.0, 3.0, 1e3, 1e6][random.below(6) as usize];
+    let origin = random.vector() * far;
+    let axis = Vec3::AXES[random.below(3) as usize] * if random.below(2) == 0 { 1.0 } else { -1.0 };
+    let direction = match random.below(8) {
+        0 => random.vector(),
+        1 | 2 => target - origin,
+        3 => target + random.vector() * 1e-6 - origin,
+        4 => target + random.vector() - origin,
+        5 => (target + other) * 0.5 - origin,
+        6 => return Ray::new(target - axis * 4.0, axis),
+        // In a plane of the axes, on a grid: corners in a row.
+        _ => {
+            let step = |random: &mut Random| (random.below(9) as f32 - 4.0) * 0.25;
+            let way = Vec3::new(step(random), step(random), step(random)) - axis;
+            return Ray::new(target - way * 4.0, way);
+        }
+    };
+    Ray::new(origin, direction)
+}
+
+/// What a capped rim may leave undecided, and t be off by, twice.
+const SLACK: f64 = 1.0 / (1 << 25) as f64;
+
+#[track_caller]
+fn assert_exact(shape: &Shape, ray: &Ray) -> usize {
+    let whole = |ray: &Ray| shape.intersect_all(ray).map(|hit| hit.t).collect::<Vec<f64>>();
+    let backwards = |mut t: Vec<f64>| {
+        t.reverse();
+        t.iter().map(|t| -t).collect::<Vec<_>>()
+    };
+    // Both halves of the line; a t of zero is in both.
+    let mut found = backwards(whole(&Ray { direction: -ray.direction, ..*ray }));
+    found.retain(|&t| t as f32 != 0.0);
+    found.extend(whole(ray));
+    let exact = crossings(ray, shape, None);
+    let t: Vec<f64> = exact.iter().map(|(t, _)| t.to_f64()).filter(|t| (*t as f32).is_finite()).collect();
+    // A solid's crossings of an edge or a rim count for each face: the first and the last remain.
+    let is_solid = matches!(shape, Shape::Cuboid(_))
+        || matches!(shape, Shape::Cylinder(Cylinder { capped: true, .. }) | Shape::Cone(Cone { capped: true, .. }));
+    let t: Vec<f64> = if is_solid { [t.first(), t.last()].into_iter().flatten().copied().collect() } else { t };
+    if matches!(shape, Shape::Cylinder(_) | Shape::Cone(_)) && found.len() != t.len() {
+        // Within rounding of a rim: the side's t and the end plane's cannot be told apart.
+        let both = [&found, &t].into_iter().find(|t| !t.is_empty()).unwrap();
+        let close = (both[both.len() - 1] - both[0]).abs() <= SLACK * both[0].abs().max(1.0);
+        let touches = exact.iter().any(|(_, touches)| *touches);
+        assert!(close || touches, "{shape:?} {ray:?}: {found:?}, exactly {t:?}");
+        return 0;
+    }
+    assert_eq!(found.len(), t.len(), "{shape:?} {ray:?}: {found:?}, exactly {t:?}");
+    for (found, exact) in found.iter().zip(&t) {
+        assert!(
+            (found - exact).abs() <= exact.abs() / f64::from(1 << 26),
+            "{shape:?} {ray:?}: {found}, exactly {exact}"
+        );
+    }
+    t.len()
+}
+
+#[test]
+fn verdicts_are_exact_and_t_is_within_its_bound_at_every_scale() {
+    for kind in 0..KINDS {
+        let (mut hits, mut touches) = (0, 0);
+        for case in 0..3000 {
+            let mut random = Random::new(kind as u64, case);
+            let (shape, targets) = sample(kind, &mut random);
+            let ray = nasty(&targets, &mut random);
+            if !ray.is_valid() {
+                continue;
+            }
+            let scale = 2f32.powi([0, 0, -40, 40, 17][random.below(5) as usize]);
+            let shape = scaled(&shape, scale);
+            let ray = Ray::new(ray.origin * scale, ray.direction * 2f32.powi(random.below(60) as i32 - 30));
+            hits += usize::from(assert_exact(&shape, &ray) > 0);
+            touches += usize::from(crossings(&ray, &shape, None).iter().any(|(_, touches)| *touches));
+        }
+        assert!(hits > 800, "kind {kind}: {hits} hits");
+        if ![1, 3, 6, 8, 9].contains(&kind) {
+            assert!(touches > 20, "kind {kind}: {touches} rays touch an edge, a rim or a silhouette");
+        }
+    }
+}
