@@ -7,6 +7,8 @@
 //! A placed shape is not moved: the ray is, by the adjugate of the transform, and the shape's lengths are multiplied by the
 //! determinant, so that nothing is divided.
 
+use std::sync::Arc;
+
 use super::exact::{Dyadic, Rational, Ring, Vector, cross, det, dot, vector, zip};
 use crate::math::{Affine3, DVec3, Vec3};
 use crate::ray::Ray;
@@ -203,7 +205,16 @@ impl Line {
         let (centre, normal) = polygon.plane();
         let from = minus(&self.origin, &times(&exact(centre), &self.scale));
         let met = self.meet(&exact(normal), &from);
-        let Some(t) = met.and_then(|[way, speed]| Rational::new(way, speed)) else { return Vec::new() };
+        let Some(mut t) = met.and_then(|[way, speed]| Rational::new(way, speed)) else { return Vec::new() };
+        // Where the corners are not quite in one plane, hits stay within their bounds.
+        let bounds = Shape::Polygon(Arc::new(polygon.clone())).bounds();
+        for axis in 0..3 {
+            let at = |corner: Vec3| Rational::new(self.from(corner)[axis].neg(), self.direction[axis].clone());
+            if let (Some(low), Some(high)) = (at(bounds.min), at(bounds.max)) {
+                let (enter, exit) = if low < high { (low, high) } else { (high, low) };
+                t = t.max(enter).min(exit);
+            }
+        }
         let d = &self.direction;
         let corners: Vec<Vector<Dyadic>> = polygon.corners().iter().map(|&p| self.from(p)).collect();
         // An axis that is not along the direction; the corners' coordinate across both, of which 0 counts as below.

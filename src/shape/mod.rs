@@ -19,7 +19,9 @@ mod polygon;
 mod quadric;
 mod round;
 mod sphere;
+mod sphere_methods;
 pub mod triangle;
+mod triangle_methods;
 
 use std::sync::Arc;
 
@@ -31,6 +33,8 @@ pub use ellipsoid::Ellipsoid;
 pub use plane::Plane;
 pub use polygon::Polygon;
 pub use sphere::Sphere;
+pub use sphere_methods::SphereMethod;
+pub use triangle_methods::TriangleMethod;
 
 use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
@@ -123,6 +127,21 @@ impl Shape {
             Self::Ellipsoid(_) => "ellipsoid",
             Self::Polygon(_) => "polygon",
         }
+    }
+
+    /// Memory it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        let corners = match self {
+            Self::Polygon(polygon) => size_of::<Polygon>() + size_of_val(polygon.corners()),
+            Self::Sphere(_)
+            | Self::Plane(_)
+            | Self::Disk(_)
+            | Self::Cuboid(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Ellipsoid(_) => 0,
+        };
+        size_of::<Self>() + corners
     }
 
     /// Whether no box contains it. Accelerators hold no such shape: tracers ask all of them for every ray.

@@ -9,14 +9,15 @@
 //!
 //! Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the polygon's is that
 //! of Newell's normal (Sutherland, Sproull, Schumacker 1974, *A characterization of ten hidden-surface algorithms*) through
-//! the mean of the corners, in f64, and corners may be off it by [`Polygon::FLATNESS`] of the polygon's size.
+//! the mean of the corners, in f64, and corners may be off it by [`Polygon::FLATNESS`] of the polygon's size. Hits stay within
+//! the bounds of the corners.
 //! Triangulating, the simpler way, would choose among outlines that are not the polygon's where it is not flat.
 
 use super::flat::Flat;
-use super::line::{Line, NO_ROOTS, Roots};
+use super::line::{Interval, Line, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A polygon.
@@ -69,10 +70,6 @@ impl Polygon {
                 corners[farthest]
             )
         })?;
-        let bounds = Aabb {
-            min: Vec3::from_array((bounds.min.as_dvec3() - distance).as_vec3().to_array().map(f32::next_down)),
-            max: Vec3::from_array((bounds.max.as_dvec3() + distance).as_vec3().to_array().map(f32::next_up)),
-        };
         Ok(Self { corners, centre, normal, bounds })
     }
 
@@ -104,13 +101,25 @@ impl Polygon {
         let reach = self.bounds.min.abs().max(self.bounds.max.abs());
         let line = Line::new(ray, reach.max_element());
         let flat = Flat { point: line.place_f64(self.centre), normal: self.normal, line };
-        let Some(t) = flat.t() else { return NO_ROOTS };
-        // A ray that grazes a polygon which is not quite flat may see its outline, and meet its plane far outside.
-        let at = ray.origin.as_dvec3() + ray.direction.as_dvec3() * t;
-        let slack = (ray.origin.abs() + reach).as_dvec3() * f64::from(UNIT_ROUNDOFF / 4.0);
-        let is_near =
-            at.cmpge(self.bounds.min.as_dvec3() - slack).all() && at.cmple(self.bounds.max.as_dvec3() + slack).all();
-        if is_near && self.contains(&line) { [Some(t), None] } else { NO_ROOTS }
+        match flat.t() {
+            Some(t) if self.contains(&line) => [Some(self.within_bounds(ray, t)), None],
+            _ => NO_ROOTS,
+        }
+    }
+
+    /// The t within the bounds that is nearest to `t`.
+    ///
+    /// Corners are off the plane by a trifle, so a ray that grazes it may pass inside the outline and meet the plane outside, even far
+    /// away. Bounds would not contain such a hit; not to count it would open a gap between polygons that share an edge. A line that passes
+    /// inside the outline meets the convex hull of the corners, so it does meet the bounds.
+    fn within_bounds(&self, ray: &Ray, t: f64) -> f64 {
+        let mut inside = Interval::ALL;
+        for axis in (0..3).filter(|&axis| ray.direction[axis] != 0.0) {
+            let [low, high] = [self.bounds.min[axis], self.bounds.max[axis]]
+                .map(|bound| (f64::from(bound) - f64::from(ray.origin[axis])) / f64::from(ray.direction[axis]));
+            inside = inside.and(Interval::between(low, high));
+        }
+        t.max(inside.enter).min(inside.exit.max(inside.enter))
     }
 
     /// Whether the line passes inside the outline, or through it.

@@ -92,6 +92,7 @@ impl Bvh {
                     let ray = &rays[i];
                     let mut nearest = found.nearest(triangles, ray);
                     if !(is_all || Q::ANY && nearest.hit().is_some()) {
+                        self.unbounded.offer(ray, &mut nearest);
                         self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, level, &mut nearest);
                         self.enter_placements::<S, Q>(ray, upper, level, &mut nearest);
                     }
@@ -138,7 +139,7 @@ impl Bvh {
 
     /// Whether there are neither shapes nor placed objects.
     fn has_only_triangles(&self) -> bool {
-        self.fixed.shapes.tree().is_empty() && self.placements.is_empty()
+        self.fixed.shapes.tree().is_empty() && self.placements.is_empty() && self.unbounded.is_empty()
     }
 
     /// Many rays in bundles of 64 where they are bundles, else ray by ray.
@@ -154,6 +155,7 @@ impl Bvh {
                 for (k, (ray, answer)) in rays.iter().zip(&mut *answers).enumerate() {
                     let mut nearest = Nearest::new(ray);
                     if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
+                        self.unbounded.offer(ray, &mut nearest);
                         self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
                         self.enter_placements::<S, Q>(ray, &mut stacks.upper, &mut stacks.level, &mut nearest);
                         *answer = Q::answer(nearest.hit());
