@@ -141,10 +141,12 @@ impl Polygon {
                     return true;
                 }
                 is_inside ^= (volume > 0) == (to_side >= 0);
-            } else if from_side == 0 && to_side == 0 && side(from, across) * side(to, across) <= 0 {
-                return true;
-            } else if to_side == 0 && side(to, across) == 0 {
-                return true;
+            } else if to_side == 0 {
+                // In a corner, or on an edge along the half-line.
+                let place = side(to, across);
+                if place == 0 || from_side == 0 && side(from, across) * place < 0 {
+                    return true;
+                }
             }
             (from, from_side) = (to, to_side);
         }
