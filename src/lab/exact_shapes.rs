@@ -1,11 +1,11 @@
 //! Where a line crosses a shape, in exact arithmetic, by other formulas than the tracers'.
 //!
-//! Planes are met at a quotient. Round shapes are quadratics in t, expanded, with the discriminant b^2 - a c as it stands: the
-//! numbers are integers, so nothing is lost; roots have 256 bits. Surfaces are tested one by one (the side of a
-//! cylinder, each of its caps), and no solid is an intersection of intervals.
+//! Planes are met at a quotient. Round shapes are quadratics in t, expanded, with the discriminant b^2 - a c as it
+//! stands: the numbers are integers, so nothing is lost; roots have 256 bits. Surfaces are tested one by one (the side
+//! of a cylinder, each of its caps), and no solid is an intersection of intervals.
 //!
-//! A placed shape is not moved: the ray is, by the adjugate of the transform, and the shape's lengths are multiplied by the
-//! determinant, so that nothing is divided.
+//! A placed shape is not moved: the ray is, by the adjugate of the transform, and the shape's lengths are multiplied by
+//! the determinant, so that nothing is divided.
 
 use std::sync::Arc;
 
@@ -94,7 +94,8 @@ impl Line {
             return Rational::new(c.neg(), b.add(b)).map(|t| (t, false)).into_iter().collect();
         }
         let root = discriminant.sqrt();
-        // The sum of two numbers of one sign, so that no digits cancel; the other root follows from their product c / a.
+        // The sum of two numbers of one sign, so that no digits cancel; the other root follows from their product c /
+        // a.
         let q = if b.signum() > 0 { b.add(&root).neg() } else { root.sub(b) };
         let touches = discriminant.signum() == 0;
         let one = Rational::new(q.clone(), a.clone());
@@ -227,7 +228,8 @@ impl Line {
         for k in 0..corners.len() {
             let (p, q) = (&corners[k], &corners[(k + 1) % corners.len()]);
             let volume = dot(d, &cross(p, q)).signum();
-            // Seen along the line, the ends are on opposite sides of it: the product of what is across the line is not positive.
+            // Seen along the line, the ends are on opposite sides of it: the product of what is across the line is not
+            // positive.
             let across = dot(p, q).mul(&dd).sub(&dot(d, p).mul(&dot(d, q))).signum();
             touches |= volume == 0 && across <= 0;
             let (from, to) = (above(p) > 0, above(q) > 0);

@@ -1,12 +1,14 @@
-//! What may be answered for a shape, whose engines get a ray that was moved to the shape's coordinates and rounded there.
+//! What may be answered for a shape, whose engines get a ray that was moved to the shape's coordinates and rounded
+//! there.
 //!
-//! A ray that is off by no more than `blur` near a convex solid meets what the exact ray meets of the solid made larger by as
-//! much, and passes by only what passes the solid made smaller. Larger and smaller are copies scaled about an inner point: with
-//! a ball of radius rho around it inside the solid, scaling by 1 + blur / rho covers every point within blur of it, and by
-//! 1 - blur / rho leaves as much room inside. The ray is scaled in place of the solid.
+//! A ray that is off by no more than `blur` near a convex solid meets what the exact ray meets of the solid made larger
+//! by as much, and passes by only what passes the solid made smaller. Larger and smaller are copies scaled about an
+//! inner point: with a ball of radius rho around it inside the solid, scaling by 1 + blur / rho covers every point
+//! within blur of it, and by 1 - blur / rho leaves as much room inside. The ray is scaled in place of the solid.
 //!
 //! A ray that was not moved is exact, and so is the verdict, but for the rims of capped cylinders and cones. Of disks,
-//! polygons and open sides that were placed by a transform, only a clear miss of the box around them is told from the rest.
+//! polygons and open sides that were placed by a transform, only a clear miss of the box around them is told from the
+//! rest.
 
 use super::super::exact_shapes::{Crossing, crossings_of};
 use super::*;
@@ -72,8 +74,8 @@ fn inside_cone(cone: &Cone) -> (DVec3, f64) {
     (base + (apex - base) * share, side.min(length * 0.25))
 }
 
-/// A convex solid, with an inner point and its distance from the surface. `unsure` of the distance from the ray's origin may be
-/// lost to the engines' own rounding.
+/// A convex solid, with an inner point and its distance from the surface. `unsure` of the distance from the ray's
+/// origin may be lost to the engines' own rounding.
 fn solid(shape: &Shape, ray: &LocalRay, (centre, depth): (DVec3, f64), unsure: f64) -> Outcome {
     let bounds = shape.bounds();
     if bounds.is_empty() {

@@ -1,9 +1,10 @@
 //! Formulas that are evaluated in f64 with a bound on the error, and exactly where the bound leaves doubt.
 //!
-//! A [`Formula`] is written once, over any [`Number`]: [`Bounded`] carries a running error bound (Higham 2002, *Accuracy
-//! and Stability of Numerical Algorithms*, section 3.3), [`Expansion`] is exact. [`Formula::values`] takes the first where
-//! it is good enough for its user, else the second. So a formula need not be stable, only short: what cancels is noticed. A
-//! bound derived by hand for each formula, the simpler alternative at run time, is a page of analysis a formula.
+//! A [`Formula`] is written once, over any [`Number`]: [`Bounded`] carries a running error bound (Higham 2002,
+//! *Accuracy and Stability of Numerical Algorithms*, section 3.3), [`Expansion`] is exact. [`Formula::values`] takes
+//! the first where it is good enough for its user, else the second. So a formula need not be stable, only short: what
+//! cancels is noticed. A bound derived by hand for each formula, the simpler alternative at run time, is a page of
+//! analysis a formula.
 
 use super::expansion::Expansion;
 use super::{DVec3, UNIT_ROUNDOFF_64};
@@ -106,9 +107,10 @@ pub trait Formula<const K: usize> {
     }
 }
 
+/// The values by exact arithmetic, off by at most one ulp.
 #[cold]
 #[inline(never)]
-fn exactly<const K: usize>(formula: &(impl Formula<K> + ?Sized)) -> [f64; K] {
+pub fn exactly<const K: usize>(formula: &(impl Formula<K> + ?Sized)) -> [f64; K] {
     formula.evaluate::<Expansion>().map(|x| x.estimate())
 }
 

@@ -1,9 +1,9 @@
 //! What a cylinder and a cone share: an axis, an end plane at each end of it, and what lies between.
 //!
-//! Capped, they are convex: the line is inside where it is inside the lateral surface and between the end planes, and hits
-//! where it enters and leaves. One comparison of t decides for the side and the cap at once, so no ray slips through the rim
-//! between them; testing the side and two disks by themselves, the simpler way, loses rays there.
-//! Open, they are hit at the lateral surface's roots, where those are between the end planes.
+//! Capped, they are convex: the line is inside where it is inside the lateral surface and between the end planes, and
+//! hits where it enters and leaves. One comparison of t decides for the side and the cap at once, so no ray slips
+//! through the rim between them; testing the side and two disks by themselves, the simpler way, loses rays there. Open,
+//! they are hit at the lateral surface's roots, where those are between the end planes.
 
 use super::InvalidShape;
 use super::line::{Interval, Line, NO_ROOTS, PRECISION, Roots};
@@ -46,8 +46,8 @@ impl Frustum {
         self.ends[1].as_dvec3() - self.ends[0].as_dvec3()
     }
 
-    /// The crossings of a line of which `inside` is within the lateral surface. `widens`: whether the line goes towards larger
-    /// radii, on the side of the apex where the surface is.
+    /// The crossings of a line of which `inside` is within the lateral surface. `widens`: whether the line goes towards
+    /// larger radii, on the side of the apex where the surface is.
     pub fn roots(&self, line: &Line, inside: Inside, widens: bool) -> Roots {
         let within = match inside {
             Inside::Nothing => return NO_ROOTS,

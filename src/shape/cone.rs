@@ -1,9 +1,9 @@
 //! A cone between two points with a radius each, open or capped: a whole cone where one of the radii is 0.
 //!
-//! With the axis a = q - p, f from p to the ray's origin, k = r1 - r0 and g = r0 a^2 + k f . a: a point is on the (double)
-//! cone where a^2 |f x a|^2 = g^2. The discriminant is a^4 (a^2 w^2 - (a^2 + k^2)(a . m)^2) with m = f x d and
-//! w = d x (r0 a + k f), which follows from Lagrange's identity. It cancels only where the line touches the cone, and no point is
-//! squared that lies farther away than it must.
+//! With the axis a = q - p, f from p to the ray's origin, k = r1 - r0 and g = r0 a^2 + k f . a: a point is on the
+//! (double) cone where a^2 |f x a|^2 = g^2. The discriminant is a^4 (a^2 w^2 - (a^2 + k^2)(a . m)^2) with m = f x d and
+//! w = d x (r0 a + k f), which follows from Lagrange's identity. It cancels only where the line touches the cone, and
+//! no point is squared that lies farther away than it must.
 
 use super::axis::Frustum;
 use super::line::{Line, Roots};

@@ -1,9 +1,10 @@
 //! A box along the axes.
 //!
-//! The line is inside between the last of the three slabs it enters and the first that it leaves (Kay, Kajiya 1986, *Ray
-//! tracing complex scenes*). Each t is a difference and a quotient in f64, off by at most 2^-51 of itself; where that
-//! cannot tell which of two comes first, their order is decided exactly. So is, then, whether a ray through an edge or a corner hits: it
-//! does. A component of the direction that is zero asks whether the origin lies in the slab, and nothing is divided by it.
+//! The line is inside between the last of the three slabs it enters and the first that it leaves (Kay, Kajiya 1986,
+//! *Ray tracing complex scenes*). Each t is a difference and a quotient in f64, off by at most 2^-51 of itself; where
+//! that cannot tell which of two comes first, their order is decided exactly. So is, then, whether a ray through an
+//! edge or a corner hits: it does. A component of the direction that is zero asks whether the origin lies in the slab,
+//! and nothing is divided by it.
 
 use super::line::{Interval, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};

@@ -1,8 +1,8 @@
 //! A disk: the part of a plane within a circle.
 //!
-//! With m = f x d, where f leads from the centre to the ray's origin, (n . d)(x - c) = n x m for the point x where the line
-//! meets the plane. So the line passes within the circle, its edge included, when |n x m|^2 <= r^2 (n . d)^2: a sign that
-//! is decided exactly.
+//! With m = f x d, where f leads from the centre to the ray's origin, (n . d)(x - c) = n x m for the point x where the
+//! line meets the plane. So the line passes within the circle, its edge included, when |n x m|^2 <= r^2 (n . d)^2: a
+//! sign that is decided exactly.
 
 use super::flat::Flat;
 use super::line::{Line, NO_ROOTS, Roots};

@@ -1,8 +1,8 @@
 //! An ellipsoid: the unit sphere under an affine map.
 //!
-//! The map's matrix is M, its adjugate N = det(M) M^-1. With f from the centre to the ray's origin, |N (f + t d)| = |det M| on
-//! the surface: no division. Since (N f) x (N d) = det(M) M^T (f x d), the discriminant is
-//! det(M)^2 (|N d|^2 - |M^T (f x d)|^2).
+//! The map's matrix is M, its adjugate N = det(M) M^-1. With f from the centre to the ray's origin, |N (f + t d)| =
+//! |det M| on the surface: no division. Since (N f) x (N d) = det(M) M^T (f x d), the discriminant is det(M)^2 (|N d|^2
+//! - |M^T (f x d)|^2).
 
 use super::line::{Line, NO_ROOTS, Roots};
 use super::quadric::{Inside, Quadric};
@@ -17,7 +17,8 @@ use crate::ray::Ray;
 pub struct Ellipsoid {
     /// The middle.
     pub centre: Vec3,
-    /// Half axes, in its columns: what the axes of the unit sphere become. They need not be perpendicular, but not lie in one plane.
+    /// Half axes, in its columns: what the axes of the unit sphere become. They need not be perpendicular, but not lie
+    /// in one plane.
     pub axes: Mat3,
 }
 
@@ -37,8 +38,7 @@ impl Ellipsoid {
         InvalidShape::unless([x_axis, y_axis, z_axis].into_iter().all(is_traceable), || {
             format!("the half axes {x_axis}, {y_axis}, {z_axis} are not finite")
         })?;
-        let inverse = self.axes.as_dmat3().inverse();
-        InvalidShape::unless(self.axes.as_dmat3().determinant() != 0.0 && inverse.is_finite(), || {
+        InvalidShape::unless(Volume(self.axes).signs() != [0], || {
             format!("the half axes {x_axis}, {y_axis}, {z_axis} lie in one plane; an ellipsoid needs three that do not")
         })
     }
@@ -76,6 +76,18 @@ impl Ellipsoid {
     /// Those of the unit sphere.
     pub(super) fn uv(&self, point: DVec3) -> Vec2 {
         spherical(self.on_sphere(point))
+    }
+}
+
+/// The determinant.
+struct Volume(Mat3);
+
+impl Formula<1> for Volume {
+    #[inline(always)]
+    fn evaluate<N: Number>(&self) -> [N; 1] {
+        let Mat3 { x_axis, y_axis, z_axis } = self.0;
+        let [x, y, z] = [x_axis, y_axis, z_axis].map(|axis| vector::<N>(axis.as_dvec3()));
+        [dot(&x, &cross(&y, &z))]
     }
 }
 

@@ -1,15 +1,15 @@
 //! A ray's line, and what intervals of it lie inside.
 //!
 //! Lengths are scaled by a power of two that brings the largest of them near 1, directions by another, which rounds
-//! nothing: products of eight factors then neither overflow nor underflow in f64, unless lengths of one ray and one shape differ
-//! by more than 1e60.
+//! nothing: products of eight factors then neither overflow nor underflow in f64, unless lengths of one ray and one
+//! shape differ by more than 1e60.
 
 use crate::math::number::{Bounded, Formula};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 
-/// The relative error that f64 is let pass in what t is computed of: t is then off by at most 2^-26 of itself, an eighth of
-/// the rounding to f32.
+/// The relative error that f64 is let pass in what t is computed of: t is then off by at most 2^-26 of itself, an
+/// eighth of the rounding to f32.
 pub(super) const PRECISION: f64 = 1.0 / (1 << 28) as f64;
 
 /// The values of t where a line crosses a shape, rising: none, one or two.
@@ -37,12 +37,10 @@ impl Line {
     pub fn new(ray: &Ray, size: f32) -> Self {
         let length = power_of_two(ray.origin.abs().max_element().max(size));
         let speed = power_of_two(ray.direction.abs().max_element());
-        Self {
-            origin: ray.origin.as_dvec3() / length,
-            direction: ray.direction.as_dvec3() / speed,
-            scale: 1.0 / length,
-            unit: length / speed,
-        }
+        // Of powers of two: exact.
+        let (scale, pace) = (1.0 / length, 1.0 / speed);
+        let (origin, direction) = (ray.origin.as_dvec3() * scale, ray.direction.as_dvec3() * pace);
+        Self { origin, direction, scale, unit: length * pace }
     }
 
     /// A point or a vector in these units.

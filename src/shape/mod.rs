@@ -42,10 +42,10 @@ use line::{NO_ROOTS, Roots};
 
 /// A primitive that is not a triangle.
 ///
-/// Whether a line hits is decided exactly, for the shape and the ray that stand there in f32: where f64 leaves a doubt, in exact
-/// arithmetic. The rims of capped cylinders and cones are the exception: there two t are compared that are each off
-/// by at most 2^-26 of themselves, the bound for all shapes; but no ray slips through between the side and the cap.
-/// What touches hits; a line within a plane, a disk, a polygon or an open side does not.
+/// Whether a line hits is decided exactly, for the shape and the ray that stand there in f32: where f64 leaves a doubt,
+/// in exact arithmetic. The rims of capped cylinders and cones are the exception: there two t are compared that are
+/// each off by at most 2^-26 of themselves, the bound for all shapes; but no ray slips through between the side and the
+/// cap. What touches hits; a line within a plane, a disk, a polygon or an open side does not.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
@@ -69,7 +69,8 @@ pub enum Shape {
 /// Where a ray meets a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
-    /// Distance in units of the ray's direction, in f64 so that near hits can be told apart; off by at most 2^-26 of itself.
+    /// Distance in units of the ray's direction, in f64 so that near hits can be told apart; off by at most 2^-26 of
+    /// itself.
     pub t: f64,
     /// The shape's own parameters at the hit.
     pub uv: Vec2,
@@ -181,8 +182,8 @@ impl Shape {
         self.intersect_all(ray).next()
     }
 
-    /// Every intersection with `tmin <= t <= tmax`, the nearest first; an even number over the whole line for closed shapes,
-    /// of which a line that touches crosses twice in one place.
+    /// Every intersection with `tmin <= t <= tmax`, the nearest first; an even number over the whole line for closed
+    /// shapes, of which a line that touches crosses twice in one place.
     pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
         let (tmin, tmax) = (ray.tmin, ray.tmax);
         let in_range = move |&t: &f64| {

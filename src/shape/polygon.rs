@@ -1,17 +1,17 @@
 //! A polygon with any number of corners, convex or not, also one that crosses itself.
 //!
-//! Looked at along the ray, the corners are points of a plane and the line is one point of it. A half-line from that point crosses
-//! the outline an odd number of times where the point is inside (Shimrat 1962, *Algorithm 112*; Haines 1994, *Point in
-//! polygon strategies*). Which edges it crosses is told by signs: on which side of the half-line's own line the corners
-//! are, where one on it counts as above, and for edges with an end on either side the sign of the volume d . (b x c), as for
-//! triangles. All signs are exact, so a ray through a corner is counted once, and a point on an edge or a corner is seen as
-//! such: it is inside. Two polygons that share an edge leave no gap.
+//! Looked at along the ray, the corners are points of a plane and the line is one point of it. A half-line from that
+//! point crosses the outline an odd number of times where the point is inside (Shimrat 1962, *Algorithm 112*; Haines
+//! 1994, *Point in polygon strategies*). Which edges it crosses is told by signs: on which side of the half-line's own
+//! line the corners are, where one on it counts as above, and for edges with an end on either side the sign of the
+//! volume d . (b x c), as for triangles. All signs are exact, so a ray through a corner is counted once, and a point on
+//! an edge or a corner is seen as such: it is inside. Two polygons that share an edge leave no gap.
 //!
-//! Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the polygon's is that
-//! of Newell's normal (Sutherland, Sproull, Schumacker 1974, *A characterization of ten hidden-surface algorithms*) through
-//! the mean of the corners, in f64, and corners may be off it by [`Polygon::FLATNESS`] of the polygon's size. Hits stay within
-//! the bounds of the corners.
-//! Triangulating, the simpler way, would choose among outlines that are not the polygon's where it is not flat.
+//! Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the
+//! polygon's is that of Newell's normal (Sutherland, Sproull, Schumacker 1974, *A characterization of ten
+//! hidden-surface algorithms*) through the mean of the corners, in f64, and corners may be off it by
+//! [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the corners. Triangulating, the simpler
+//! way, would choose among outlines that are not the polygon's where it is not flat.
 
 use super::flat::Flat;
 use super::line::{Interval, Line, NO_ROOTS, Roots};
@@ -87,8 +87,8 @@ impl Polygon {
         self.bounds
     }
 
-    /// The corners are rounded in their new place. Where that leaves no polygon (it is smaller than a step of f32 there), it
-    /// keeps the plane, and is not hit.
+    /// The corners are rounded in their new place. Where that leaves no polygon (it is smaller than a step of f32
+    /// there), it keeps the plane, and is not hit.
     pub(super) fn translated(&self, offset: DVec3) -> Self {
         let corners: Vec<Vec3> = self.corners.iter().map(|p| in_f32(p.as_dvec3() + offset)).collect();
         Self::new(corners.clone()).unwrap_or_else(|_| Self { corners, bounds: Aabb::EMPTY, ..self.clone() })
@@ -109,9 +109,10 @@ impl Polygon {
 
     /// The t within the bounds that is nearest to `t`.
     ///
-    /// Corners are off the plane by a trifle, so a ray that grazes it may pass inside the outline and meet the plane outside, even far
-    /// away. Bounds would not contain such a hit; not to count it would open a gap between polygons that share an edge. A line that passes
-    /// inside the outline meets the convex hull of the corners, so it does meet the bounds.
+    /// Corners are off the plane by a trifle, so a ray that grazes it may pass inside the outline and meet the plane
+    /// outside, even far away. Bounds would not contain such a hit; not to count it would open a gap between polygons
+    /// that share an edge. A line that passes inside the outline meets the convex hull of the corners, so it does meet
+    /// the bounds.
     fn within_bounds(&self, ray: &Ray, t: f64) -> f64 {
         let mut inside = Interval::ALL;
         for axis in (0..3).filter(|&axis| ray.direction[axis] != 0.0) {
@@ -157,7 +158,8 @@ impl Polygon {
         self.normal
     }
 
-    /// Coordinates in the plane, in units of length: from the first corner, along the first edge that has a length and across.
+    /// Coordinates in the plane, in units of length: from the first corner, along the first edge that has a length and
+    /// across.
     pub(super) fn uv(&self, at: DVec3) -> Vec2 {
         let first = self.corners[0].as_dvec3();
         let edge = self.corners.iter().map(|p| p.as_dvec3() - first).find(|edge| *edge != DVec3::ZERO);
@@ -167,7 +169,8 @@ impl Polygon {
     }
 }
 
-/// d . (e x v) for an axis e and v from the ray's origin to a corner: on which side of the plane of d and e the corner is.
+/// d . (e x v) for an axis e and v from the ray's origin to a corner: on which side of the plane of d and e the corner
+/// is.
 struct Side<'a> {
     line: &'a Line,
     axis: usize,

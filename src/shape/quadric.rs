@@ -1,15 +1,16 @@
 //! Where a line crosses a quadric: the roots of a t^2 + 2 b t + c.
 //!
-//! With q = -(b + sign(b) sqrt(b^2 - a c)) they are q / a and c / q: no sum cancels (Press, Teukolsky, Vetterling, Flannery
-//! 1992, *Numerical Recipes in C*, section 5.6). The discriminant is not taken from the difference b^2 - a c, which loses every
-//! digit of a small or far shape: each quadric gives it in a form that cancels at the silhouette only (for the sphere that of
-//! Haines, Günther, Akenine-Möller 2019, *Precision improvements for ray/sphere intersection*). And where f64's error bound
-//! leaves a doubt of its sign or of the digits of t, it is exact.
+//! With q = -(b + sign(b) sqrt(b^2 - a c)) they are q / a and c / q: no sum cancels (Press, Teukolsky, Vetterling,
+//! Flannery 1992, *Numerical Recipes in C*, section 5.6). The discriminant is not taken from the difference b^2 - a c,
+//! which loses every digit of a small or far shape: each quadric gives it in a form that cancels at the silhouette only
+//! (for the sphere that of Haines, Günther, Akenine-Möller 2019, *Precision improvements for ray/sphere intersection*).
+//! And where f64's error bound leaves a doubt of its sign or of the digits of t, it is exact.
 
 use super::line::{Interval, PRECISION};
 use crate::math::number::{Bounded, Formula};
 
-/// The coefficients, as a [`Formula`] of five values: a, b, c, e, s with b^2 - a c = s^2 e. The quadric is negative inside.
+/// The coefficients, as a [`Formula`] of five values: a, b, c, e, s with b^2 - a c = s^2 e. The quadric is negative
+/// inside.
 pub(super) trait Quadric: Formula<5> {
     /// What of the line is inside.
     #[inline]

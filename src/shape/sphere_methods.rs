@@ -1,7 +1,7 @@
 //! The textbooks' ways to meet a sphere, to compare and to learn from, in f32 as they are written.
 //!
-//! Only [`SphereMethod::Exact`] is what tracers use. The others fail where their numbers cancel: a small sphere far away, a huge
-//! one seen from near its surface, a ray that touches.
+//! Only [`SphereMethod::Exact`] is what tracers use. The others fail where their numbers cancel: a small sphere far
+//! away, a huge one seen from near its surface, a ray that touches.
 
 use super::sphere::Sphere;
 use crate::math::Vec3;
@@ -144,7 +144,7 @@ mod tests {
         for i in 1..100 {
             let ray = Ray::new(Vec3::new(0.3, 1.0 + i as f32 * 0.1, 0.0), Vec3::new(i as f32 * 0.013, -0.5, 0.2));
             // In f64, from the foot of the perpendicular: nothing cancels at this height.
-            let (d, f) = (ray.direction.as_dvec3(), (ray.origin - ground.centre).as_dvec3());
+            let (d, f) = (ray.direction.as_dvec3(), ray.origin.as_dvec3() - ground.centre.as_dvec3());
             let height = (f.length_squared() - 1e12) / (2e6 * f.length());
             for (worst, method) in worst.iter_mut().zip(SphereMethod::ALL) {
                 let t = method.roots(&ray, &ground).map_or(f64::INFINITY, |t| t[0]);

@@ -1,7 +1,7 @@
 //! The textbooks' ways to meet a triangle, to compare and to learn from, in f32 as they are written.
 //!
-//! Only [`TriangleMethod::Exact`] is what tracers use ([`triangle`](super::triangle)). The others decide for numbers that
-//! were rounded: most of them miss some rays at an edge that two triangles share, or hit both.
+//! Only [`TriangleMethod::Exact`] is what tracers use ([`triangle`](super::triangle)). The others decide for numbers
+//! that were rounded: most of them miss some rays at an edge that two triangles share, or hit both.
 
 use super::triangle::{self, TriangleHit};
 use crate::math::{Vec3, is_traceable};
@@ -10,7 +10,8 @@ use crate::ray::Ray;
 /// How a ray meets a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TriangleMethod {
-    /// The plane first; then whether the point is on the inner side of the three planes through the ray's origin and an edge.
+    /// The plane first; then whether the point is on the inner side of the three planes through the ray's origin and an
+    /// edge.
     SidePlanes,
     /// The plane first; then whether the point is on the same side of each edge as the third corner.
     SameSide,

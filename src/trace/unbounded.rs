@@ -1,9 +1,9 @@
 //! Shapes that no box contains: planes.
 //!
 //! They are kept in a list that is asked for every ray, beside the accelerator. A box of the largest coordinates, the
-//! simpler alternative, would make the pads of all boxes in its tree as large ([`bvh`](super::bvh) pads by the largest coordinate), so that
-//! a ray would meet every leaf; placed by a transform it would overflow. Bounds of scenes leave planes out, so that one plane
-//! does not move the centre or the camera.
+//! simpler alternative, would make the pads of all boxes in its tree as large ([`bvh`](super::bvh) pads by the largest
+//! coordinate), so that a ray would meet every leaf; placed by a transform it would overflow. Bounds of scenes leave
+//! planes out, so that one plane does not move the centre or the camera.
 
 use super::nearest::Nearest;
 use super::{Placement, Primitives, World};
