@@ -17,7 +17,7 @@
 //!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an edge,
 //!   |n| . |o'| and t |n| . |d'| in the numerator of t.
 //! - **Shapes** are intersected in f64, or exactly, by every engine; only the ray that they are given, which is f32, is
-//!   rounded (`rounding_shapes`).
+//!   rounded (`rounding/shapes.rs`).
 //!
 //! The counts are rounded up to [`Precision::operations`]. Measuring the error instead, by evaluating each engine's
 //! formula again, would need the engine's own formula, and Embree has one for each instruction set.
@@ -28,7 +28,6 @@ use super::oracle::{Body, Primitive, place};
 use crate::math::{Affine3, DMat3, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3, gamma, gamma64, is_traceable};
 use crate::ray::Ray;
 
-#[path = "rounding_shapes.rs"]
 mod shapes;
 
 /// What an engine computes in.
