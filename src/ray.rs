@@ -38,7 +38,10 @@ impl Ray {
 }
 
 /// Where a ray met the scene: ids and parameters, nothing else. `surface` computes the rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// Six words in the order of the fields, so that the hits of a packet can be written as vectors.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Hit {
     /// Distance in units of the ray's direction; finite.
     pub t: f32,

@@ -39,9 +39,16 @@ impl Sampler {
     }
 
     /// What the samples of a pixel have in common, computed once for all of them.
+    // Inlined, with `place`: a pattern that came back from a call would be copied by loads wider than the stores that made
+    // it, which wait for those.
+    #[inline]
     pub fn pattern(&self, x: u32, y: u32) -> Pattern {
-        let hash = if self.spp == 1 { [0; 4] } else { self.hash(x, y, 0, PATTERN) };
-        let [order, columns, rows, _] = hash;
+        if self.spp == 1 {
+            // Not hashed, nor divided: every pixel has the same.
+            let (order, columns, rows) = (Key::ONLY, Key::ONLY, Key::ONLY);
+            return Pattern { x, y, order, columns, rows };
+        }
+        let [order, columns, rows, _] = self.hash(x, y, 0, PATTERN);
         Pattern {
             x,
             y,
@@ -53,12 +60,14 @@ impl Sampler {
 
     /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples. The pixel's
     /// middle for a single sample.
+    #[inline]
     pub fn place(&self, pixel: &Pattern, sample: u32) -> DVec2 {
         let corner = DVec2::new(f64::from(pixel.x), f64::from(pixel.y));
         corner + self.within(pixel, sample)
     }
 
     /// The same within the unit square.
+    #[inline]
     fn within(&self, pixel: &Pattern, sample: u32) -> DVec2 {
         if self.spp == 1 {
             return DVec2::splat(0.5);
@@ -87,6 +96,9 @@ struct Key {
 }
 
 impl Key {
+    /// The permutation of one element.
+    const ONLY: Self = Self { bits: 0, turn: 0 };
+
     const fn new(bits: u32, length: u32) -> Self {
         Self { bits, turn: bits % length }
     }

@@ -14,6 +14,9 @@ use crate::trace::Tracer;
 use super::sampler::Pattern;
 use super::{Renderer, tiles::Tile};
 
+/// Camera rays that are made at a time: enough for vectors of any width, few enough for registers and a little stack.
+const LANES: usize = 16;
+
 /// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
 pub(super) struct Buffers {
@@ -74,10 +77,18 @@ impl Renderer<'_> {
     /// One sample of each pixel: its camera ray, and what that hits.
     fn camera_hits<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         let Buffers { patterns, rays, hits, .. } = buffers;
-        rays.clear();
-        rays.extend(patterns.iter().map(|pixel| self.pinhole.ray(self.sampler.place(pixel, sample))));
-        hits.clear();
-        hits.resize(rays.len(), None);
+        let place = |pixel: &Pattern| self.sampler.place(pixel, sample);
+        // Neither is cleared: every one of them is written.
+        rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
+        hits.resize(patterns.len(), None);
+        let (groups, rest) = patterns.as_chunks::<LANES>();
+        let (ray_groups, ray_rest) = rays.as_chunks_mut::<LANES>();
+        for (group, rays) in groups.iter().zip(ray_groups) {
+            *rays = self.pinhole.rays(&group.each_ref().map(place));
+        }
+        for (pixel, ray) in rest.iter().zip(ray_rest) {
+            *ray = self.pinhole.ray(place(pixel));
+        }
         tracer.closest_batch(rays, hits, self.settings.batch);
     }
 

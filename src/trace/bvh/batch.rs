@@ -1,5 +1,7 @@
 //! Many rays: in bundles where they are bundles, else one by one, made ready and computed several at a time.
 
+use std::cell::Cell;
+
 use super::flight::{self, Flight};
 use super::found::NONE;
 use super::level::Through;
@@ -13,11 +15,30 @@ use crate::ray::Ray;
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
 
+/// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some dozens of
+/// rays.
+struct Workspace {
+    stacks: Stacks,
+    flight: Flight,
+    tile: tile::Scratch,
+}
+
 /// One stack for the placements, one for what is below them.
-pub(super) struct Stacks {
-    pub upper: Stack,
-    pub level: Stack,
-    pub flight: Flight,
+struct Stacks {
+    upper: Stack,
+    level: Stack,
+}
+
+thread_local! {
+    /// Taken while a batch is traced: a batch within a batch gets one of its own.
+    static WORKSPACE: Cell<Option<Box<Workspace>>> = const { Cell::new(None) };
+}
+
+impl Workspace {
+    fn new() -> Box<Self> {
+        let stacks = Stacks { upper: Stack::new(), level: Stack::new() };
+        Box::new(Self { stacks, flight: Flight::new(), tile: tile::Scratch::new() })
+    }
 }
 
 impl Bvh {
@@ -27,22 +48,19 @@ impl Bvh {
     /// Unless there is one answer a ray.
     pub(super) fn run_batch<Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer], batch: Batch) {
         assert_eq!(rays.len(), answers.len(), "one answer a ray");
-        isa::dispatch(self.isa, BatchKernel::<Q> { bvh: self, rays, answers, batch });
+        let mut workspace = WORKSPACE.take().unwrap_or_else(Workspace::new);
+        isa::dispatch(self.isa, BatchKernel::<Q> { bvh: self, rays, answers, batch, workspace: &mut workspace });
+        WORKSPACE.set(Some(workspace));
     }
 
     /// Placed objects for one ray.
     #[inline(always)]
-    fn enter_placements<S: Simd, Q: Query>(
-        &self,
-        ray: &Ray,
-        upper: &mut Stack,
-        lower: &mut Stack,
-        nearest: &mut Nearest,
-    ) {
+    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
         if self.placements.is_empty() || Q::ANY && nearest.hit().is_some() {
             return;
         }
         let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
+        let Stacks { upper, level: lower } = stacks;
         walk::single::<S, Q>(
             upper,
             self.placements.tree(),
@@ -63,40 +81,42 @@ impl Bvh {
         );
     }
 
-    /// Many rays, in flight together; hits are computed several at a time.
+    /// Many rays among the triangles of the world, in flight together; hits are computed several at a time. Also tells t
+    /// in f64, for the last 64 of them: that of ray i in the place of `first` + i.
     #[inline(always)]
-    fn trace_rays<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
+    fn fly<S: Simd, Q: Query>(
+        &self,
+        flight: &mut Flight,
+        first: usize,
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+        t: &mut [f64; bundle::RAYS],
+    ) {
         let triangles = &self.fixed.triangles;
-        let is_all = self.has_only_triangles();
+        answers.fill(Q::MISS);
+        if triangles.tree().is_empty() {
+            return;
+        }
         // Rays, and the triangles that they hit for sure.
         let (mut pending, mut ids, mut count) = ([0; 4], [NONE; 4], 0);
-        answers.fill(Q::MISS);
-        let Stacks { flight, upper, level } = stacks;
         flight::trace::<S, Q>(
             flight,
             triangles,
             rays,
             #[inline(always)]
             |i, found| {
-                let is_noted = found.is_noted();
-                if is_noted && Q::ANY {
+                if found.is_noted() && Q::ANY {
                     answers[i] = Q::answer(Some(SOMETHING));
-                } else if is_noted && is_all {
+                } else if found.is_noted() {
                     (pending[count % 4], ids[count % 4]) = (i, found.noted);
                     count += 1;
                     if count == 4 {
                         count = 0;
-                        self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+                        self.compute_noted::<S, Q>(&pending, &ids, first, rays, answers, t);
                     }
-                } else if found.is_hit() || !is_all {
-                    let ray = &rays[i];
-                    let mut nearest = found.nearest(triangles, ray);
-                    if !(is_all || Q::ANY && nearest.hit().is_some()) {
-                        self.unbounded.offer(ray, &mut nearest);
-                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, level, &mut nearest);
-                        self.enter_placements::<S, Q>(ray, upper, level, &mut nearest);
-                    }
-                    answers[i] = Q::answer(nearest.hit());
+                } else if found.is_hit() {
+                    let nearest = found.nearest(triangles, &rays[i]);
+                    (answers[i], t[(first + i) % bundle::RAYS]) = (Q::answer(nearest.hit()), nearest.t());
                 }
             },
         );
@@ -105,7 +125,7 @@ impl Bvh {
             for i in count..4 {
                 (pending[i], ids[i]) = (pending[0], ids[0]);
             }
-            self.compute_noted::<S, Q>(&pending, &ids, rays, answers);
+            self.compute_noted::<S, Q>(&pending, &ids, first, rays, answers, t);
         }
     }
 
@@ -115,8 +135,10 @@ impl Bvh {
         &self,
         pending: &[usize; 4],
         ids: &[u32; 4],
+        first: usize,
         rays: &[Ray],
         answers: &mut [Q::Answer],
+        t: &mut [f64; bundle::RAYS],
     ) {
         let [a, b, c, d] = pending.map(|i| &rays[i]);
         let (oa, ob, oc, od) = (a.origin, b.origin, c.origin, d.origin);
@@ -131,9 +153,9 @@ impl Bvh {
             widen::<S>(&[da.y, db.y, dc.y, dd.y]),
             widen::<S>(&[da.z, db.z, dc.z, dd.z]),
         ];
-        let (_, hits) = self.fixed.triangles.hits::<S>(origin, direction, *ids);
-        for (i, hit) in pending.iter().zip(hits) {
-            answers[*i] = Q::answer(Some(hit));
+        let (exact, hits) = self.fixed.triangles.hits::<S>(origin, direction, *ids);
+        for ((&i, hit), exact) in pending.iter().zip(hits).zip(exact) {
+            (answers[i], t[(first + i) % bundle::RAYS]) = (Q::answer(Some(hit)), exact);
         }
     }
 
@@ -142,33 +164,53 @@ impl Bvh {
         self.fixed.shapes.tree().is_empty() && self.placements.is_empty() && self.unbounded.is_empty()
     }
 
-    /// Many rays in bundles of 64 where they are bundles, else ray by ray.
+    /// Many rays: in bundles of 64 where they are bundles, else in flight.
     #[inline(always)]
-    fn trace_bundles<S: Simd, Q: Query>(&self, stacks: &mut Stacks, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut scratch = tile::Scratch::new();
+    fn trace<S: Simd, Q: Query>(
+        &self,
+        workspace: &mut Workspace,
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+        coherent: bool,
+    ) {
+        let Workspace { stacks, flight, tile } = workspace;
         let triangles = &self.fixed.triangles;
         let is_all = self.has_only_triangles();
-        for (rays, answers) in rays.chunks(bundle::RAYS).zip(answers.chunks_mut(bundle::RAYS)) {
-            let is_empty = triangles.tree().is_empty();
-            let traced = if is_empty { 0 } else { tile::trace::<S, Q>(&mut scratch, triangles, rays, answers) };
-            if !is_all {
-                for (k, (ray, answer)) in rays.iter().zip(&mut *answers).enumerate() {
-                    let mut nearest = Nearest::new(ray);
-                    if traced >> k & 1 != 0 && Q::resume(&mut nearest, scratch.t[k], *answer) {
-                        self.unbounded.offer(ray, &mut nearest);
-                        self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
-                        self.enter_placements::<S, Q>(ray, &mut stacks.upper, &mut stacks.level, &mut nearest);
-                        *answer = Q::answer(nearest.hit());
-                    }
-                }
+        let in_bundles = coherent && !triangles.tree().is_empty();
+        let chunk = if in_bundles || !is_all { bundle::RAYS } else { rays.len().max(1) };
+        for (rays, answers) in rays.chunks(chunk).zip(answers.chunks_mut(chunk)) {
+            let traced = if in_bundles { tile::trace::<S, Q>(tile, triangles, rays, answers) } else { 0 };
+            // The others, in runs: all of them, where there are no bundles.
+            let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - rays.len()) } else { 1 };
+            while open != 0 {
+                let first = open.trailing_zeros() as usize;
+                let end = if in_bundles { first + (open >> first).trailing_ones() as usize } else { rays.len() };
+                let run = first..end;
+                self.fly::<S, Q>(flight, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
-            // The others, in runs.
-            let mut rest = !traced & u64::MAX >> (bundle::RAYS - rays.len());
-            while rest != 0 {
-                let first = rest.trailing_zeros() as usize;
-                let end = first + (rest >> first).trailing_ones() as usize;
-                self.trace_rays::<S, Q>(stacks, &rays[first..end], &mut answers[first..end]);
-                rest &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
+            if !is_all {
+                self.trace_others::<S, Q>(stacks, rays, answers, &tile.t);
+            }
+        }
+    }
+
+    /// What there is besides triangles of the world, for rays that have `answers`, with t in f64, among these.
+    #[inline(always)]
+    fn trace_others<S: Simd, Q: Query>(
+        &self,
+        stacks: &mut Stacks,
+        rays: &[Ray],
+        answers: &mut [Q::Answer],
+        t: &[f64; bundle::RAYS],
+    ) {
+        for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
+            let mut nearest = Nearest::new(ray);
+            if Q::resume(&mut nearest, t, *answer) {
+                self.unbounded.offer(ray, &mut nearest);
+                self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                *answer = Q::answer(nearest.hit());
             }
         }
     }
@@ -180,6 +222,7 @@ struct BatchKernel<'a, Q: Query> {
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     batch: Batch,
+    workspace: &'a mut Workspace,
 }
 
 impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
@@ -187,12 +230,7 @@ impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, rays, answers, batch } = self;
-        let mut stacks = Stacks { upper: Stack::new(), level: Stack::new(), flight: Flight::new() };
-        if batch.coherent {
-            bvh.trace_bundles::<S, Q>(&mut stacks, rays, answers);
-        } else {
-            bvh.trace_rays::<S, Q>(&mut stacks, rays, answers);
-        }
+        let Self { bvh, rays, answers, batch, workspace } = self;
+        bvh.trace::<S, Q>(workspace, rays, answers, batch.coherent);
     }
 }

@@ -20,7 +20,7 @@ use super::bundle::{Bundle, axes};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
 
-/// Numbers of four triangles; the sign is such that the bundle sees each from its front (slope > 0).
+/// Numbers of a block of triangles; the sign is such that the bundle sees each from its front (slope > 0).
 pub(super) struct Edges {
     /// On the bundle's axes, the third turned forward: the scalar product with (p, q, 1) is the edge function, and with
     /// the fourth, the triangle's own normal, the slope.

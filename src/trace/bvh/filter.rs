@@ -1,4 +1,4 @@
-//! One ray against a block of four triangles: rejected in f32 by the ray's own shear.
+//! One ray against a block of eight triangles: rejected in f32 by the ray's own shear.
 //!
 //! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
 //! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it

@@ -9,6 +9,8 @@
 //!
 //! Only when a hit shortens the ray is its stack gone through; so what is on it is always to be visited.
 
+use std::hint::select_unpredictable;
+
 use super::build::MAX_DEPTH;
 use super::found::Found;
 use super::leaves::{Blocks, Leaves};
@@ -21,7 +23,7 @@ use crate::math::Vec3;
 use crate::ray::Ray;
 
 /// Rays in flight.
-const RAYS: usize = 16;
+const RAYS: usize = 32;
 
 /// Places on a stack: every level of the tree leaves at most seven siblings waiting, and at the bottom is [`Child::NONE`].
 const STACK: usize = 256;
@@ -94,10 +96,10 @@ impl Traveller {
                 self.shorten();
             }
         }
-        match self.next.rest() {
-            Some(rest) => self.next = rest,
-            None => self.pop(),
-        }
+        // On to the next block, or to what is on the stack; without a branch.
+        let is_more = self.next.count() > 1;
+        self.len -= usize::from(!is_more);
+        self.next = select_unpredictable(is_more, self.next.rest(), self.stack[self.len % STACK]);
     }
 
     /// Goes on to the nearest; at last to [`Child::NONE`].
@@ -216,7 +218,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
 #[inline(always)]
 fn prefetch<S: Simd>(next: Child, nodes: &Tree, leaves: &(impl Blocks + ?Sized)) {
     let (node, block) = (S::address(nodes.nodes(), next.node()), leaves.address::<S>(next.first()));
-    S::prefetch(std::hint::select_unpredictable(next.is_leaf(), block, node));
+    S::prefetch(select_unpredictable(next.is_leaf(), block, node));
 }
 
 #[inline(always)]
@@ -229,33 +231,34 @@ fn run<S: Simd, Q: Query>(
 ) {
     let nodes = tree.tree();
     let mut waiting = Waiting::new(rays, nodes.reach());
-    // Those at nodes, and those at leaves.
-    let mut lists = [List::EMPTY; 2];
+    // Those at nodes, those at leaves, and those that have arrived.
+    let mut lists = [List::EMPTY; 3];
     for k in 0..RAYS {
         let Some(ray) = waiting.next::<S>() else { break };
         flight.at(k as u8).start(ray, &waiting);
         lists[0].push(k as u8);
     }
-    while lists[0].len + lists[1].len > 0 {
-        let mut next = [List::EMPTY; 2];
-        for k in lists[0].iter() {
+    while lists[0].len + lists[1].len + lists[2].len > 0 {
+        let [mut at_nodes, at_leaves, arrived] = std::mem::replace(&mut lists, [List::EMPTY; 3]);
+        for k in arrived.iter() {
+            let traveller = flight.at(k);
+            done(traveller.ray, &traveller.found);
+            if let Some(ray) = waiting.next::<S>() {
+                traveller.start(ray, &waiting);
+                at_nodes.push(k);
+            }
+        }
+        for k in at_nodes.iter() {
             let traveller = flight.at(k);
             traveller.enter::<S>(nodes.node(traveller.next));
             prefetch::<S>(traveller.next, nodes, leaves);
-            next[usize::from(traveller.next.is_leaf())].push(k);
+            lists[traveller.next.kind()].push(k);
         }
-        for k in lists[1].iter() {
+        for k in at_leaves.iter() {
             let traveller = flight.at(k);
-            if traveller.next == Child::NONE {
-                done(traveller.ray, &traveller.found);
-                let Some(ray) = waiting.next::<S>() else { continue };
-                traveller.start(ray, &waiting);
-            } else {
-                traveller.visit::<S, Q>(tree, leaves, rays);
-                prefetch::<S>(traveller.next, nodes, leaves);
-            }
-            next[usize::from(traveller.next.is_leaf())].push(k);
+            traveller.visit::<S, Q>(tree, leaves, rays);
+            prefetch::<S>(traveller.next, nodes, leaves);
+            lists[traveller.next.kind()].push(k);
         }
-        lists = next;
     }
 }

@@ -11,13 +11,14 @@
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `walk` | one ray, from the root to the leaves |
 //! | `batch`, `query` | many rays, as bundles or one by one; the two questions |
+//! | `flight` | single rays, several of them in turn |
 //! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
-//! | `block`, `filter`, `found` | four triangles together, what a single ray rejects of them, and what it keeps |
+//! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad` | t, u and v of four hits |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
 //!
@@ -92,7 +93,10 @@ struct PartId {
 }
 
 impl Bvh {
-    /// What a node counts in [`Bvh::sah_cost`], in tests of a block of four triangles.
+    /// Triangles that are tested together.
+    pub const BLOCK: usize = block::LANES;
+
+    /// What a node counts in [`Bvh::sah_cost`], in tests of a block.
     pub const NODE_COST: f64 = build::NODE_COST as f64;
 
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
@@ -133,8 +137,8 @@ impl Bvh {
     }
 
     /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
-    /// four triangles: the sum over nodes of twice their area, and over leaves of their area times the blocks (or shapes) in them,
-    /// divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
+    /// [`Bvh::BLOCK`] triangles: the sum over nodes of [`Bvh::NODE_COST`] times their area, and over leaves of their area times the
+    /// blocks (or shapes) in them, divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
     /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
     /// much as its own tree, by the area of its box in the world. 0 for an empty scene.
     pub fn sah_cost(&self) -> f64 {

@@ -66,12 +66,17 @@ impl Child {
         (self.0 >> Self::COUNT_SHIFT) % Self::MOST + 1
     }
 
-    /// What is left of a leaf without its first block.
+    /// What a leaf of several blocks is without its first.
     #[inline(always)]
-    pub fn rest(self) -> Option<Self> {
-        let is_more = (self.0 >> Self::COUNT_SHIFT) % Self::MOST != 0;
+    pub fn rest(self) -> Self {
         // One block fewer, from the next on.
-        is_more.then_some(Self(self.0.wrapping_sub((1 << Self::COUNT_SHIFT) - 1)))
+        Self(self.0.wrapping_sub((1 << Self::COUNT_SHIFT) - 1))
+    }
+
+    /// 0 for a node, 1 for a leaf, 2 for [`Self::NONE`]; without a branch, since nobody can predict it.
+    #[inline(always)]
+    pub fn kind(self) -> usize {
+        (self.0 >> 31) as usize + usize::from(self == Self::NONE)
     }
 
     /// A leaf's blocks.

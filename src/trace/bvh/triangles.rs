@@ -1,4 +1,4 @@
-//! Leaves of triangles: blocks of four, rejected together ([`Filter`], [`Edges`]), decided one by one.
+//! Leaves of triangles: blocks of eight, rejected together ([`Filter`], [`Edges`]), decided one by one.
 
 use std::sync::Arc;
 

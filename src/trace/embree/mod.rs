@@ -1,8 +1,8 @@
 //! Intel Embree (Wald, Woop, Benthin, Johnson, Ernst 2014, *Embree: a kernel framework for efficient CPU ray tracing*).
 //!
-//! [`Embree`] is the engine; below it, `device` owns what every scene shares, `scene` builds and commits, `packet`
-//! lays rays out as Embree wants them and `query` asks; `sah` measures the trees
-//! that Embree's `builder` makes. Versions 3.13 and 4 are served by one source: the bindings are
+//! [`Embree`] is the engine; below it, `device` owns what every scene shares, `scene` builds and commits, `single` and
+//! `packet` lay rays out as Embree wants them, `lanes` turns four about, and `query` asks; `sah` measures the trees that
+//! Embree's `builder` makes. Versions 3.13 and 4 are served by one source: the bindings are
 //! made from the header that is installed, and the two layouts of a hit are told apart by their size alone.
 //!
 //! A scene under construction and a committed one are different types, so that a query on an uncommitted scene, which
@@ -15,10 +15,12 @@
 
 mod builder;
 mod device;
+mod lanes;
 mod packet;
 mod query;
 mod sah;
 mod scene;
+mod single;
 mod sys;
 
 use std::slice;
@@ -31,9 +33,10 @@ use crate::trace::nearest::Nearest;
 use crate::trace::unbounded::Unbounded;
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
-use packet::{Active, Answer, Packet, RayHits, Rays, SingleRay, SingleRayHit};
+use packet::{Active, Packet, RayHits, Rays, Recent};
 use query::{Mode, PacketQuery, Packets};
 use scene::{Scene, SceneBuilder};
+use single::{SingleRay, SingleRayHit};
 
 pub use sah::sah_cost;
 pub use sys::VERSION;
@@ -167,13 +170,11 @@ impl Embree {
 
     /// Embree's ids turned into the scene's.
     #[inline(always)]
-    fn hit(&self, answer: Answer) -> Hit {
-        let Answer { t, u, v, primitive, geometry, instance } = answer;
-        let PartIds { geometry, instance } = match instance {
+    fn ids(&self, geometry: u32, instance: Option<u32>) -> PartIds {
+        match instance {
             None => self.parts[geometry as usize],
             Some(instance) => self.placed(geometry, instance),
-        };
-        Hit { t, u, v, primitive, geometry, instance }
+        }
     }
 
     /// The ids of a geometry in a placed object; a call, so that scenes without any keep their registers.
@@ -196,42 +197,32 @@ impl Embree {
 
     fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
         let mut query = SingleRayHit::new();
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = None;
-            if query.load(ray) {
-                query::intersect(&mut query, &self.scene, mode);
-                *hit = query.answer().map(|answer| self.hit(answer));
-            }
-        }
+        single::each(rays, hits, None, |ray| {
+            query.load(ray);
+            query::intersect(&mut query, &self.scene, mode);
+            query.hit(|geometry, instance| self.ids(geometry, instance))
+        });
     }
 
     fn occluded_singles(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode) {
         let mut query = SingleRay::new();
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = false;
-            if query.load(ray) {
-                query::occluded(&mut query, &self.scene, mode);
-                *occluded = query.tfar() < 0.0;
-            }
-        }
+        single::each(rays, occluded, false, |ray| {
+            query.load(ray);
+            query::occluded(&mut query, &self.scene, mode);
+            query.tfar() < 0.0
+        });
     }
 
     fn closest_packets<const G: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode)
     where
         Packets: PacketQuery<G>,
     {
-        let (mut packet, mut active) = (RayHits::new(), Active::new());
+        let (mut packet, mut active, mut recent) = (RayHits::new(), Active::new(), Recent::NONE);
         packet::each(rays, hits, |rays: &Packet<Ray, G>, hits: &mut Packet<Option<Hit>, G>| {
             packet.load(rays, &mut active);
             Packets::intersect(&mut packet, &active, &self.scene, mode);
             for (group, hits) in hits.iter_mut().enumerate() {
-                for (lane, hit) in hits.iter_mut().enumerate() {
-                    // Not `map`: a miss writes no more than that it is one.
-                    match packet.answer(group, lane) {
-                        Some(answer) => *hit = Some(self.hit(answer)),
-                        None => *hit = None,
-                    }
-                }
+                packet.hits(group, hits, &mut recent, |geometry, instance| self.ids(geometry, instance));
             }
         });
     }

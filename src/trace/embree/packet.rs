@@ -14,9 +14,11 @@
 
 use std::mem::offset_of;
 
-use super::sys;
+use super::lanes::{Lanes, NOWHERE};
+use super::single::{SingleRay, SingleRayHit};
+use super::{PartIds, sys};
 use crate::math::{BVec4A, Mat4, Vec4};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 
 /// Rows of a ray, or fields of a single one.
 pub(super) mod ray_row {
@@ -40,78 +42,6 @@ pub(super) mod hit_row {
     pub const COUNT: usize = size_of::<super::sys::RTCHit4>() / 16;
 }
 
-/// A hit with Embree's ids.
-#[derive(Clone, Copy)]
-pub(super) struct Answer {
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    pub primitive: u32,
-    pub geometry: u32,
-    pub instance: Option<u32>,
-}
-
-/// `RTCRay`.
-#[repr(C, align(16))]
-pub(super) struct SingleRay([Vec4; 3]);
-
-/// `RTCRayHit`.
-#[repr(C, align(16))]
-pub(super) struct SingleRayHit {
-    ray: SingleRay,
-    hit: [u32; size_of::<sys::RTCHit>() / 4],
-}
-
-impl SingleRay {
-    /// Room for a ray.
-    #[inline]
-    pub const fn new() -> Self {
-        // Time 0, every bit of the mask; id and flags 0.
-        Self([Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, ALL_BITS, 0.0, 0.0)])
-    }
-
-    /// Takes a ray; false, and nothing else, where it is not valid.
-    #[inline(always)]
-    pub fn load(&mut self, ray: &Ray) -> bool {
-        if !ray.is_valid() {
-            return false;
-        }
-        let time = 0.0;
-        self.0[0] = ray.origin.extend(ray.tmin);
-        self.0[1] = ray.direction.extend(time);
-        self.0[2] = Vec4::new(ray.tmax, ALL_BITS, 0.0, 0.0);
-        true
-    }
-
-    /// The end of the ray; negative infinity once it is occluded.
-    #[inline(always)]
-    pub fn tfar(&self) -> f32 {
-        self.0[2].x
-    }
-}
-
-impl SingleRayHit {
-    /// Room for a ray and its hit.
-    #[inline]
-    pub const fn new() -> Self {
-        Self { ray: SingleRay::new(), hit: [sys::INVALID_ID; _] }
-    }
-
-    /// Takes a ray, which has hit nothing yet; false, and nothing else, where it is not valid.
-    #[inline(always)]
-    pub fn load(&mut self, ray: &Ray) -> bool {
-        self.hit[hit_row::GEOMETRY] = sys::INVALID_ID;
-        self.hit[hit_row::INSTANCE] = sys::INVALID_ID;
-        self.ray.load(ray)
-    }
-
-    /// What the ray hit.
-    #[inline(always)]
-    pub fn answer(&self) -> Option<Answer> {
-        answer(self.ray.tfar(), |row| self.hit[row])
-    }
-}
-
 /// `RTCRay4` for G = 1, `RTCRay8` for 2, `RTCRay16` for 4.
 #[repr(C, align(64))]
 pub(super) struct Rays<const G: usize>([[Vec4; G]; ray_row::COUNT]);
@@ -128,10 +58,7 @@ pub(super) struct RayHits<const G: usize> {
 pub(super) struct Active<const G: usize>([Vec4; G]);
 
 /// The f32 of all bits set.
-const ALL_BITS: f32 = f32::from_bits(u32::MAX);
-
-/// Stands in for rays that are not traced: even if it were, it would hit nothing.
-const NOWHERE: Ray = Ray { tmin: f32::INFINITY, tmax: 0.0, ..Ray::new(crate::math::Vec3::ZERO, crate::math::Vec3::Z) };
+pub(super) const ALL_BITS: f32 = f32::from_bits(u32::MAX);
 
 /// One thing for each ray of a packet, in groups of four.
 pub(super) type Packet<T, const G: usize> = [[T; 4]; G];
@@ -188,19 +115,36 @@ impl<const G: usize> Rays<G> {
     /// Takes new rays; those that are not valid are inactive.
     #[inline(always)]
     pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+        let mut valid = BVec4A::splat(true);
         for (g, four) in rays.iter().enumerate() {
-            let mut lanes = Lanes::new(four);
-            let valid = lanes.valid();
-            if !valid.all() {
-                lanes = Lanes::without_invalid(four);
-            }
-            active.0[g] = Vec4::select(valid, Vec4::splat(ALL_BITS), Vec4::ZERO);
-            for axis in 0..3 {
-                self.0[ray_row::ORIGIN + axis][g] = lanes.origin[axis];
-                self.0[ray_row::DIRECTION + axis][g] = lanes.direction[axis];
-            }
-            self.0[ray_row::TNEAR][g] = lanes.tmin;
-            self.0[ray_row::TFAR][g] = lanes.tmax;
+            let lanes = Lanes::new(four);
+            valid &= lanes.surely_valid();
+            self.put(g, &lanes);
+            active.0[g] = Vec4::splat(ALL_BITS);
+        }
+        // One branch a packet.
+        if !valid.all() {
+            self.leave_out_invalid(rays, active);
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, group: usize, lanes: &Lanes) {
+        for axis in 0..3 {
+            self.0[ray_row::ORIGIN + axis][group] = lanes.origin[axis];
+            self.0[ray_row::DIRECTION + axis][group] = lanes.direction[axis];
+        }
+        self.0[ray_row::TNEAR][group] = lanes.tmin;
+        self.0[ray_row::TFAR][group] = lanes.tmax;
+    }
+
+    /// Judges each ray; in the place of those that are not valid stands one that hits nothing.
+    #[cold]
+    #[inline(never)]
+    fn leave_out_invalid(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+        for (g, four) in rays.iter().enumerate() {
+            active.0[g] = Vec4::from_array(four.map(|ray| if ray.is_valid() { ALL_BITS } else { 0.0 }));
+            self.put(g, &Lanes::new(&four.map(|ray| if ray.is_valid() { ray } else { NOWHERE })));
         }
     }
 
@@ -213,49 +157,6 @@ impl<const G: usize> Rays<G> {
     #[inline(always)]
     fn tfar(&self, group: usize) -> &[f32; 4] {
         self.0[ray_row::TFAR][group].as_ref()
-    }
-}
-
-/// Four rays, component by component.
-struct Lanes {
-    origin: [Vec4; 3],
-    direction: [Vec4; 3],
-    tmin: Vec4,
-    tmax: Vec4,
-}
-
-impl Lanes {
-    #[inline(always)]
-    fn new(rays: &[Ray; 4]) -> Self {
-        // In the order of memory, so that each column is one load.
-        let [a, b, c, d] = rays.each_ref().map(|r| Vec4::new(r.origin.x, r.origin.y, r.origin.z, r.direction.x));
-        let starts = Mat4::from_cols(a, b, c, d).transpose();
-        let [a, b, c, d] = rays.each_ref().map(|r| Vec4::new(r.direction.y, r.direction.z, r.tmin, r.tmax));
-        let ends = Mat4::from_cols(a, b, c, d).transpose();
-        Self {
-            origin: [starts.x_axis, starts.y_axis, starts.z_axis],
-            direction: [starts.w_axis, ends.x_axis, ends.y_axis],
-            tmin: ends.z_axis,
-            tmax: ends.w_axis,
-        }
-    }
-
-    #[cold]
-    fn without_invalid(rays: &[Ray; 4]) -> Self {
-        Self::new(&rays.map(|ray| if ray.is_valid() { ray } else { NOWHERE }))
-    }
-
-    /// [`Ray::is_valid`] of each.
-    #[inline(always)]
-    fn valid(&self) -> BVec4A {
-        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
-        // NaN for NaN and infinities, else a zero.
-        let nothing = (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0);
-        let largest = dx.abs().max(dy.abs()).max(dz.abs());
-        nothing.cmpeq(Vec4::ZERO)
-            & largest.cmpge(Vec4::splat(f32::MIN_POSITIVE))
-            & self.tmin.cmpge(Vec4::ZERO)
-            & self.tmin.cmple(self.tmax)
     }
 }
 
@@ -274,24 +175,62 @@ impl<const G: usize> RayHits<G> {
         self.hits[hit_row::INSTANCE] = [[sys::INVALID_ID; 4]; G];
     }
 
-    /// What ray `lane` of a group hit.
+    /// What the rays of a group hit. `ids` turns Embree's ids of a geometry and an instance into the scene's; `recent` is
+    /// kept from group to group.
+    ///
+    /// Neighbours mostly hit the same geometry or nothing, so four rays are one comparison each, and no branch depends
+    /// on a single ray unless they differ.
     #[inline(always)]
-    pub fn answer(&self, group: usize, lane: usize) -> Option<Answer> {
-        answer(self.rays.tfar(group)[lane], |row| self.hits[row][group][lane])
+    pub fn hits(
+        &self,
+        group: usize,
+        hits: &mut [Option<Hit>; 4],
+        recent: &mut Recent,
+        ids: impl Fn(u32, Option<u32>) -> PartIds,
+    ) {
+        let (geometry, instance) = (self.hits[hit_row::GEOMETRY][group], self.hits[hit_row::INSTANCE][group]);
+        if geometry == [sys::INVALID_ID; 4] {
+            *hits = [None; 4];
+            return;
+        }
+        let row = |row: usize| bytemuck::cast(self.hits[row][group]);
+        let (t, primitive) = (self.rays.0[ray_row::TFAR][group], row(hit_row::PRIMITIVE));
+        let columns = Mat4::from_cols(t, row(hit_row::U), row(hit_row::V), primitive).transpose();
+        let columns = [columns.x_axis, columns.y_axis, columns.z_axis, columns.w_axis];
+        // Written as a vector of t, u, v and primitive and a pair of ids.
+        let hit = |lane: usize, PartIds { geometry, instance }| {
+            let [[t, u], [v, primitive]]: [[u32; 2]; 2] = bytemuck::cast(columns[lane]);
+            Some(bytemuck::cast([[t, u], [v, primitive], [geometry, instance]]))
+        };
+        if geometry == [recent.geometry; 4] && instance == [sys::INVALID_ID; 4] {
+            for (lane, place) in hits.iter_mut().enumerate() {
+                *place = hit(lane, recent.ids);
+            }
+            return;
+        }
+        for (lane, place) in hits.iter_mut().enumerate() {
+            *place = None;
+            if geometry[lane] != sys::INVALID_ID {
+                let instance = Some(instance[lane]).filter(|&instance| instance != sys::INVALID_ID);
+                let ids = ids(geometry[lane], instance);
+                if instance.is_none() {
+                    *recent = Recent { geometry: geometry[lane], ids };
+                }
+                *place = hit(lane, ids);
+            }
+        }
     }
 }
 
-#[inline(always)]
-fn answer(t: f32, hit: impl Fn(usize) -> u32) -> Option<Answer> {
-    let geometry = hit(hit_row::GEOMETRY);
-    (geometry != sys::INVALID_ID).then(|| Answer {
-        t,
-        u: f32::from_bits(hit(hit_row::U)),
-        v: f32::from_bits(hit(hit_row::V)),
-        primitive: hit(hit_row::PRIMITIVE),
-        geometry,
-        instance: Some(hit(hit_row::INSTANCE)).filter(|&instance| instance != sys::INVALID_ID),
-    })
+/// The geometry hit most recently outside any instance, by Embree's id and the scene's.
+pub(super) struct Recent {
+    geometry: u32,
+    ids: PartIds,
+}
+
+impl Recent {
+    /// None yet.
+    pub const NONE: Self = Self { geometry: sys::INVALID_ID, ids: PartIds { geometry: 0, instance: 0 } };
 }
 
 /// Holds the layouts of one width to the header's. Ours may be longer by padding; Embree knows nothing of that.
@@ -323,7 +262,7 @@ assert_layout!(RayHits<1>, 4, RTCRay4, RTCHit4, RTCRayHit4);
 assert_layout!(RayHits<2>, 8, RTCRay8, RTCHit8, RTCRayHit8);
 assert_layout!(RayHits<4>, 16, RTCRay16, RTCHit16, RTCRayHit16);
 const _: () = {
-    assert!(offset_of!(SingleRayHit, hit) == size_of::<sys::RTCRay>());
+    assert!(size_of::<SingleRay>() == size_of::<sys::RTCRay>());
     assert!(offset_of!(RayHits<1>, hits) == size_of::<sys::RTCRay4>());
     assert!(offset_of!(RayHits<2>, hits) == size_of::<sys::RTCRay8>());
     assert!(offset_of!(RayHits<4>, hits) == size_of::<sys::RTCRay16>());
@@ -360,37 +299,5 @@ mod tests {
             assert_eq!((get(8), get(9).to_bits()), (ray.tmax, u32::MAX));
         }
         assert_eq!([packet.occluded(0), packet.occluded(1)], [[false; 4]; 2]);
-    }
-
-    #[test]
-    fn four_rays_are_valid_as_each_of_them_is() {
-        const ODD: [f32; 9] =
-            [0.0, -0.0, 1.0, f32::MAX, f32::MIN, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, f32::MIN_POSITIVE / 2.0];
-        let good = Ray { tmin: 0.5, ..Ray::new(Vec3::ONE, Vec3::Y) };
-        let mut rays = Vec::new();
-        for x in ODD {
-            for axis in 0..3 {
-                let mut ray = good;
-                ray.origin[axis] = x;
-                rays.push(ray);
-                let mut ray = good;
-                ray.direction[axis] = x;
-                rays.push(ray);
-                let mut ray = Ray { direction: Vec3::ZERO, ..good };
-                ray.direction[axis] = x;
-                rays.push(ray);
-            }
-            rays.extend([Ray { tmin: x, ..good }, Ray { tmax: x, ..good }]);
-        }
-        let good_ones = rays.iter().filter(|ray| ray.is_valid()).count();
-        assert!(good_ones > 30 && good_ones < rays.len() - 30, "{good_ones} of {}", rays.len());
-        for ray in rays {
-            for lane in 0..4 {
-                let mut four = [good; 4];
-                four[lane] = ray;
-                let expected = 0b1111 & !(u32::from(!ray.is_valid()) << lane);
-                assert_eq!(Lanes::new(&four).valid().bitmask(), expected, "{ray:?}");
-            }
-        }
     }
 }

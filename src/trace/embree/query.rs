@@ -4,8 +4,9 @@
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::packet::{Active, RayHits, Rays, SingleRay, SingleRayHit, hit_row, ray_row};
+use super::packet::{Active, RayHits, Rays, hit_row, ray_row};
 use super::scene::{Scene, ShapeList};
+use super::single::{SingleRay, SingleRayHit};
 use super::sys;
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;

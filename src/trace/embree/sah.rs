@@ -11,15 +11,16 @@ use super::device::Device;
 use super::{Options, Quality};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3, is_traceable};
+use crate::trace::bvh::Bvh;
 use crate::trace::{Part, Primitives, World};
 
-/// Triangles that are tested together, as in the native tree.
+/// Triangles in a block of Embree's.
 const BLOCK: u32 = 4;
 /// Most items in a leaf of a scene: seven blocks.
 const MOST_IN_LEAF: u32 = 7 * BLOCK;
 
-/// The surface area heuristic's cost of the trees that Embree's builder makes for `world`: in tests of a block of four
-/// triangles, of which a node costs `node_cost`. High quality splits triangles, except where scenes are robust or compact:
+/// The surface area heuristic's cost of the trees that Embree's builder makes for `world`: in tests of a block as
+/// the native tree has them ([`Bvh::BLOCK`](crate::trace::bvh::Bvh::BLOCK)), of which a node costs `node_cost`. High quality splits triangles, except where scenes are robust or compact:
 /// there it is medium, as in Embree. 0 for an empty world.
 ///
 /// # Errors
@@ -88,7 +89,7 @@ impl Level {
                 }
             }
         }
-        let blocks = |items: &[Item]| items.len().div_ceil(BLOCK as usize) as f64;
+        let blocks = |items: &[Item]| items.len().div_ceil(Bvh::BLOCK) as f64;
         let rule =
             Rule { quality, block: BLOCK, most: MOST_IN_LEAF, leaf: &blocks, node: node_cost, corners: &corners };
         let of_triangles = builder::cost(device, triangles, &rule)?;
@@ -114,7 +115,6 @@ mod tests {
     use super::*;
     use crate::scene::{Geometry, Material, Mesh, Scene, architecture, rocks, terrain};
     use crate::shape::{Shape, Sphere};
-    use crate::trace::bvh::Bvh;
 
     fn of_geometry(geometry: Geometry) -> World {
         World::new(&Scene::from_geometries(vec![geometry], vec![Material::default()])).unwrap()
@@ -135,8 +135,8 @@ mod tests {
         assert_eq!(cost(&triangle, Quality::Medium, 2.0), 3.0);
         assert_eq!(Bvh::build(&triangle).sah_cost(), Bvh::NODE_COST + 1.0);
         // Nothing divides what is in one place: two blocks of triangles, or a leaf of each under one node.
-        let five = of_mesh(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::ONE], vec![[0, 1, 2]; 5]));
-        assert_eq!(cost(&five, Quality::Medium, 2.0), 4.0);
+        let nine = of_mesh(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::ONE], vec![[0, 1, 2]; 9]));
+        assert_eq!(cost(&nine, Quality::Medium, 2.0), 4.0);
         let ball = |x| Shape::Sphere(Sphere { centre: Vec3::X * x, radius: 1.0 });
         let balls = of_geometry(Geometry::Shapes { shapes: vec![ball(0.0), ball(98.0)], material: 0 });
         // Boxes of 2 x 2 x 2 in one of 100 x 2 x 2: half areas of 12 and 404.

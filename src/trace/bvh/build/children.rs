@@ -5,7 +5,7 @@ use super::split::{Range, Rule, Split};
 use crate::trace::bvh::node::WIDTH;
 
 /// Cost of visiting a node, in tests of a block. Measured: from 1 to 4 rates hardly differ, bytes do.
-pub(in crate::trace::bvh) const NODE_COST: f32 = 2.0;
+pub(in crate::trace::bvh) const NODE_COST: f32 = 1.0;
 
 /// How ranges are divided: by one thread or by several.
 pub(super) trait Splitter {
