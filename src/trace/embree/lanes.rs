@@ -37,9 +37,9 @@ impl Lanes {
     pub fn surely_valid(&self) -> BVec4A {
         let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
         let length_squared = dx * dx + dy * dy + dz * dz;
-        // Finite only where every term is; then the difference is zero, else NaN.
+        // Finite only where every term is; then this adds zero, else NaN.
         let sum = ox + oy + oz;
-        let judged = length_squared + (sum - sum);
+        let judged = length_squared + sum * 0.0;
         judged.cmpge(Vec4::splat(f32::MIN_POSITIVE))
             & judged.cmple(Vec4::splat(f32::MAX))
             & self.tmin.cmpge(Vec4::ZERO)

@@ -24,8 +24,7 @@ impl Simd for Portable {
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
     ) {
-        let mut len = 0;
-        for slot in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0) {
+        for (len, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
             let key = near[slot].to_bits() & !7;
             let mut at = len;
             while at > 0 && sorted_near[at - 1] < key {
@@ -33,7 +32,6 @@ impl Simd for Portable {
                 at -= 1;
             }
             (sorted_near[at], sorted_child[at]) = (key, child[slot]);
-            len += 1;
         }
     }
 
