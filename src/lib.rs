@@ -48,7 +48,11 @@ pub use image::Image;
 pub use ray::{Hit, Ray};
 pub use render::{Renderer, Settings};
 pub use scene::Scene;
-pub use shape::{Shape, ShapeHit, Sphere};
+pub use shape::triangle::TriangleHit;
+pub use shape::{
+    Cone, Cuboid, Cylinder, Disk, Ellipsoid, InvalidShape, Plane, Polygon, Shape, ShapeHit, Sphere, SphereMethod,
+    TriangleMethod,
+};
 pub use trace::{Batch, Tracer, Width, World};
 
 /// The README's example runs as a test.

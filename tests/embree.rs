@@ -407,7 +407,8 @@ fn spheres_are_hit_where_the_closed_form_says() {
 #[test]
 fn shapes_and_triangles_hide_each_other() {
     let sphere = Shape::Sphere(Sphere { centre: Vec3::new(0.5, 0.0, 0.0), radius: 0.25 });
-    let world = world(vec![Geometry::Mesh(square()), Geometry::Shapes { shapes: vec![sphere, sphere], material: 0 }]);
+    let world =
+        world(vec![Geometry::Mesh(square()), Geometry::Shapes { shapes: vec![sphere.clone(), sphere], material: 0 }]);
     let tracer = build(&world);
     let up = Ray::new(Vec3::new(0.5, 0.0, -5.0), Vec3::Z);
     for (ray, geometry, t) in [(down(0.5, 0.0), 1, 4.75), (up, 1, 4.75), (down(-0.5, 0.1), 0, 5.0)] {

@@ -16,3 +16,4 @@ mod queries;
 mod references;
 mod render;
 mod scenes;
+mod shapes;

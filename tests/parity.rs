@@ -10,7 +10,7 @@ use crate::scenes::{self, Random};
 
 /// Closest hits by single rays and packets, with every preset and instruction set, and occlusion, against brute force.
 #[track_caller]
-fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
+pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
     let world = World::new(scene).expect("the scene is sound");
     assert_parity_of(&world, &Brute::new(&world), rays)
 }

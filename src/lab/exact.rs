@@ -156,6 +156,11 @@ impl Rational {
         }
     }
 
+    /// The sign of `constant + slope * self`.
+    pub fn sign_of(&self, constant: &Dyadic, slope: &Dyadic) -> i32 {
+        constant.mul(&self.denominator).add(&slope.mul(&self.numerator)).signum()
+    }
+
     /// The nearest f64; infinite where it is too large.
     pub fn to_f64(&self) -> f64 {
         let (n, d) = (&self.numerator, &self.denominator);

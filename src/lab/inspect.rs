@@ -5,6 +5,7 @@
 //! and then read in runs. Hash maps would do the same, with a random access for each of the three edges of a triangle;
 //! sorting runs on all cores and reads memory in order.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use rayon::prelude::*;
@@ -26,6 +27,8 @@ pub struct Inspection {
     pub vertices: u64,
     /// Shapes that are not meshes, as stored.
     pub shapes: u64,
+    /// How many of each kind.
+    pub shape_kinds: BTreeMap<&'static str, u64>,
     /// Meshes and lists of shapes.
     pub geometries: u64,
     /// Placements of groups of geometries.
@@ -111,10 +114,12 @@ impl Inspection {
             Geometry::Shapes { .. } => None,
         });
         let meshes: Vec<MeshInfo> = meshes.collect();
-        let shapes = scene.geometries.iter().map(|geometry| match geometry {
-            Geometry::Mesh(_) => 0,
-            Geometry::Shapes { shapes, .. } => shapes.len() as u64,
+        let shapes = scene.geometries.iter().flat_map(|geometry| match geometry {
+            Geometry::Mesh(_) => &[][..],
+            Geometry::Shapes { shapes, .. } => &shapes[..],
         });
+        let mut shape_kinds = BTreeMap::new();
+        shapes.for_each(|shape| *shape_kinds.entry(shape.name()).or_default() += 1);
         let bounds: DAabb = scene.bounds();
         let textures = scene.textures.iter();
         let textures = textures.map(|t| TextureInfo { name: t.name.clone(), width: t.width, height: t.height });
@@ -127,7 +132,8 @@ impl Inspection {
             triangles: meshes.iter().map(|m| m.triangles).sum(),
             placed_primitives: scene.primitive_count(),
             vertices: meshes.iter().map(|m| m.vertices).sum(),
-            shapes: shapes.sum(),
+            shapes: shape_kinds.values().sum(),
+            shape_kinds,
             geometries: scene.geometries.len() as u64,
             instances: scene.instances.len() as u64,
             bounds: (!bounds.is_empty()).then(|| [bounds.min.to_array(), bounds.max.to_array()]),
@@ -150,7 +156,7 @@ fn bytes(scene: &Scene) -> u64 {
                 + size_of_val(&mesh.uvs[..])
                 + size_of_val(&mesh.colors[..])
         }
-        Geometry::Shapes { shapes, .. } => size_of::<Shape>() * shapes.len(),
+        Geometry::Shapes { shapes, .. } => shapes.iter().map(Shape::bytes).sum(),
     });
     let textures = scene.textures.iter().map(|texture| size_of_val(&texture.pixels[..]));
     let instances = size_of_val(&scene.instances[..]);
@@ -247,7 +253,8 @@ impl fmt::Display for Inspection {
         row("triangles", &self.triangles)?;
         row("vertices", &self.vertices)?;
         if self.shapes > 0 {
-            row("shapes", &self.shapes)?;
+            let kinds: Vec<_> = self.shape_kinds.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
+            row("shapes", &format!("{} ({})", self.shapes, kinds.join(", ")))?;
         }
         row("geometries", &self.geometries)?;
         row("instances", &format!("{} ({} primitives as placed)", self.instances, self.placed_primitives))?;

@@ -10,6 +10,7 @@ pub mod bench;
 mod classify;
 pub mod compare;
 pub mod exact;
+pub(crate) mod exact_shapes;
 pub mod inspect;
 pub mod oracle;
 mod paired;

@@ -7,15 +7,16 @@
 //! zero among them is a ray through an edge or a corner, and a hit. Then t = det(a, b, c) / sum. The corners of an
 //! instanced triangle are `to_world` times its f32 positions, not rounded.
 //!
-//! **Shapes** are quadratics in t: the sign of the exact discriminant decides, and t is its root to 256 bits.
+//! **Shapes** are in `exact_shapes`.
 //!
 //! The determinants are formed from the corners and not from points along the ray, because o + d need not be an f64.
-//! Nothing here is tuned for speed but the f64 filter in front of the integers ([`Approx`]).
+//! Nothing here is tuned for speed but the f64 filter in front of the integers of triangles ([`Approx`]).
 
-use super::exact::{Approx, Dyadic, Rational, Ring, Vector, cross, det, dot, vector, zip};
+use super::exact::{Approx, Dyadic, Rational, Ring, Vector, det, vector, zip};
+use super::exact_shapes::crossings;
 use crate::math::{Affine3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
-use crate::shape::{Shape, Sphere};
+use crate::shape::Shape;
 use crate::trace::{Part, Primitives, World};
 
 /// The order of [`Hit::id`]: instance, geometry, primitive.
@@ -25,18 +26,18 @@ pub type Id = (u32, u32, u32);
 #[derive(Clone, Copy, Debug)]
 pub struct Primitive<'a> {
     /// What it is, in its own coordinates.
-    pub body: Body,
+    pub body: Body<'a>,
     /// From its own coordinates to the world's; None where they are the same.
     pub to_world: Option<&'a Affine3>,
 }
 
 /// What a primitive is.
 #[derive(Clone, Copy, Debug)]
-pub enum Body {
+pub enum Body<'a> {
     /// Three corners.
     Triangle([Vec3; 3]),
     /// Anything else.
-    Shape(Shape),
+    Shape(&'a Shape),
 }
 
 /// Where the line of a ray meets a primitive, in exact arithmetic.
@@ -82,7 +83,7 @@ pub fn meet(ray: &Ray, primitive: &Primitive) -> Option<Meeting> {
     }
     match primitive.body {
         Body::Triangle(corners) => meet_triangle(ray, corners, primitive.to_world),
-        Body::Shape(Shape::Sphere(sphere)) => meet_sphere(ray, &sphere, primitive.to_world),
+        Body::Shape(shape) => meet_shape(ray, shape, primitive.to_world),
     }
 }
 
@@ -102,12 +103,12 @@ pub fn closest(world: &World, ray: &Ray) -> Vec<(Id, Meeting)> {
     nearest
 }
 
-fn body(part: &Part, index: usize) -> Option<Body> {
+fn body(part: &Part, index: usize) -> Option<Body<'_>> {
     match &part.primitives {
         Primitives::Triangles { positions, triangles } => {
             triangles.get(index).map(|corners| Body::Triangle(corners.map(|i| positions[i as usize])))
         }
-        Primitives::Shapes(shapes) => shapes.get(index).map(|&shape| Body::Shape(shape)),
+        Primitives::Shapes(shapes) => shapes.get(index).map(Body::Shape),
     }
 }
 
@@ -173,62 +174,17 @@ fn meet_triangle(ray: &Ray, corners: [Vec3; 3], to_world: Option<&Affine3>) -> O
     Some(Meeting::new(ray, t, signs.contains(&0)))
 }
 
-/// The coefficients of a t^2 + 2 b t + c, which is 0 where the ray is on the sphere. In the sphere's own coordinates,
-/// times the square of the transform's determinant, so that no division is needed to get there.
-fn sphere_quadratic<R: Ring>(ray: &Ray, sphere: &Sphere, to_world: Option<&Affine3>) -> [R; 3] {
-    let (mut f, mut d) = (vector::<R>(ray.origin), vector::<R>(ray.direction));
-    let mut r = R::new(sphere.radius);
-    if let Some(m) = to_world {
-        let [x, y, z] = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(vector::<R>);
-        let determinant = det(&x, &y, &z);
-        // The rows of the adjugate: M^-1 times the determinant.
-        let rows = [cross(&y, &z), cross(&z, &x), cross(&x, &y)];
-        let adjugate = |v: &Vector<R>| rows.each_ref().map(|row| dot(row, v));
-        f = zip(&f, &place(sphere.centre, Some(m)), R::sub);
-        (f, d) = (adjugate(&f), adjugate(&d));
-        r = r.mul(&determinant);
-    } else {
-        f = zip(&f, &vector(sphere.centre), R::sub);
-    }
-    [dot(&d, &d), dot(&d, &f), dot(&f, &f).sub(&r.mul(&r))]
-}
-
-fn discriminant<R: Ring>([a, b, c]: &[R; 3]) -> R {
-    b.mul(b).sub(&a.mul(c))
-}
-
-fn meet_sphere(ray: &Ray, sphere: &Sphere, to_world: Option<&Affine3>) -> Option<Meeting> {
-    let size = Vec3::splat(sphere.radius);
-    if !(sphere.radius > 0.0 && is_traceable(sphere.centre) && is_traceable(size)) {
-        return None;
-    }
-    let filter = discriminant(&sphere_quadratic::<Approx>(ray, sphere, to_world));
-    // A value that overflowed says nothing.
-    if filter.value.is_finite() && filter.error.is_finite() && filter.signum() == Some(-1) {
-        return None;
-    }
-    let coefficients = sphere_quadratic::<Dyadic>(ray, sphere, to_world);
-    let discriminant = discriminant(&coefficients);
-    if discriminant.signum() < 0 {
-        return None;
-    }
-    let [a, b, c] = coefficients;
-    let root = discriminant.sqrt();
-    // The sum of two numbers of one sign, so that no digits cancel; the other root follows from their product c / a.
-    let q = if b.signum() > 0 { b.add(&root).neg() } else { root.sub(&b) };
-    let one = Rational::new(q.clone(), a)?;
-    // q is 0 only where both roots are.
-    let other = Rational::new(c, q).unwrap_or_else(|| one.clone());
-    let touches = discriminant.signum() == 0;
-    let (near, far) = if one <= other { (one, other) } else { (other, one) };
-    let [near, far] = [near, far].map(|t| Meeting::new(ray, t, touches));
-    Some(if !near.in_range && far.in_range { far } else { near })
+fn meet_shape(ray: &Ray, shape: &Shape, to_world: Option<&Affine3>) -> Option<Meeting> {
+    let meetings = crossings(ray, shape, to_world).into_iter().map(|(t, touches)| Meeting::new(ray, t, touches));
+    let meetings: Vec<Meeting> = meetings.collect();
+    meetings.iter().find(|meeting| meeting.in_range).or(meetings.first()).cloned()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::Mat3;
+    use crate::shape::Sphere;
 
     const UNIT: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
@@ -305,8 +261,8 @@ mod tests {
 
     #[test]
     fn spheres_in_closed_form() {
-        let ball =
-            Primitive { body: Body::Shape(Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 })), to_world: None };
+        let sphere = Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 });
+        let ball = Primitive { body: Body::Shape(&sphere), to_world: None };
         let at = |y: f32| Ray::new(Vec3::new(-3.0, y, 0.0), Vec3::X);
         assert_eq!(meet(&at(0.0), &ball).unwrap().t.to_f64(), 2.0);
         assert!(meet(&at(1.0), &ball).unwrap().touches);
@@ -325,8 +281,8 @@ mod tests {
 
     #[test]
     fn a_huge_sphere_keeps_every_digit_of_t() {
-        let ground = Sphere { centre: Vec3::new(0.0, -1e6, 0.0), radius: 1e6 };
-        let ball = Primitive { body: Body::Shape(Shape::Sphere(ground)), to_world: None };
+        let ground = Shape::Sphere(Sphere { centre: Vec3::new(0.0, -1e6, 0.0), radius: 1e6 });
+        let ball = Primitive { body: Body::Shape(&ground), to_world: None };
         let t = meet(&Ray::new(Vec3::Y, Vec3::NEG_Y), &ball).unwrap().t.to_f64();
         assert_eq!(t, 1.0);
         // Start exactly on it, look up along the outside: t = 0, or the far side is behind.

@@ -159,7 +159,7 @@ impl<'a> Aim<'a> {
             Primitives::Triangles { positions, triangles } => {
                 Body::Triangle(triangles[(index - first) as usize].map(|i| positions[i as usize]))
             }
-            Primitives::Shapes(shapes) => Body::Shape(shapes[(index - first) as usize]),
+            Primitives::Shapes(shapes) => Body::Shape(&shapes[(index - first) as usize]),
         };
         Primitive { body, to_world: placement.map(|i| &self.world.placements[i].to_world) }
     }

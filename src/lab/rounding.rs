@@ -16,7 +16,8 @@
 //! - **Instances**: engines move the ray, not the triangle. The inverse matrix is the adjugate over the determinant;
 //!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an edge,
 //!   |n| . |o'| and t |n| . |d'| in the numerator of t.
-//! - **Shapes** are intersected in f64 by every engine; only the ray that they are given, which is f32, is rounded.
+//! - **Shapes** are intersected in f64, or exactly, by every engine; only the ray that they are given, which is f32, is
+//!   rounded (`rounding/shapes.rs`).
 //!
 //! The counts are rounded up to [`Precision::operations`]. Measuring the error instead, by evaluating each engine's
 //! formula again, would need the engine's own formula, and Embree has one for each instruction set.
@@ -26,7 +27,8 @@ use super::exact::{Approx, Ring, cross, det, dot, vector, zip};
 use super::oracle::{Body, Primitive, place};
 use crate::math::{Affine3, DMat3, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3, gamma, gamma64, is_traceable};
 use crate::ray::Ray;
-use crate::shape::{Shape, Sphere};
+
+mod shapes;
 
 /// What an engine computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,7 +116,7 @@ pub fn outcome(ray: &Ray, primitive: &Primitive, precision: Precision) -> Outcom
     match primitive.body {
         Body::Triangle(corners) if !corners.into_iter().all(is_traceable) => Outcome::MISS,
         Body::Triangle(corners) => triangle(ray, corners, primitive.to_world, &local, precision),
-        Body::Shape(Shape::Sphere(sphere)) => quadric(&sphere, &local.rounded(primitive.to_world.is_some())),
+        Body::Shape(shape) => shapes::outcome(shape, &local.rounded(primitive.to_world.is_some())),
     }
 }
 
@@ -271,35 +273,6 @@ impl WorldValues {
     }
 }
 
-fn quadric(sphere: &Sphere, ray: &LocalRay) -> Outcome {
-    let Sphere { centre, radius } = *sphere;
-    if !(radius > 0.0 && is_traceable(centre) && is_traceable(Vec3::splat(radius))) {
-        return Outcome::MISS;
-    }
-    let (g, r) = (Precision::Double.gamma(), f64::from(radius));
-    let (f, d) = (ray.origin - centre.as_dvec3(), ray.direction);
-    let (a, b, c) = (d.dot(d), d.dot(f), f.dot(f) - r * r);
-    let sums = |f: DVec3, d: DVec3| (d.dot(d), d.dot(f), f.dot(f) + r * r);
-    let still = sums(f.abs(), d.abs());
-    let with = sums(f.abs() + ray.origin_error, d.abs() + ray.direction_error);
-    let error = |still: f64, with: f64| g * with + (with - still).max(0.0);
-    let (discriminant, bound) =
-        (b * b - a * c, error(still.1 * still.1 + still.0 * still.2, with.1 * with.1 + with.0 * with.2));
-    if discriminant < -bound {
-        return Outcome::MISS;
-    }
-    let (a_error, b_error) = (error(still.0, with.0), error(still.1, with.1));
-    if !(a > a_error && discriminant.is_finite() && bound.is_finite()) {
-        return Outcome::ANYTHING;
-    }
-    let [low, middle, high] = [discriminant - bound, discriminant, discriminant + bound].map(|x| x.max(0.0).sqrt());
-    let root = |sign: f64| {
-        let t = (-b + sign * middle) / a;
-        around(t, (b_error + (high - low) + t.abs() * a_error) / (a - a_error))
-    };
-    Outcome { may_meet: true, may_pass: !(discriminant > bound), roots: [root(-1.0), root(1.0)] }
-}
-
 /// The interval around t, widened by the rounding to f32.
 fn around(t: f64, error: f64) -> (f64, f64) {
     let error = error + t.abs() * f64::from(UNIT_ROUNDOFF) + f64::from(f32::from_bits(1));
@@ -322,6 +295,7 @@ mod tests {
     use crate::lab::oracle::meet;
     use crate::lab::rays::Random;
     use crate::math::Mat3;
+    use crate::shape::{Shape, Sphere};
 
     /// Embree's robust test, in f32.
     fn pluecker(ray: &Ray, corners: [Vec3; 3]) -> Option<f32> {
@@ -426,7 +400,7 @@ mod tests {
         for _ in 0..20_000 {
             let origin = random.vector() * 4.0;
             let ray = Ray::new(origin, random.vector());
-            let primitive = Primitive { body: Body::Shape(ball), to_world: None };
+            let primitive = Primitive { body: Body::Shape(&ball), to_world: None };
             let allowed = outcome(&ray, &primitive, Precision::Double);
             match ball.intersect(&ray) {
                 Some(hit) => {
@@ -438,7 +412,7 @@ mod tests {
             assert!(!(allowed.may_meet && allowed.may_pass), "{ray:?}");
         }
         let touching = Ray::new(Vec3::new(-3.0, 1.0, 0.0), Vec3::X);
-        let allowed = outcome(&touching, &Primitive { body: Body::Shape(ball), to_world: None }, Precision::Double);
+        let allowed = outcome(&touching, &Primitive { body: Body::Shape(&ball), to_world: None }, Precision::Double);
         assert!(allowed.may_hit(&touching) && allowed.may_miss(&touching));
     }
 }

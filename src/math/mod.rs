@@ -5,6 +5,7 @@
 //! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
 
 pub mod expansion;
+pub mod number;
 
 pub use glam::{Affine3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
 

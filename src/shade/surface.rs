@@ -210,7 +210,8 @@ fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> 
     let position = to_world.transform_point3(on_shape);
     let normal = cofactor(&to_world.matrix3) * shape.normal(on_shape);
     let outwards = normal.try_normalize().unwrap_or_else(|| -direction.normalize());
-    let extent = to_world.matrix3 * shape.bounds().size().as_dvec3();
+    // None of a plane: the rounding of a point on it is that of its coordinates.
+    let extent = to_world.matrix3 * shape.bounds().size().max(Vec3::ZERO).as_dvec3();
     let error = f64::from(gamma(TEST_ROUNDINGS)) * extent.length() + rounding_error(position, outwards, placement);
     SurfacePoint {
         parameters: [f64::from(root.uv.x), f64::from(root.uv.y)],

@@ -1,7 +1,11 @@
 //! A sphere.
 
-use super::ShapeHit;
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use super::line::{Line, NO_ROOTS, Roots};
+use super::quadric::{Inside, Quadric};
+use super::round::{outwards, spherical};
+use super::{InvalidShape, in_f32};
+use crate::math::number::{Bounded, Formula, Number, cross, dot, exactly, minus, vector};
+use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF_64, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A sphere.
@@ -14,64 +18,116 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// The box around it, rounded outwards.
-    pub fn bounds(&self) -> Aabb {
-        let traceable = is_traceable(self.centre) && self.radius > 0.0 && is_traceable(Vec3::splat(self.radius));
-        if !traceable {
-            return Aabb::EMPTY;
+    pub(super) fn check(&self) -> Result<(), InvalidShape> {
+        InvalidShape::unless(is_traceable(self.centre), || format!("the centre {} is not finite", self.centre))?;
+        InvalidShape::unless_radius(self.radius)
+    }
+
+    pub(super) fn bounds(&self) -> Aabb {
+        outwards(self.centre.as_dvec3(), DVec3::splat(self.radius.into()))
+    }
+
+    pub(super) fn translated(&self, offset: DVec3) -> Self {
+        Self { centre: in_f32(self.centre.as_dvec3() + offset), ..*self }
+    }
+
+    #[inline]
+    pub(super) fn roots(&self, ray: &Ray) -> Roots {
+        let line = Line::new(ray, self.centre.abs().max_element().max(self.radius));
+        let seen = Seen { line, centre: line.place(self.centre), radius: line.length(self.radius) };
+        match seen.solve() {
+            Inside::Between(roots) => roots.ends().map(|t| t.map(|t| line.t(t))),
+            Inside::Nothing | Inside::All | Inside::Beyond(_) => NO_ROOTS,
         }
-        let round = |x: f32, out: fn(f32) -> f32| out(x);
-        let (low, high) = (self.centre - self.radius, self.centre + self.radius);
-        Aabb {
-            min: Vec3::from_array(low.to_array().map(|x| round(x, f32::next_down))),
-            max: Vec3::from_array(high.to_array().map(|x| round(x, f32::next_up))),
-        }
     }
 
-    /// The nearest intersection with `tmin <= t <= tmax`, in f64.
-    pub fn intersect(&self, ray: &Ray) -> Option<ShapeHit> {
-        self.intersect_all(ray).next()
-    }
-
-    /// Both intersections, the nearer first, where `tmin <= t <= tmax`; a tangent has the same one twice.
-    pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
-        let valid = |t: &f64| (ray.tmin..=ray.tmax).contains(&(*t as f32)) && (*t as f32).is_finite();
-        let hit = |t: f64| ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) };
-        self.roots(ray).into_iter().flatten().filter(valid).map(hit)
-    }
-
-    /// Where the ray's line enters and leaves, in f64.
-    ///
-    /// The discriminant is taken from the distance between the centre and the ray's line, not from the difference of
-    /// two large squares, and the roots without cancellation (Haines, Günther, Akenine-Möller 2019, *Precision
-    /// improvements for ray/sphere intersection*, Ray Tracing Gems ch. 7).
-    fn roots(&self, ray: &Ray) -> Option<[f64; 2]> {
-        let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let f = origin - self.centre.as_dvec3();
-        let r = f64::from(self.radius);
-        let a = d.length_squared();
-        let b = -f.dot(d);
-        let discriminant = r * r - (f + d * (b / a)).length_squared();
-        if !(discriminant >= 0.0 && r > 0.0) {
-            return None;
-        }
-        let c = f.length_squared() - r * r;
-        let q = b + (a * discriminant).sqrt().copysign(b);
-        // q is 0 only for a ray that starts on the sphere and touches it.
-        let (t0, t1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
-        Some(if t0 <= t1 { [t0, t1] } else { [t1, t0] })
-    }
-
-    /// The unit normal, outwards, at `point` on the surface.
-    pub fn normal(&self, point: DVec3) -> DVec3 {
+    pub(super) fn normal(&self, point: DVec3) -> DVec3 {
         (point - self.centre.as_dvec3()).normalize_or(DVec3::Y)
     }
 
-    /// Longitude from -z about +y, and latitude from the south pole, both over [0, 1].
-    fn uv(&self, point: DVec3) -> Vec2 {
-        let n = self.normal(point);
-        let turn = libm::atan2(n.x, -n.z) / std::f64::consts::TAU;
-        let latitude = libm::asin(n.y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
-        Vec2::new((turn + if turn < 0.0 { 1.0 } else { 0.0 }) as f32, (latitude + 0.5) as f32)
+    pub(super) fn uv(&self, point: DVec3) -> Vec2 {
+        spherical(self.normal(point))
+    }
+}
+
+/// From the ray's line. The short discriminant is r^2 d^2 - |f x d|^2, with f from the centre to the ray's origin.
+struct Seen {
+    line: Line,
+    centre: DVec3,
+    radius: f64,
+}
+
+impl Formula<5> for Seen {
+    #[inline(always)]
+    fn evaluate<N: Number>(&self) -> [N; 5] {
+        let d = vector::<N>(self.line.direction);
+        let f = minus(&vector::<N>(self.line.origin), &vector(self.centre));
+        let r = N::new(self.radius);
+        let (a, rr, m) = (dot(&d, &d), r.mul(&r), cross(&f, &d));
+        let (b, c, e) = (dot(&f, &d), dot(&f, &f).sub(&rr), rr.mul(&a).sub(&dot(&m, &m)));
+        [a, b, c, e, N::new(1.0)]
+    }
+
+    /// The bounds by hand, for spheres are many: with u the roundoff, f is off by u |f|, so a product of k factors of
+    /// it that are summed up by at most (2 k + 4) u of the sum of magnitudes. All are rounded up to 8 u.
+    #[inline]
+    fn values(&self, good: impl Fn(&[Bounded; 5]) -> bool) -> [f64; 5] {
+        const U: f64 = 8.0 * UNIT_ROUNDOFF_64;
+        let (d, f) = (self.line.direction, self.line.origin - self.centre);
+        let (a, rr, ff, m) = (d.length_squared(), self.radius * self.radius, f.length_squared(), f.cross(d));
+        let (x, y) = (d.abs(), f.abs());
+        // The vector product with every sign a plus.
+        let p = DVec3::new(y.y * x.z + y.z * x.y, y.z * x.x + y.x * x.z, y.x * x.y + y.y * x.x);
+        let (mm, ra) = (m.length_squared(), rr * a);
+        // The square of m + U p.
+        let mm_error = U * (mm + 2.0 * m.abs().dot(p) + U * p.length_squared());
+        let bounded = |value: f64, error: f64| Bounded { value, error };
+        let values = [
+            bounded(a, U * a),
+            bounded(f.dot(d), U * y.dot(x)),
+            bounded(ff - rr, U * (ff + rr)),
+            bounded(ra - mm, mm_error + U * ra),
+            Bounded::new(1.0),
+        ];
+        if good(&values) { values.map(|x| x.value) } else { exactly(self) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::quadric::tests::assert_discriminant;
+    use super::*;
+
+    #[test]
+    fn the_short_discriminant_is_the_discriminant() {
+        let sphere = Sphere { centre: Vec3::new(1.3, -7.1, 0.2), radius: 0.7 };
+        for i in 0..50 {
+            let x = i as f32;
+            let ray = Ray::new(Vec3::new(x.sin(), x, 3.0), Vec3::new(0.1, x.cos(), 1.7));
+            let line = Line::new(&ray, 8.0);
+            assert_discriminant(&Seen { line, centre: line.place(sphere.centre), radius: line.length(0.7) });
+        }
+    }
+
+    #[test]
+    fn the_bounds_by_hand_cover_the_errors() {
+        use crate::lab::rays::Random;
+        use crate::math::expansion::Expansion;
+        for case in 0..5000 {
+            let mut random = Random::new(1, case);
+            let sphere = Sphere { centre: random.vector() * 9.0, radius: random.unit() };
+            let origin = random.vector() * 10f32.powi(random.below(6) as i32);
+            let ray = Ray::new(origin, sphere.centre + random.direction() * sphere.radius - origin);
+            let line = Line::new(&ray, 9.0);
+            let seen = Seen { line, centre: line.place(sphere.centre), radius: line.length(sphere.radius) };
+            let exact = seen.evaluate::<Expansion>();
+            seen.values(|values| {
+                for (value, exact) in values.iter().zip(&exact) {
+                    let error = exact.sub(&Expansion::new(value.value)).estimate().abs();
+                    assert!(error <= value.error, "{value:?} {error} {ray:?}");
+                }
+                true
+            });
+        }
     }
 }

@@ -9,6 +9,7 @@ pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
 mod nearest;
+mod unbounded;
 mod world;
 
 pub use world::{Part, Placement, Primitives, World};

@@ -192,7 +192,7 @@ fn placed_objects_and_spheres() {
     for placement in &world.placements {
         for part in &world.parts[world.objects[placement.object as usize].clone()] {
             let Primitives::Shapes(shapes) = &part.primitives else { continue };
-            targets.extend(shapes.iter().map(|Shape::Sphere(s)| placement.to_world.transform_point3(s.centre)));
+            targets.extend(shapes.iter().map(|shape| placement.to_world.transform_point3(shape.bounds().centre())));
         }
     }
     assert!(targets.len() > corners, "there are spheres");

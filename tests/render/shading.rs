@@ -122,7 +122,7 @@ fn textures_lie_the_right_way_up() {
 #[test]
 fn a_ball_casts_a_round_shadow() {
     let ball = Shape::Sphere(Sphere { centre: Vec3::new(0.0, 3.0, 0.0), radius: 1.0 });
-    let shapes = Geometry::Shapes { shapes: vec![ball], material: 0 };
+    let shapes = Geometry::Shapes { shapes: vec![ball.clone()], material: 0 };
     let sun = Light::Directional { direction: DVec3::NEG_Y, color: Vec3::ONE };
     let scene = Scene { lights: vec![sun], ..Scene::from_geometries(vec![floor(5.0, 0), shapes], vec![matte(0.5)]) };
     let camera = twincast::scene::Camera::look_at(DVec3::new(0.0, 2.0, 9.0), DVec3::ZERO, DVec3::Y, 0.5).unwrap();
@@ -155,7 +155,7 @@ fn surfaces_do_not_shadow_themselves() {
     for (size, place) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 3000.0)] {
         let ball = Shape::Sphere(Sphere { centre: Vec3::new(place, 0.0, 0.0), radius: size });
         let light = Light::Directional { direction: DVec3::new(-1.0, -1.0, -1.0).normalize(), color: Vec3::ONE };
-        let geometries = vec![Geometry::Shapes { shapes: vec![ball], material: 0 }];
+        let geometries = vec![Geometry::Shapes { shapes: vec![ball.clone()], material: 0 }];
         let scene = Scene { lights: vec![light], ..Scene::from_geometries(geometries, vec![matte(1.0)]) };
         let (s, centre) = (f64::from(size), DVec3::X * f64::from(place));
         let camera =

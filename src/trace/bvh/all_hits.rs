@@ -31,8 +31,8 @@ impl Bvh {
     /// also by a ray through its edges and corners. There the lowest id among the triangles that touch stands for
     /// each crossing, of those that are crossed in the same sense (inwards, or outwards). A ray that only touches an edge or
     /// a corner counts as two crossings, in and out, or as none: as if it were moved aside by next to nothing in x, and if
-    /// that leaves it there in y, then z. So a ray may have a closest hit and no crossing. Spheres are crossed twice, also
-    /// where the ray is a tangent.
+    /// that leaves it there in y, then z. So a ray may have a closest hit and no crossing. Closed shapes are crossed twice,
+    /// also where the ray is a tangent.
     ///
     /// Triangles that coincide count each. The ends of the range are held against every triangle's own t, rounded to
     /// f32: parity is that of the range where no edge lies within that rounding of its ends.
@@ -133,6 +133,7 @@ impl Kernel for Gather<'_> {
         let Self { bvh, ray, gathered } = self;
         let (mut upper, mut level) = (Stack::new(), Stack::new());
         bvh.fixed.gather::<S>(ray, ray, None, &mut level, gathered);
+        bvh.unbounded.gather(ray, &mut gathered.shapes);
         if bvh.placements.is_empty() {
             return;
         }

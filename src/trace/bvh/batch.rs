@@ -161,7 +161,7 @@ impl Bvh {
 
     /// Whether there are neither shapes nor placed objects.
     fn has_only_triangles(&self) -> bool {
-        self.fixed.shapes.tree().is_empty() && self.placements.is_empty()
+        self.fixed.shapes.tree().is_empty() && self.placements.is_empty() && self.unbounded.is_empty()
     }
 
     /// Many rays: in bundles of 64 where they are bundles, else in flight.
@@ -207,6 +207,7 @@ impl Bvh {
         for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
             let mut nearest = Nearest::new(ray);
             if Q::resume(&mut nearest, t, *answer) {
+                self.unbounded.offer(ray, &mut nearest);
                 self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
                 self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
                 *answer = Q::answer(nearest.hit());

@@ -66,6 +66,7 @@ pub use preset::{Options, Preset};
 
 use std::ops::Range;
 
+use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
@@ -79,6 +80,7 @@ pub struct Bvh {
     fixed: Level,
     objects: Vec<Level>,
     placements: PlacementTree,
+    unbounded: Unbounded,
     preset: Preset,
     isa: Isa,
 }
@@ -125,7 +127,7 @@ impl Bvh {
         let objects: Vec<Level> = levels.collect();
         let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
         let placements = PlacementTree::build(&world.placements, &bounds, options);
-        Self { fixed, objects, placements, preset, isa }
+        Self { fixed, objects, placements, unbounded: Unbounded::new(world), preset, isa }
     }
 
     /// Memory the trees hold, in bytes.

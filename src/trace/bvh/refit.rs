@@ -12,6 +12,7 @@ use super::preset::Options;
 use super::shapes::ShapeTree;
 use crate::error::{Error, Result};
 use crate::math::Aabb;
+use crate::trace::unbounded::Unbounded;
 use crate::trace::{Part, World};
 
 impl Bvh {
@@ -32,6 +33,7 @@ impl Bvh {
         }
         let bounds: Vec<Aabb> = self.objects.iter().map(Level::bounds).collect();
         self.placements = PlacementTree::build(&world.placements, &bounds, &options);
+        self.unbounded = Unbounded::new(world);
         Ok(())
     }
 }

@@ -41,7 +41,7 @@ impl ShapeTree {
             let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };
             let ids = PartId { geometry: part.geometry, instance: part.instance };
-            Entry { shape: list[item.primitive() as usize], primitive: item.primitive(), part: ids }
+            Entry { shape: list[item.primitive() as usize].clone(), primitive: item.primitive(), part: ids }
         };
         Self { tree, entries: items.iter().map(entry).collect() }
     }

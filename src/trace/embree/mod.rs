@@ -29,6 +29,8 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
+use crate::trace::nearest::Nearest;
+use crate::trace::unbounded::Unbounded;
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
 use packet::{Active, Packet, RayHits, Rays, Recent};
@@ -80,6 +82,7 @@ pub struct Embree {
     parts: Vec<PartIds>,
     fixed: usize,
     placements: Vec<PlacementIds>,
+    unbounded: Unbounded,
     commit_time: Duration,
     mesh_bytes: usize,
     device: Arc<Device>,
@@ -138,6 +141,7 @@ impl Embree {
             parts: world.parts.iter().map(part_ids).collect(),
             fixed: fixed.len(),
             placements: placements.collect(),
+            unbounded: Unbounded::new(world),
             commit_time,
             mesh_bytes: world.parts.iter().map(|part| mesh_bytes(&part.primitives)).sum(),
             device,
@@ -178,6 +182,17 @@ impl Embree {
     fn placed(&self, geometry: u32, instance: u32) -> PartIds {
         let placement = self.placements[instance as usize - self.fixed];
         PartIds { instance: placement.instance, ..self.parts[placement.first_part + geometry as usize] }
+    }
+
+    /// The nearest of `hit` and of what the ray hits that has no bounds, which Embree cannot hold.
+    #[inline(never)]
+    fn beyond_bounds(&self, ray: &Ray, hit: Option<Hit>) -> Option<Hit> {
+        let mut nearest = Nearest::new(ray);
+        if let Some(hit) = hit {
+            nearest.offer(hit.t.into(), hit);
+        }
+        self.unbounded.offer(ray, &mut nearest);
+        nearest.hit()
     }
 
     fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
@@ -249,6 +264,11 @@ impl Tracer for Embree {
             Width::Eight => self.closest_packets::<2>(rays, hits, mode),
             Width::Sixteen => self.closest_packets::<4>(rays, hits, mode),
         }
+        if !self.unbounded.is_empty() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.beyond_bounds(ray, *hit);
+            }
+        }
         self.scene.check_panic();
     }
 
@@ -263,6 +283,11 @@ impl Tracer for Embree {
             Width::Four => self.occluded_packets::<1>(rays, occluded, mode),
             Width::Eight => self.occluded_packets::<2>(rays, occluded, mode),
             Width::Sixteen => self.occluded_packets::<4>(rays, occluded, mode),
+        }
+        if !self.unbounded.is_empty() {
+            for (ray, occluded) in rays.iter().zip(occluded) {
+                *occluded = *occluded || self.beyond_bounds(ray, None).is_some();
+            }
         }
         self.scene.check_panic();
     }
