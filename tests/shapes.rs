@@ -23,7 +23,9 @@ fn shapes(count: usize, size: f32, seed: u64) -> Vec<Shape> {
             0 => Shape::Sphere(Sphere { centre, radius }),
             1 => Shape::Disk(Disk::new(centre, random.vec3(), radius).expect("a disk")),
             2 => Shape::Cuboid(Cuboid::new(centre.min(end), centre.max(end)).expect("a box")),
-            3 | 4 => Shape::Cylinder(Cylinder::new(centre, end, radius * 0.5, i.is_multiple_of(2)).expect("a cylinder")),
+            3 | 4 => {
+                Shape::Cylinder(Cylinder::new(centre, end, radius * 0.5, i.is_multiple_of(2)).expect("a cylinder"))
+            }
             5 | 6 => {
                 let tip = [0.0, radius * 0.3][i % 2];
                 Shape::Cone(Cone::new(centre, radius, end, tip, i % 4 < 2).expect("a cone"))
