@@ -82,10 +82,12 @@ impl Part {
         let (place, permissions) = match fs::metadata(path) {
             Ok(old) if old.is_dir() => return Err(Error::output(path, "is a folder; give the name of a file in it")),
             Ok(old) if !old.is_file() => return Ok(Target::Special),
-            Ok(old) => {
-                let place = fs::canonicalize(path).map_err(|e| cannot_create(path, &e))?;
-                (place, Some(old.permissions()))
-            }
+            Ok(old) => match fs::canonicalize(path) {
+                Ok(place) => (place, Some(old.permissions())),
+                // Removed meanwhile by someone else.
+                Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
+                Err(e) => return Err(cannot_create(path, &e)),
+            },
             Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
             Err(e) => return Err(cannot_create(path, &e)),
         };
