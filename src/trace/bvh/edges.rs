@@ -14,6 +14,9 @@
 //! Where the bundle is turned, a ray's own origin is at its far end, most often on a surface. On which side of the plane
 //! it lies, t' is too coarse to tell, but C . N does, C being A less the ray's end: C is off by u L + b and small, N by
 //! 8 u s^2 a component, and product and sum by as much again.
+//!
+//! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first two. All
+//! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b.
 
 use super::block::LANES;
 use super::bundle::{Bundle, axes};

@@ -46,6 +46,8 @@ mod leaves;
 mod level;
 mod meshes;
 mod node;
+mod noted;
+mod place;
 mod placements;
 mod preset;
 mod quad;
@@ -125,8 +127,7 @@ impl Bvh {
         let mut levels = triangles.into_iter().zip(parts).map(level);
         let fixed = levels.next().expect("the fixed parts are a level");
         let objects: Vec<Level> = levels.collect();
-        let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds, options);
+        let placements = PlacementTree::build(&world.placements, &objects, options);
         Self { fixed, objects, placements, unbounded: Unbounded::new(world), preset, isa }
     }
 
@@ -149,7 +150,7 @@ impl Bvh {
         let objects: Vec<f64> =
             self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
         let placed = self.placements.tree().cost(|items| {
-            let costs = self.placements.leaf(items).iter().map(|placement| objects[placement.object as usize]);
+            let costs = items.map(|item| objects[self.placements.at(item).placement.object as usize]);
             costs.sum()
         });
         let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));

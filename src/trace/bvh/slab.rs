@@ -9,9 +9,14 @@
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
 //! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. What still overflows turns into a pad that
 //! lets everything pass.
+//!
+//! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the largest
+//! component: at the t of a hit, at most the largest span over that component, it is off by b + r span, and the pad is wider
+//! by this over the component.
 
 use super::filter::{Filter, Filters};
 use super::node::Node;
+use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -37,13 +42,13 @@ const SMALLEST: f32 = 1e-18;
 const HUGE: f32 = 1e37;
 
 impl SlabRay {
-    /// `reach` is the tree's, `blur` by how much more than its own rounding the ray may be off (1: not at all).
+    /// `reach` is the tree's.
     #[inline(always)]
-    pub fn new(ray: &Ray, reach: Vec3, blur: f32) -> Self {
+    pub fn new(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let largest = ray.direction.abs().max_element();
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
         let span = ray.origin.abs() + reach;
-        let stray = 4.0 * (smallest / largest) * span.max_element();
+        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * span.max_element() + 1.1 * blur.origin;
         let mut slab = Self {
             reciprocal: [0.0; 3],
             near_offset: [0.0; 3],
@@ -55,7 +60,7 @@ impl SlabRay {
             let component = ray.direction[axis];
             let kept = if component.abs() < smallest { smallest.copysign(component) } else { component };
             let reciprocal = 1.0 / kept;
-            let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * blur * span[axis] + stray);
+            let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * span[axis] + stray);
             let pad = if reciprocal.abs() * span[axis] < HUGE { width } else { f32::INFINITY };
             let offset = -ray.origin[axis] * reciprocal;
             slab.reciprocal[axis] = reciprocal;
@@ -108,9 +113,29 @@ impl ReadyRay {
 
     #[inline(always)]
     pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], _] = self.rows;
+        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
+            self.rows;
         let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
-        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin])
+        let blur = Blur { origin: b, direction: r };
+        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
+    }
+
+    /// A single ray in a tree that reaches that far; [`Self::end`] is not asked of it.
+    #[inline(always)]
+    pub fn new(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+        let SlabRay { reciprocal, near_offset, far_offset, side, tmin } = SlabRay::new(ray, reach, blur);
+        let (axes, [x, y, z], [p, q], [width, along, shorten, begin], _) = Filter::new(ray, blur).fields();
+        let ([rx, ry, rz], [nx, ny, nz], [fx, fy, fz]) = (reciprocal, near_offset, far_offset);
+        let [ax, ay, az] = [axes[0] as u32, axes[1] as u32, axes[2] as u32].map(f32::from_bits);
+        let [sx, sy, sz] = side.map(f32::from_bits);
+        Self {
+            rows: [
+                [rx, ry, rz, tmin, nx, ny, nz, begin],
+                [fx, fy, fz, width, x, y, z, shorten],
+                [p, q, along, ax, ay, az, 0.0, 0.0],
+                [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
+            ],
+        }
     }
 
     /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.

@@ -10,20 +10,28 @@
 //!   of rays takes three scalar products.
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
-//!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`]), with the bits that a single ray would get.
+//!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
+//! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
+//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one.
 
 mod found;
+mod placed;
 mod walk;
 
+use std::marker::PhantomData;
+
+use super::Bvh;
 use super::build::MAX_DEPTH;
-use super::bundle::{Bundle, Fit, RAYS};
+use super::bundle::{Bundle, Fit, RAYS, Range};
+use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::simd::{Group, Simd};
-use super::triangles::TriangleTree;
+use super::walk::Stack;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use found::Found;
-use walk::{Entry, Walk};
+use placed::{Tour, one_by_one};
+use walk::{Entry, Walk, Way};
 
 /// Fewer rays than this are better traced one by one.
 const FEWEST: usize = 6;
@@ -37,10 +45,19 @@ pub(super) struct Scratch {
     part: [Ray; RAYS],
 }
 
+/// Places on a stack.
+const STACK: usize = MAX_DEPTH * 7 + 8;
+
 /// One bundle and its way.
 struct One {
-    stack: [Entry; MAX_DEPTH * 7 + 8],
+    /// In the tree of placements, and in one of triangles; of a single ray.
+    upper: [Entry; STACK],
+    stack: [Entry; STACK],
+    single: Stack,
+    /// In the world, and in the coordinates of a placed object.
     bundle: Bundle,
+    local: Bundle,
+    range: Range,
     found: Found,
 }
 
@@ -48,27 +65,29 @@ impl Scratch {
     pub fn new() -> Self {
         let ray = Ray::new(Vec3::ZERO, Vec3::X);
         let found = Found::new();
-        let one = One { stack: [Entry::ROOT; MAX_DEPTH * 7 + 8], bundle: Bundle::new(), found };
+        let stack = [Entry::root(0); STACK];
+        let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
+        let one = One { upper: stack, stack, single: Stack::new(), bundle, local, range, found };
         Self { one, t: [0.0; RAYS], part: [ray; RAYS] }
     }
 }
 
-/// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through `tree`, into `answers` of the
-/// same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
+/// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through all triangles, into `answers` of
+/// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
 /// have too little in common.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(
     scratch: &mut Scratch,
-    tree: &TriangleTree,
+    bvh: &Bvh,
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
     let Scratch { one, t, part } = scratch;
     if let (Ok(rays), Ok(answers)) = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers))
     {
-        match one.bundle.fill::<S, Q>(rays) {
+        match one.bundle.fill::<S, Q>(rays, &mut one.range) {
             Fit::Whole => {
-                let is_traced = one.trace::<S, Q>(tree, rays, RAYS, answers, t);
+                let is_traced = one.trace::<S, Q>(bvh, rays, RAYS, answers, t);
                 return if is_traced { u64::MAX } else { 0 };
             }
             Fit::Parts => {}
@@ -97,8 +116,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
         let last = part[count - 1];
         part[count..].fill(last);
         let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
-        if one.bundle.fill::<S, Q>(part) == Fit::Whole
-            && one.trace::<S, Q>(tree, part, count, &mut part_answers, &mut part_t)
+        if one.bundle.fill::<S, Q>(part, &mut one.range) == Fit::Whole
+            && one.trace::<S, Q>(bvh, part, count, &mut part_answers, &mut part_t)
         {
             for (k, &i) in index[..count].iter().enumerate() {
                 (answers[usize::from(i)], t[usize::from(i)]) = (part_answers[k], part_t[k]);
@@ -111,30 +130,57 @@ pub(super) fn trace<S: Simd, Q: Query>(
 
 impl One {
     /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
-    /// too steep for the tree.
+    /// too steep for a tree.
     #[inline(always)]
     fn trace<S: Simd, Q: Query>(
         &mut self,
-        tree: &TriangleTree,
+        bvh: &Bvh,
         rays: &[Ray; RAYS],
         count: usize,
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
     ) -> bool {
-        let Self { stack, bundle, found } = self;
-        let Some(slab) = bundle.slab(tree.tree().reach()) else { return false };
+        let Self { upper, stack, single, bundle, local, range, found } = self;
         let groups = count.div_ceil(S::Wide::LANES);
-        match bundle.axis {
-            0 => Walk::<Q, 0>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-            1 => Walk::<Q, 1>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
-            _ => Walk::<Q, 2>::new(tree, rays, bundle, found, groups).run::<S>(stack, &slab),
+        let Some(mut tour) = Tour::new(bvh, bundle, groups, upper) else { return false };
+        found.start();
+        while let Some((place, first)) = tour.next::<S>(range) {
+            let (tree, _) = bvh.triangles_at(place);
+            if tree.tree().is_empty() {
+                continue;
+            }
+            let is_bundle = place == FIXED || local.place::<S>(bundle, bvh.placements.at(place), range);
+            let bundle = if place == FIXED { &*bundle } else { &*local };
+            let Some(slab) = bundle.slab(tree.tree().reach()).filter(|_| is_bundle) else {
+                one_by_one::<S, Q>(bvh, place, rays, count, single, range, found);
+                continue;
+            };
+            let way = Way { bundle, slab, groups, most: 0.0 };
+            match bundle.axis {
+                0 => {
+                    let query = PhantomData::<Q>;
+                    let walk = Walk::<Q, 0> { bvh, place, tree, rays, bundle, found, groups, query };
+                    walk.run::<S>(stack, way, first);
+                }
+                1 => {
+                    let query = PhantomData::<Q>;
+                    let walk = Walk::<Q, 1> { bvh, place, tree, rays, bundle, found, groups, query };
+                    walk.run::<S>(stack, way, first);
+                }
+                _ => {
+                    let query = PhantomData::<Q>;
+                    let walk = Walk::<Q, 2> { bvh, place, tree, rays, bundle, found, groups, query };
+                    walk.run::<S>(stack, way, first);
+                }
+            }
+            range.shorten::<S>(bundle, &found.sure, &found.limit);
         }
         if Q::ANY {
-            for (answer, limit) in answers.iter_mut().zip(&found.limit.0) {
+            for (answer, limit) in answers.iter_mut().zip(&range.limit.0) {
                 *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
             }
         } else {
-            found.finish::<S, Q>(tree, bundle, count, answers, t);
+            found.finish::<S, Q>(bvh, bundle, rays, count, answers, t);
         }
         true
     }
