@@ -14,6 +14,7 @@
 //! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
 
 use super::filter::largest_axis;
+use super::footprint::Rows;
 use super::node::{Node, WIDTH};
 use super::place::Place;
 use super::query::Query;
@@ -115,6 +116,8 @@ pub(super) struct Bundle {
     pub low: [f32; 2],
     pub high: [f32; 2],
     pub largest: f32,
+    /// The same of eight rays at a time.
+    pub rows: Rows,
     /// 1 / slope.
     pub reciprocal: [PerRay; 2],
     /// Least and most that t' may be; rounded inwards, so that what lies between is within the range for sure.
@@ -163,6 +166,7 @@ impl Bundle {
             low: [0.0; 2],
             high: [0.0; 2],
             largest: 1.0,
+            rows: Rows::NONE,
             reciprocal: [PerRay::ZERO; 2],
             begin: PerRay::ZERO,
             end: PerRay::ZERO,
@@ -306,6 +310,7 @@ impl Bundle {
         (self.forward, self.least_depth) = if low[2] > 0.0 { (1.0, low[2]) } else { (-1.0, -high[2]) };
         (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
         self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
+        self.rows = Rows::new::<S>(&self.slope);
         // NaN and infinity, too: a direction whose smallest component vanishes against the others.
         if self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }

@@ -18,7 +18,7 @@
 //! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first two. All
 //! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b.
 
-use super::block::LANES;
+use super::block::{Block, LANES};
 use super::bundle::{Bundle, axes};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
@@ -42,13 +42,11 @@ pub(super) struct Edges {
 }
 
 impl Edges {
-    /// Also a bit for every triangle that some ray of the bundle may hit before `most`. `AXIS` is the bundle's.
+    /// Also a bit for every triangle that some ray of the bundle may hit before `most`; none if there is none. `AXIS` is the
+    /// bundle's.
     #[inline(always)]
-    pub fn new<S: Simd, const AXIS: usize>(
-        corners: &[[[f32; LANES]; 3]; 3],
-        bundle: &Bundle,
-        most: f32,
-    ) -> (u32, Self) {
+    pub fn new<S: Simd, const AXIS: usize>(block: &Block, bundle: &Bundle, most: f32) -> Option<(u32, Self)> {
+        let corners = &block.corners;
         let splat = S::V8::splat;
         let [x, y, z] = bundle.origin;
         let origin = [splat(x), splat(y), splat(z)];
@@ -98,6 +96,10 @@ impl Edges {
         let nearest = height.sub(height_error);
         let beyond = most_slope.add(slope_error).mul(splat(most * (1.0 + 1e-6))).less(nearest);
         let culled = misses.or(behind).or(beyond).bits() & !two_sided;
+        let lanes = !culled & block.lanes;
+        if lanes == 0 {
+            return None;
+        }
         // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few roundings.
         let (x, y) = (height_error.div(height), slope_error.div(least_slope.sub(slope_error)));
         let quarter = splat(0.25);
@@ -118,7 +120,7 @@ impl Edges {
             normal_error: square.mul(splat(24.0 * u)).to_array(),
             is_vague: two_sided | !tame.bits(),
         };
-        (!culled & 0b1111_1111, edges)
+        Some((lanes, edges))
     }
 }
 

@@ -101,9 +101,9 @@ impl Filter {
 
     /// In the order of [`Self::of_eight`].
     #[inline(always)]
-    pub fn fields(&self) -> ([usize; 3], [f32; 3], [f32; 2], [f32; 4], Blur) {
-        let Self { axes, origin, shear, width, along, shorten, begin, blur } = *self;
-        (axes, origin, shear, [width, along, shorten, begin], blur)
+    pub fn fields(&self) -> ([usize; 3], [f32; 3], [f32; 2], [f32; 4]) {
+        let Self { axes, origin, shear, width, along, shorten, begin, .. } = *self;
+        (axes, origin, shear, [width, along, shorten, begin])
     }
 
     /// The triangles that the ray may hit up to `limit`. If it is not `BLURRED`, it is the ray that is meant.

@@ -40,6 +40,7 @@ mod clusters;
 mod edges;
 mod filter;
 mod flight;
+mod footprint;
 mod found;
 mod isa;
 mod leaves;

@@ -120,14 +120,31 @@ impl ReadyRay {
         Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
     }
 
-    /// A single ray in a tree that reaches that far; [`Self::end`] is not asked of it.
+    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
     #[inline(always)]
-    pub fn new(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
-        let SlabRay { reciprocal, near_offset, far_offset, side, tmin } = SlabRay::new(ray, reach, blur);
-        let (axes, [x, y, z], [p, q], [width, along, shorten, begin], _) = Filter::new(ray, blur).fields();
-        let ([rx, ry, rz], [nx, ny, nz], [fx, fy, fz]) = (reciprocal, near_offset, far_offset);
-        let [ax, ay, az] = [axes[0] as u32, axes[1] as u32, axes[2] as u32].map(f32::from_bits);
-        let [sx, sy, sz] = side.map(f32::from_bits);
+    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+        let splat = S::V4::splat;
+        let (o, d, zero) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction), splat(0.0));
+        let largest = ray.direction.abs().max_element();
+        let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
+        let span = o.abs().add(lanes::<S>(reach));
+        let stray =
+            (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element() + 1.1 * blur.origin;
+        let is_negative = d.less(zero);
+        let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
+        let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));
+        let steep = reciprocal.abs();
+        let width = steep.mul(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)));
+        let pad = S::V4::select(steep.mul(span).less(splat(HUGE)), width, splat(f32::INFINITY));
+        let offset = zero.sub(o).mul(reciprocal);
+        let sides = S::V4::select(is_negative, splat(f32::from_bits(1)), zero);
+        let filter = Filter::new(ray, blur);
+        let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
+        let [ax, ay, az] = [axis(ax), axis(ay), axis(az)];
+        let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), offset.sub(pad).to_array());
+        let ([fx, fy, fz, _], [sx, sy, sz, _]) = (offset.add(pad).to_array(), sides.to_array());
+        // Rounded down, for t is rounded before it is held against it.
+        let tmin = (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0);
         Self {
             rows: [
                 [rx, ry, rz, tmin, nx, ny, nz, begin],
@@ -144,6 +161,17 @@ impl ReadyRay {
         let [.., tmax, limit] = self.rows[2];
         [tmax, limit]
     }
+}
+
+#[inline(always)]
+fn lanes<S: Simd>(v: Vec3) -> S::V4 {
+    S::V4::load(&[v.x, v.y, v.z, 0.0])
+}
+
+/// The number of an axis as bits of a number.
+#[inline(always)]
+const fn axis(number: usize) -> f32 {
+    f32::from_bits(number as u32)
 }
 
 /// As [`SlabRay::new`] and [`Filter::new`] for eight rays, with no blur; and a bit for each that

@@ -8,6 +8,7 @@ use crate::trace::bvh::block::Block;
 use crate::trace::bvh::leaves::Blocks;
 use crate::trace::bvh::node::{Child, Node, Tree};
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::triangles::TriangleTree;
 
 /// What rays travel through.
 pub(super) trait Ground {
@@ -48,19 +49,39 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
     }
 }
 
-/// The triangles of the world and of objects in their places.
-pub(super) struct Placed<'a> {
-    pub bvh: &'a Bvh,
+/// The triangles of the world and of objects in their places: what each space has, in one table, since rays of a list are in
+/// different ones, and nobody can predict which.
+pub(super) struct Placed<'a>(Vec<Region<'a>>);
+
+/// What a space has.
+struct Region<'a> {
+    nodes: &'a [Node],
+    triangles: &'a TriangleTree,
+    /// Where in memory leaves' first blocks or placements are, and how far apart.
+    leaves: *const u8,
+    stride: usize,
 }
 
-impl Placed<'_> {
-    #[inline(always)]
-    fn tree(&self, space: Space) -> &Tree {
-        match space {
-            Space::FIXED => self.bvh.fixed.triangles.tree(),
-            Space::UPPER => self.bvh.placements.tree(),
-            Space(object) => self.bvh.objects[object as usize - 2].triangles.tree(),
-        }
+impl<'a> Placed<'a> {
+    pub fn new<S: Simd>(bvh: &'a Bvh) -> Self {
+        let fixed = Region::new::<S>(&bvh.fixed.triangles);
+        let places = bvh.placements.places();
+        let upper = Region {
+            nodes: bvh.placements.tree().nodes(),
+            triangles: &bvh.fixed.triangles,
+            leaves: S::address(places, 0),
+            stride: size_of_val(places) / places.len().max(1),
+        };
+        let objects = bvh.objects.iter().map(|level| Region::new::<S>(&level.triangles));
+        Self([fixed, upper].into_iter().chain(objects).collect())
+    }
+}
+
+impl<'a> Region<'a> {
+    fn new<S: Simd>(triangles: &'a TriangleTree) -> Self {
+        let leaves = triangles.leaves();
+        let stride = leaves.bytes() / leaves.len().max(1);
+        Self { nodes: triangles.tree().nodes(), triangles, leaves: leaves.address::<S>(0), stride }
     }
 }
 
@@ -69,23 +90,19 @@ impl Ground for Placed<'_> {
 
     #[inline(always)]
     fn node(&self, space: Space, child: Child) -> &Node {
-        self.tree(space).node(child)
+        &self.0[space.0 as usize].nodes[child.node() as usize]
     }
     #[inline(always)]
     fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        let level = if space == Space::FIXED { &self.bvh.fixed } else { &self.bvh.objects[space.0 as usize - 2] };
-        level.triangles.block(index, scratch)
+        self.0[space.0 as usize].triangles.block(index, scratch)
     }
     #[inline(always)]
     fn node_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
-        S::address(self.tree(space).nodes(), next.node())
+        S::address(self.0[space.0 as usize].nodes, next.node())
     }
     #[inline(always)]
     fn leaf_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
-        match space {
-            Space::FIXED => self.bvh.fixed.triangles.leaves().address::<S>(next.first()),
-            Space::UPPER => S::address(self.bvh.placements.places(), next.first()),
-            Space(object) => self.bvh.objects[object as usize - 2].triangles.leaves().address::<S>(next.first()),
-        }
+        let region = &self.0[space.0 as usize];
+        region.leaves.wrapping_add(region.stride * next.first() as usize)
     }
 }

@@ -56,7 +56,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
     let fixed = &bvh.fixed.triangles;
     let tree = fixed.tree();
     if bvh.placements.has_triangles() {
-        return run::<S, Q, _>(flight, bvh, &Placed { bvh }, rays, done);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, done);
     }
     match fixed.leaves() {
         Leaves::Blocks(blocks) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, done),
@@ -106,7 +106,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
         }
         for k in at_nodes.iter() {
             let traveller = flight.at(k);
-            traveller.enter::<S>(ground.node(traveller.space, traveller.next));
+            traveller.enter::<S, G>(ground.node(traveller.space, traveller.next));
             prefetch::<S>(traveller, ground);
             lists[traveller.step::<G>()].push(k);
         }

@@ -28,8 +28,14 @@ impl Space {
     /// Among the placements; and whoever arrives does so from here.
     pub const UPPER: Self = Self(1);
 
+    #[inline(always)]
     pub fn object(index: u32) -> Self {
         Self(index + 2)
+    }
+
+    #[inline(always)]
+    pub fn is_object(self) -> bool {
+        self.0 >= 2
     }
 }
 
@@ -52,10 +58,8 @@ impl Step {
 #[repr(align(64))]
 #[derive(Clone, Copy)]
 pub(super) struct Traveller {
-    /// The ray in the space where it is.
-    ready: ReadyRay,
-    /// The ray in the world.
-    world: ReadyRay,
+    /// The ray in the world, and in the object where it is.
+    ready: [ReadyRay; 2],
     pub found: Found,
     /// Which of the rays it is.
     pub ray: usize,
@@ -73,8 +77,7 @@ pub(super) struct Traveller {
 
 impl Traveller {
     pub const NONE: Self = Self {
-        ready: ReadyRay::NONE,
-        world: ReadyRay::NONE,
+        ready: [ReadyRay::NONE; 2],
         found: Found::NONE,
         ray: 0,
         len: 1,
@@ -89,11 +92,11 @@ impl Traveller {
     /// theirs.
     #[inline(always)]
     pub fn start<G: Ground>(&mut self, ray: usize, ready: &ReadyRay, has_fixed: bool) {
-        self.ready = *ready;
+        self.ready[0] = *ready;
         self.found.start(ready.end());
         (self.ray, self.len, self.next) = (ray, 1, Child::ROOT);
         if G::HAS_PLACEMENTS {
-            (self.world, self.place, self.space) = (*ready, FIXED, Space::UPPER);
+            (self.place, self.space) = (FIXED, Space::UPPER);
             if has_fixed {
                 // Near entries of 0: they stay whatever the ray hits.
                 (self.near[1], self.stack[1]) = (0, Child::ROOT);
@@ -117,10 +120,16 @@ impl Traveller {
         usize::from(STEPS[usize::from(self.space == Space::UPPER)][kind % 4])
     }
 
+    /// The ray in the space where it is.
+    #[inline(always)]
+    fn ready<G: Ground>(&self) -> &ReadyRay {
+        &self.ready[usize::from(G::HAS_PLACEMENTS && self.space.is_object())]
+    }
+
     /// One node.
     #[inline(always)]
-    pub fn enter<S: Simd>(&mut self, node: &Node) {
-        let (mask, near) = self.ready.slab().enter::<S>(node, self.found.limit);
+    pub fn enter<S: Simd, G: Ground>(&mut self, node: &Node) {
+        let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
         let len = self.len % STACK;
         let (nears, stack) = (self.near[len..].first_chunk_mut(), self.stack[len..].first_chunk_mut());
         if let (Some(nears), Some(stack)) = (nears, stack) {
@@ -136,7 +145,7 @@ impl Traveller {
         let (index, limit) = (self.next.first(), self.found.limit);
         let mut scratch = None;
         let block = ground.block(self.space, index, &mut scratch);
-        let filter = self.ready.filter();
+        let filter = self.ready::<G>().filter();
         // The bounds of a ray in the world cost less, and are tighter.
         let candidates = if G::HAS_PLACEMENTS {
             filter.candidates::<S, true>(block, limit)
@@ -172,7 +181,7 @@ impl Traveller {
             return;
         }
         let (local, blur) = place.local::<S>(&rays[self.ray]);
-        self.ready = ReadyRay::new(&local, tree.reach(), blur);
+        self.ready[1] = ReadyRay::new::<S>(&local, tree.reach(), blur);
         let top = self.len % STACK;
         (self.near[top], self.stack[top]) = (0, Child::NONE);
         self.len = top + 1;
@@ -182,7 +191,7 @@ impl Traveller {
     /// Out of it again.
     #[inline(always)]
     pub fn leave(&mut self) {
-        (self.ready, self.space) = (self.world, Space::UPPER);
+        self.space = Space::UPPER;
         self.pop();
     }
 

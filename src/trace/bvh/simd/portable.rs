@@ -210,7 +210,11 @@ impl Doubles for [f64; 4] {
     }
     #[inline(always)]
     fn less(self, other: Self) -> u32 {
-        (0..4).fold(0, |bits, i| bits | u32::from(self[i] < other[i]) << i)
+        let mut bits = 0;
+        for i in 0..4 {
+            bits |= u32::from(self[i] < other[i]) << i;
+        }
+        bits
     }
     #[inline(always)]
     fn widen(values: [f32; 4]) -> Self {

@@ -8,6 +8,7 @@ use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::edges::Edges;
+use crate::trace::bvh::footprint::Footprints;
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
@@ -164,30 +165,36 @@ impl<Q: Query, const AXIS: usize> Walk<'_, Q, AXIS> {
     #[inline(always)]
     fn visit<S: Simd>(&mut self, leaf: Entry, most: f32) -> bool {
         let mut changed = false;
+        // Those of the groups that enter the leaf.
+        let per_group = S::Wide::LANES / 8;
+        let rows = (1 << (self.groups * per_group)) - (1 << (usize::from(leaf.first) * per_group));
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, most);
-            let mut lanes = lanes & block.lanes;
+            let Some((mut lanes, edges)) = Edges::new::<S, AXIS>(block, self.bundle, most) else { continue };
+            let seen = Footprints::new::<S, AXIS>(&block.corners, self.bundle);
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize % LANES;
                 lanes &= lanes - 1;
-                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, leaf.first);
+                let rows = seen.rows::<S>(lane, &self.bundle.rows) & rows;
+                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, rows);
             }
         }
         changed
     }
 
-    /// One triangle against the groups from `first` on.
+    /// One triangle against the groups of the rows that are named.
     #[inline(always)]
-    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, first: u8) -> bool {
+    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, mut rows: u32) -> bool {
         let splat = S::Wide::splat;
         let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
         let bound = splat(edges.edge_error[lane]);
         let below = splat(-edges.edge_error[lane]);
         let is_vague = edges.is_vague >> lane & 1 != 0;
         let (mut changed, first_t) = (false, splat(self.bundle.first));
-        for group in usize::from(first)..self.groups {
+        while rows != 0 {
+            let group = rows.trailing_zeros() as usize / (S::Wide::LANES / 8);
+            rows &= (!0 << (S::Wide::LANES / 8)) << (group * (S::Wide::LANES / 8));
             let p = S::Wide::at(&self.bundle.slope[0], group);
             let q = S::Wide::at(&self.bundle.slope[1], group);
             let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
