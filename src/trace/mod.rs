@@ -8,6 +8,7 @@ pub mod brute;
 pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
+mod limits;
 mod nearest;
 mod unbounded;
 mod world;

@@ -311,8 +311,10 @@ impl Bundle {
         (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
         self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
         self.rows = Rows::new::<S>(&self.slope);
-        // NaN and infinity, too: a direction whose smallest component vanishes against the others.
-        if self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
+        // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's coordinates
+        // a depth may be infinite, which leaves no slope.
+        let is_small = high[2].max(-low[2]) < HUGE;
+        if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
 
     /// The slope rectangle's reciprocals, against the boxes of a tree that reaches that far. None where they are too

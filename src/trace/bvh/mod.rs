@@ -9,17 +9,18 @@
 //! | `cache` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `walk` | one ray, from the root to the leaves |
-//! | `batch`, `query` | many rays, as bundles or one by one; the two questions |
+//! | `batch`, `query` | many rays, as bundles or in flight; the two questions |
 //! | `flight` | single rays, several of them in turn |
-//! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
+//! | `tile`, `bundle`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
+//! | `walk` | one ray by itself, from the root to the leaves |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
-//! | `quad` | t, u and v of four hits |
+//! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without

@@ -65,8 +65,7 @@ impl Place {
             (m.x_axis + m.y_axis + m.z_axis).max_element()
         };
         let stretch = norm(matrix);
-        let residue = norm(DMat3::IDENTITY - matrix * to_world.matrix3)
-            + gamma64(8) * stretch * norm(to_world.matrix3);
+        let residue = norm(DMat3::IDENTITY - matrix * to_world.matrix3) + gamma64(8) * stretch * norm(to_world.matrix3);
         // Also where it is NaN.
         let quotient = if residue < 0.5 { residue / (1.0 - residue) + gamma64(16) } else { f64::INFINITY };
         let away = to_world.translation.abs().max_element();

@@ -128,8 +128,8 @@ impl ReadyRay {
         let largest = ray.direction.abs().max_element();
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
         let span = o.abs().add(lanes::<S>(reach));
-        let stray =
-            (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element() + 1.1 * blur.origin;
+        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element()
+            + 1.1 * blur.origin;
         let is_negative = d.less(zero);
         let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
         let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));

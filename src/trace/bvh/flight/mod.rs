@@ -47,12 +47,7 @@ impl Flight {
 
 /// Answers all rays among triangles, of which there are some: `done` is told of each valid one what it has found.
 #[inline(always)]
-pub(super) fn trace<S: Simd, Q: Query>(
-    flight: &mut Flight,
-    bvh: &Bvh,
-    rays: &[Ray],
-    done: impl FnMut(usize, &Found),
-) {
+pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[Ray], done: impl FnMut(usize, &Found)) {
     let fixed = &bvh.fixed.triangles;
     let tree = fixed.tree();
     if bvh.placements.has_triangles() {

@@ -4,8 +4,8 @@ use std::marker::PhantomData;
 
 use super::found::{DONE, Found};
 use crate::ray::Ray;
-use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::Bvh;
+use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::edges::Edges;
 use crate::trace::bvh::footprint::Footprints;
