@@ -108,7 +108,7 @@ impl Place {
         let origin = self.origin_blur(ray.origin, local.origin);
         let direction = (noise / f64::from(largest)) as f32 + UNIT_ROUNDOFF;
         // Written so that NaN is unknown.
-        let is_finite = largest >= f32::MIN_POSITIVE && largest < f32::INFINITY && origin < f32::MAX;
+        let is_finite = (f32::MIN_POSITIVE..f32::INFINITY).contains(&largest) && origin < f32::MAX;
         (is_finite && direction <= Blur::MOST).then_some(Blur { origin, direction: direction * 1.01 })
     }
 

@@ -66,8 +66,7 @@ impl Way<'_> {
         loop {
             *len = len.checked_sub(1)?;
             let next = stack[*len];
-            // Written so that it also leaves out what waits for rays that are all done.
-            if !(next.near <= self.most) {
+            if next.near > self.most {
                 continue;
             }
             if next.child.is_leaf() {
