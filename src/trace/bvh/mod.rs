@@ -11,7 +11,7 @@
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `batch`, `query` | many rays, as bundles or in flight; the two questions |
 //! | `flight` | single rays, several of them in turn |
-//! | `tile`, `bundle`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
+//! | `tile`, `bundle`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
 //! | `walk` | one ray by itself, from the root to the leaves |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
@@ -54,6 +54,7 @@ mod placements;
 mod preset;
 mod quad;
 mod query;
+mod range;
 mod refit;
 mod room;
 mod shapes;

@@ -22,9 +22,10 @@ use std::marker::PhantomData;
 
 use super::Bvh;
 use super::build::MAX_DEPTH;
-use super::bundle::{Bundle, Fit, RAYS, Range};
+use super::bundle::{Bundle, Fit, RAYS};
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
+use super::range::Range;
 use super::simd::{Group, Simd};
 use super::walk::Stack;
 use crate::math::Vec3;

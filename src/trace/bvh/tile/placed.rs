@@ -5,10 +5,11 @@ use super::found::{DONE, Found};
 use super::walk::{Entry, Goal, Way};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS, Range};
+use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::placements::{FIXED, PlacementTree};
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::range::Range;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::walk::Stack;
 
