@@ -15,6 +15,8 @@ pub(super) struct Pinhole {
     size: DVec2,
     /// Half the film at distance 1.
     half: DVec2,
+    /// The camera's lens shift, in halves of the film, y down.
+    shift: DVec2,
 }
 
 impl Pinhole {
@@ -23,7 +25,8 @@ impl Pinhole {
         let size = DVec2::new(f64::from(width), f64::from(height));
         let half_y = libm::tan(camera.fov_y / 2.0);
         let half = DVec2::new(half_y * size.x / size.y, half_y);
-        Self { origin: (camera.eye - centre).as_vec3(), frame: camera.frame, size, half }
+        let shift = camera.shift * DVec2::new(2.0, -2.0);
+        Self { origin: (camera.eye - centre).as_vec3(), frame: camera.frame, size, half, shift }
     }
 
     /// The ray through a point of the film in pixels, from its top left corner; with a unit direction.
@@ -41,8 +44,8 @@ impl Pinhole {
         let [right, up, back] = self.frame.to_cols_array_2d();
         let mut direction = [[0.0; N]; 3];
         for i in 0..N {
-            let x = (x[i] / self.size.x * 2.0 - 1.0) * self.half.x;
-            let y = (y[i] / self.size.y * 2.0 - 1.0) * self.half.y;
+            let x = (x[i] / self.size.x * 2.0 - 1.0 + self.shift.x) * self.half.x;
+            let y = (y[i] / self.size.y * 2.0 - 1.0 + self.shift.y) * self.half.y;
             let [a, b, c] = [0, 1, 2].map(|axis| right[axis] * x - up[axis] * y - back[axis]);
             let reciprocal = 1.0 / (a * a + b * b + c * c).sqrt();
             direction[0][i] = (a * reciprocal) as f32;

@@ -1,6 +1,6 @@
 //! A pinhole camera.
 
-use crate::math::{DAabb, DAffine3, DMat3, DVec3};
+use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 
 /// A pinhole camera. It looks along its -z, +y is up, +x is right (glTF's convention).
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +13,9 @@ pub struct Camera {
     pub frame: DMat3,
     /// Full vertical angle of view, radians, in (0, pi).
     pub fov_y: f64,
+    /// Lens shift: how far the picture's middle is moved from where the camera looks, to the right and up, as shares of
+    /// the picture's width and height (half of it puts the view's centre on the picture's edge).
+    pub shift: DVec2,
 }
 
 impl Camera {
@@ -27,7 +30,13 @@ impl Camera {
             return None;
         };
         let frame = DMat3::from_cols(right, back.cross(right), back);
-        (eye.is_finite() && frame.is_finite()).then(|| Self { name: String::new(), eye, frame, fov_y })
+        (eye.is_finite() && frame.is_finite()).then(|| Self {
+            name: String::new(),
+            eye,
+            frame,
+            fov_y,
+            shift: DVec2::ZERO,
+        })
     }
 
     /// A view of the whole of `bounds`, from the front, a little from the right and above.

@@ -46,6 +46,9 @@ pub enum Light {
         attenuation: Attenuation,
         /// Nothing farther than this is lit; infinite by default.
         range: f64,
+        /// Of the lamp around the point: shadow rays end at its surface, so that a ball may stand there and glow.
+        /// 0 for a bare point.
+        radius: f64,
     },
     /// From a point, into a cone.
     Spot {
@@ -75,8 +78,12 @@ impl Light {
         if let Self::Point { position, .. } | Self::Spot { position, .. } = self {
             *position = transform.transform_point3(*position);
         }
+        let scale = transform.matrix3.determinant().abs().cbrt();
         if let Self::Point { range, .. } | Self::Spot { range, .. } = self {
-            *range *= transform.matrix3.determinant().abs().cbrt();
+            *range *= scale;
+        }
+        if let Self::Point { radius, .. } = self {
+            *radius *= scale;
         }
     }
 }

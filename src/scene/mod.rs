@@ -9,6 +9,7 @@ mod light;
 mod material;
 mod mesh;
 mod procedural;
+mod request;
 mod rocks;
 mod texture;
 
@@ -19,6 +20,7 @@ pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};
+pub use request::Request;
 pub use rocks::rocks;
 pub use texture::{Filter, Texture, Wrap};
 
@@ -46,6 +48,8 @@ pub struct Scene {
     pub ambient: Vec3,
     /// What a ray that hits nothing sees, linear RGB.
     pub background: Vec3,
+    /// What the file wants of a render.
+    pub request: Request,
 }
 
 /// Something rays can hit: triangles, or shapes of any other kind.

@@ -4,9 +4,12 @@
 //! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
 
 use super::SurfacePoint;
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3, gamma};
 use crate::ray::Ray;
 use crate::scene::{Attenuation, Light};
+
+/// Chained f32 roundings in the test of a ray against a lamp, of its centre and of its radius; generous.
+const LAMP_ROUNDINGS: u32 = 32;
 
 /// A light as the renderer uses it, in world coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +39,8 @@ impl LightSource {
     /// A white light at the viewer's `eye` (world coordinates), the same at any distance. Its shadows lie where the
     /// viewer cannot see them, so that none are traced.
     pub fn headlight(eye: DVec3) -> Self {
-        let light =
-            Light::Point { position: eye, color: Vec3::ONE, attenuation: Attenuation::NONE, range: f64::INFINITY };
+        let (attenuation, range) = (Attenuation::NONE, f64::INFINITY);
+        let light = Light::Point { position: eye, color: Vec3::ONE, attenuation, range, radius: 0.0 };
         Self { light, casts_shadows: false }
     }
 
@@ -45,7 +48,7 @@ impl LightSource {
     pub fn illuminate(&self, point: DVec3) -> Option<Illumination> {
         match &self.light {
             Light::Directional { direction, color } => Some(Illumination { to_light: -*direction, color: *color }),
-            Light::Point { position, color, attenuation, range } => {
+            Light::Point { position, color, attenuation, range, .. } => {
                 from_point(point, *position, *color, attenuation, *range)
             }
             Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
@@ -60,6 +63,13 @@ impl LightSource {
     pub fn shadow_ray(&self, surface: &SurfacePoint, to_light: DVec3) -> Ray {
         match &self.light {
             Light::Directional { .. } => surface.spawn(to_light.as_vec3(), f32::INFINITY),
+            Light::Point { position, radius, .. } if *radius > 0.0 => {
+                // Short of the lamp by what f32 may move its surface, so that the lamp does not shade itself.
+                let slack = f64::from(gamma(LAMP_ROUNDINGS)) * (position.abs().max_element() + radius);
+                let reach = (position - surface.position).length() - radius - slack;
+                // Inside the lamp nothing is in between.
+                surface.spawn_to(surface.position + to_light * reach.max(0.0))
+            }
             Light::Point { position, .. } | Light::Spot { position, .. } => surface.spawn_to(*position),
         }
     }
@@ -144,6 +154,7 @@ mod tests {
             color: Vec3::ONE,
             attenuation: Attenuation::INVERSE_SQUARE,
             range: 1.0,
+            radius: 0.0,
         };
         assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO), None);
     }

@@ -159,7 +159,7 @@ fn everything_is_where_it_belongs() {
         assert!((color.x - 1.0 / pi).abs() < 1e-7 && (*inner_angle, *outer_angle) == (0.25, 0.5));
         let Light::Directional { direction, color } = sun else { panic!("{sun:?}") };
         assert!(*direction == DVec3::NEG_Z && color.abs_diff_eq(Vec3::splat(3.0 / pi), 1e-6));
-        let Light::Point { position, color, attenuation, range } = bulb else { panic!("{bulb:?}") };
+        let Light::Point { position, color, attenuation, range, radius: 0.0 } = bulb else { panic!("{bulb:?}") };
         assert!(color.abs_diff_eq(Vec3::new(2.0, 1.0, 0.0) / pi, 1e-6));
         let expected = (DVec3::new(0.0, 0.0, 4.0), Attenuation::INVERSE_SQUARE, 7.0);
         assert_eq!((*position, *attenuation, *range), expected);

@@ -25,6 +25,7 @@ fn busy_scene(place: DVec3) -> Scene {
             color: Vec3::splat(20.0),
             attenuation: Attenuation::INVERSE_SQUARE,
             range: 30.0,
+            radius: 0.0,
         },
     ];
     let camera = Camera::look_at(DVec3::new(4.0, 5.0, 7.0), DVec3::ZERO, DVec3::Y, 0.7).unwrap();

@@ -61,6 +61,7 @@ fn lights_add_up_and_weaken_with_distance() {
         color: Vec3::splat(2.0),
         attenuation,
         range: f64::INFINITY,
+        radius: 0.0,
     };
     // 1 / (1 + 0.25 * 4 + 0.125 * 16) = 1/4.
     let one = 2.0 * 0.25 * 0.8;

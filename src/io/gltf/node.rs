@@ -5,7 +5,7 @@
 use super::Document;
 use super::schema::{Camera as CameraSource, Lights, Node};
 use crate::error::{Result, Warning};
-use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
 use crate::scene::{Attenuation, Camera, Instance, Light, Scene};
 
 /// Places everything that the document's scene (the first, where it names none) shows. `groups` has the group of each
@@ -135,7 +135,7 @@ fn make_camera(
     };
     let name = if node.name.is_empty() { source.name.clone() } else { node.name.clone() };
     let frame = DMat3::from_cols(right, back.cross(right), back);
-    Ok(Some(Camera { name, eye: transform.translation, frame, fov_y }))
+    Ok(Some(Camera { name, eye: transform.translation, frame, fov_y, shift: DVec2::ZERO }))
 }
 
 /// The lights of `KHR_lights_punctual`, at the origin, along -z.
@@ -158,7 +158,7 @@ fn lights(document: &Document<'_>) -> Result<Vec<Light>> {
         }
         match light.kind.as_str() {
             "directional" => Ok(Light::Directional { direction, color }),
-            "point" => Ok(Light::Point { position, color, attenuation, range }),
+            "point" => Ok(Light::Point { position, color, attenuation, range, radius: 0.0 }),
             "spot" => {
                 let (inner_angle, outer_angle) = (light.spot.inner_cone_angle, light.spot.outer_cone_angle);
                 if !(inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2) {
