@@ -50,10 +50,12 @@ pub struct Settings {
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
+    /// How often a ray may be mirrored or refracted; what it would see after that is black.
+    pub max_depth: u32,
 }
 
 impl Default for Settings {
-    /// 1280 x 720 pixels of 4 samples.
+    /// 1280 x 720 pixels of 4 samples, 5 mirrors deep.
     fn default() -> Self {
         Self {
             width: 1280,
@@ -63,6 +65,7 @@ impl Default for Settings {
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
+            max_depth: 5,
         }
     }
 }
@@ -112,7 +115,7 @@ impl<'a> Renderer<'a> {
             let degrees = camera.fov_y.to_degrees();
             return Err(Error::Usage(format!("angle of view {degrees}: must be above 0 and below 180 degrees")));
         }
-        let plan = Plan::new(scene, world, settings.background);
+        let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,

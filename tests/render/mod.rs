@@ -3,6 +3,7 @@
 mod determinism;
 mod shading;
 mod toy;
+mod whitted;
 
 use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Camera, Geometry, Material, Mesh};
