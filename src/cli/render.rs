@@ -7,13 +7,15 @@ use clap::{Args, ValueEnum};
 
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
-use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
+use super::camera::{CameraArgs, camera_flags};
+use super::common::{SceneArgs, Size, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
 use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_memory, size, time};
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
+use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::plan::BuildChoice;
 use crate::render::{Renderer, Settings, TileOrder};
@@ -140,6 +142,9 @@ enum Order {
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     let cancel = interrupt::install()?;
+    if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
+        return Err(no_picture());
+    }
     outputs::check(&args.output, &args.stats, args.inputs())?;
     let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(image::read).transpose()?;
@@ -262,8 +267,7 @@ impl RenderArgs {
         // Of what a scene names the folder is left out: a scene must not choose whose files are replaced.
         let named = request.output.as_ref().and_then(|name| Path::new(name).file_name());
         let Some(picture) = named.map(PathBuf::from) else {
-            let message = "no picture to write: name one with --output FILE; the scene names none";
-            return Err(Error::Usage(message.to_owned()));
+            return Err(no_picture());
         };
         let pictures = vec![picture];
         outputs::check(&pictures, &self.stats, self.inputs())?;
@@ -358,6 +362,10 @@ impl RenderArgs {
         }
         Err(Error::Check(failed.into_iter().map(|(words, _)| words).collect::<Vec<_>>().join("; ")))
     }
+}
+
+fn no_picture() -> Error {
+    Error::Usage("no picture to write: name one with --output FILE; the scene names none".to_owned())
 }
 
 fn placed_triangles(scene: &Scene) -> u64 {

@@ -111,15 +111,14 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
-        if !(camera.fov_y > 0.0 && camera.fov_y < std::f64::consts::PI) {
-            let degrees = camera.fov_y.to_degrees();
-            return Err(Error::Usage(format!("angle of view {degrees}: must be above 0 and below 180 degrees")));
-        }
+        let pinhole = Pinhole::new(&camera, world.centre, width, height).ok_or_else(|| {
+            Error::Usage(format!("angle of view {}: must be above 0 and below 180 degrees", camera.fov))
+        })?;
         let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
-            pinhole: Pinhole::new(&camera, world.centre, width, height),
+            pinhole,
             sampler: Sampler::new(spp, seed),
             lights: Vec::new(),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
