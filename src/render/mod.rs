@@ -6,6 +6,7 @@
 mod camera;
 mod counted;
 mod film;
+mod filter;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
@@ -14,19 +15,22 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
+pub use filter::Filter;
+pub use sampler::Sampling;
 pub use tiles::TileOrder;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{Vec3, Vec4};
+use crate::math::{DVec2, Vec3, Vec4};
 use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
 use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
-use camera::Pinhole;
+use camera::View;
 use film::Film;
-use sampler::Sampler;
+use filter::FilterSampler;
+use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
@@ -44,6 +48,10 @@ pub struct Settings {
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How samples become a pixel.
+    pub filter: Filter,
     /// How rays are bundled; never changes a native picture.
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
@@ -62,6 +70,8 @@ impl Default for Settings {
             height: 720,
             spp: 4,
             seed: 0,
+            sampling: Sampling::default(),
+            filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
@@ -85,8 +95,9 @@ pub struct Renderer<'a> {
     world: &'a World,
     settings: Settings,
     plan: Plan,
-    pinhole: Pinhole,
+    view: View,
     sampler: Sampler,
+    filter: FilterSampler,
     lights: Vec<LightSource>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
@@ -98,10 +109,10 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
-    /// angle of view outside (0, 180) degrees.
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and a
+    /// camera that cannot be.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
-        let Settings { width, height, spp, seed, .. } = settings;
+        let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         for side in [width, height] {
             if side == 0 || side > LARGEST_SIDE {
                 let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
@@ -111,15 +122,15 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
-        let pinhole = Pinhole::new(&camera, world.centre, width, height).ok_or_else(|| {
-            Error::Usage(format!("angle of view {}: must be above 0 and below 180 degrees", camera.fov))
-        })?;
+        let view = View::new(&camera, world.centre, width, height)?;
         let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
-            pinhole,
-            sampler: Sampler::new(spp, seed),
+            view,
+            sampler: Sampler::new(sampling, spp, seed),
+            // A single sample is the pixel's middle, whatever the filter.
+            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
             lights: Vec::new(),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
@@ -196,8 +207,19 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and its weight.
+    #[inline]
+    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, f32) {
+        let (within, weight) = self.filter.place(self.sampler.film(pixel, sample));
+        (pixel.corner() + within, weight)
+    }
+
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        self.pinhole.ray(self.sampler.place(&self.sampler.pattern(x, y), sample))
+        self.ray(&self.sampler.pattern(x, y), sample)
+    }
+
+    fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
+        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::Lens))
     }
 }
