@@ -59,6 +59,13 @@ impl Index for Grid {
         let own = size_of_val(&self.starts[..]) + size_of_val(&self.entries[..]) + size_of_val(&self.nested[..]);
         own + self.nested.iter().map(Self::bytes).sum::<usize>()
     }
+
+    fn note(&self) -> Option<String> {
+        let UVec3 { x, y, z } = self.counts;
+        let nested = self.nested.len();
+        (!self.entries.is_empty())
+            .then(|| format!("a grid of {x} x {y} x {z} cells, {nested} of them with grids of their own"))
+    }
 }
 
 /// Cells from one corner to another, both included.
@@ -294,11 +301,6 @@ impl Grid {
         let near = usize::from(ray.backwards[axis]);
         let limit = self.halve(ray, halves[near], limit, each);
         self.halve(ray, halves[1 - near], limit, each)
-    }
-
-    /// Cells along each axis.
-    pub(super) fn resolution(&self) -> UVec3 {
-        self.counts
     }
 }
 

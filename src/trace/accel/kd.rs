@@ -13,8 +13,8 @@ use rayon::join;
 
 use super::items::Input;
 use super::ray::IndexRay;
-use super::{Index, Options};
-use crate::math::{Aabb, Vec3};
+use super::{Cell, Index, Options};
+use crate::math::{Aabb, DVec3, Vec3};
 
 /// What going through a node costs, in tests of an item.
 const NODE_COST: f32 = 0.3;
@@ -55,7 +55,7 @@ enum Branch {
 }
 
 /// A cell with everything that is in it.
-struct Cell<'a> {
+struct Part<'a> {
     boxes: &'a [Aabb],
     bounds: Aabb,
     items: Vec<u32>,
@@ -71,9 +71,9 @@ impl Index for KdTree {
         let items = input.all();
         // As deep as Havran 2000 found to pay, plus some for uneven scenes.
         let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
-        let cell = Cell { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32) };
+        let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32) };
         let mut tree = Self { bounds, nodes: Vec::new(), items: Vec::new() };
-        tree.place(cell.build());
+        tree.place(whole.build());
         tree
     }
 
@@ -128,6 +128,24 @@ impl Index for KdTree {
     fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.items[..])
     }
+
+    fn locate(&self, point: Vec3) -> Option<Cell> {
+        let mut cell = Cell::within(&self.bounds, point)?;
+        let mut at = 0;
+        loop {
+            let node = self.nodes[at];
+            let axis = (node.link & 3) as usize;
+            if axis == LEAF as usize {
+                cell.number = at as u32;
+                cell.items.extend(&self.items[node.plane.to_bits() as usize..][..(node.link >> 2) as usize]);
+                return Some(cell);
+            }
+            let (normal, plane) = (DVec3::AXES[axis], f64::from(node.plane));
+            let is_above = point[axis] >= node.plane;
+            at = if is_above { (node.link >> 2) as usize } else { at + 1 };
+            cell.sides.push(if is_above { (-normal, -plane) } else { (normal, plane) });
+        }
+    }
 }
 
 impl KdTree {
@@ -149,33 +167,9 @@ impl KdTree {
             }
         }
     }
-
-    /// The cell that holds a point: its bounds and its items. A point on a plane is above it; None for one outside of everything.
-    pub fn locate(&self, point: Vec3) -> Option<(Aabb, &[u32])> {
-        let mut bounds = self.bounds;
-        if !(point.cmpge(bounds.min) & point.cmple(bounds.max)).all() {
-            return None;
-        }
-        let mut at = 0;
-        loop {
-            let node = self.nodes[at];
-            let axis = (node.link & 3) as usize;
-            if axis == LEAF as usize {
-                let first = node.plane.to_bits() as usize;
-                return Some((bounds, &self.items[first..first + (node.link >> 2) as usize]));
-            }
-            if point[axis] < node.plane {
-                bounds.max[axis] = node.plane;
-                at += 1;
-            } else {
-                bounds.min[axis] = node.plane;
-                at = (node.link >> 2) as usize;
-            }
-        }
-    }
 }
 
-impl<'a> Cell<'a> {
+impl<'a> Part<'a> {
     fn build(self) -> Branch {
         let count = self.items.len() as f32;
         let split = if self.depth > 0 && self.items.len() > 1 { self.best_split() } else { None };
@@ -205,7 +199,7 @@ impl<'a> Cell<'a> {
         }
         let (mut lower, mut upper) = (bounds, bounds);
         (lower.max[axis], upper.min[axis]) = (plane, plane);
-        let part = |bounds, items| Cell { boxes, bounds, items, depth: depth - 1 };
+        let part = |bounds, items| Part { boxes, bounds, items, depth: depth - 1 };
         [part(lower, below), part(upper, above)]
     }
 

@@ -1,10 +1,13 @@
 //! The accelerators by name.
 
 use super::binary::Binary;
+use super::bsp::Bsp;
 use super::grid::Grid;
+use super::groups::Groups;
 use super::kd::KdTree;
 use super::octree::Octree;
-use super::{Accelerated, Options};
+use super::{Accelerated, Cell, Index, Options};
+use crate::math::Vec3;
 use crate::trace::brute::Brute;
 use crate::trace::bvh::Bvh;
 use crate::trace::{Tracer, World};
@@ -17,6 +20,8 @@ pub enum Accel {
     Bvh,
     /// Nothing: every primitive for every ray.
     Brute,
+    /// A flat list of bounding volumes, one a geometry.
+    Groups,
     /// A binary BVH.
     Binary,
     /// A uniform grid, nested where it is crowded.
@@ -25,56 +30,81 @@ pub enum Accel {
     Octree,
     /// A kd-tree.
     Kd,
+    /// A BSP tree of general planes.
+    Bsp,
+}
+
+/// A tracer that may know where points are.
+pub trait Accelerator: Tracer + Send {
+    /// The cell of what is fixed in the world that holds a point. None outside of everything, and by accelerators that do not
+    /// divide space: all but the kd-tree and the BSP tree.
+    fn locate(&self, _point: Vec3) -> Option<Cell> {
+        None
+    }
+}
+
+impl Accelerator for Bvh {}
+impl Accelerator for Brute {}
+
+impl<I: Index> Accelerator for Accelerated<I> {
+    fn locate(&self, point: Vec3) -> Option<Cell> {
+        self.fixed.index.locate(point)
+    }
 }
 
 /// An accelerator that is ready to trace.
 pub struct Built {
     /// The tracer. It is called once a batch; what is inside is compiled for each accelerator.
-    pub tracer: Box<dyn Tracer + Send>,
+    pub tracer: Box<dyn Accelerator>,
     /// Memory it holds, in bytes.
     pub bytes: usize,
+    /// What there is to say about how it was built: the grid's resolution, or where the BSP tree stopped.
+    pub notes: Vec<String>,
 }
 
 impl Accel {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Bvh, Self::Brute, Self::Binary, Self::Grid, Self::Octree, Self::Kd];
+    pub const ALL: [Self; 8] =
+        [Self::Bvh, Self::Brute, Self::Groups, Self::Binary, Self::Grid, Self::Octree, Self::Kd, Self::Bsp];
 
     /// As flags and reports have it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Bvh => "bvh",
             Self::Brute => "brute",
+            Self::Groups => "groups",
             Self::Binary => "binary-bvh",
             Self::Grid => "grid",
             Self::Octree => "octree",
             Self::Kd => "kd-tree",
+            Self::Bsp => "bsp",
         }
     }
 
     /// Builds it.
     pub fn build(self, world: &World, options: &Options) -> Built {
-        let (tracer, bytes): (Box<dyn Tracer + Send>, usize) = match self {
+        match self {
             Self::Bvh => {
                 let bvh = Bvh::build(world);
-                let bytes = bvh.bytes();
-                (Box::new(bvh), bytes)
+                Built { bytes: bvh.bytes(), notes: Vec::new(), tracer: Box::new(bvh) }
             }
             Self::Brute => {
                 let brute = Brute::new(world);
-                let bytes = brute.bytes();
-                (Box::new(brute), bytes)
+                Built { bytes: brute.bytes(), notes: Vec::new(), tracer: Box::new(brute) }
             }
-            Self::Binary => accelerated::<Binary>(world, options),
-            Self::Grid => accelerated::<Grid>(world, options),
-            Self::Octree => accelerated::<Octree>(world, options),
-            Self::Kd => accelerated::<KdTree>(world, options),
-        };
-        Built { tracer, bytes }
+            Self::Groups => Built::over::<Groups>(world, options),
+            Self::Binary => Built::over::<Binary>(world, options),
+            Self::Grid => Built::over::<Grid>(world, options),
+            Self::Octree => Built::over::<Octree>(world, options),
+            Self::Kd => Built::over::<KdTree>(world, options),
+            Self::Bsp => Built::over::<Bsp>(world, options),
+        }
     }
 }
 
-fn accelerated<I: super::Index + 'static>(world: &World, options: &Options) -> (Box<dyn Tracer + Send>, usize) {
-    let tracer = Accelerated::<I>::build(world, options);
-    let bytes = tracer.bytes();
-    (Box::new(tracer), bytes)
+impl Built {
+    fn over<I: Index + 'static>(world: &World, options: &Options) -> Self {
+        let tracer = Accelerated::<I>::build(world, options);
+        Self { bytes: tracer.bytes(), notes: tracer.notes(), tracer: Box::new(tracer) }
+    }
 }

@@ -19,7 +19,10 @@
 //! trait hides.
 
 mod binary;
+mod bsp;
+mod cell;
 mod grid;
+mod groups;
 mod items;
 mod kd;
 mod kind;
@@ -27,22 +30,27 @@ mod octree;
 mod placed;
 mod ray;
 
+use std::time::Duration;
+
 use super::nearest::Nearest;
 use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
-use crate::math::{Aabb, DVec3, UVec3};
+use crate::math::{Aabb, DVec3, UVec3, Vec3};
 use crate::ray::{Hit, Ray};
 use items::{Boxes, Input, Items, Through, reach};
 use placed::{Placed, Spread, stray_of_shapes};
 use ray::{IndexRay, limit};
 
-pub use kind::{Accel, Built};
+pub use cell::Cell;
+pub use kind::{Accel, Accelerator, Built};
 
 /// What an accelerator may be told.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Cells of the grid along each axis; none to have the number follow from that of the primitives.
     pub grid: Option<UVec3>,
+    /// How long the BSP tree may be divided; 10 seconds where none is given. It does not change hits.
+    pub bsp_time: Option<Duration>,
 }
 
 /// Which of many boxes a ray may pass.
@@ -59,6 +67,16 @@ trait Index: Sized + Send + Sync {
 
     /// Memory it holds, in bytes.
     fn bytes(&self) -> usize;
+
+    /// What there is to say about how it was built.
+    fn note(&self) -> Option<String> {
+        None
+    }
+
+    /// The cell that holds a point, by an index that divides space.
+    fn locate(&self, _point: Vec3) -> Option<Cell> {
+        None
+    }
 }
 
 /// A tracer over indices of one kind.
@@ -123,6 +141,12 @@ impl<I: Index> Accelerated<I> {
         let levels = self.objects.iter().chain([&self.fixed]);
         let levels = levels.map(|level| level.items.bytes() + level.index.bytes());
         levels.sum::<usize>() + self.placements.bytes() + size_of_val(&self.placed[..])
+    }
+
+    /// What its indices have to say.
+    fn notes(&self) -> Vec<String> {
+        let levels = self.objects.iter().chain([&self.fixed]);
+        levels.filter_map(|level| level.index.note()).chain(self.placements.note()).collect()
     }
 
     /// The nearest hit; if `any`, the first one found, and the place where it was.
@@ -261,3 +285,6 @@ impl<I: Index> Tracer for Accelerated<I> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
