@@ -16,8 +16,6 @@ use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF_64, UVec3};
 
 /// Cells for each item, where no resolution is asked for.
 const DENSITY: f64 = 3.0;
-/// Most cells along an axis.
-const LONGEST: u32 = 2048;
 /// By how much of a cell's width items reach into the neighbours.
 const SLACK: f64 = 1.0 / 128.0;
 /// More items in a cell than this make a nested grid, if that helps.
@@ -30,6 +28,32 @@ const NESTED: u32 = 1 << 31;
 const MOST_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
 const MOST_ENTRIES: usize = 1 << 30;
+
+/// How many cells a grid has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolution {
+    /// So many along the longest side; cubes.
+    Longest(u32),
+    /// So many along each axis.
+    Axes(UVec3),
+}
+
+impl Resolution {
+    /// Most cells along an axis.
+    pub const MOST: u32 = 2048;
+
+    fn counts(self, bounds: &Aabb) -> UVec3 {
+        match self {
+            Self::Axes(counts) => counts.clamp(UVec3::ONE, UVec3::splat(Self::MOST)),
+            Self::Longest(count) => {
+                let size = bounds.max.as_dvec3() - bounds.min.as_dvec3();
+                let edge = size.max_element() / f64::from(count);
+                // A point has no longest side: 0 / 0 is cast to 0.
+                (size / edge).round().as_uvec3().clamp(UVec3::ONE, UVec3::splat(Self::MOST))
+            }
+        }
+    }
+}
 
 /// The index.
 pub(super) struct Grid {
@@ -77,8 +101,11 @@ struct Block {
 
 impl Grid {
     /// Over some of the boxes, as far as they are within `bounds`.
-    fn over(boxes: &[Aabb], items: &[u32], bounds: &Aabb, resolution: Option<UVec3>, depth: u32) -> Self {
-        let mut counts = resolution.unwrap_or_else(|| resolution_for(bounds, items.len()));
+    fn over(boxes: &[Aabb], items: &[u32], bounds: &Aabb, resolution: Option<Resolution>, depth: u32) -> Self {
+        let mut counts = match resolution {
+            Some(resolution) => resolution.counts(bounds),
+            None => counts_for(bounds, items.len()),
+        };
         let most = if resolution.is_some() { MOST_ENTRIES } else { MOST_REFERENCES * items.len() };
         let mut grid = Self::empty(bounds, counts);
         // Where items are larger than cells, fewer cells lose nothing.
@@ -311,7 +338,7 @@ impl Block {
 }
 
 /// Cubes, [`DENSITY`] to an item; an axis along which there is next to nothing has one cell.
-pub(super) fn resolution_for(bounds: &Aabb, items: usize) -> UVec3 {
+fn counts_for(bounds: &Aabb, items: usize) -> UVec3 {
     if bounds.is_empty() || items == 0 {
         return UVec3::ONE;
     }
@@ -329,7 +356,7 @@ pub(super) fn resolution_for(bounds: &Aabb, items: usize) -> UVec3 {
         edge = (volume / cells).powf(1.0 / f64::from(axes));
         takes_part = [0, 1, 2].map(|axis| size[axis] >= edge);
     }
-    (size / edge).round().clamp(DVec3::ONE, DVec3::splat(LONGEST.into())).as_uvec3()
+    (size / edge).round().clamp(DVec3::ONE, DVec3::splat(Resolution::MOST.into())).as_uvec3()
 }
 
 fn intersection(a: &Aabb, b: &Aabb) -> Aabb {

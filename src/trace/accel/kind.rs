@@ -8,9 +8,10 @@ use super::kd::KdTree;
 use super::octree::Octree;
 use super::{Accelerated, Cell, Index, Options};
 use crate::math::Vec3;
+use crate::ray::{Hit, Ray};
 use crate::trace::brute::Brute;
 use crate::trace::bvh::Bvh;
-use crate::trace::{Tracer, World};
+use crate::trace::{Batch, Tracer, World};
 
 /// How a scene is searched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,6 +46,8 @@ pub trait Accelerator: Tracer + Send {
 
 impl Accelerator for Bvh {}
 impl Accelerator for Brute {}
+#[cfg(feature = "embree")]
+impl Accelerator for crate::trace::embree::Embree {}
 
 impl<I: Index> Accelerator for Accelerated<I> {
     fn locate(&self, point: Vec3) -> Option<Cell> {
@@ -84,10 +87,7 @@ impl Accel {
     /// Builds it.
     pub fn build(self, world: &World, options: &Options) -> Built {
         match self {
-            Self::Bvh => {
-                let bvh = Bvh::build(world);
-                Built { bytes: bvh.bytes(), notes: Vec::new(), tracer: Box::new(bvh) }
-            }
+            Self::Bvh => Bvh::build(world).into(),
             Self::Brute => {
                 let brute = Brute::new(world);
                 Built { bytes: brute.bytes(), notes: Vec::new(), tracer: Box::new(brute) }
@@ -106,5 +106,29 @@ impl Built {
     fn over<I: Index + 'static>(world: &World, options: &Options) -> Self {
         let tracer = Accelerated::<I>::build(world, options);
         Self { bytes: tracer.bytes(), notes: tracer.notes(), tracer: Box::new(tracer) }
+    }
+}
+
+impl From<Bvh> for Built {
+    fn from(bvh: Bvh) -> Self {
+        Self { bytes: bvh.bytes(), notes: Vec::new(), tracer: Box::new(bvh) }
+    }
+}
+
+impl Tracer for Built {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.tracer.closest(ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.tracer.occluded(ray)
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
+        self.tracer.closest_batch(rays, hits, batch);
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
+        self.tracer.occluded_batch(rays, occluded, batch);
     }
 }

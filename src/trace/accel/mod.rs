@@ -35,20 +35,21 @@ use std::time::Duration;
 use super::nearest::Nearest;
 use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
-use crate::math::{Aabb, DVec3, UVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
 use items::{Boxes, Input, Items, Through, reach};
 use placed::{Placed, Spread, stray_of_shapes};
 use ray::{IndexRay, limit};
 
 pub use cell::Cell;
+pub use grid::Resolution;
 pub use kind::{Accel, Accelerator, Built};
 
 /// What an accelerator may be told.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Cells of the grid along each axis; none to have the number follow from that of the primitives.
-    pub grid: Option<UVec3>,
+    /// Cells of the grid; none to have the number follow from that of the primitives.
+    pub grid: Option<Resolution>,
     /// How long the BSP tree may be divided; 10 seconds where none is given. It does not change hits.
     pub bsp_time: Option<Duration>,
 }

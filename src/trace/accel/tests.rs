@@ -11,7 +11,7 @@ use super::items::{Boxes, Input, reach};
 use super::kd::KdTree;
 use super::octree::Octree;
 use super::ray::IndexRay;
-use super::{Accel, Index, Options};
+use super::{Accel, Index, Options, Resolution};
 use crate::lab::rays::Random;
 use crate::math::{Aabb, DVec3, UVec3, Vec3};
 use crate::scene::{Geometry, Mesh, Scene};
@@ -112,7 +112,8 @@ fn every_index_finds_what_rays_meet() {
     finds_what_it_must::<Octree>("octree", 0.08, &options);
     finds_what_it_must::<KdTree>("kd", 0.06, &options);
     finds_what_it_must::<Bsp>("bsp", 0.08, &options);
-    for counts in [UVec3::ONE, UVec3::new(1, 40, 3), UVec3::splat(65)] {
+    let [slices, cubes] = [Resolution::Axes(UVec3::new(1, 40, 3)), Resolution::Longest(65)];
+    for counts in [Resolution::Longest(1), slices, cubes] {
         finds_what_it_must::<Grid>("given grid", 1.1, &Options { grid: Some(counts), ..options.clone() });
     }
 }
@@ -172,7 +173,7 @@ fn points_are_in_the_one_cell_whose_planes_say_so() {
     let bsp = Bsp::build(&input, &Options::default());
     let mut random = Random::new(10, 0);
     let points: Vec<Vec3> = (0..3000).map(|_| random.vector() * 7.0).collect();
-    let on_triangles = corners.iter().flatten().copied();
+    let middles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
     for locate in [&(|p| kd.locate(p)) as &dyn Fn(Vec3) -> Option<super::Cell>, &|p| bsp.locate(p)] {
         let cells: Vec<_> = points.iter().map(|&p| locate(p).expect("inside of the bounds")).collect();
         let mut known: Vec<_> = cells.clone();
@@ -184,9 +185,9 @@ fn points_are_in_the_one_cell_whose_planes_say_so() {
                 known.iter().filter(|cell| cell.contains(point.as_dvec3())).map(|cell| cell.number).collect();
             assert_eq!(holding, [cell.number], "{point}");
         }
-        for (point, i) in on_triangles.clone().zip(0..) {
+        for (&point, i) in middles.iter().zip(0..) {
             let cell = locate(point).expect("inside of the bounds");
-            assert!(cell.items.contains(&(i / 3)), "corner {point} of {} in {:?}", i / 3, cell.items);
+            assert!(cell.items.contains(&i), "{point} of {i} in {:?}", cell.items);
         }
         assert!(locate(Vec3::splat(100.0)).is_none());
     }
