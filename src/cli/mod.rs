@@ -3,6 +3,7 @@
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
+mod accel;
 mod bench;
 mod build;
 mod cache;

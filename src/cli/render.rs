@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use super::accel::AccelArgs;
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
@@ -20,6 +21,7 @@ use crate::math::{DVec3, Vec3};
 use crate::plan::BuildChoice;
 use crate::render::{Filter, Renderer, Sampling, Settings, TileOrder};
 use crate::scene::{Geometry, Light, Request, Scene};
+use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
 use crate::trace::{Batch, Primitives, Width, World};
 
@@ -31,6 +33,7 @@ Examples:
   twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
   twincast render large.ply --cache ~/.cache/twincast -o large.png
+  twincast render bunny.glb --accel kd-tree -o bunny.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -94,6 +97,9 @@ pub(super) struct RenderArgs {
     packet: Option<Packet>,
 
     #[command(flatten)]
+    accel: AccelArgs,
+
+    #[command(flatten)]
     build: BuildArgs,
 
     #[command(flatten)]
@@ -149,6 +155,12 @@ enum Order {
 
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
+    let accel = args.accel.choose(args.backend, Some(&args.build), &args.cache)?;
+    if args.backend == BackendArg::Both && accel.0 != Accel::Bvh {
+        let name = accel.0.name();
+        let problem = "renders by itself; twincast compare --accel holds it against Embree";
+        return Err(Error::Usage(format!("--accel {name} {problem}")));
+    }
     let cancel = interrupt::install()?;
     if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
@@ -190,8 +202,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 
         let pixels = u64::from(width) * u64::from(height);
         let stored = stored_triangles(&world);
-        let build =
-            args.build.choose(args.backend, stored, pixels * u64::from(settings.spp), pixels, renderer.plan())?;
+        // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
+        let build = match accel.0 {
+            Accel::Bvh => {
+                let samples = pixels * u64::from(settings.spp);
+                args.build.choose(args.backend, stored, samples, pixels, renderer.plan())?
+            }
+            _ => None,
+        };
         let job = Job {
             world: &world,
             renderer: &renderer,
@@ -199,6 +217,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
+            accel: &accel,
             cache: cache.as_ref(),
         };
         let outcome = job.run(args.backend)?;
@@ -331,6 +350,9 @@ impl RenderArgs {
         for engine in &stats.engines {
             let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
             summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
+            for note in &engine.notes {
+                summary.line("built", note);
+            }
             if self.verbose {
                 if let Some(cache) = &engine.cache {
                     summary.line("cache", cache);
