@@ -17,9 +17,11 @@ mod interrupt;
 mod man;
 mod metadata;
 mod outputs;
+mod picture;
 mod progress;
 mod render;
 mod report;
+mod summary;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
