@@ -7,12 +7,17 @@
 
 mod check;
 mod compact;
+mod course;
 mod gltf;
+mod nff;
 mod obj;
+mod parts;
 mod ply;
 mod polygon;
 mod records;
+mod statement;
 mod stl;
+mod suggest;
 mod text;
 mod texture;
 mod weld;
@@ -22,9 +27,9 @@ use std::sync::Arc;
 
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Mesh, Scene};
+use crate::scene::{Attenuation, Geometry, Light, Mesh, Scene};
 
 /// How a file is understood.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,7 +82,7 @@ pub enum Normals {
 type Placeless<T> = std::result::Result<T, String>;
 
 /// The suffixes that [`load`] knows.
-pub const SUFFIXES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+pub const SUFFIXES: [&str; 7] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test"];
 
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
@@ -109,9 +114,11 @@ pub fn load_watched(
     let mut warnings = Vec::new();
     let mut scene = match suffix.as_str() {
         "glb" | "gltf" => gltf::load(path, &file, &mut warnings)?,
+        "nff" => nff::load(path, &file, &mut warnings)?,
         "obj" => obj::load(path, &file, &mut warnings)?,
         "ply" => ply::load(path, &file, &mut warnings)?,
         "stl" => stl::load(path, &file, &mut warnings)?,
+        "test" => course::load(path, &file)?,
         _ => {
             let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
             return Err(Error::input(path, "", message));
@@ -184,6 +191,15 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
         Geometry::Mesh(mesh) => Some(mesh),
         Geometry::Shapes { .. } => None,
     })
+}
+
+/// Of formats that describe all light: where a file has no lights there is darkness, a light of no colour. With none at
+/// all the renderer would add a headlight, which is for formats that know shapes alone.
+fn light_or_darkness(lights: &mut Vec<Light>) {
+    if lights.is_empty() {
+        let (position, color, attenuation) = (DVec3::ZERO, Vec3::ZERO, Attenuation::NONE);
+        lights.push(Light::Point { position, color, attenuation, range: f64::INFINITY, radius: 0.0 });
+    }
 }
 
 /// What the system says about a file, as a message.
