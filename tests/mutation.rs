@@ -13,7 +13,7 @@ use twincast::World;
 use twincast::io::{LoadOptions, Normals, load};
 
 use crate::allocation;
-use crate::io::{course, gltf, model, nff, obj, ply, stl};
+use crate::io::{course, gltf, model, nff, obj, ply, stl, toml};
 
 /// Broken files in all, over all seeds of the corpus.
 const FILES: usize = 24_000;
@@ -56,6 +56,7 @@ fn corpus() -> Vec<Seed> {
         seed("stl binary", "stl", stl::binary(b"solid")),
         seed("course", "test", course::TEXT.into()),
         seed("nff", "nff", nff::TEXT.into()),
+        seed("toml", "toml", toml::text().into()),
         seed("gltf", "gltf", gltf::rich().into()),
         seed("glb", "glb", gltf::glb(gltf::rich_with_binary(), &gltf::triangle_bytes())),
     ];

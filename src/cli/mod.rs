@@ -12,6 +12,7 @@ mod completions;
 mod engine;
 mod info;
 mod interrupt;
+mod make;
 mod man;
 mod metadata;
 mod outputs;
@@ -42,6 +43,7 @@ enum Command {
     Compare(compare::CompareArgs),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
+    Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -53,6 +55,7 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Bench(args) => bench::run(args),
             Self::Info(args) => info::run(args),
+            Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

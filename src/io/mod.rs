@@ -15,15 +15,19 @@ mod parts;
 mod ply;
 mod polygon;
 mod records;
+mod save;
 mod statement;
 mod stl;
 mod suggest;
 mod text;
 mod texture;
+mod toml;
 mod weld;
 
 use std::path::Path;
 use std::sync::Arc;
+
+pub use self::save::{SAVE_SUFFIXES, save};
 
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
@@ -43,7 +47,7 @@ pub struct LoadOptions {
 }
 
 /// The axis that points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UpAxis {
     /// +y, as in glTF.
     #[default]
@@ -53,7 +57,7 @@ pub enum UpAxis {
 }
 
 /// The length unit of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Unit {
     /// 1 m.
     #[default]
@@ -67,7 +71,7 @@ pub enum Unit {
 }
 
 /// Where shading normals come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Normals {
     /// The file's; flat where it has none (and, in OBJ, smooth where it has smoothing groups).
     #[default]
@@ -82,7 +86,7 @@ pub enum Normals {
 type Placeless<T> = std::result::Result<T, String>;
 
 /// The suffixes that [`load`] knows.
-pub const SUFFIXES: [&str; 7] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test"];
+pub const SUFFIXES: [&str; 8] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test", "toml"];
 
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
@@ -119,6 +123,7 @@ pub fn load_watched(
         "ply" => ply::load(path, &file, &mut warnings)?,
         "stl" => stl::load(path, &file, &mut warnings)?,
         "test" => course::load(path, &file)?,
+        "toml" => toml::load(path, &file, &mut warnings)?,
         _ => {
             let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
             return Err(Error::input(path, "", message));
