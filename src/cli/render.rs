@@ -18,7 +18,7 @@ use crate::image::{self, Image};
 use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::plan::BuildChoice;
-use crate::render::{Renderer, Settings, TileOrder};
+use crate::render::{Filter, Renderer, Sampling, Settings, TileOrder};
 use crate::scene::{Geometry, Light, Request, Scene};
 use crate::trace::bvh::Preset;
 use crate::trace::{Batch, Primitives, Width, World};
@@ -76,6 +76,14 @@ pub(super) struct RenderArgs {
     /// Chooses among equally good sample patterns (default: the scene's, else 0)
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+
+    /// How samples are spread: sobol, blue-noise, halton, stratified or independent
+    #[arg(long, value_name = "NAME", default_value_t)]
+    sampler: Sampling,
+
+    /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
+    #[arg(long, value_name = "NAME", default_value_t)]
+    filter: Filter,
 
     /// Write times, rays, rays a second and memory as JSON
     #[arg(long, value_name = "FILE.json", requires = "output")]
@@ -248,6 +256,8 @@ impl RenderArgs {
             height: rows,
             spp: self.spp.or(request.spp).unwrap_or(usual.spp),
             seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            sampling: self.sampler,
+            filter: self.filter,
             max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
             batch: Batch { width, coherent: true },
             tile_order: match self.tile_order {

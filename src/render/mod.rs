@@ -6,6 +6,7 @@
 mod camera;
 mod counted;
 mod film;
+mod filter;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
@@ -14,11 +15,13 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
+pub use filter::Filter;
+pub use sampler::Sampling;
 pub use tiles::TileOrder;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{Vec3, Vec4};
+use crate::math::{DVec2, Vec3, Vec4};
 use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
@@ -26,7 +29,8 @@ use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
 use camera::Pinhole;
 use film::Film;
-use sampler::Sampler;
+use filter::FilterSampler;
+use sampler::{Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
@@ -44,6 +48,10 @@ pub struct Settings {
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How samples become a pixel.
+    pub filter: Filter,
     /// How rays are bundled; never changes a native picture.
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
@@ -62,6 +70,8 @@ impl Default for Settings {
             height: 720,
             spp: 4,
             seed: 0,
+            sampling: Sampling::default(),
+            filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
@@ -87,6 +97,7 @@ pub struct Renderer<'a> {
     plan: Plan,
     pinhole: Pinhole,
     sampler: Sampler,
+    filter: FilterSampler,
     lights: Vec<LightSource>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
@@ -101,7 +112,7 @@ impl<'a> Renderer<'a> {
     /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
     /// angle of view outside (0, 180) degrees.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
-        let Settings { width, height, spp, seed, .. } = settings;
+        let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         for side in [width, height] {
             if side == 0 || side > LARGEST_SIDE {
                 let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
@@ -119,7 +130,9 @@ impl<'a> Renderer<'a> {
             scene,
             world,
             pinhole,
-            sampler: Sampler::new(spp, seed),
+            sampler: Sampler::new(sampling, spp, seed),
+            // A single sample is the pixel's middle, whatever the filter.
+            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
             lights: Vec::new(),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
@@ -196,8 +209,15 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and its weight.
+    #[inline]
+    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, f32) {
+        let (within, weight) = self.filter.place(self.sampler.film(pixel, sample));
+        (pixel.corner() + within, weight)
+    }
+
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        self.pinhole.ray(self.sampler.place(&self.sampler.pattern(x, y), sample))
+        self.pinhole.ray(self.place(&self.sampler.pattern(x, y), sample).0)
     }
 }

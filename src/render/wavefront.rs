@@ -83,13 +83,26 @@ impl Renderer<'_> {
             buffers.radiance.clear();
             buffers.radiance.resize(tile.len(), Vec4::ZERO);
             self.radiance(tracer, 0, 0, buffers);
-            for (sum, radiance) in buffers.sums.iter_mut().zip(&buffers.radiance) {
-                *sum += *radiance;
+            let Buffers { patterns, sums, radiance, .. } = &mut *buffers;
+            for ((sum, radiance), pixel) in sums.iter_mut().zip(radiance).zip(patterns) {
+                let negative = self.filter.has_negative() && self.place(pixel, sample).1 < 0.0;
+                *sum += if negative { -*radiance } else { *radiance };
             }
         }
-        // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples.
-        buffers.sums.iter_mut().for_each(|sum| *sum /= self.settings.spp as f32);
+        for (sum, pixel) in buffers.sums.iter_mut().zip(&buffers.patterns) {
+            // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples.
+            *sum /= self.total_weight(pixel);
+        }
         &buffers.sums
+    }
+
+    /// The sum of a pixel's sample weights; 1 where they cancel out.
+    fn total_weight(&self, pixel: &Pattern) -> f32 {
+        let spp = self.settings.spp;
+        if !self.filter.has_negative() {
+            return spp as f32;
+        }
+        (0..spp).map(|sample| self.place(pixel, sample).1).sum::<f32>().max(1.0)
     }
 
     /// How many camera rays of a tile hit something.
@@ -113,7 +126,7 @@ impl Renderer<'_> {
         let Buffers { patterns, waves, hits, .. } = buffers;
         waves.resize_with(waves.len().max(1), Wave::default);
         let Wave { rays, paths } = &mut waves[0];
-        let place = |pixel: &Pattern| self.sampler.place(pixel, sample);
+        let place = |pixel: &Pattern| self.place(pixel, sample).0;
         // None of them is cleared: every one is written.
         rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
         hits.resize(patterns.len(), None);
