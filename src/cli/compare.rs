@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::cache::CacheArgs;
-use super::common::{CameraArgs, SceneArgs, Size};
+use super::camera::CameraArgs;
+use super::common::{SceneArgs, Size};
 use super::engine::BackendArg;
 use crate::error::Result;
 

@@ -54,7 +54,7 @@ pub(super) struct Pass {
     pub(super) render_seconds: f64,
     /// Bytes the engine uses for the scene.
     pub(super) bytes: usize,
-    pub(super) camera_rays: u64,
+    pub(super) closest_rays: u64,
     pub(super) shadow_rays: u64,
     /// What became of the native tree's file.
     pub(super) cache: Option<CacheReport>,
@@ -162,10 +162,10 @@ impl Job<'_> {
         let render_seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
 
-        let (camera_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
+        let (closest_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
         let bytes = bytes(&tracer);
         let image = image?;
-        let pass = Pass { engine, image, build_seconds, render_seconds, bytes, camera_rays, shadow_rays, cache: None };
+        let pass = Pass { engine, image, build_seconds, render_seconds, bytes, closest_rays, shadow_rays, cache: None };
         Ok((tracer, pass))
     }
 }

@@ -6,6 +6,7 @@
 mod bench;
 mod build;
 mod cache;
+mod camera;
 mod common;
 mod compare;
 mod completions;

@@ -7,17 +7,19 @@ use clap::{Args, ValueEnum};
 
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
-use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
+use super::camera::{CameraArgs, camera_flags};
+use super::common::{SceneArgs, Size, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
 use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_memory, size, time};
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
+use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::plan::BuildChoice;
-use crate::render::{Renderer, Settings, TileOrder};
-use crate::scene::{Geometry, Light, Scene};
+use crate::render::{Filter, Renderer, Sampling, Settings, TileOrder};
+use crate::scene::{Geometry, Light, Request, Scene};
 use crate::trace::bvh::Preset;
 use crate::trace::{Batch, Primitives, Width, World};
 
@@ -34,21 +36,26 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
 
-    /// Picture to write; the suffix decides the format (may be repeated)
-    #[arg(short, long, value_name = "FILE", required_unless_present = "print_camera")]
+    /// Picture to write; the suffix decides the format (may be repeated; default: what the scene names, in the current
+    /// folder)
+    #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
 
     /// Engine
     #[arg(long, value_enum, default_value_t)]
     backend: BackendArg,
 
-    /// Pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720")]
-    size: Size,
+    /// Pixels (default: the scene's, else 1280x720)
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
 
-    /// Samples a pixel; 1 is the pixel's centre
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    spp: u32,
+    /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    spp: Option<u32>,
+
+    /// How often a ray may be mirrored or refracted; what it would see after that is black (default: the scene's, else 5)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    max_depth: Option<u32>,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -66,9 +73,17 @@ pub(super) struct RenderArgs {
     #[arg(short, long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     threads: usize,
 
-    /// Chooses among equally good sample patterns
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// Chooses among equally good sample patterns (default: the scene's, else 0)
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// How samples are spread: sobol, blue-noise, halton, stratified or independent
+    #[arg(long, value_name = "NAME", default_value_t)]
+    sampler: Sampling,
+
+    /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
+    #[arg(long, value_name = "NAME", default_value_t)]
+    filter: Filter,
 
     /// Write times, rays, rays a second and memory as JSON
     #[arg(long, value_name = "FILE.json", requires = "output")]
@@ -135,13 +150,12 @@ enum Order {
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     let cancel = interrupt::install()?;
-    outputs::check(
-        &args.output,
-        &args.stats,
-        [Some(&args.scene.scene), args.reference.as_ref()].into_iter().flatten(),
-    )?;
+    if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
+        return Err(no_picture());
+    }
+    outputs::check(&args.output, &args.stats, args.inputs())?;
     let cache = args.cache.open(args.backend)?;
-    let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
+    let reference = args.reference.as_deref().map(image::read).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
@@ -155,25 +169,29 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
-        let aspect = f64::from(args.size.width) / f64::from(args.size.height);
+        let settings = args.settings(&scene.request);
+        let (width, height) = (settings.width, settings.height);
+        args.check_reference(reference.as_ref(), width, height)?;
+        let pictures = args.pictures(&scene.request)?;
+        let aspect = f64::from(width) / f64::from(height);
         let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
         if args.print_camera {
             say(camera_flags(&camera, &scene.bounds()))?;
-            if args.output.is_empty() {
+            if pictures.is_empty() {
                 return Ok(());
             }
         }
 
         let start = Instant::now();
         let world = World::new(&scene)?;
-        let settings = args.settings();
         let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
         let prepare_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let pixels = u64::from(width) * u64::from(height);
         let stored = stored_triangles(&world);
-        let build = args.build.choose(args.backend, stored, pixels * u64::from(args.spp), pixels, renderer.plan())?;
+        let build =
+            args.build.choose(args.backend, stored, pixels * u64::from(settings.spp), pixels, renderer.plan())?;
         let job = Job {
             world: &world,
             renderer: &renderer,
@@ -188,13 +206,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 
         let start = Instant::now();
         let metadata = metadata(&camera, &settings, picture.render_seconds);
-        outputs::write_pictures(&args.output, &picture.image, &metadata)?;
+        outputs::write_pictures(&pictures, &picture.image, &metadata)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
             triangles: placed_triangles(&scene),
-            size: [settings.width, settings.height],
+            size: [width, height],
             spp: settings.spp,
             threads: rayon::current_num_threads(),
             packet: settings.batch.width.rays(),
@@ -202,20 +220,30 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             prepare_seconds,
             write_seconds,
             peak_memory: peak_memory(),
-            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
+            engines: outcome
+                .passes
+                .iter()
+                .map(|pass| EngineStats::new(pass, stored, pixels * u64::from(settings.spp)))
+                .collect(),
         };
         if let Some(path) = &args.stats {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            say(args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats))?;
+            let mut summary = args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats);
+            pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
+            say(summary)?;
         }
         args.judge(&outcome, reference.as_ref())
     })
 }
 
 impl RenderArgs {
-    fn settings(&self) -> Settings {
+    /// What the flags say, else the scene's file, else what is usual.
+    fn settings(&self, request: &Request) -> Settings {
+        let usual = Settings::default();
+        let size = self.size.map(|size| [size.width, size.height]).or(request.size);
+        let [columns, rows] = size.unwrap_or([usual.width, usual.height]);
         let width = match self.packet {
             None => self.backend.best_width(),
             Some(Packet::One) => Width::One,
@@ -224,10 +252,13 @@ impl RenderArgs {
             Some(Packet::Sixteen) => Width::Sixteen,
         };
         Settings {
-            width: self.size.width,
-            height: self.size.height,
-            spp: self.spp,
-            seed: self.seed,
+            width: columns,
+            height: rows,
+            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
+            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            sampling: self.sampler,
+            filter: self.filter,
+            max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
             batch: Batch { width, coherent: true },
             tile_order: match self.tile_order {
                 Order::Scanline => TileOrder::Scanline,
@@ -236,6 +267,36 @@ impl RenderArgs {
             },
             background: self.background,
         }
+    }
+
+    /// The pictures to write: those of the flags, else the one that the scene names.
+    fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
+        if !self.output.is_empty() || self.print_camera {
+            return Ok(self.output.clone());
+        }
+        // Of what a scene names the folder is left out: a scene must not choose whose files are replaced.
+        let named = request.output.as_ref().and_then(|name| Path::new(name).file_name());
+        let Some(picture) = named.map(PathBuf::from) else {
+            return Err(no_picture());
+        };
+        let pictures = vec![picture];
+        outputs::check(&pictures, &self.stats, self.inputs())?;
+        Ok(pictures)
+    }
+
+    /// The files it reads.
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        [Some(&self.scene.scene), self.reference.as_ref()].into_iter().flatten()
+    }
+
+    fn check_reference(&self, reference: Option<&Image>, width: u32, height: u32) -> Result<()> {
+        let (Some(picture), Some(path)) = (reference, &self.reference) else { return Ok(()) };
+        if (picture.width, picture.height) == (width, height) {
+            return Ok(());
+        }
+        let own = format_args!("{}x{}", picture.width, picture.height);
+        let message = format!("--reference {}: it is {own}, and the picture {width}x{height}", path.display());
+        Err(Error::Usage(message))
     }
 
     fn summary(
@@ -274,19 +335,20 @@ impl RenderArgs {
                 if let Some(cache) = &engine.cache {
                     summary.line("cache", cache);
                 }
-                let Rays { camera, shadow } = &engine.rays;
+                let Rays { camera, sent_on, shadow } = &engine.rays;
                 let speed = engine.rays_per_second / 1e6;
                 let (camera, shadow) = (grouped(*camera), grouped(*shadow));
-                summary.line("rays", format_args!("{camera} camera + {shadow} shadow, {speed:.2} million a second"));
+                let sent_on = if *sent_on > 0 { format!(" + {} sent on", grouped(*sent_on)) } else { String::new() };
+                summary.line(
+                    "rays",
+                    format_args!("{camera} camera{sent_on} + {shadow} shadow, {speed:.2} million a second"),
+                );
                 let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
                 summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
             }
         }
         if let (true, Some(peak)) = (self.verbose, stats.peak_memory) {
             summary.line("peak", format_args!("{} of memory for everything", size(peak)));
-        }
-        for path in self.output.iter().chain(&self.stats) {
-            summary.line("wrote", path.display());
         }
         summary
     }
@@ -312,13 +374,8 @@ impl RenderArgs {
     }
 }
 
-fn read_reference(path: &Path, size: Size) -> Result<Image> {
-    let picture = image::read(path)?;
-    if (picture.width, picture.height) == (size.width, size.height) {
-        return Ok(picture);
-    }
-    let (own, Size { width, height }) = (format_args!("{}x{}", picture.width, picture.height), size);
-    Err(Error::Usage(format!("--reference {}: it is {own} and --size is {width}x{height}", path.display())))
+fn no_picture() -> Error {
+    Error::Usage("no picture to write: name one with --output FILE; the scene names none".to_owned())
 }
 
 fn placed_triangles(scene: &Scene) -> u64 {

@@ -45,18 +45,20 @@ pub(super) struct EngineStats {
 #[derive(Debug, Serialize)]
 pub(super) struct Rays {
     pub(super) camera: u64,
+    /// Mirrored and refracted.
+    pub(super) sent_on: u64,
     pub(super) shadow: u64,
 }
 
 impl EngineStats {
-    /// `stored` triangles were built.
-    pub(super) fn new(pass: &Pass, stored: u64) -> Self {
-        let rays = Rays { camera: pass.camera_rays, shadow: pass.shadow_rays };
+    /// `stored` triangles were built, and `camera` rays began at the camera.
+    pub(super) fn new(pass: &Pass, stored: u64, camera: u64) -> Self {
+        let rays = Rays { camera, sent_on: pass.closest_rays - camera, shadow: pass.shadow_rays };
         Self {
             backend: pass.engine.clone(),
             build_seconds: pass.build_seconds,
             render_seconds: pass.render_seconds,
-            rays_per_second: (rays.camera + rays.shadow) as f64 / pass.render_seconds.max(1e-9),
+            rays_per_second: (pass.closest_rays + pass.shadow_rays) as f64 / pass.render_seconds.max(1e-9),
             rays,
             bytes: pass.bytes,
             bytes_per_triangle: (stored > 0).then(|| pass.bytes as f64 / stored as f64),

@@ -88,6 +88,16 @@ type Placeless<T> = std::result::Result<T, String>;
 /// The suffixes that [`load`] knows.
 pub const SUFFIXES: [&str; 8] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test", "toml"];
 
+/// Whether a file of this name may say where its picture is to be written ([`Request::output`](crate::scene::Request)).
+pub(crate) fn may_name_a_picture(path: &Path) -> bool {
+    matches!(suffix(path).as_str(), "test" | "toml")
+}
+
+/// What decides the format, in lower case.
+fn suffix(path: &Path) -> String {
+    path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
 /// What is odd but can be rendered comes back as warnings: a missing texture, triangles with corners that are not
@@ -109,7 +119,7 @@ pub fn load_watched(
     options: &LoadOptions,
     on_bytes: Option<&(dyn Fn(u64) + Sync)>,
 ) -> Result<(Scene, Vec<Warning>)> {
-    let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let suffix = suffix(path);
     // First, so that a directory, a missing or an empty file is called that, whatever its name.
     let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(on_bytes);
     if file.is_empty() {

@@ -20,13 +20,12 @@ pub(super) struct Pinhole {
 }
 
 impl Pinhole {
-    /// `centre` is [`World::centre`](crate::World).
-    pub(super) fn new(camera: &Camera, centre: DVec3, width: u32, height: u32) -> Self {
+    /// `centre` is [`World::centre`](crate::World). None for angles of view that cannot be.
+    pub(super) fn new(camera: &Camera, centre: DVec3, width: u32, height: u32) -> Option<Self> {
         let size = DVec2::new(f64::from(width), f64::from(height));
-        let half_y = libm::tan(camera.fov_y / 2.0);
-        let half = DVec2::new(half_y * size.x / size.y, half_y);
+        let half = camera.fov.half_extent(size.x / size.y)?;
         let shift = camera.shift * DVec2::new(2.0, -2.0);
-        Self { origin: (camera.eye - centre).as_vec3(), frame: camera.frame, size, half, shift }
+        Some(Self { origin: (camera.eye - centre).as_vec3(), frame: camera.frame, size, half, shift })
     }
 
     /// The ray through a point of the film in pixels, from its top left corner; with a unit direction.
@@ -65,7 +64,7 @@ mod tests {
         let eye = DVec3::new(3.0, 1.0 / 3.0, -7.1);
         for (i, up) in [DVec3::Y, DVec3::new(0.3, -1.0, 0.2)].into_iter().enumerate() {
             let camera = Camera::look_at(eye, DVec3::splat(0.1), up, 0.3 + i as f64).expect("a view");
-            let pinhole = Pinhole::new(&camera, DVec3::ONE, 1000, 77);
+            let pinhole = Pinhole::new(&camera, DVec3::ONE, 1000, 77).expect("a view");
             for step in 0..500 {
                 let film: [DVec2; 16] = std::array::from_fn(|k| {
                     DVec2::new(f64::from(step) * 2.0 + 0.37, k as f64 * 4.9 + f64::from(step) / 97.0)

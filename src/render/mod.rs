@@ -6,6 +6,7 @@
 mod camera;
 mod counted;
 mod film;
+mod filter;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
@@ -14,11 +15,13 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
+pub use filter::Filter;
+pub use sampler::Sampling;
 pub use tiles::TileOrder;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{Vec3, Vec4};
+use crate::math::{DVec2, Vec3, Vec4};
 use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
@@ -26,7 +29,8 @@ use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
 use camera::Pinhole;
 use film::Film;
-use sampler::Sampler;
+use filter::FilterSampler;
+use sampler::{Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
@@ -44,25 +48,34 @@ pub struct Settings {
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How samples become a pixel.
+    pub filter: Filter,
     /// How rays are bundled; never changes a native picture.
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
+    /// How often a ray may be mirrored or refracted; what it would see after that is black.
+    pub max_depth: u32,
 }
 
 impl Default for Settings {
-    /// 1280 x 720 pixels of 4 samples.
+    /// 1280 x 720 pixels of 4 samples, 5 mirrors deep.
     fn default() -> Self {
         Self {
             width: 1280,
             height: 720,
             spp: 4,
             seed: 0,
+            sampling: Sampling::default(),
+            filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
+            max_depth: 5,
         }
     }
 }
@@ -84,6 +97,7 @@ pub struct Renderer<'a> {
     plan: Plan,
     pinhole: Pinhole,
     sampler: Sampler,
+    filter: FilterSampler,
     lights: Vec<LightSource>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
@@ -98,7 +112,7 @@ impl<'a> Renderer<'a> {
     /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
     /// angle of view outside (0, 180) degrees.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
-        let Settings { width, height, spp, seed, .. } = settings;
+        let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         for side in [width, height] {
             if side == 0 || side > LARGEST_SIDE {
                 let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
@@ -108,16 +122,17 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
-        if !(camera.fov_y > 0.0 && camera.fov_y < std::f64::consts::PI) {
-            let degrees = camera.fov_y.to_degrees();
-            return Err(Error::Usage(format!("angle of view {degrees}: must be above 0 and below 180 degrees")));
-        }
-        let plan = Plan::new(scene, world, settings.background);
+        let pinhole = Pinhole::new(&camera, world.centre, width, height).ok_or_else(|| {
+            Error::Usage(format!("angle of view {}: must be above 0 and below 180 degrees", camera.fov))
+        })?;
+        let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
-            pinhole: Pinhole::new(&camera, world.centre, width, height),
-            sampler: Sampler::new(spp, seed),
+            pinhole,
+            sampler: Sampler::new(sampling, spp, seed),
+            // A single sample is the pixel's middle, whatever the filter.
+            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
             lights: Vec::new(),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
@@ -194,8 +209,15 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and its weight.
+    #[inline]
+    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, f32) {
+        let (within, weight) = self.filter.place(self.sampler.film(pixel, sample));
+        (pixel.corner() + within, weight)
+    }
+
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        self.pinhole.ray(self.sampler.place(&self.sampler.pattern(x, y), sample))
+        self.pinhole.ray(self.place(&self.sampler.pattern(x, y), sample).0)
     }
 }

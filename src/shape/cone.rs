@@ -5,10 +5,10 @@
 //! w = d x (r0 a + k f), which follows from Lagrange's identity. It cancels only where the line touches the cone, and
 //! no point is squared that lies farther away than it must.
 
+use super::InvalidShape;
 use super::axis::Frustum;
 use super::line::{Line, Roots};
 use super::quadric::Quadric;
-use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, plus, times, vector};
 use crate::math::{Aabb, DVec3, Vec2, Vec3};
 use crate::ray::Ray;
@@ -55,8 +55,8 @@ impl Cone {
     }
 
     pub(super) fn translated(&self, offset: DVec3) -> Self {
-        let moved = |p: Vec3| in_f32(p.as_dvec3() + offset);
-        Self { base: moved(self.base), apex: moved(self.apex), ..*self }
+        let [base, apex] = self.frustum().moved_ends(offset);
+        Self { base, apex, ..*self }
     }
 
     #[inline]
@@ -121,17 +121,14 @@ impl Formula<1> for Widening<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quadric::tests::assert_discriminant;
+    use super::super::quadric::tests::assert_discriminants;
     use super::*;
 
     #[test]
     fn the_short_discriminant_is_the_discriminant() {
-        for i in 0..50 {
-            let x = i as f32;
-            let v = |k: f32| Vec3::new((x * k).sin(), x + k, (x + k * k).cos());
-            let line = Line::new(&Ray::new(v(1.0), v(2.1)), 8.0);
-            let radii = [0.3, f64::from((x * 0.1).sin().abs())];
-            assert_discriminant(&Seen { base: line.place(v(0.3)), apex: line.place(v(0.7)), radii, line });
+        for apex_radius in [0.0, 0.2, 0.3, 1.7] {
+            let radii = [0.3, apex_radius];
+            assert_discriminants(|line, v| Seen { base: v(0.3), apex: v(0.7), radii, line });
         }
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Attenuation, Filter, Light, Wrap};
+use twincast::scene::{Attenuation, Filter, Fov, Light, Wrap};
 
 use super::{Files, corners, meshes, obj, refused};
 
@@ -148,7 +148,7 @@ fn everything_is_where_it_belongs() {
         assert_eq!((texture.name.as_str(), &texture.pixels[..]), ("two", &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
 
         let eye = &scene.cameras[0];
-        assert_eq!((eye.name.as_str(), eye.eye, eye.fov_y), ("eye", DVec3::new(0.0, 0.0, 4.0), 0.5));
+        assert_eq!((eye.name.as_str(), eye.eye, eye.fov), ("eye", DVec3::new(0.0, 0.0, 4.0), Fov::Vertical(0.5)));
         assert_eq!(eye.frame, twincast::math::DMat3::IDENTITY);
         let pi = std::f32::consts::PI;
         let [Light::Spot { position, direction, color, inner_angle, outer_angle, .. }, sun, bulb] = &scene.lights[..]

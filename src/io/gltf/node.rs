@@ -6,7 +6,7 @@ use super::Document;
 use super::schema::{Camera as CameraSource, Lights, Node};
 use crate::error::{Result, Warning};
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
-use crate::scene::{Attenuation, Camera, Instance, Light, Scene};
+use crate::scene::{Attenuation, Camera, Fov, Instance, Light, Scene};
 
 /// Places everything that the document's scene (the first, where it names none) shows. `groups` has the group of each
 /// mesh.
@@ -135,7 +135,7 @@ fn make_camera(
     };
     let name = if node.name.is_empty() { source.name.clone() } else { node.name.clone() };
     let frame = DMat3::from_cols(right, back.cross(right), back);
-    Ok(Some(Camera { name, eye: transform.translation, frame, fov_y, shift: DVec2::ZERO }))
+    Ok(Some(Camera { name, eye: transform.translation, frame, fov: Fov::Vertical(fov_y), shift: DVec2::ZERO }))
 }
 
 /// The lights of `KHR_lights_punctual`, at the origin, along -z.
