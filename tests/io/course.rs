@@ -1,7 +1,7 @@
 //! The ray tracer course format.
 
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Attenuation, Geometry, Light, Scene};
+use twincast::scene::{Attenuation, Fov, Geometry, Light, Scene};
 use twincast::trace::bvh::Bvh;
 use twincast::{Ray, Shape, Tracer, World};
 
@@ -33,7 +33,7 @@ fn everything_arrives() {
         (Some([64, 48]), Some(3), Some("out.png"))
     );
     let camera = &scene.cameras[0];
-    assert!(close(camera.eye, [0.0, -4.0, 4.0]) && (camera.fov_y - 45f64.to_radians()).abs() < 1e-15);
+    assert!(close(camera.eye, [0.0, -4.0, 4.0]) && camera.fov == Fov::Vertical(45f64.to_radians()));
     assert!(close(-camera.frame.z_axis * 5.0, [0.0, 3.0, -4.0]), "it looks from eye to at");
 
     let Light::Directional { direction, color } = scene.lights[0] else { panic!("{:?}", scene.lights[0]) };
@@ -140,7 +140,7 @@ fn faults_are_told_with_line_word_and_remedy() {
         ("pushTransform\npopTransform\npopTransform\n", 3, "no pushTransform is left"),
         ("scale 1 0 1\n", 1, "no factor may be 0"),
         ("rotate 0 0 0 90\n", 1, "no direction"),
-        ("camera 0 0 1 0 0 0 0 0 1 45\n", 1, "looks along its up"),
+        ("camera 0 0 1 0 0 1 0 0 1 45\n", 1, "are one point"),
         ("camera 0 0 1 0 0 0 0 1 0 180\n", 1, "below 180"),
         ("attenuation 0 0 0\n", 1, "divides by zero"),
         ("diffuse -1 0 0\n", 1, "from 0 up"),

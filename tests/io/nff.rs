@@ -2,7 +2,7 @@
 
 use twincast::Shape;
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Geometry, Light, Scene, Specular};
+use twincast::scene::{Fov, Geometry, Light, Scene, Specular};
 
 use super::{Files, corners, refused_bytes};
 
@@ -73,7 +73,8 @@ fn the_angle_is_between_the_centres_of_rows() {
     for rows in [2, 3, 60] {
         let text = TEXT.replace("resolution 80 60", &format!("resolution 7 {rows}"));
         let camera = &scene(&text).cameras[0];
-        let half = (camera.fov_y / 2.0).tan();
+        let Fov::Vertical(angle) = camera.fov else { panic!("{camera:?}") };
+        let half = (angle / 2.0).tan();
         let first = half * (1.0 - 1.0 / f64::from(rows));
         assert!((first.atan() - 20f64.to_radians()).abs() < 1e-14, "{rows}: {first}");
         assert!((-camera.frame.z_axis - DVec3::new(0.0, 8.0, -2.0).normalize()).length() < 1e-14);
@@ -117,9 +118,9 @@ fn faults_are_told_with_line_word_and_remedy() {
         (
             "v\nfrom 0 0 1\nat 0 0 0\nup 0 1 0\nangle 45\nresolution 4 4\nb 0 0 0\n",
             7,
-            "lacks the line \"hither distance\"",
+            "lacks the line \"hither\"",
         ),
-        ("v\nfrom 0 0 1\nat 0 0 0\nup 0 0 1\nangle 45\nhither 0\nresolution 4 4\n", 7, "looks along its up"),
+        ("v\nfrom 0 0 1\nat 0 0 1\nup 0 0 1\nangle 45\nhither 0\nresolution 4 4\n", 7, "are one point"),
         ("v\nangle 200\n", 2, "below 180"),
         ("f 1 1 1 1 0 0 0.5 0\n", 1, "an index of 0, but T is 0.5"),
         ("f 1 1 1 1 0 0 0\n", 1, "expected f r g b Kd Ks Shine T index"),

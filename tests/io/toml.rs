@@ -1,7 +1,7 @@
 //! Twincast's own scene format.
 
 use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{Geometry, Light, Scene, Specular};
+use twincast::scene::{Fov, Geometry, Light, Scene, Specular};
 use twincast::{Shape, World};
 
 use super::{Files, obj, refused, refused_bytes};
@@ -91,7 +91,16 @@ fn what_the_file_asks_of_a_render() {
         (camera.name.as_str(), camera.eye, camera.shift),
         ("front", DVec3::new(0.0, 1.0, 5.0), DVec2::new(0.25, 0.0))
     );
-    assert!((camera.fov_y - 40f64.to_radians()).abs() < 1e-15 && scene.lights.is_empty());
+    let Fov::Both { horizontal, vertical } = camera.fov else { panic!("{:?}", camera.fov) };
+    assert_eq!((horizontal, vertical), (60f64.to_radians(), 40f64.to_radians()));
+    assert!(scene.lights.is_empty());
+    let only = scene_of_camera("fov_x = 60\n");
+    assert_eq!(only.cameras[0].fov, Fov::Horizontal(60f64.to_radians()));
+    assert_eq!(scene_of_camera("").cameras[0].fov, Fov::Vertical(40f64.to_radians()));
+}
+
+fn scene_of_camera(keys: &str) -> Scene {
+    scene(&format!("[[camera]]\neye = [0, 1, 5]\nlook_at = [0, 0, 0]\n{keys}{SPHERE}"))
 }
 
 #[test]
@@ -209,7 +218,7 @@ fn faults_are_told_with_line_and_remedy() {
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
-        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\n", 1, "along its \"up\""),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
         ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",

@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
-use crate::math::{DAffine3, DMat3, Vec3};
-use crate::scene::{Attenuation, Camera, Geometry, Light, Material, Mesh, Scene, Specular};
+use crate::math::{DAffine3, DMat3, DVec2, Vec3};
+use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Scene, Specular};
 use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
@@ -36,6 +36,10 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             let what = "ambient light, emission, textures, Blinn's highlights, or highlights that are not as mirrors";
             return elsewhere(format!("{what} (material {:?})", material.name));
         }
+    }
+    let is_plain = |camera: &Camera| camera.shift == DVec2::ZERO && !matches!(camera.fov, Fov::Both { .. });
+    if !scene.cameras.iter().all(is_plain) {
+        return elsewhere("cameras with a shift or with pixels that are not square".to_owned());
     }
     let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, .. } if range.is_infinite());
     if scene.lights.iter().all(is_bare) {
@@ -90,8 +94,9 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
 fn view(camera: &Camera, width: u32, height: u32, out: &mut dyn Write) -> io::Result<()> {
     // From the edges of the picture to the centres of its first and last row.
     let rows = f64::from(height);
+    let half = camera.fov.half_extent(f64::from(width) / rows).map_or(1.0, |half| half.y);
     let share = if height > 1 { (rows - 1.0) / rows } else { 1.0 };
-    let angle = 2.0 * libm::atan(libm::tan(camera.fov_y / 2.0) * share);
+    let angle = 2.0 * libm::atan(half * share);
     let at = camera.eye - camera.frame.z_axis;
     writeln!(out, "v\nfrom {}\nat {}", spaced_f64(camera.eye), spaced_f64(at))?;
     writeln!(out, "up {}\nangle {}\nhither 0", spaced_f64(camera.frame.y_axis), angle.to_degrees())?;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::Unsayable;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
-use crate::scene::{Attenuation, Camera, Geometry, Light, Material, Mesh, Request, Scene, Specular};
+use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Request, Scene, Specular};
 use crate::shape::{Shape, Sphere};
 
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
@@ -106,7 +106,17 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
 fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(&camera.name), list_f64(camera.eye))?;
     let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
-    writeln!(out, "look_at = {}\nup = {}\nfov = {}", list_f64(at), list_f64(up), camera.fov_y.to_degrees())?;
+    writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
+    let (horizontal, vertical) = match camera.fov {
+        Fov::Vertical(vertical) => (None, Some(vertical)),
+        Fov::Horizontal(horizontal) => (Some(horizontal), None),
+        Fov::Both { horizontal, vertical } => (Some(horizontal), Some(vertical)),
+    };
+    for (key, angle) in [("fov_x", horizontal), ("fov", vertical)] {
+        if let Some(angle) = angle {
+            writeln!(out, "{key} = {}", angle.to_degrees())?;
+        }
+    }
     if camera.shift != DVec2::ZERO {
         writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;
     }

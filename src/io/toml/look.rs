@@ -1,11 +1,13 @@
 //! What is seen of shapes, and from where: materials, lights, cameras, and what the file asks of a render.
 
-use super::table::{Read, Table};
+use super::table::{Read, Table, Value};
 use crate::math::{DVec2, DVec3, Vec3};
-use crate::scene::{Attenuation, Camera, Light, Material, Request, Specular};
+use crate::scene::{Attenuation, Camera, Fov, Light, Material, Request, Specular};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u64 = 65_536;
+/// Vertical angle of view where none is given, degrees.
+const USUAL_FOV: f64 = 40.0;
 
 /// How lights and surfaces go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,17 +156,24 @@ fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
 pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     let (eye, target) = (table.need("eye")?.vector()?, table.need("look_at")?.vector()?);
     let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
-    let fov = table.optional("fov", |value| {
-        let degrees = value.number()?;
-        let inside = degrees > 0.0 && degrees < 180.0;
-        if inside { Ok(degrees) } else { Err(value.fault("\"fov\" wants degrees above 0 and below 180")) }
-    })?;
-    let fov_y = fov.unwrap_or(40.0).to_radians();
-    let mut camera = Camera::look_at(eye, target, up, fov_y).ok_or_else(|| {
-        table.fault("the camera looks along its \"up\", or nowhere: \"eye\" and \"look_at\" are one point")
-    })?;
+    let vertical = table.optional("fov", angle)?;
+    let horizontal = table.optional("fov_x", angle)?;
+    let mut camera = Camera::look_at(eye, target, up, vertical.unwrap_or(USUAL_FOV.to_radians()))
+        .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    camera.fov = match (horizontal, vertical) {
+        (None, _) => camera.fov,
+        (Some(horizontal), None) => Fov::Horizontal(horizontal),
+        (Some(horizontal), Some(vertical)) => Fov::Both { horizontal, vertical },
+    };
     camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
     camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
     table.finish()?;
     Ok(camera)
+}
+
+/// An angle of view, in radians.
+fn angle(value: Value<'_>) -> Read<f64> {
+    let degrees = value.number()?;
+    let inside = degrees > 0.0 && degrees < 180.0;
+    if inside { Ok(degrees.to_radians()) } else { Err(value.unlike("degrees above 0 and below 180")) }
 }

@@ -111,7 +111,8 @@ impl<'t> Value<'t> {
         Fault { at: self.at, message: message.into() }
     }
 
-    fn unlike(self, expected: &str) -> Fault {
+    /// Something else was expected.
+    pub(super) fn unlike(self, expected: &str) -> Fault {
         let found = match self.value {
             DeValue::String(text) => quoted(text.as_bytes()),
             DeValue::Integer(number) => quoted(number.as_str().as_bytes()),

@@ -30,8 +30,8 @@ const TUBES: [Tube; 3] = [
 ];
 
 /// Steps along each curve, and around.
-const STEPS: u32 = 10;
-const AROUND: u32 = 32;
+const STEPS: u32 = 8;
+const AROUND: u32 = 24;
 
 /// Standing on y = 0 about, 3.2 high, with smooth normals; the spout along +x.
 pub(super) fn mesh() -> Mesh {

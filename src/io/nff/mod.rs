@@ -8,16 +8,16 @@
 //! read and not used. All faces have two sides, so a negative radius, inside out, changes nothing but what a ray through
 //! glass takes for outside: there it is told in a warning.
 //!
-//! `angle` spans from the centre of the first row to that of the last. N rows are N / (N - 1) of that, by the tangents of
-//! the half angles.
-//!
 //! Triangles become meshes. Polygons stay polygons, concave or not; what is no polygon of one plane is divided into
 //! triangles, and told.
+
+mod view;
 
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use self::view::View;
 use super::parts::Parts;
 use super::polygon::triangulate;
 use super::statement::{Statement, statements};
@@ -26,8 +26,11 @@ use super::{Placeless, light_or_darkness};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Light, Material, Scene, Specular};
+use crate::scene::{Attenuation, Light, Material, Scene, Specular};
 use crate::shape::{Cone, Cylinder, Polygon, Shape, Sphere};
+
+/// What sets the material.
+const FILL: &str = "f r g b Kd Ks Shine T index";
 
 /// Every statement as it should look; the first word is the keyword.
 const USAGES: [&str; 14] = [
@@ -40,7 +43,7 @@ const USAGES: [&str; 14] = [
     "resolution width height",
     "b r g b",
     "l x y z [r g b]",
-    "f r g b Kd Ks Shine T index",
+    FILL,
     "c, then two lines: x y z radius",
     "s x y z radius",
     "p count, then a line for each corner: x y z",
@@ -129,16 +132,6 @@ impl Odd {
     }
 }
 
-#[derive(Default)]
-struct View {
-    from: Option<DVec3>,
-    at: Option<DVec3>,
-    up: Option<DVec3>,
-    angle: Option<f64>,
-    hither: Option<f64>,
-    resolution: Option<[u32; 2]>,
-}
-
 impl Reader {
     fn read<'a>(
         &mut self,
@@ -203,21 +196,9 @@ impl Reader {
     /// Makes a camera of the view whose lines have been read, if there is one.
     fn end_view(&mut self) -> Placeless<()> {
         let Some(view) = self.view.take() else { return Ok(()) };
-        let lacks = |what: &str| format!("the view above lacks the line {what:?}");
-        let from = view.from.ok_or_else(|| lacks(USAGES[1]))?;
-        let at = view.at.ok_or_else(|| lacks(USAGES[2]))?;
-        let up = view.up.ok_or_else(|| lacks(USAGES[3]))?;
-        let angle = view.angle.ok_or_else(|| lacks(USAGES[4]))?;
-        view.hither.ok_or_else(|| lacks(USAGES[5]))?;
-        let [width, height] = view.resolution.ok_or_else(|| lacks(USAGES[6]))?;
-        // A single row has no first and last; the angle is then that of the row.
-        let rows = f64::from(height);
-        let share = if height > 1 { rows / (rows - 1.0) } else { 1.0 };
-        let fov_y = 2.0 * libm::atan(libm::tan(angle.to_radians() / 2.0) * share);
-        let camera = Camera::look_at(from, at, up, fov_y);
-        let camera = camera.ok_or("the view looks along its up, or nowhere: from, at and up must make a plane")?;
+        let (camera, size) = view.camera()?;
         self.scene.cameras.push(camera);
-        self.scene.request.size.get_or_insert([width, height]);
+        self.scene.request.size.get_or_insert(size);
         Ok(())
     }
 
@@ -250,7 +231,7 @@ impl Reader {
 
     /// The material of a primitive that comes now.
     fn material(&self) -> Placeless<u32> {
-        self.material.ok_or_else(|| format!("a primitive before any {:?}, which says what it is made of", USAGES[9]))
+        self.material.ok_or_else(|| format!("a primitive before any {FILL:?}, which says what it is made of"))
     }
 
     fn shape(&mut self, shape: Shape, is_inside_out: bool, line: usize) -> Placeless<()> {
@@ -318,20 +299,6 @@ impl Reader {
         scene.lights = self.lights.into_iter().map(light).collect();
         light_or_darkness(&mut scene.lights);
         scene
-    }
-}
-
-impl View {
-    fn read(&mut self, word: &[u8], statement: &mut Statement<'_>) -> Placeless<()> {
-        match word {
-            b"from" => self.from = Some(statement.vector()?),
-            b"at" => self.at = Some(statement.vector()?),
-            b"up" => self.up = Some(statement.vector()?),
-            b"angle" => self.angle = Some(statement.angle_of_view()?),
-            b"hither" => self.hither = Some(statement.number()?),
-            _ => self.resolution = Some(statement.picture_size()?),
-        }
-        Ok(())
     }
 }
 
