@@ -10,6 +10,7 @@ mod embree;
 mod image;
 mod io;
 mod layering;
+mod minray;
 mod mutation;
 mod parity;
 mod queries;

@@ -15,7 +15,7 @@ use crate::scene::Scene;
 /// A scene file and how to read it.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SceneArgs {
-    /// Scene file: .glb, .gltf, .obj, .ply or .stl
+    /// Scene file: .glb, .gltf, .obj, .ply, .stl, .nff, .test or .toml
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
 

@@ -14,6 +14,7 @@ mod completions;
 mod engine;
 mod info;
 mod interrupt;
+mod make;
 mod man;
 mod metadata;
 mod outputs;
@@ -46,6 +47,7 @@ enum Command {
     Compare(compare::CompareArgs),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
+    Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -57,6 +59,7 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Bench(args) => bench::run(args),
             Self::Info(args) => info::run(args),
+            Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }
