@@ -224,6 +224,13 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"orthographic\"\n", 1, "\"height\""),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\ndistortion = [1, 0, 0, 0, 0]\n",
+            5,
+            "perspective cameras alone",
+        ),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0, focus = 1 }\n", 4, "a length above 0"),
         ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",
