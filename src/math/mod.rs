@@ -33,6 +33,15 @@ pub const fn gamma64(n: u32) -> f64 {
     nu / (1.0 - nu)
 }
 
+/// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al. 2017, *Building an orthonormal
+/// basis, revisited*).
+pub fn tangents(n: DVec3) -> [DVec3; 2] {
+    let sign = 1f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
+}
+
 /// Whether a vertex may take part in tracing: finite, and small enough not to overflow.
 pub fn is_traceable(p: Vec3) -> bool {
     // Written so that NaN gives false.
