@@ -17,7 +17,7 @@ const BINS: usize = 16;
 /// Most items that are left together because no split is worth it.
 const LEAF: usize = 8;
 /// What a node costs, in tests of an item.
-const NODE_COST: f32 = 0.5;
+const NODE_COST: f32 = 0.2;
 /// From this depth on halves are made, so that the tree is never deeper than [`STACK`].
 const DEEP: usize = 64;
 /// Halving 2^32 items takes 32 levels more.
