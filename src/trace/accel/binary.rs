@@ -77,11 +77,11 @@ impl Index for Binary {
                 let mut next = None;
                 // The far one first, so that it is what waits if both are entered.
                 for i in [1 - near, near] {
-                    if !ranges[i].is_empty() {
-                        if let Some(other) = next.replace((children[i], ranges[i].from)) {
-                            stack[waiting] = other;
-                            waiting += 1;
-                        }
+                    if !ranges[i].is_empty()
+                        && let Some(other) = next.replace((children[i], ranges[i].from))
+                    {
+                        stack[waiting] = other;
+                        waiting += 1;
                     }
                 }
                 if let Some((child, _)) = next {

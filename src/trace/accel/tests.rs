@@ -155,7 +155,7 @@ fn triangles(count: u64) -> Vec<[Vec3; 3]> {
     let mut random = Random::new(9, 0);
     let triangle = |i: u64| {
         let centre = random.direction() * 8.0;
-        let size = if i % 20 == 0 { 4.0 } else { 0.3 };
+        let size = if i.is_multiple_of(20) { 4.0 } else { 0.3 };
         [0; 3].map(|_| centre + random.vector() * size)
     };
     (0..count).map(triangle).collect()
