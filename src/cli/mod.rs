@@ -19,6 +19,7 @@ mod outputs;
 mod progress;
 mod render;
 mod report;
+mod scaling;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
