@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::accel::{AccelArg, AccelOptions};
 use super::common::UpAxis;
 use super::engine::BackendArg;
-use crate::error::Result;
+use super::{interrupt, outputs, progress, say};
+use crate::error::{Error, Result};
 #[cfg(feature = "embree")]
 use crate::lab::bench::Kind;
-use crate::lab::bench::SIDE;
+use crate::lab::bench::{SIDE, Scaling, processor, scaling_chart};
 
 /// Measure builds and rays of native and Embree, in turn
 ///
@@ -24,7 +26,9 @@ Examples:
   twincast bench bunny.obj
   twincast bench scan.obj --up-axis z --rays primary,shadow --repeat 9
   twincast bench terrain1000 architecture instances --json --chart rates.svg
-  twincast bench terrain3162 --modes default,fast,robust --threads 2")]
+  twincast bench terrain3162 --modes default,fast,robust --threads 2
+  twincast bench bunny.obj --modes default --accel binary-bvh,grid,octree,kd-tree
+  twincast bench --scaling --max 10000000 --chart scaling.svg")]
 pub(super) struct BenchArgs {
     /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
     /// placements of one mesh)
@@ -71,6 +75,22 @@ pub(super) struct BenchArgs {
     /// How often everything is measured
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
+
+    /// Other accelerators to measure beside these modes: brute, groups, binary-bvh, grid, octree, kd-tree, bsp
+    #[arg(long, value_name = "NAME,...", value_enum, value_delimiter = ',', hide_possible_values = true)]
+    accel: Vec<AccelArg>,
+
+    #[command(flatten)]
+    options: AccelOptions,
+
+    /// Measure time against the number of triangles instead, for every accelerator: builds on all threads, rays on one. One that takes
+    /// over 10 seconds for a step is not asked for more
+    #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid"])]
+    scaling: bool,
+
+    /// Most triangles of --scaling
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
+    max: u64,
 
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
@@ -140,8 +160,36 @@ enum ModeArg {
 }
 
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
+    if args.scaling {
+        return scaling(args);
+    }
     BackendArg::Both.check_available()?;
     bench(args)
+}
+
+/// Time against the number of triangles.
+fn scaling(args: &BenchArgs) -> Result<()> {
+    let cancel = interrupt::install()?;
+    outputs::check(&[], &args.chart, [])?;
+    let bar = progress::spinner("measuring", args.json);
+    let on_step = |what: &str| bar.set_message(what.to_owned());
+    let scaling = Scaling { max: args.max, cancel: Some(cancel), on_step: Some(&on_step) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    let report = pool.install(|| scaling.run());
+    bar.finish_and_clear();
+    let report = report?;
+    if let Some(path) = &args.chart {
+        let threads = pool.current_num_threads();
+        let notes = [format!("{}; builds on {threads} threads, rays on one", processor())];
+        outputs::write_text(path, &scaling_chart(&report, &notes))?;
+    }
+    if args.json {
+        let document = serde_json::to_string(&report);
+        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
+    } else {
+        say(report.to_string().trim_end())
+    }
 }
 
 #[cfg(not(feature = "embree"))]
@@ -160,11 +208,12 @@ mod with_embree {
 
     use serde::Serialize;
 
-    use super::{BenchArgs, IsaArg, ModeArg};
+    use super::{AccelArg, BenchArgs, IsaArg, ModeArg};
     use crate::cli::{interrupt, outputs, progress, say, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::trace::World;
+    use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Options, Quality};
 
@@ -196,6 +245,7 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
+        let options = args.options.choose(args.accel.contains(&AccelArg::Grid))?;
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
@@ -206,7 +256,9 @@ mod with_embree {
             interrupt::check()?;
             let costs = Arc::default();
             let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
-            let contenders: Vec<_> = modes.map(|mode| contender(mode, threads, isa, &costs)).collect();
+            let modes = modes.map(|mode| contender(mode, threads, isa, &costs));
+            let others = args.accel.iter().map(|accel| other(accel.accel(), &options));
+            let contenders: Vec<_> = modes.chain(others).collect();
             let setup = Setup {
                 subject: &subject,
                 contenders: &contenders,
@@ -274,6 +326,18 @@ mod with_embree {
             ModeArg::Compact => embree("compact", Options { compact: true, ..medium }),
             ModeArg::High => embree("high", Options { quality: Quality::High, ..medium }),
         }
+    }
+
+    /// Another accelerator, which answers as native.
+    fn other(accel: Accel, options: &accel::Options) -> Contender {
+        let options = options.clone();
+        let build = move |world: &World| {
+            let start = Instant::now();
+            let built = accel.build(world, &options);
+            let seconds = start.elapsed().as_secs_f64();
+            Ok(Built { seconds, bytes: built.bytes, sah_cost: None, tracer: Box::new(built) })
+        };
+        Contender { backend: "native", mode: accel.name(), build: Box::new(build) }
     }
 
     fn build_native(world: &World, preset: Preset, isa: Isa) -> Built {

@@ -1,11 +1,11 @@
 //! Where to look from: a camera of the file, or flags; and a camera as flags.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::common::parse_vector;
 use crate::error::{Error, Result};
 use crate::math::{DAabb, DVec2, DVec3};
-use crate::scene::{Camera, Fov, Scene};
+use crate::scene::{Camera, Distortion, Fov, Projection, Scene, ThinLens};
 
 /// Vertical angle of view where none is given, degrees.
 const DEFAULT_FOV: f64 = 40.0;
@@ -16,7 +16,8 @@ const DEFAULT_FOV: f64 = 40.0;
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
     /// Camera of the file, by name (default: its first; without any, a view of the whole scene)
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "fov", "fov_x", "shift"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "fov", "fov_x", "shift",
+        "projection", "height"])]
     camera: Option<String>,
 
     /// Position, in metres with +y up, as --unit and --up-axis leave the scene
@@ -42,14 +43,64 @@ pub(crate) struct CameraArgs {
     /// Moves the picture to the right and up, in shares of its width and height, without turning the camera
     #[arg(long, value_name = "X,Y", value_parser = parse_shift, allow_hyphen_values = true, requires = "eye")]
     shift: Option<DVec2>,
+
+    /// Which rays make the picture
+    #[arg(long, value_enum, default_value_t, requires = "eye")]
+    projection: ProjectionArg,
+
+    /// Height of an orthographic picture, metres (default: that of the scene's bounding sphere)
+    #[arg(long, value_name = "M", value_parser = parse_length, requires = "eye")]
+    height: Option<f64>,
+
+    /// Radius of the lens's opening, metres: what is not in the plane of focus is blurred (default: the file's)
+    #[arg(long, value_name = "M", value_parser = parse_length)]
+    aperture: Option<f64>,
+
+    /// From the lens to the plane of focus, metres (default: the file's, else that of --look-at)
+    #[arg(long, value_name = "M", value_parser = parse_length, requires = "aperture")]
+    focus: Option<f64>,
+
+    /// Blades of the lens's diaphragm, at least 3 (default: round)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=100), requires = "aperture")]
+    blades: Option<u32>,
+
+    /// Distortion of the lens after Brown and Conrady, as OpenCV has it
+    #[arg(long, value_name = "K1,K2,K3,P1,P2", value_parser = parse_distortion, allow_hyphen_values = true)]
+    distortion: Option<Distortion>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum ProjectionArg {
+    /// All rays meet in the eye
+    #[default]
+    Perspective,
+    /// All rays are parallel
+    Orthographic,
+    /// The whole sphere around the eye
+    Equirectangular,
 }
 
 impl CameraArgs {
     /// The camera, and in words where it comes from.
     pub(crate) fn choose(&self, scene: &Scene, aspect: f64) -> Result<(Camera, String)> {
         let bounds = scene.bounds();
+        let (mut camera, source) = self.without_lens(scene, &bounds, aspect)?;
+        if let Some(radius) = self.aperture {
+            let target = self.look_at.unwrap_or_else(|| bounds.centre());
+            let to_target = (target - camera.eye).dot(-camera.frame.z_axis);
+            let before = camera.lens.map(|lens| lens.focus);
+            let focus = self.focus.or(before).or((to_target > 0.0).then_some(to_target)).ok_or_else(|| {
+                Error::Usage("--aperture needs --focus: what the camera should look at is not ahead of it".to_owned())
+            })?;
+            camera.lens = Some(ThinLens { radius, focus, blades: self.blades.unwrap_or(0) });
+        }
+        camera.distortion = self.distortion.or(camera.distortion);
+        Ok((camera, source))
+    }
+
+    fn without_lens(&self, scene: &Scene, bounds: &DAabb, aspect: f64) -> Result<(Camera, String)> {
         if let Some(eye) = self.eye {
-            return Ok((self.flagged(eye, &bounds)?, "from the flags".to_owned()));
+            return Ok((self.flagged(eye, bounds)?, "from the flags".to_owned()));
         }
         if let Some(name) = &self.camera {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);
@@ -59,7 +110,7 @@ impl CameraArgs {
         Ok(match scene.cameras.first() {
             Some(camera) if camera.name.is_empty() => (camera.clone(), "the file's first".to_owned()),
             Some(camera) => (camera.clone(), format!("{:?}, the file's first", camera.name)),
-            None => (Camera::framing(&bounds, aspect), "framed on the scene".to_owned()),
+            None => (Camera::framing(bounds, aspect), "framed on the scene".to_owned()),
         })
     }
 
@@ -82,7 +133,15 @@ impl CameraArgs {
                 format!("--eye {} and --look-at {} are too far apart", list(eye), list(target))
             })
         })?;
-        Ok(Camera { fov, shift: self.shift.unwrap_or(DVec2::ZERO), ..camera })
+        let projection = match self.projection {
+            ProjectionArg::Perspective => Projection::Perspective(fov),
+            ProjectionArg::Orthographic => {
+                let radius = if bounds.radius() > 0.0 { bounds.radius() } else { 1.0 };
+                Projection::Orthographic(self.height.unwrap_or(2.0 * radius))
+            }
+            ProjectionArg::Equirectangular => Projection::Equirectangular,
+        };
+        Ok(Camera { projection, shift: self.shift.unwrap_or(DVec2::ZERO), ..camera })
     }
 }
 
@@ -99,16 +158,30 @@ pub(crate) fn camera_flags(camera: &Camera, bounds: &DAabb) -> String {
     let ahead = (bounds.centre() - camera.eye).dot(forward);
     let target = camera.eye + forward * if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
     let (eye, target, up) = (list(camera.eye), list(target), list(camera.frame.y_axis));
-    let fov = match camera.fov {
-        Fov::Vertical(angle) => format!("--fov {}", angle.to_degrees()),
-        Fov::Horizontal(angle) => format!("--fov-x {}", angle.to_degrees()),
-        Fov::Both { horizontal, vertical } => {
-            format!("--fov-x {} --fov {}", horizontal.to_degrees(), vertical.to_degrees())
+    let mut flags = format!("--eye {eye} --look-at {target} --up {up}");
+    flags += &match camera.projection {
+        Projection::Perspective(Fov::Vertical(angle)) => format!(" --fov {}", angle.to_degrees()),
+        Projection::Perspective(Fov::Horizontal(angle)) => format!(" --fov-x {}", angle.to_degrees()),
+        Projection::Perspective(Fov::Both { horizontal, vertical }) => {
+            format!(" --fov-x {} --fov {}", horizontal.to_degrees(), vertical.to_degrees())
         }
+        Projection::Orthographic(height) => format!(" --projection orthographic --height {height}"),
+        Projection::Equirectangular => " --projection equirectangular".to_owned(),
     };
     let DVec2 { x, y } = camera.shift;
-    let shift = if camera.shift == DVec2::ZERO { String::new() } else { format!(" --shift {x},{y}") };
-    format!("--eye {eye} --look-at {target} --up {up} {fov}{shift}")
+    if camera.shift != DVec2::ZERO {
+        flags += &format!(" --shift {x},{y}");
+    }
+    if let Some(ThinLens { radius, focus, blades }) = camera.lens {
+        flags += &format!(" --aperture {radius} --focus {focus}");
+        if blades >= 3 {
+            flags += &format!(" --blades {blades}");
+        }
+    }
+    if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
+        flags += &format!(" --distortion {k1},{k2},{k3},{p1},{p2}");
+    }
+    flags
 }
 
 fn list(v: DVec3) -> String {
@@ -124,6 +197,22 @@ fn parse_shift(text: &str) -> std::result::Result<DVec2, String> {
     shift.ok_or_else(|| "expected two numbers with a comma between, as in 0.25,0".to_owned())
 }
 
+/// A finite number above 0.
+fn parse_length(text: &str) -> std::result::Result<f64, String> {
+    let length = text.parse().ok().filter(|&length: &f64| length > 0.0 && length.is_finite());
+    length.ok_or_else(|| "expected a length above 0".to_owned())
+}
+
+/// Five finite numbers with commas between.
+fn parse_distortion(text: &str) -> std::result::Result<Distortion, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    match numbers.as_deref() {
+        Some(&[k1, k2, k3, p1, p2]) => Ok(Distortion { k1, k2, k3, p1, p2 }),
+        _ => Err("expected five numbers with commas between, as in -0.28,0.07,0,0.001,0".to_owned()),
+    }
+}
+
 /// An angle of view in degrees.
 fn parse_fov(text: &str) -> std::result::Result<f64, String> {
     let degrees = text.parse().ok().filter(|&degrees: &f64| degrees > 0.0 && degrees < 180.0);
@@ -132,7 +221,24 @@ fn parse_fov(text: &str) -> std::result::Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
+    use crate::math::Vec3;
+    use crate::scene::{Geometry, Mesh};
+
+    #[derive(Parser)]
+    struct Parsed {
+        #[command(flatten)]
+        camera: CameraArgs,
+    }
+
+    /// A scene of the given bounds.
+    fn scene(bounds: &DAabb) -> Scene {
+        let size = (bounds.max - bounds.min).as_vec3();
+        let mesh = Mesh { origin: bounds.min, ..Mesh::new(vec![Vec3::ZERO, size, Vec3::X], vec![[0, 1, 2]]) };
+        Scene::from_geometries(vec![Geometry::Mesh(mesh)], Vec::new())
+    }
 
     #[test]
     fn angles_and_shifts() {
@@ -150,24 +256,24 @@ mod tests {
     fn printed_flags_give_the_camera_again() {
         let bounds = DAabb { min: DVec3::new(1e7, 0.0, -3.0), max: DVec3::new(1e7 + 4.0, 2.0, 5.0) };
         let framed = Camera::framing(&bounds, 1.5);
-        let fovs = [Fov::Vertical(0.7), Fov::Horizontal(1.1), Fov::Both { horizontal: 2.0, vertical: 0.3 }];
-        for (fov, shift) in fovs.into_iter().zip([DVec2::ZERO, DVec2::new(-0.5, 0.25), DVec2::Y]) {
-            let camera = Camera { fov, shift, ..framed.clone() };
+        let perspective = Projection::Perspective;
+        let lens = ThinLens { radius: 0.1, focus: 7.0, blades: 5 };
+        let distortion = Distortion { k1: -0.3, k2: 0.1, k3: 0.0, p1: 1e-3, p2: -1e-4 };
+        for camera in [
+            Camera { projection: perspective(Fov::Vertical(0.7)), ..framed.clone() },
+            Camera { projection: perspective(Fov::Horizontal(1.1)), shift: DVec2::Y, ..framed.clone() },
+            Camera { projection: perspective(Fov::Both { horizontal: 2.0, vertical: 0.3 }), ..framed.clone() },
+            Camera { projection: Projection::Orthographic(4.5), shift: DVec2::new(-0.5, 0.25), ..framed.clone() },
+            Camera { projection: Projection::Equirectangular, ..framed.clone() },
+            Camera { lens: Some(lens), distortion: Some(distortion), ..framed.clone() },
+            Camera { lens: Some(ThinLens { blades: 0, ..lens }), ..framed },
+        ] {
             let flags = camera_flags(&camera, &bounds);
-            let words: Vec<_> = flags.split(' ').collect();
-            let flag = |name: &str| words.iter().position(|word| *word == name).map(|at| words[at + 1]);
-            let args = CameraArgs {
-                eye: flag("--eye").map(|text| parse_vector(text).unwrap()),
-                look_at: flag("--look-at").map(|text| parse_vector(text).unwrap()),
-                up: flag("--up").map(|text| parse_vector(text).unwrap()),
-                fov: flag("--fov").map(|text| parse_fov(text).unwrap()),
-                fov_x: flag("--fov-x").map(|text| parse_fov(text).unwrap()),
-                shift: flag("--shift").map(|text| parse_shift(text).unwrap()),
-                camera: None,
-            };
-            let again = args.flagged(args.eye.unwrap(), &bounds).unwrap();
-            assert_eq!((again.eye, again.shift), (camera.eye, camera.shift));
-            let extents = [&again, &camera].map(|camera| camera.fov.half_extent(1.5).unwrap());
+            let args = Parsed::try_parse_from(["it"].into_iter().chain(flags.split(' '))).expect("valid flags").camera;
+            let (again, _) = args.choose(&scene(&bounds), 1.5).unwrap();
+            assert_eq!((again.eye, again.shift, again.lens), (camera.eye, camera.shift, camera.lens));
+            assert_eq!(again.distortion, camera.distortion);
+            let extents = [&again, &camera].map(|camera| camera.projection.half_extent(1.5).unwrap());
             assert!((extents[0] - extents[1]).length() < 1e-12, "{flags}");
             let turned = [again.frame.x_axis - camera.frame.x_axis, again.frame.z_axis - camera.frame.z_axis];
             assert!(turned.iter().all(|d| d.length() < 1e-8), "{turned:?}");

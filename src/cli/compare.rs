@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::accel::AccelArgs;
 use super::cache::CacheArgs;
 use super::camera::CameraArgs;
 use super::common::{SceneArgs, Size};
@@ -20,7 +21,9 @@ use crate::error::Result;
 Examples:
   twincast compare bunny.glb
   twincast compare scan.ply --up-axis z --size 1920x1080 --random 1000000 --json
-  twincast compare part.stl --diff difference.png")]
+  twincast compare part.stl --diff difference.png
+  twincast compare bunny.glb --accel kd-tree
+  twincast compare bunny.glb --all")]
 pub(super) struct CompareArgs {
     #[command(flatten)]
     scene: SceneArgs,
@@ -45,6 +48,18 @@ pub(super) struct CompareArgs {
     seed: u64,
 
     #[command(flatten)]
+    accel: AccelArgs,
+
+    /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
+    /// code 1 if any of this program's own differs on one
+    #[arg(long, conflicts_with_all = ["accel", "diff", "cache", "spp"])]
+    all: bool,
+
+    /// Most seconds that brute force takes with --all
+    #[arg(long, value_name = "SECONDS", default_value_t = 10, requires = "all")]
+    seconds: u64,
+
+    #[command(flatten)]
     cache: CacheArgs,
 
     /// Print the counts as one JSON document, and nothing else
@@ -57,6 +72,9 @@ pub(super) struct CompareArgs {
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
+    if args.all {
+        return compare_all(args);
+    }
     BackendArg::Both.check_available()?;
     compare(args)
 }
@@ -74,11 +92,13 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer, Settings};
+    use crate::trace::accel::{Accel, Built};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
     use crate::trace::{Tracer, World};
 
+    let (accel, options) = args.accel.choose(BackendArg::Both, None, &args.cache)?;
     let diff = args.diff.as_slice();
     outputs::check(diff, None, [&args.scene.scene])?;
     let cache = args.cache.open(BackendArg::Both)?;
@@ -92,7 +112,10 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let world = World::new(&scene)?;
     let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
-    let (native, _) = cache::bvh(cache.as_ref(), &world, bvh::Options::default());
+    let native = match accel {
+        Accel::Bvh => Built::from(cache::bvh(cache.as_ref(), &world, bvh::Options::default()).0),
+        _ => accel.build(&world, &options),
+    };
     let embree = Embree::new(&world, &Options::default())?;
     let brute = (world.primitive_count() < BRUTE_LIMIT).then(|| Brute::new(&world));
     interrupt::check()?;
@@ -120,6 +143,47 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let report = &comparison.report;
     if args.json {
         let document = serde_json::to_string(report);
+        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
+    } else {
+        say(report.to_string().trim_end())?;
+    }
+    report.check()
+}
+
+/// Every accelerator against brute force.
+fn compare_all(args: &CompareArgs) -> Result<()> {
+    use super::{interrupt, progress, say, warn};
+    use crate::error::Error;
+    use crate::lab::{Entrant, all};
+    use crate::render::{Control, Renderer, Settings};
+    use crate::trace::World;
+
+    let options = args.accel.options.choose(true)?;
+    let cancel = interrupt::install()?;
+    let (scene, warnings) = args.scene.load()?;
+    warn(&warnings);
+    interrupt::check()?;
+
+    let Size { width, height } = args.size;
+    let (camera, _) = args.camera.choose(&scene, f64::from(width) / f64::from(height))?;
+    let world = World::new(&scene)?;
+    let settings = Settings { width, height, spp: 1, seed: args.seed, ..Settings::default() };
+    let renderer = Renderer::new(&scene, &world, camera, settings)?;
+    let bar = progress::bar(Entrant::all().len() as u64, "comparing", args.json);
+    let setup = all::Setup {
+        scene: &args.scene.scene.display().to_string(),
+        renderer: &renderer,
+        size: (width, height),
+        random: args.random,
+        seed: args.seed,
+        longest: std::time::Duration::from_secs(args.seconds),
+        options: &options,
+    };
+    let report = setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)) });
+    bar.finish_and_clear();
+    let report = report?;
+    if args.json {
+        let document = serde_json::to_string(&report);
         say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
     } else {
         say(report.to_string().trim_end())?;

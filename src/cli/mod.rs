@@ -3,6 +3,7 @@
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
+mod accel;
 mod bench;
 mod build;
 mod cache;
@@ -17,9 +18,11 @@ mod make;
 mod man;
 mod metadata;
 mod outputs;
+mod picture;
 mod progress;
 mod render;
 mod report;
+mod summary;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

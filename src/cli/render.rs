@@ -3,25 +3,28 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::accel::AccelArgs;
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
-use super::common::{SceneArgs, Size, parse_vector};
+use super::common::{SceneArgs, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
-use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_memory, size, time};
+use super::picture::PictureArgs;
+use super::report::{EngineStats, Stats, peak_memory};
+use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
 use crate::io;
 use crate::math::{DVec3, Vec3};
-use crate::plan::BuildChoice;
-use crate::render::{Filter, Renderer, Sampling, Settings, TileOrder};
+use crate::render::Renderer;
 use crate::scene::{Geometry, Light, Request, Scene};
+use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
-use crate::trace::{Batch, Primitives, Width, World};
+use crate::trace::{Primitives, World};
 
 /// Render a scene
 #[derive(Debug, Args)]
@@ -31,6 +34,7 @@ Examples:
   twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
   twincast render large.ply --cache ~/.cache/twincast -o large.png
+  twincast render bunny.glb --accel kd-tree -o bunny.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -45,17 +49,8 @@ pub(super) struct RenderArgs {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendArg,
 
-    /// Pixels (default: the scene's, else 1280x720)
-    #[arg(long, value_name = "WxH")]
-    size: Option<Size>,
-
-    /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    spp: Option<u32>,
-
-    /// How often a ray may be mirrored or refracted; what it would see after that is black (default: the scene's, else 5)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
-    max_depth: Option<u32>,
+    #[command(flatten)]
+    picture: PictureArgs,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -73,39 +68,18 @@ pub(super) struct RenderArgs {
     #[arg(short, long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     threads: usize,
 
-    /// Chooses among equally good sample patterns (default: the scene's, else 0)
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-
-    /// How samples are spread: sobol, blue-noise, halton, stratified or independent
-    #[arg(long, value_name = "NAME", default_value_t)]
-    sampler: Sampling,
-
-    /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
-    #[arg(long, value_name = "NAME", default_value_t)]
-    filter: Filter,
-
     /// Write times, rays, rays a second and memory as JSON
     #[arg(long, value_name = "FILE.json", requires = "output")]
     stats: Option<PathBuf>,
 
-    /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
-    #[arg(long, value_name = "N")]
-    packet: Option<Packet>,
+    #[command(flatten)]
+    accel: AccelArgs,
 
     #[command(flatten)]
     build: BuildArgs,
 
     #[command(flatten)]
     cache: CacheArgs,
-
-    /// Order of the tiles; never changes a picture
-    #[arg(long, value_enum, default_value_t)]
-    tile_order: Order,
-
-    /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
-    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
-    background: Option<Vec3>,
 
     /// Light with hard shadows that comes from this direction, in place of the scene's lights
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
@@ -124,31 +98,14 @@ pub(super) struct RenderArgs {
     camera: CameraArgs,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Packet {
-    #[value(name = "1")]
-    One,
-    #[value(name = "4")]
-    Four,
-    #[value(name = "8")]
-    Eight,
-    #[value(name = "16")]
-    Sixteen,
-}
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Order {
-    /// Row by row from the top
-    Scanline,
-    /// Along a curve from neighbour to neighbour
-    #[default]
-    Hilbert,
-    /// From the middle outwards
-    Spiral,
-}
-
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
+    let accel = args.accel.choose(args.backend, Some(&args.build), &args.cache)?;
+    if args.backend == BackendArg::Both && accel.0 != Accel::Bvh {
+        let name = accel.0.name();
+        let problem = "renders by itself; twincast compare --accel holds it against Embree";
+        return Err(Error::Usage(format!("--accel {name} {problem}")));
+    }
     let cancel = interrupt::install()?;
     if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
@@ -169,7 +126,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
-        let settings = args.settings(&scene.request);
+        let settings = args.picture.settings(&scene.request, args.backend.best_width());
         let (width, height) = (settings.width, settings.height);
         args.check_reference(reference.as_ref(), width, height)?;
         let pictures = args.pictures(&scene.request)?;
@@ -190,8 +147,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 
         let pixels = u64::from(width) * u64::from(height);
         let stored = stored_triangles(&world);
-        let build =
-            args.build.choose(args.backend, stored, pixels * u64::from(settings.spp), pixels, renderer.plan())?;
+        // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
+        let build = match accel.0 {
+            Accel::Bvh => {
+                let samples = pixels * u64::from(settings.spp);
+                args.build.choose(args.backend, stored, samples, pixels, renderer.plan())?
+            }
+            _ => None,
+        };
         let job = Job {
             world: &world,
             renderer: &renderer,
@@ -199,6 +162,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
+            accel: &accel,
             cache: cache.as_ref(),
         };
         let outcome = job.run(args.backend)?;
@@ -230,7 +194,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            let mut summary = args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats);
+            let mut summary = Rendered {
+                scene: &scene,
+                renderer: &renderer,
+                camera: &camera_source,
+                build: build.as_ref(),
+                stats: &stats,
+            }
+            .summary(args.verbose);
             pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
             say(summary)?;
         }
@@ -239,36 +210,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 }
 
 impl RenderArgs {
-    /// What the flags say, else the scene's file, else what is usual.
-    fn settings(&self, request: &Request) -> Settings {
-        let usual = Settings::default();
-        let size = self.size.map(|size| [size.width, size.height]).or(request.size);
-        let [columns, rows] = size.unwrap_or([usual.width, usual.height]);
-        let width = match self.packet {
-            None => self.backend.best_width(),
-            Some(Packet::One) => Width::One,
-            Some(Packet::Four) => Width::Four,
-            Some(Packet::Eight) => Width::Eight,
-            Some(Packet::Sixteen) => Width::Sixteen,
-        };
-        Settings {
-            width: columns,
-            height: rows,
-            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
-            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
-            sampling: self.sampler,
-            filter: self.filter,
-            max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
-            batch: Batch { width, coherent: true },
-            tile_order: match self.tile_order {
-                Order::Scanline => TileOrder::Scanline,
-                Order::Hilbert => TileOrder::Hilbert,
-                Order::Spiral => TileOrder::Spiral,
-            },
-            background: self.background,
-        }
-    }
-
     /// The pictures to write: those of the flags, else the one that the scene names.
     fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
         if !self.output.is_empty() || self.print_camera {
@@ -297,60 +238,6 @@ impl RenderArgs {
         let own = format_args!("{}x{}", picture.width, picture.height);
         let message = format!("--reference {}: it is {own}, and the picture {width}x{height}", path.display());
         Err(Error::Usage(message))
-    }
-
-    fn summary(
-        &self,
-        scene: &Scene,
-        renderer: &Renderer,
-        camera_source: &str,
-        build: Option<&BuildChoice>,
-        stats: &Stats,
-    ) -> Summary {
-        let mut summary = Summary::default();
-        let parts = [
-            counted(stats.triangles, "triangle", "triangles"),
-            counted(scene.materials.len() as u64, "material", "materials"),
-            counted(scene.lights.len() as u64, "light", "lights"),
-        ];
-        summary.line("scene", format_args!("{}: {}", stats.scene, parts.join(", ")));
-        if self.verbose {
-            summary.line("plan", renderer.plan());
-            if let Some(build) = build {
-                summary.line("build", format_args!("{}: {}", build.preset.name(), build.why));
-            }
-        }
-        summary.line("camera", camera_source);
-        let [width, height] = stats.size;
-        let samples = counted(u64::from(stats.spp), "sample", "samples");
-        let threads = counted(stats.threads as u64, "thread", "threads");
-        summary.line("picture", format_args!("{width}x{height}, {samples} a pixel, {threads}"));
-        if self.verbose {
-            summary.line("load", format_args!("{}, prepare {}", time(stats.load_seconds), time(stats.prepare_seconds)));
-        }
-        for engine in &stats.engines {
-            let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
-            summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
-            if self.verbose {
-                if let Some(cache) = &engine.cache {
-                    summary.line("cache", cache);
-                }
-                let Rays { camera, sent_on, shadow } = &engine.rays;
-                let speed = engine.rays_per_second / 1e6;
-                let (camera, shadow) = (grouped(*camera), grouped(*shadow));
-                let sent_on = if *sent_on > 0 { format!(" + {} sent on", grouped(*sent_on)) } else { String::new() };
-                summary.line(
-                    "rays",
-                    format_args!("{camera} camera{sent_on} + {shadow} shadow, {speed:.2} million a second"),
-                );
-                let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
-                summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
-            }
-        }
-        if let (true, Some(peak)) = (self.verbose, stats.peak_memory) {
-            summary.line("peak", format_args!("{} of memory for everything", size(peak)));
-        }
-        summary
     }
 
     /// Says how the checks that were asked for went; an error where one did not hold.
@@ -408,10 +295,4 @@ pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
 fn parse_direction(text: &str) -> std::result::Result<DVec3, String> {
     let direction = parse_vector(text)?.try_normalize();
     direction.ok_or_else(|| "expected a direction, which is not zero".to_owned())
-}
-
-fn parse_color(text: &str) -> std::result::Result<Vec3, String> {
-    let color = parse_vector(text)?.as_vec3();
-    let valid = color.is_finite() && color.cmpge(Vec3::ZERO).all();
-    valid.then_some(color).ok_or_else(|| "expected three numbers of at least 0".to_owned())
 }

@@ -39,6 +39,9 @@ pub(super) struct EngineStats {
     /// What became of the native tree's file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) cache: Option<CacheStats>,
+    /// What there is to say about how it was built.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) notes: Vec<String>,
 }
 
 /// Rays by kind.
@@ -63,6 +66,7 @@ impl EngineStats {
             bytes: pass.bytes,
             bytes_per_triangle: (stored > 0).then(|| pass.bytes as f64 / stored as f64),
             cache: pass.cache.as_ref().map(CacheStats::new),
+            notes: pass.notes.clone(),
         }
     }
 }

@@ -7,7 +7,9 @@
 pub mod expansion;
 pub mod number;
 
-pub use glam::{Affine3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
+pub use glam::{
+    Affine3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, UVec3, Vec2, Vec3, Vec4,
+};
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.
 pub const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;

@@ -27,10 +27,10 @@ use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
 use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
-use camera::Pinhole;
+use camera::View;
 use film::Film;
 use filter::FilterSampler;
-use sampler::{Pattern, Sampler};
+use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
@@ -95,7 +95,7 @@ pub struct Renderer<'a> {
     world: &'a World,
     settings: Settings,
     plan: Plan,
-    pinhole: Pinhole,
+    view: View,
     sampler: Sampler,
     filter: FilterSampler,
     lights: Vec<LightSource>,
@@ -109,8 +109,8 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
-    /// angle of view outside (0, 180) degrees.
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and a
+    /// camera that cannot be.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         for side in [width, height] {
@@ -122,14 +122,12 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
-        let pinhole = Pinhole::new(&camera, world.centre, width, height).ok_or_else(|| {
-            Error::Usage(format!("angle of view {}: must be above 0 and below 180 degrees", camera.fov))
-        })?;
+        let view = View::new(&camera, world.centre, width, height)?;
         let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
-            pinhole,
+            view,
             sampler: Sampler::new(sampling, spp, seed),
             // A single sample is the pixel's middle, whatever the filter.
             filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
@@ -218,6 +216,10 @@ impl<'a> Renderer<'a> {
 
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        self.pinhole.ray(self.place(&self.sampler.pattern(x, y), sample).0)
+        self.ray(&self.sampler.pattern(x, y), sample)
+    }
+
+    fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
+        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::Lens))
     }
 }

@@ -20,6 +20,7 @@ use crate::shade::phong::Shading;
 use crate::shade::{SurfacePoint, whitted};
 use crate::trace::{Batch, Tracer};
 
+use super::camera::View;
 use super::sampler::Pattern;
 use super::{Renderer, tiles::Tile};
 
@@ -133,13 +134,18 @@ impl Renderer<'_> {
         let known = paths.len();
         paths.resize(patterns.len(), Path { pixel: 0, weight: Vec3::ONE });
         paths.iter_mut().zip(0..).skip(known).for_each(|(path, pixel)| path.pixel = pixel);
-        let (groups, rest) = patterns.as_chunks::<LANES>();
-        let (ray_groups, ray_rest) = rays.as_chunks_mut::<LANES>();
-        for (group, rays) in groups.iter().zip(ray_groups) {
-            *rays = self.pinhole.rays(&group.each_ref().map(place));
-        }
-        for (pixel, ray) in rest.iter().zip(ray_rest) {
-            *ray = self.pinhole.ray(place(pixel));
+        let (groups, rest) = match &self.view {
+            View::Pinhole(pinhole) => {
+                let (groups, rest) = patterns.as_chunks::<LANES>();
+                for (group, rays) in groups.iter().zip(rays.as_chunks_mut::<LANES>().0) {
+                    *rays = pinhole.rays(&group.each_ref().map(place));
+                }
+                (groups.len(), rest)
+            }
+            View::General(_) => (0, &patterns[..]),
+        };
+        for (pixel, ray) in rest.iter().zip(&mut rays[groups * LANES..]) {
+            *ray = self.ray(pixel, sample);
         }
         tracer.closest_batch(rays, hits, self.settings.batch);
     }

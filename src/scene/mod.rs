@@ -14,7 +14,7 @@ mod request;
 mod rocks;
 mod texture;
 
-pub use camera::{Camera, Fov};
+pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use instance::{Group, Instance};
 pub use light::{Attenuation, Light};
 pub use material::{Material, Specular};

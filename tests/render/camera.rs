@@ -1,8 +1,8 @@
 //! Camera rays, against the three ways in which lectures derive them.
 
 use twincast::math::{DMat3, DVec2, DVec3};
-use twincast::scene::{Camera, Fov};
-use twincast::{Renderer, Scene, World};
+use twincast::scene::{Camera, Distortion, Fov, Projection, ThinLens};
+use twincast::{Error, Renderer, Scene, World};
 
 use super::settings;
 
@@ -116,11 +116,126 @@ fn angles_of_view_span_the_picture() {
         (Fov::Both { horizontal: 0.5, vertical: 2.0 }, [0.25f64.tan(), 1f64.tan()]),
     ] {
         for shift in [DVec2::ZERO, DVec2::new(0.5, -0.25)] {
-            let camera = Camera { fov, shift, ..base.clone() };
+            let camera = Camera { projection: Projection::Perspective(fov), shift, ..base.clone() };
             let (_, _, edge) = rays(&camera, width, height)[4];
             let expected = DVec2::new(half[0], -half[1]) + 2.0 * shift * DVec2::new(half[0], half[1]);
             let got = edge.truncate() / -edge.z;
             assert!((got - expected).abs().max_element() < 1e-4, "{fov} {shift}: {got} against {expected}");
         }
     }
+}
+
+fn with_projection(projection: Projection) -> Camera {
+    let base = Camera::look_at(DVec3::new(3.0, -1.0, 2.0), DVec3::new(1.0, 4.0, -2.0), DVec3::Y, 1.0).unwrap();
+    Camera { projection, ..base }
+}
+
+#[test]
+fn parallel_rays_cover_the_height() {
+    let camera = with_projection(Projection::Orthographic(6.0));
+    let (scene, world) = (Scene::default(), World::default());
+    let renderer = Renderer::new(&scene, &world, camera.clone(), settings(30, 10, 1)).unwrap();
+    let [right, up, back] = [camera.frame.x_axis, camera.frame.y_axis, camera.frame.z_axis];
+    for (x, y) in [(0, 0), (29, 9), (15, 2)] {
+        let ray = renderer.camera_ray(x, y, 0);
+        assert_along(ray.direction.as_dvec3(), -back, "parallel");
+        // Pixels are 0.6 wide: 6 over 10 rows.
+        let expected = camera.eye + right * (0.6 * (f64::from(x) - 14.5)) + up * (0.6 * (4.5 - f64::from(y)));
+        assert!((ray.origin.as_dvec3() - expected).length() < 1e-6, "{ray:?}");
+    }
+}
+
+#[test]
+fn the_whole_sphere_by_longitude_and_latitude() {
+    let camera = with_projection(Projection::Equirectangular);
+    let (width, height) = (72, 36);
+    for (x, y, got) in rays(&camera, width, height) {
+        let longitude = (f64::from(x) + 0.5 - 36.0) * 5f64.to_radians();
+        let latitude = (18.0 - f64::from(y) - 0.5) * 5f64.to_radians();
+        let local = DMat3::from_rotation_y(-longitude) * DMat3::from_rotation_x(latitude) * DVec3::NEG_Z;
+        assert_along(got, camera.frame * local, "sphere");
+    }
+}
+
+/// All rays of a pixel meet in the plane of focus; at distance d from the lens they are 2 r |d - f| / f apart.
+#[test]
+fn the_circle_of_confusion_is_that_of_a_thin_lens() {
+    let (radius, focus) = (0.25, 8.0);
+    let base = with_projection(Projection::Perspective(Fov::Vertical(0.8)));
+    let lens = ThinLens { radius, focus, blades: 0 };
+    for camera in [base.clone(), Camera { projection: Projection::Orthographic(3.0), ..base }] {
+        let camera = Camera { lens: Some(lens), ..camera };
+        let (scene, world) = (Scene::default(), World::default());
+        let spp = 4000;
+        let renderer = Renderer::new(&scene, &world, camera.clone(), settings(1000, 1000, spp)).unwrap();
+        let at_depth = |depth: f64| {
+            let point = |sample| {
+                let ray = renderer.camera_ray(700, 300, sample);
+                let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                let ahead = -camera.frame.z_axis;
+                origin + d * ((depth - (origin - camera.eye).dot(ahead)) / d.dot(ahead))
+            };
+            let points: Vec<_> = (0..spp).map(point).collect();
+            let middle = points.iter().sum::<DVec3>() / f64::from(spp);
+            points.iter().map(|p| 2.0 * (*p - middle).length()).fold(0.0, f64::max)
+        };
+        // The pixel itself is as wide as 8 * 2 tan(0.4) / 1000 in the plane of focus.
+        assert!(at_depth(focus) < 0.012, "{}", at_depth(focus));
+        for depth in [2.0, 5.0, 16.0] {
+            let expected = 2.0 * radius * (depth - focus).abs() / focus;
+            assert!((at_depth(depth) - expected).abs() < 0.02, "{depth}: {} against {expected}", at_depth(depth));
+        }
+    }
+}
+
+/// Points that OpenCV's formula moves to a pixel must lie on that pixel's ray.
+#[test]
+fn distortion_is_undone() {
+    let base = with_projection(Projection::Perspective(Fov::Vertical(0.9)));
+    let distortion = Distortion { k1: -0.2, k2: 0.05, k3: 0.001, p1: 1e-3, p2: -2e-3 };
+    let camera = Camera { distortion: Some(distortion), ..base };
+    let half = camera.projection.half_extent(64.0 / 48.0).unwrap();
+    for (px, py, got) in rays(&camera, 64, 48) {
+        let local = camera.frame.transpose() * got;
+        let (x, y) = (local.x / -local.z, local.y / local.z);
+        let r2 = x * x + y * y;
+        let Distortion { k1, k2, k3, p1, p2 } = distortion;
+        let radial = 1.0 + k1 * r2 + k2 * r2.powi(2) + k3 * r2.powi(3);
+        let seen_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
+        let seen_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
+        let pixel = DVec2::new((seen_x / half.x + 1.0) * 32.0, (seen_y / half.y + 1.0) * 24.0);
+        assert!((pixel - DVec2::new(f64::from(px) + 0.5, f64::from(py) + 0.5)).length() < 1e-4, "{pixel}");
+    }
+    // Folded over before the picture's edge: there is nothing to see there, and no panic.
+    let fold = Distortion { k1: -2.0, ..Distortion::default() };
+    let (_, _, edge) = rays(&Camera { distortion: Some(fold), ..camera }, 64, 48)[0];
+    assert_eq!(edge, DVec3::ZERO);
+}
+
+#[test]
+fn cameras_that_cannot_be_are_bad_usage() {
+    let base = with_projection(Projection::Perspective(Fov::Vertical(0.9)));
+    let lens = |radius, focus| Some(ThinLens { radius, focus, blades: 6 });
+    let narrow = Projection::Perspective(Fov::Vertical(1e-5));
+    for (camera, words) in [
+        (Camera { lens: lens(0.0, 1.0), ..base.clone() }, "opening"),
+        (Camera { lens: lens(0.1, f64::NAN), ..base.clone() }, "focus"),
+        (Camera { projection: Projection::Orthographic(0.0), ..base.clone() }, "height 0"),
+        (Camera { projection: Projection::Equirectangular, lens: lens(0.1, 1.0), ..base.clone() }, "whole sphere"),
+        (Camera { projection: narrow, ..base.clone() }, "neighbouring pixels"),
+    ] {
+        let (scene, world) = (Scene::default(), World::default());
+        let error = Renderer::new(&scene, &world, camera, settings(400, 300, 1)).err().expect("refused");
+        assert!(matches!(error, Error::Usage(_)) && error.to_string().contains(words), "{error}");
+    }
+    // The smallest that the message names does work.
+    let (scene, world) = (Scene::default(), World::default());
+    let camera = Camera { projection: Projection::Perspective(Fov::Vertical(2.1e-3f64.to_radians())), ..base };
+    let renderer = Renderer::new(&scene, &world, camera, settings(400, 300, 1)).unwrap();
+    let mut directions: Vec<_> = (0..400 * 300)
+        .map(|i| renderer.camera_ray(i % 400, i / 400, 0).direction.to_array().map(f32::to_bits))
+        .collect();
+    directions.sort_unstable();
+    directions.dedup();
+    assert_eq!(directions.len(), 400 * 300);
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use twincast::math::{DAffine3, DVec3, Vec3, Vec4};
 use twincast::render::{Control, Counted, TileOrder};
-use twincast::scene::{Attenuation, Camera, Fov, Geometry, Instance, Light, Material};
+use twincast::scene::{Attenuation, Camera, Fov, Geometry, Instance, Light, Material, Projection};
 use twincast::{Batch, Error, Renderer, Scene, Settings, Width, World};
 
 use super::{engines, floor, matte, render, settings, torus};
@@ -193,7 +193,7 @@ fn impossible_settings_are_bad_usage() {
         assert!(matches!(refused.err(), Some(Error::Usage(_))));
     }
     for fov_y in [0.0, -1.0, std::f64::consts::PI, f64::NAN] {
-        let camera = Camera { fov: Fov::Vertical(fov_y), ..scene.cameras[0].clone() };
+        let camera = Camera { projection: Projection::Perspective(Fov::Vertical(fov_y)), ..scene.cameras[0].clone() };
         assert!(matches!(Renderer::new(&scene, &world, camera, settings(1, 1, 1)).err(), Some(Error::Usage(_))));
     }
 }

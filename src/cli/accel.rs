@@ -1,0 +1,116 @@
+//! Which accelerator: its flags, and what they go together with.
+
+use clap::{Args, ValueEnum};
+
+use super::build::BuildArgs;
+use super::cache::CacheArgs;
+use super::engine::BackendArg;
+use crate::error::{Error, Result};
+use crate::math::UVec3;
+use crate::trace::accel::{Accel, Options, Resolution};
+
+#[derive(Debug, Args)]
+pub(super) struct AccelArgs {
+    /// How the native engine searches the scene; never changes a picture
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) accel: AccelArg,
+
+    #[command(flatten)]
+    pub(super) options: AccelOptions,
+}
+
+/// What an accelerator may be told.
+#[derive(Debug, Args)]
+pub(super) struct AccelOptions {
+    /// Cells of the grid: along its longest side, or along each axis (default: by the number of primitives)
+    #[arg(long, value_name = "N|XxYxZ", value_parser = parse_grid)]
+    grid: Option<Resolution>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum AccelArg {
+    /// The eight-wide BVH
+    #[default]
+    Bvh,
+    /// Every primitive for every ray
+    Brute,
+    /// A flat list of boxes, one a geometry
+    Groups,
+    /// A binary BVH
+    BinaryBvh,
+    /// A uniform grid, nested where it is crowded
+    Grid,
+    /// An octree
+    Octree,
+    /// A kd-tree
+    KdTree,
+    /// A BSP tree of general planes
+    Bsp,
+}
+
+impl AccelArg {
+    pub(super) const fn accel(self) -> Accel {
+        match self {
+            Self::Bvh => Accel::Bvh,
+            Self::Brute => Accel::Brute,
+            Self::Groups => Accel::Groups,
+            Self::BinaryBvh => Accel::Binary,
+            Self::Grid => Accel::Grid,
+            Self::Octree => Accel::Octree,
+            Self::KdTree => Accel::Kd,
+            Self::Bsp => Accel::Bsp,
+        }
+    }
+}
+
+impl AccelOptions {
+    /// For accelerators among which there is `accel`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a resolution without a grid.
+    pub(super) fn choose(&self, has_grid: bool) -> Result<Options> {
+        if self.grid.is_some() && !has_grid {
+            return Err(Error::Usage("--grid is the resolution of --accel grid; give both or neither".to_owned()));
+        }
+        Ok(Options { grid: self.grid, ..Options::default() })
+    }
+}
+
+impl AccelArgs {
+    /// The accelerator and its options.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where Embree alone renders, and where something is said about a native BVH that is not built.
+    pub(super) fn choose(
+        &self,
+        backend: BackendArg,
+        build: Option<&BuildArgs>,
+        cache: &CacheArgs,
+    ) -> Result<(Accel, Options)> {
+        let accel = self.accel.accel();
+        let options = self.options.choose(accel == Accel::Grid)?;
+        if accel == Accel::Bvh {
+            return Ok((accel, options));
+        }
+        let name = accel.name();
+        let refuse = |problem: &str| Err(Error::Usage(format!("--accel {name} {problem}; leave one of them out")));
+        match backend {
+            BackendArg::Embree => refuse("searches the scene in place of --backend embree"),
+            _ if cache.is_given() => refuse("is not what --cache keeps: that is native BVHs"),
+            _ if build.is_some_and(BuildArgs::is_given) => {
+                refuse("is not what --build and --max-memory are about: that is the native BVH")
+            }
+            BackendArg::Native | BackendArg::Both => Ok((accel, options)),
+        }
+    }
+}
+
+fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=Resolution::MOST).contains(side));
+    let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(side).collect();
+    match sides.as_deref() {
+        Some(&[n]) => Ok(Resolution::Longest(n)),
+        Some(&[x, y, z]) => Ok(Resolution::Axes(UVec3::new(x, y, z))),
+        _ => Err(format!("expected N or XxYxZ, each 1 to {}, as in 64 or 100x20x100", Resolution::MOST)),
+    }
+}
