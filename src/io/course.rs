@@ -244,6 +244,7 @@ impl Reader {
         let mut scene = self.scene;
         // The file's ambient colours stand for the surface and the light at once.
         scene.ambient = Vec3::ONE;
+        scene.background = Some(Vec3::ZERO);
         light_or_darkness(&mut scene.lights);
         scene.geometries = self.parts.into_geometries();
         let identity = DAffine3::IDENTITY;

@@ -1,7 +1,7 @@
 //! The ray tracer course format.
 
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Attenuation, Fov, Geometry, Light, Scene};
+use twincast::scene::{Attenuation, Fov, Geometry, Light, Projection, Scene};
 use twincast::trace::bvh::Bvh;
 use twincast::{Ray, Shape, Tracer, World};
 
@@ -33,7 +33,10 @@ fn everything_arrives() {
         (Some([64, 48]), Some(3), Some("out.png"))
     );
     let camera = &scene.cameras[0];
-    assert!(close(camera.eye, [0.0, -4.0, 4.0]) && camera.fov == Fov::Vertical(45f64.to_radians()));
+    assert!(
+        close(camera.eye, [0.0, -4.0, 4.0])
+            && camera.projection == Projection::Perspective(Fov::Vertical(45f64.to_radians()))
+    );
     assert!(close(-camera.frame.z_axis * 5.0, [0.0, 3.0, -4.0]), "it looks from eye to at");
 
     let Light::Directional { direction, color } = scene.lights[0] else { panic!("{:?}", scene.lights[0]) };

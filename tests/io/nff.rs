@@ -2,7 +2,7 @@
 
 use twincast::Shape;
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Fov, Geometry, Light, Scene, Specular};
+use twincast::scene::{Fov, Geometry, Light, Projection, Scene, Specular};
 
 use super::{Files, corners, refused_bytes};
 
@@ -27,7 +27,7 @@ fn shapes(scene: &Scene, index: usize) -> &[Shape] {
 #[test]
 fn everything_arrives() {
     let scene = scene(TEXT);
-    assert_eq!((scene.background, scene.request.size), (Vec3::new(0.1, 0.2, 0.3), Some([80, 60])));
+    assert_eq!((scene.background, scene.request.size), (Some(Vec3::new(0.1, 0.2, 0.3)), Some([80, 60])));
     let kinds = scene.geometries.iter().flat_map(|geometry| match geometry {
         Geometry::Mesh(mesh) => vec![if mesh.normals.is_empty() { "flat" } else { "smooth" }],
         Geometry::Shapes { shapes, .. } => shapes.iter().map(Shape::name).collect(),
@@ -73,7 +73,7 @@ fn the_angle_is_between_the_centres_of_rows() {
     for rows in [2, 3, 60] {
         let text = TEXT.replace("resolution 80 60", &format!("resolution 7 {rows}"));
         let camera = &scene(&text).cameras[0];
-        let Fov::Vertical(angle) = camera.fov else { panic!("{camera:?}") };
+        let Projection::Perspective(Fov::Vertical(angle)) = camera.projection else { panic!("{camera:?}") };
         let half = (angle / 2.0).tan();
         let first = half * (1.0 - 1.0 / f64::from(rows));
         assert!((first.atan() - 20f64.to_radians()).abs() < 1e-14, "{rows}: {first}");
@@ -115,11 +115,7 @@ fn faults_are_told_with_line_word_and_remedy() {
         ("x 1\n", 1, "\"x\" is no statement of an NFF file; expected v, b, l"),
         ("s 0 0 0 1\n", 1, "before any \"f r g b"),
         ("from 0 0 0\n", 1, "\"from\" before any v"),
-        (
-            "v\nfrom 0 0 1\nat 0 0 0\nup 0 1 0\nangle 45\nresolution 4 4\nb 0 0 0\n",
-            7,
-            "lacks the line \"hither\"",
-        ),
+        ("v\nfrom 0 0 1\nat 0 0 0\nup 0 1 0\nangle 45\nresolution 4 4\nb 0 0 0\n", 7, "lacks the line \"hither\""),
         ("v\nfrom 0 0 1\nat 0 0 1\nup 0 0 1\nangle 45\nhither 0\nresolution 4 4\n", 7, "are one point"),
         ("v\nangle 200\n", 2, "below 180"),
         ("f 1 1 1 1 0 0 0.5 0\n", 1, "an index of 0, but T is 0.5"),

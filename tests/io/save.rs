@@ -2,7 +2,7 @@
 
 use twincast::io::save;
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, RECIPES, Scene};
+use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, Projection, RECIPES, Scene};
 use twincast::{Error, Shape};
 
 use super::Files;
@@ -37,8 +37,8 @@ fn contents(scene: &Scene) -> (Vec<String>, Vec<[[u32; 3]; 3]>) {
 }
 
 fn angle(camera: &Camera) -> f64 {
-    match camera.fov {
-        Fov::Vertical(angle) => angle,
+    match camera.projection {
+        Projection::Perspective(Fov::Vertical(angle)) => angle,
         other => panic!("{other:?}"),
     }
 }
@@ -144,6 +144,11 @@ fn every_shape_comes_back_from_toml() {
     assert!(placed.iter().all(|instance| names(&again).contains(instance)), "{:?}", names(&again));
     // Degrees and radians round once each.
     assert_eq!(format!("{:.6?}", again.lights), format!("{:.6?}", scene.lights));
+    let looks = |scene: &Scene| {
+        let look = |c: &Camera| format!("{} {:.9?} {:?} {:?} {}", c.name, c.projection, c.lens, c.distortion, c.shift);
+        scene.cameras.iter().map(look).collect::<Vec<_>>()
+    };
+    assert_eq!(looks(&again), looks(&scene));
     assert_eq!(
         (again.request, again.ambient, &again.cameras[0].name),
         (scene.request, scene.ambient, &scene.cameras[0].name)

@@ -1,7 +1,7 @@
 //! Twincast's own scene format.
 
 use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{Fov, Geometry, Light, Scene, Specular};
+use twincast::scene::{Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
 use twincast::{Shape, World};
 
 use super::{Files, obj, refused, refused_bytes};
@@ -85,18 +85,22 @@ fn what_the_file_asks_of_a_render() {
     let request = &scene.request;
     assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
     assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
-    assert_eq!((scene.background, scene.ambient), (Vec3::new(0.1, 0.2, 0.4), Vec3::splat(0.1)));
+    assert_eq!((scene.background, scene.ambient), (Some(Vec3::new(0.1, 0.2, 0.4)), Vec3::splat(0.1)));
     let camera = &scene.cameras[0];
     assert_eq!(
         (camera.name.as_str(), camera.eye, camera.shift),
         ("front", DVec3::new(0.0, 1.0, 5.0), DVec2::new(0.25, 0.0))
     );
-    let Fov::Both { horizontal, vertical } = camera.fov else { panic!("{:?}", camera.fov) };
+    let Projection::Perspective(Fov::Both { horizontal, vertical }) = camera.projection else { panic!("{camera:?}") };
     assert_eq!((horizontal, vertical), (60f64.to_radians(), 40f64.to_radians()));
     assert!(scene.lights.is_empty());
+    assert_eq!(camera.lens, Some(ThinLens { radius: 0.05, focus: 5.0, blades: 6 }));
+    assert_eq!(camera.distortion, Some(Distortion { k1: -0.1, k2: 0.01, ..Distortion::default() }));
+    let kinds: Vec<_> = scene.cameras[1..].iter().map(|camera| camera.projection).collect();
+    assert_eq!(kinds, [Projection::Orthographic(8.0), Projection::Equirectangular]);
     let only = scene_of_camera("fov_x = 60\n");
-    assert_eq!(only.cameras[0].fov, Fov::Horizontal(60f64.to_radians()));
-    assert_eq!(scene_of_camera("").cameras[0].fov, Fov::Vertical(40f64.to_radians()));
+    assert_eq!(only.cameras[0].projection, Projection::Perspective(Fov::Horizontal(60f64.to_radians())));
+    assert_eq!(scene_of_camera("").cameras[0].projection, Projection::Perspective(Fov::Vertical(40f64.to_radians())));
 }
 
 fn scene_of_camera(keys: &str) -> Scene {
@@ -184,7 +188,7 @@ fn glowing_spheres_are_lights() {
     let scene = scene(&format!("{minray}{SPHERE}"));
     let [Light::Point { position, color, radius, .. }] = scene.lights[..] else { panic!("{:?}", scene.lights) };
     assert!((position - DVec3::new(3.0, 1.0, 0.0)).length() < 1e-12 && (radius - 6.0).abs() < 1e-9);
-    assert_eq!((color, scene.background), (Vec3::new(0.5, 0.4, 0.3), Vec3::splat(0.02)));
+    assert_eq!((color, scene.background), (Vec3::new(0.5, 0.4, 0.3), Some(Vec3::splat(0.02))));
 }
 
 #[test]
@@ -219,6 +223,12 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\nfov = 40\n",
+            5,
+            "has no key \"fov\"",
+        ),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0 }\n", 4, "wants a number above 0"),
         ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Scene, Specular};
+use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Projection, Scene, Specular};
 use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
@@ -37,9 +37,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             return elsewhere(format!("{what} (material {:?})", material.name));
         }
     }
-    let is_plain = |camera: &Camera| camera.shift == DVec2::ZERO && !matches!(camera.fov, Fov::Both { .. });
+    let is_plain = |camera: &Camera| {
+        let has_angle = matches!(camera.projection, Projection::Perspective(Fov::Vertical(_) | Fov::Horizontal(_)));
+        has_angle && camera.shift == DVec2::ZERO && camera.lens.is_none() && camera.distortion.is_none()
+    };
     if !scene.cameras.iter().all(is_plain) {
-        return elsewhere("cameras with a shift or with pixels that are not square".to_owned());
+        return elsewhere("cameras but pinholes with square pixels, without shift".to_owned());
     }
     let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, .. } if range.is_infinite());
     if scene.lights.iter().all(is_bare) {
@@ -67,7 +70,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     for camera in &scene.cameras {
         view(camera, width, height, out)?;
     }
-    writeln!(out, "b {}", spaced(scene.background))?;
+    writeln!(out, "b {}", spaced(scene.background.unwrap_or_default()))?;
     for light in &scene.lights {
         if let Light::Point { position, color, .. } = light {
             writeln!(out, "l {} {}", spaced_f64(*position), spaced(*color))?;
@@ -94,7 +97,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
 fn view(camera: &Camera, width: u32, height: u32, out: &mut dyn Write) -> io::Result<()> {
     // From the edges of the picture to the centres of its first and last row.
     let rows = f64::from(height);
-    let half = camera.fov.half_extent(f64::from(width) / rows).map_or(1.0, |half| half.y);
+    let half = camera.projection.half_extent(f64::from(width) / rows).map_or(1.0, |half| half.y);
     let share = if height > 1 { (rows - 1.0) / rows } else { 1.0 };
     let angle = 2.0 * libm::atan(half * share);
     let at = camera.eye - camera.frame.z_axis;

@@ -5,7 +5,10 @@ use std::io::{self, Write};
 
 use super::Unsayable;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Request, Scene, Specular};
+use crate::scene::{
+    Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request, Scene, Specular,
+    ThinLens,
+};
 use crate::shape::{Shape, Sphere};
 
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
@@ -100,22 +103,38 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     if let Some(output) = output {
         writeln!(out, "output = {}", quoted(output))?;
     }
-    writeln!(out, "background = {}\nambient = {}\n", list(scene.background), list(scene.ambient))
+    if let Some(background) = scene.background {
+        writeln!(out, "background = {}", list(background))?;
+    }
+    writeln!(out, "ambient = {}\n", list(scene.ambient))
 }
 
 fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(&camera.name), list_f64(camera.eye))?;
     let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
-    let (horizontal, vertical) = match camera.fov {
-        Fov::Vertical(vertical) => (None, Some(vertical)),
-        Fov::Horizontal(horizontal) => (Some(horizontal), None),
-        Fov::Both { horizontal, vertical } => (Some(horizontal), Some(vertical)),
-    };
-    for (key, angle) in [("fov_x", horizontal), ("fov", vertical)] {
-        if let Some(angle) = angle {
-            writeln!(out, "{key} = {}", angle.to_degrees())?;
+    match camera.projection {
+        Projection::Perspective(fov) => {
+            let (horizontal, vertical) = match fov {
+                Fov::Vertical(vertical) => (None, Some(vertical)),
+                Fov::Horizontal(horizontal) => (Some(horizontal), None),
+                Fov::Both { horizontal, vertical } => (Some(horizontal), Some(vertical)),
+            };
+            for (key, angle) in [("fov_x", horizontal), ("fov", vertical)] {
+                if let Some(angle) = angle {
+                    writeln!(out, "{key} = {}", angle.to_degrees())?;
+                }
+            }
         }
+        Projection::Orthographic(height) => writeln!(out, "projection = \"orthographic\"\nheight = {height}")?,
+        Projection::Equirectangular => writeln!(out, "projection = \"equirectangular\"")?,
+    }
+    if let Some(ThinLens { radius, focus, blades }) = camera.lens {
+        let blades = if blades < 3 { String::new() } else { format!(", blades = {blades}") };
+        writeln!(out, "lens = {{ radius = {radius}, focus = {focus}{blades} }}")?;
+    }
+    if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
+        writeln!(out, "distortion = {{ k1 = {k1}, k2 = {k2}, k3 = {k3}, p1 = {p1}, p2 = {p2} }}")?;
     }
     if camera.shift != DVec2::ZERO {
         writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;

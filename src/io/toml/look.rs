@@ -1,13 +1,11 @@
-//! What is seen of shapes, and from where: materials, lights, cameras, and what the file asks of a render.
+//! What is seen of shapes: materials, lights, and what the file asks of a render.
 
-use super::table::{Read, Table, Value};
-use crate::math::{DVec2, DVec3, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Light, Material, Request, Specular};
+use super::table::{Read, Table};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Attenuation, Light, Material, Request, Specular};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u64 = 65_536;
-/// Vertical angle of view where none is given, degrees.
-const USUAL_FOV: f64 = 40.0;
 
 /// How lights and surfaces go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +19,8 @@ pub(super) enum Shading {
 /// `[render]`.
 pub(super) struct Render {
     pub(super) request: Request,
-    pub(super) background: Vec3,
+    /// None for a transparent picture.
+    pub(super) background: Option<Vec3>,
     pub(super) ambient: Vec3,
     pub(super) shading: Shading,
     pub(super) headlight: bool,
@@ -31,7 +30,7 @@ impl Render {
     pub(super) fn read(table: Option<Table<'_>>) -> Read<Self> {
         let mut render = Self {
             request: Request::default(),
-            background: Vec3::ZERO,
+            background: None,
             ambient: Vec3::ZERO,
             shading: Shading::Phong,
             headlight: true,
@@ -56,9 +55,9 @@ impl Render {
         let shadings = [("phong", Shading::Phong), ("minray", Shading::Minray)];
         render.shading = table.optional("shading", |value| value.choice(&shadings))?.unwrap_or(render.shading);
         render.headlight = table.optional("headlight", |value| value.flag())?.unwrap_or(true);
-        render.background = background.unwrap_or(match render.shading {
-            Shading::Phong => Vec3::ZERO,
-            Shading::Minray => render.ambient,
+        render.background = background.or(match render.shading {
+            Shading::Phong => None,
+            Shading::Minray => Some(render.ambient),
         });
         table.finish()?;
         Ok(render)
@@ -150,30 +149,4 @@ fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
         if range > 0.0 { Ok(range) } else { Err(value.fault("\"range\" wants a number above 0")) }
     })?;
     Ok((position, attenuation.unwrap_or(Attenuation::NONE), range.unwrap_or(f64::INFINITY)))
-}
-
-/// `[[camera]]`.
-pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
-    let (eye, target) = (table.need("eye")?.vector()?, table.need("look_at")?.vector()?);
-    let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
-    let vertical = table.optional("fov", angle)?;
-    let horizontal = table.optional("fov_x", angle)?;
-    let mut camera = Camera::look_at(eye, target, up, vertical.unwrap_or(USUAL_FOV.to_radians()))
-        .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
-    camera.fov = match (horizontal, vertical) {
-        (None, _) => camera.fov,
-        (Some(horizontal), None) => Fov::Horizontal(horizontal),
-        (Some(horizontal), Some(vertical)) => Fov::Both { horizontal, vertical },
-    };
-    camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
-    camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
-    table.finish()?;
-    Ok(camera)
-}
-
-/// An angle of view, in radians.
-fn angle(value: Value<'_>) -> Read<f64> {
-    let degrees = value.number()?;
-    let inside = degrees > 0.0 && degrees < 180.0;
-    if inside { Ok(degrees.to_radians()) } else { Err(value.unlike("degrees above 0 and below 180")) }
 }

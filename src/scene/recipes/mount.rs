@@ -43,7 +43,7 @@ fn heights(side: u32) -> Vec<f64> {
             let middle = ((a.0 + b.0) / 2, (a.1 + b.1) / 2);
             // In units of the whole, so that a finer mountain is the same one.
             let unit = (1 << 13) / side;
-            let random = noise(middle.0 * unit, middle.1 * unit) * 2.0 - 0.8;
+            let random = noise(middle.0 * unit, middle.1 * unit) * 2.0 - 0.7;
             heights[place(middle)] = (heights[place(a)] + heights[place(b)]) / 2.0 + random * length * ROUGHNESS;
         };
         for y in (0..=side).step_by(step as usize) {
