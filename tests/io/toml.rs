@@ -91,13 +91,14 @@ fn what_the_file_asks_of_a_render() {
         (camera.name.as_str(), camera.eye, camera.shift),
         ("front", DVec3::new(0.0, 1.0, 5.0), DVec2::new(0.25, 0.0))
     );
-    let Projection::Perspective(Fov::Both { horizontal, vertical }) = camera.projection else { panic!("{camera:?}") };
-    assert_eq!((horizontal, vertical), (60f64.to_radians(), 40f64.to_radians()));
+    let both = Fov::Both { horizontal: 60f64.to_radians(), vertical: 40f64.to_radians() };
+    assert_eq!(camera.projection, Projection::Perspective(both));
+    assert_eq!(camera.lens, Some(ThinLens { radius: 0.02, focus: 5.0, blades: 6 }));
+    assert_eq!(camera.distortion, Some(Distortion { k1: -0.28, k2: 0.07, k3: 0.0, p1: 0.001, p2: 0.0 }));
+    let plan = &scene.cameras[1];
+    assert_eq!((plan.name.as_str(), plan.projection), ("plan", Projection::Orthographic(3.0)));
+    assert_eq!((plan.frame.y_axis, plan.lens, plan.distortion), (DVec3::NEG_Z, None, None));
     assert!(scene.lights.is_empty());
-    assert_eq!(camera.lens, Some(ThinLens { radius: 0.05, focus: 5.0, blades: 6 }));
-    assert_eq!(camera.distortion, Some(Distortion { k1: -0.1, k2: 0.01, ..Distortion::default() }));
-    let kinds: Vec<_> = scene.cameras[1..].iter().map(|camera| camera.projection).collect();
-    assert_eq!(kinds, [Projection::Orthographic(8.0), Projection::Equirectangular]);
     let only = scene_of_camera("fov_x = 60\n");
     assert_eq!(only.cameras[0].projection, Projection::Perspective(Fov::Horizontal(60f64.to_radians())));
     assert_eq!(scene_of_camera("").cameras[0].projection, Projection::Perspective(Fov::Vertical(40f64.to_radians())));
@@ -223,12 +224,13 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"orthographic\"\n", 1, "\"height\""),
         (
-            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\nfov = 40\n",
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\ndistortion = [1, 0, 0, 0, 0]\n",
             5,
-            "has no key \"fov\"",
+            "perspective cameras alone",
         ),
-        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0 }\n", 4, "wants a number above 0"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0, focus = 1 }\n", 4, "a length above 0"),
         ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",

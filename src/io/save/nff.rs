@@ -38,11 +38,13 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
         }
     }
     let is_plain = |camera: &Camera| {
-        let has_angle = matches!(camera.projection, Projection::Perspective(Fov::Vertical(_) | Fov::Horizontal(_)));
-        has_angle && camera.shift == DVec2::ZERO && camera.lens.is_none() && camera.distortion.is_none()
+        let square = matches!(camera.projection, Projection::Perspective(Fov::Vertical(_) | Fov::Horizontal(_)));
+        square && camera.shift == DVec2::ZERO && camera.lens.is_none() && camera.distortion.is_none()
     };
     if !scene.cameras.iter().all(is_plain) {
-        return elsewhere("cameras but pinholes with square pixels, without shift".to_owned());
+        return elsewhere(
+            "cameras with a shift, a lens or pixels that are not square, or without perspective".to_owned(),
+        );
     }
     let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, .. } if range.is_infinite());
     if scene.lights.iter().all(is_bare) {

@@ -114,27 +114,19 @@ fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
     let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
     match camera.projection {
-        Projection::Perspective(fov) => {
-            let (horizontal, vertical) = match fov {
-                Fov::Vertical(vertical) => (None, Some(vertical)),
-                Fov::Horizontal(horizontal) => (Some(horizontal), None),
-                Fov::Both { horizontal, vertical } => (Some(horizontal), Some(vertical)),
-            };
-            for (key, angle) in [("fov_x", horizontal), ("fov", vertical)] {
-                if let Some(angle) = angle {
-                    writeln!(out, "{key} = {}", angle.to_degrees())?;
-                }
-            }
+        Projection::Perspective(Fov::Vertical(vertical)) => writeln!(out, "fov = {}", vertical.to_degrees())?,
+        Projection::Perspective(Fov::Horizontal(horizontal)) => writeln!(out, "fov_x = {}", horizontal.to_degrees())?,
+        Projection::Perspective(Fov::Both { horizontal, vertical }) => {
+            writeln!(out, "fov_x = {}\nfov = {}", horizontal.to_degrees(), vertical.to_degrees())?;
         }
         Projection::Orthographic(height) => writeln!(out, "projection = \"orthographic\"\nheight = {height}")?,
         Projection::Equirectangular => writeln!(out, "projection = \"equirectangular\"")?,
     }
     if let Some(ThinLens { radius, focus, blades }) = camera.lens {
-        let blades = if blades < 3 { String::new() } else { format!(", blades = {blades}") };
-        writeln!(out, "lens = {{ radius = {radius}, focus = {focus}{blades} }}")?;
+        writeln!(out, "lens = {{ radius = {radius}, focus = {focus}, blades = {blades} }}")?;
     }
     if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
-        writeln!(out, "distortion = {{ k1 = {k1}, k2 = {k2}, k3 = {k3}, p1 = {p1}, p2 = {p2} }}")?;
+        writeln!(out, "distortion = [{k1}, {k2}, {k3}, {p1}, {p2}]")?;
     }
     if camera.shift != DVec2::ZERO {
         writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;

@@ -1,11 +1,13 @@
-//! What is seen of shapes: materials, lights, and what the file asks of a render.
+//! What is seen of shapes, and from where: materials, lights, cameras, and what the file asks of a render.
 
-use super::table::{Read, Table};
-use crate::math::{DVec3, Vec3};
-use crate::scene::{Attenuation, Light, Material, Request, Specular};
+use super::table::{Read, Table, Value};
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::scene::{Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Specular, ThinLens};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u64 = 65_536;
+/// Vertical angle of view where none is given, degrees.
+const USUAL_FOV: f64 = 40.0;
 
 /// How lights and surfaces go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,4 +151,66 @@ fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
         if range > 0.0 { Ok(range) } else { Err(value.fault("\"range\" wants a number above 0")) }
     })?;
     Ok((position, attenuation.unwrap_or(Attenuation::NONE), range.unwrap_or(f64::INFINITY)))
+}
+
+/// `[[camera]]`.
+pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
+    let (eye, target) = (table.need("eye")?.vector()?, table.need("look_at")?.vector()?);
+    let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
+    let mut camera = Camera::look_at(eye, target, up, 1.0)
+        .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    camera.projection = projection(&mut table)?;
+    camera.lens = table.optional("lens", lens)?;
+    let bends = table.get("distortion");
+    if let (Some(value), false) = (bends, matches!(camera.projection, Projection::Perspective(_))) {
+        return Err(value.fault("\"distortion\" is for perspective cameras alone"));
+    }
+    camera.distortion = bends
+        .map(|value| {
+            let [k1, k2, k3, p1, p2] = value.numbers()?;
+            Ok(Distortion { k1, k2, k3, p1, p2 })
+        })
+        .transpose()?;
+    camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
+    camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
+    table.finish()?;
+    Ok(camera)
+}
+
+fn projection(table: &mut Table<'_>) -> Read<Projection> {
+    let kinds = ["perspective", "orthographic", "equirectangular"].map(|name| (name, name));
+    match table.optional("projection", |value| value.choice(&kinds))? {
+        Some("orthographic") => Ok(Projection::Orthographic(length(table.need("height")?)?)),
+        Some("equirectangular") => Ok(Projection::Equirectangular),
+        _ => {
+            let vertical = table.optional("fov", angle)?;
+            let horizontal = table.optional("fov_x", angle)?;
+            Ok(Projection::Perspective(match (horizontal, vertical) {
+                (None, vertical) => Fov::Vertical(vertical.unwrap_or(USUAL_FOV.to_radians())),
+                (Some(horizontal), None) => Fov::Horizontal(horizontal),
+                (Some(horizontal), Some(vertical)) => Fov::Both { horizontal, vertical },
+            }))
+        }
+    }
+}
+
+/// `lens = { radius, focus, blades }`.
+fn lens(value: Value<'_>) -> Read<ThinLens> {
+    let mut table = value.table("\"lens\"".to_owned())?;
+    let (radius, focus) = (length(table.need("radius")?)?, length(table.need("focus")?)?);
+    let blades = table.optional("blades", |value| value.whole(0..=100))?.unwrap_or(0) as u32;
+    table.finish()?;
+    Ok(ThinLens { radius, focus, blades })
+}
+
+fn length(value: Value<'_>) -> Read<f64> {
+    let length = value.number()?;
+    if length > 0.0 { Ok(length) } else { Err(value.unlike("a length above 0")) }
+}
+
+/// An angle of view, in radians.
+fn angle(value: Value<'_>) -> Read<f64> {
+    let degrees = value.number()?;
+    let inside = degrees > 0.0 && degrees < 180.0;
+    if inside { Ok(degrees.to_radians()) } else { Err(value.unlike("degrees above 0 and below 180")) }
 }

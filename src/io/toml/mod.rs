@@ -3,9 +3,8 @@
 //!
 //! The document is parsed into a tree that knows its places ([`table`]). The top of the file and each group are bodies:
 //! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
-//! ([`group`]). What is seen of it all is in [`look`], from where in [`camera`]. A key that nobody reads is refused.
+//! ([`group`]). What is seen of it all, and from where, is in [`look`]. A key that nobody reads is refused.
 
-mod camera;
 mod group;
 mod include;
 mod look;
@@ -99,7 +98,7 @@ impl Reader<'_> {
         (self.scene.ambient, self.scene.background) = (render.ambient, render.background);
         self.scene.request = render.request;
         for table in top.tables("camera")? {
-            self.scene.cameras.push(camera::camera(table)?);
+            self.scene.cameras.push(look::camera(table)?);
         }
         for table in top.tables("light")? {
             self.scene.lights.push(look::light(table)?);

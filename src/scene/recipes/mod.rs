@@ -157,7 +157,7 @@ fn stage(scene: &mut Scene, floor: Option<Material>) {
     let subject = scene.bounds();
     // Nearer than where a ball around the subject would fit into the picture: none of them is one.
     let framing = Camera::framing(&subject, 4.0 / 3.0);
-    let camera = Camera { eye: subject.centre().lerp(framing.eye, 0.75), ..framing };
+    let camera = Camera { eye: subject.centre().lerp(framing.eye, 0.85), ..framing };
     let eye = camera.eye;
     scene.cameras = vec![camera];
     scene.request = Request { size: Some([400, 300]), ..Request::default() };
