@@ -7,7 +7,8 @@
 //!
 //! Decided where courses differ: lights and cameras are not moved by the transform; `maxverts` and `maxvertnorms` promise
 //! sizes that nobody needs, and are only read; colours are linear; a file without lights is lit by `ambient` and
-//! `emission` alone. `maxdepth` counts mirrored rays, and a surface mirrors by its `specular`.
+//! `emission` alone; where nothing is hit the picture is black; all faces have two sides. `maxdepth` counts mirrored rays, and a
+//! surface mirrors by its `specular`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -244,6 +245,7 @@ impl Reader {
         let mut scene = self.scene;
         // The file's ambient colours stand for the surface and the light at once.
         scene.ambient = Vec3::ONE;
+        scene.background = Some(Vec3::ZERO);
         light_or_darkness(&mut scene.lights);
         scene.geometries = self.parts.into_geometries();
         let identity = DAffine3::IDENTITY;

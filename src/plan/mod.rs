@@ -88,14 +88,13 @@ impl Plan {
             uvs: (lit || ambient) && materials.iter().any(|m| m.diffuse_texture.is_some()),
             colors: (lit || ambient) && meshes().any(|m| !m.colors.is_empty()),
         };
-        let own_background = (scene.background != Vec3::ZERO).then_some(scene.background);
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
             lighting,
             ambient,
             depth,
-            background: background.or(own_background),
+            background: background.or(scene.background),
             primitives: world.primitive_count(),
             materials: materials.len(),
         }

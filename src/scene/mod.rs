@@ -48,8 +48,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Light that reaches every point from everywhere, linear RGB.
     pub ambient: Vec3,
-    /// What a ray that hits nothing sees, linear RGB.
-    pub background: Vec3,
+    /// What a ray that hits nothing sees, linear RGB; none where the picture is to be transparent.
+    pub background: Option<Vec3>,
     /// What the file wants of a render.
     pub request: Request,
 }

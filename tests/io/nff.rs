@@ -27,7 +27,7 @@ fn shapes(scene: &Scene, index: usize) -> &[Shape] {
 #[test]
 fn everything_arrives() {
     let scene = scene(TEXT);
-    assert_eq!((scene.background, scene.request.size), (Vec3::new(0.1, 0.2, 0.3), Some([80, 60])));
+    assert_eq!((scene.background, scene.request.size), (Some(Vec3::new(0.1, 0.2, 0.3)), Some([80, 60])));
     let kinds = scene.geometries.iter().flat_map(|geometry| match geometry {
         Geometry::Mesh(mesh) => vec![if mesh.normals.is_empty() { "flat" } else { "smooth" }],
         Geometry::Shapes { shapes, .. } => shapes.iter().map(Shape::name).collect(),

@@ -87,7 +87,7 @@ fn what_the_file_asks_of_a_render() {
     let request = &scene.request;
     assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
     assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
-    assert_eq!((scene.background, scene.ambient), (Vec3::new(0.1, 0.2, 0.4), Vec3::splat(0.1)));
+    assert_eq!((scene.background, scene.ambient), (Some(Vec3::new(0.1, 0.2, 0.4)), Vec3::splat(0.1)));
     let camera = &scene.cameras[0];
     assert_eq!(
         (camera.name.as_str(), camera.eye, camera.shift),
@@ -196,7 +196,7 @@ fn glowing_spheres_are_lights() {
     let scene = scene(&format!("{minray}{SPHERE}"));
     let [Light::Point { position, color, radius, .. }] = scene.lights[..] else { panic!("{:?}", scene.lights) };
     assert!((position - DVec3::new(3.0, 1.0, 0.0)).length() < 1e-12 && (radius - 6.0).abs() < 1e-9);
-    assert_eq!((color, scene.background), (Vec3::new(0.5, 0.4, 0.3), Vec3::splat(0.02)));
+    assert_eq!((color, scene.background), (Vec3::new(0.5, 0.4, 0.3), Some(Vec3::splat(0.02))));
 }
 
 #[test]

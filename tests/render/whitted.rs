@@ -88,7 +88,7 @@ fn a_pane_moves_what_stands_behind_it() {
 fn total_internal_reflection_lets_nothing_through() {
     let water = Material { transmission: Vec3::ONE, ior: 1.33, emission: Vec3::X, ..BLACK };
     let mut scene = scene(vec![(plane(0.0, Vec3::Y), water)]);
-    scene.background = Vec3::Y;
+    scene.background = Some(Vec3::Y);
     let critical = (1.0f64 / f64::from(1.33f32)).asin().to_degrees();
     for (degrees, sky) in [(critical - 0.1, 1.0), (critical + 0.1, 0.0)] {
         let up = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);

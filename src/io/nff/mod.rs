@@ -152,7 +152,7 @@ impl Reader {
         let (line, usage) = (statement.line, statement.usage);
         match word {
             b"v" => self.view = Some(View::default()),
-            b"b" => self.scene.background = statement.color()?,
+            b"b" => self.scene.background = Some(statement.color()?),
             b"l" => {
                 let position = statement.vector()?;
                 let color = statement.has_more().then(|| statement.color()).transpose()?;
@@ -290,7 +290,9 @@ impl Reader {
     fn finish(self) -> Scene {
         let Scene { materials, cameras, background, request, .. } = self.scene;
         let mut scene = Scene::from_geometries(self.parts.into_geometries(), materials);
-        (scene.cameras, scene.background, scene.request) = (cameras, background, request);
+        (scene.cameras, scene.request) = (cameras, request);
+        // A picture of this format is opaque.
+        scene.background = background.or(Some(Vec3::ZERO));
         let share = 1.0 / (self.lights.len() as f32).sqrt();
         let light = |(position, color): (DVec3, Option<Vec3>)| {
             let (color, attenuation) = (color.unwrap_or(Vec3::splat(share)), Attenuation::NONE);

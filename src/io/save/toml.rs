@@ -103,7 +103,10 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     if let Some(output) = output {
         writeln!(out, "output = {}", quoted(output))?;
     }
-    writeln!(out, "background = {}\nambient = {}\n", list(scene.background), list(scene.ambient))
+    if let Some(background) = scene.background {
+        writeln!(out, "background = {}", list(background))?;
+    }
+    writeln!(out, "ambient = {}\n", list(scene.ambient))
 }
 
 fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {

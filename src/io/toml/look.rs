@@ -23,7 +23,8 @@ pub(super) enum Shading {
 /// `[render]`.
 pub(super) struct Render {
     pub(super) request: Request,
-    pub(super) background: Vec3,
+    /// None for a transparent picture.
+    pub(super) background: Option<Vec3>,
     pub(super) ambient: Vec3,
     pub(super) shading: Shading,
     pub(super) headlight: bool,
@@ -33,7 +34,7 @@ impl Render {
     pub(super) fn read(table: Option<Table<'_>>) -> Read<Self> {
         let mut render = Self {
             request: Request::default(),
-            background: Vec3::ZERO,
+            background: None,
             ambient: Vec3::ZERO,
             shading: Shading::Phong,
             headlight: true,
@@ -58,9 +59,9 @@ impl Render {
         let shadings = [("phong", Shading::Phong), ("minray", Shading::Minray)];
         render.shading = table.optional("shading", |value| value.choice(&shadings))?.unwrap_or(render.shading);
         render.headlight = table.optional("headlight", |value| value.flag())?.unwrap_or(true);
-        render.background = background.unwrap_or(match render.shading {
-            Shading::Phong => Vec3::ZERO,
-            Shading::Minray => render.ambient,
+        render.background = background.or(match render.shading {
+            Shading::Phong => None,
+            Shading::Minray => Some(render.ambient),
         });
         table.finish()?;
         Ok(render)

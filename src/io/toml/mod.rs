@@ -3,7 +3,7 @@
 //!
 //! The document is parsed into a tree that knows its places ([`table`]). The top of the file and each group are bodies:
 //! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
-//! ([`group`]). What is seen of it all is in [`look`]. A key that nobody reads is refused.
+//! ([`group`]). What is seen of it all, and from where, is in [`look`]. A key that nobody reads is refused.
 
 mod group;
 mod include;

@@ -122,10 +122,11 @@ impl Recipe {
     }
 }
 
-/// The terrain, ten metres wide.
+/// The terrain, ten metres wide, and less steep.
 fn land(n: u32) -> Scene {
     let mut mesh = terrain(n);
-    let positions = mesh.positions.iter().map(|p| (*p - Vec3::new(0.5, 0.0, 0.5)) * 10.0).collect();
+    let positions =
+        mesh.positions.iter().map(|p| (*p - Vec3::new(0.5, 0.0, 0.5)) * Vec3::new(10.0, 4.0, 10.0)).collect();
     mesh.positions = Arc::new(positions);
     staged(vec![Geometry::Mesh(mesh)], vec![fill([0.55, 0.6, 0.35], 1.0, 0.0, 1.0)], None)
 }
@@ -154,17 +155,19 @@ fn staged(geometries: Vec<Geometry>, materials: Vec<Material>, floor: Option<Mat
 /// Adds camera, lights and a floor.
 fn stage(scene: &mut Scene, floor: Option<Material>) {
     let subject = scene.bounds();
-    let camera = Camera::framing(&subject, 4.0 / 3.0);
+    // Nearer than where a ball around the subject would fit into the picture: none of them is one.
+    let framing = Camera::framing(&subject, 4.0 / 3.0);
+    let camera = Camera { eye: subject.centre().lerp(framing.eye, 0.85), ..framing };
     let eye = camera.eye;
     scene.cameras = vec![camera];
     scene.request = Request { size: Some([400, 300]), ..Request::default() };
-    scene.background = Vec3::new(0.08, 0.16, 0.3);
+    scene.background = Some(Vec3::new(0.08, 0.16, 0.3));
     let reach = subject.radius().max(1e-3);
-    // From the left, the right and the camera, above all of it; each a third of the light by the rule of NFF.
+    // From the left, the right and the camera, above all of it.
     let lights = [DVec3::new(-2.0, 3.0, 1.5), DVec3::new(3.0, 2.5, 1.0), (eye - subject.centre()) / reach + DVec3::Y];
     let light = |offset: DVec3| Light::Point {
         position: subject.centre() + offset * reach,
-        color: Vec3::splat(1.0 / 3f32.sqrt()),
+        color: Vec3::splat(0.4),
         attenuation: Attenuation::NONE,
         range: f64::INFINITY,
         radius: 0.0,

@@ -22,9 +22,14 @@ pub(super) fn make(generations: u32) -> Scene {
         let [a, b, c, d] = [index(x, y), index(x + 1, y), index(x, y + 1), index(x + 1, y + 1)];
         [[a, c, d], [a, d, b]]
     });
+    // Above the ground, wherever that is.
+    let ball = |x: f32, z: f32| {
+        let at = |place: f32| ((place + 1.0) / 2.0 * side as f32) as u32;
+        let ground = heights[index(at(x), at(z)) as usize] as f32;
+        Shape::Sphere(Sphere { centre: Vec3::new(x, ground + 0.4, z), radius: 0.18 })
+    };
+    let balls = vec![ball(-0.5, 0.5), ball(0.1, -0.3), ball(0.6, 0.2), ball(0.1, 0.7)];
     let mesh = Mesh::new(positions.collect(), triangles.collect());
-    let ball = |x: f32, y: f32, z: f32| Shape::Sphere(Sphere { centre: Vec3::new(x, y, z), radius: 0.18 });
-    let balls = vec![ball(-0.5, 0.75, 0.5), ball(0.1, 0.9, 0.6), ball(0.6, 0.7, 0.4), ball(0.2, 0.65, 0.95)];
     let glass = Material { transmission: Vec3::splat(0.85), ior: 1.5, ..fill([1.0, 0.95, 0.9], 0.0, 0.12, 60.0) };
     let geometries = vec![Geometry::Mesh(mesh), Geometry::Shapes { shapes: balls, material: 1 }];
     staged(geometries, vec![fill([0.5, 0.45, 0.35], 1.0, 0.0, 1.0), glass], None)
@@ -43,7 +48,7 @@ fn heights(side: u32) -> Vec<f64> {
             let middle = ((a.0 + b.0) / 2, (a.1 + b.1) / 2);
             // In units of the whole, so that a finer mountain is the same one.
             let unit = (1 << 13) / side;
-            let random = noise(middle.0 * unit, middle.1 * unit) * 2.0 - 0.8;
+            let random = noise(middle.0 * unit, middle.1 * unit) * 2.0 - 0.7;
             heights[place(middle)] = (heights[place(a)] + heights[place(b)]) / 2.0 + random * length * ROUGHNESS;
         };
         for y in (0..=side).step_by(step as usize) {
