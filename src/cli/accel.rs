@@ -7,7 +7,8 @@ use super::cache::CacheArgs;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
 use crate::math::UVec3;
-use crate::trace::accel::{Accel, Options, Resolution};
+use crate::shape::{SphereMethod, TriangleMethod};
+use crate::trace::accel::{Accel, Methods, Options, Resolution};
 
 #[derive(Debug, Args)]
 pub(super) struct AccelArgs {
@@ -25,6 +26,15 @@ pub(super) struct AccelOptions {
     /// Cells of the grid: along its longest side, or along each axis (default: by the number of primitives)
     #[arg(long, value_name = "N|XxYxZ", value_parser = parse_grid)]
     grid: Option<Resolution>,
+
+    /// How the classic accelerators meet triangles: exact, or a textbook's side-planes, same-side, areas,
+    /// moeller-trumbore or woop, to see what these miss
+    #[arg(long, value_name = "NAME", value_parser = parse_triangle_method)]
+    triangle_method: Option<TriangleMethod>,
+
+    /// How the classic accelerators meet spheres: exact, or a textbook's algebraic, geometric or accurate
+    #[arg(long, value_name = "NAME", value_parser = parse_sphere_method)]
+    sphere_method: Option<SphereMethod>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -64,15 +74,25 @@ impl AccelArg {
 }
 
 impl AccelOptions {
-    /// For accelerators among which there is `accel`.
+    /// For these accelerators.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a resolution without a grid.
-    pub(super) fn choose(&self, has_grid: bool) -> Result<Options> {
-        if self.grid.is_some() && !has_grid {
+    /// [`Error::Usage`] for a resolution without a grid, and for methods without an accelerator that has a choice.
+    pub(super) fn choose(&self, accels: &[Accel]) -> Result<Options> {
+        if self.grid.is_some() && !accels.contains(&Accel::Grid) {
             return Err(Error::Usage("--grid is the resolution of --accel grid; give both or neither".to_owned()));
         }
-        Ok(Options { grid: self.grid, ..Options::default() })
+        let has_choice = |accel: &Accel| !matches!(accel, Accel::Bvh | Accel::Brute);
+        if (self.triangle_method.is_some() || self.sphere_method.is_some()) && !accels.iter().any(has_choice) {
+            let problem =
+                "are for the classic accelerators: add --accel binary-bvh or another; bvh and brute are exact";
+            return Err(Error::Usage(format!("--triangle-method and --sphere-method {problem}")));
+        }
+        let methods = Methods {
+            triangle: self.triangle_method.unwrap_or_default(),
+            sphere: self.sphere_method.unwrap_or_default(),
+        };
+        Ok(Options { grid: self.grid, methods, ..Options::default() })
     }
 }
 
@@ -88,7 +108,7 @@ impl AccelArgs {
         cache: &CacheArgs,
     ) -> Result<(Accel, Options)> {
         let accel = self.accel.accel();
-        let options = self.options.choose(accel == Accel::Grid)?;
+        let options = self.options.choose(&[accel])?;
         if accel == Accel::Bvh {
             return Ok((accel, options));
         }
@@ -103,6 +123,16 @@ impl AccelArgs {
             BackendArg::Native | BackendArg::Both => Ok((accel, options)),
         }
     }
+}
+
+fn parse_triangle_method(name: &str) -> std::result::Result<TriangleMethod, String> {
+    let found = TriangleMethod::ALL.into_iter().find(|method| method.name() == name);
+    found.ok_or_else(|| format!("expected one of {}", TriangleMethod::ALL.map(TriangleMethod::name).join(", ")))
+}
+
+fn parse_sphere_method(name: &str) -> std::result::Result<SphereMethod, String> {
+    let found = SphereMethod::ALL.into_iter().find(|method| method.name() == name);
+    found.ok_or_else(|| format!("expected one of {}", SphereMethod::ALL.map(SphereMethod::name).join(", ")))
 }
 
 fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {

@@ -183,7 +183,7 @@ mod with_embree {
 
     use serde::Serialize;
 
-    use super::{AccelArg, BenchArgs, IsaArg, ModeArg};
+    use super::{BenchArgs, IsaArg, ModeArg};
     use crate::cli::{interrupt, outputs, progress, say, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
@@ -220,7 +220,7 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let options = args.options.choose(args.accel.contains(&AccelArg::Grid))?;
+        let options = args.options.choose(&args.accel.iter().map(|accel| accel.accel()).collect::<Vec<_>>())?;
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();

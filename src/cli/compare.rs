@@ -157,8 +157,9 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
     use crate::lab::{Entrant, all};
     use crate::render::{Control, Renderer, Settings};
     use crate::trace::World;
+    use crate::trace::accel::Accel;
 
-    let options = args.accel.options.choose(true)?;
+    let options = args.accel.options.choose(&Accel::ALL)?;
     let cancel = interrupt::install()?;
     let (scene, warnings) = args.scene.load()?;
     warn(&warnings);

@@ -76,6 +76,18 @@ pub struct ShapeHit {
     pub uv: Vec2,
 }
 
+impl ShapeHit {
+    /// Whether it lies within the ray's range.
+    pub(crate) fn is_within(&self, ray: &Ray) -> bool {
+        is_within(self.t, ray)
+    }
+}
+
+fn is_within(t: f64, ray: &Ray) -> bool {
+    let t = t as f32;
+    ray.tmin <= t && t <= ray.tmax && t.is_finite()
+}
+
 /// Why numbers make no shape, and what would.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -185,14 +197,13 @@ impl Shape {
     /// Every intersection with `tmin <= t <= tmax`, the nearest first; an even number over the whole line for closed
     /// shapes, of which a line that touches crosses twice in one place.
     pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
-        let (tmin, tmax) = (ray.tmin, ray.tmax);
-        let in_range = move |&t: &f64| {
-            let t = t as f32;
-            tmin <= t && t <= tmax && t.is_finite()
-        };
-        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let hit = move |t: f64| ShapeHit { t, uv: self.uv(origin + direction * t) };
-        self.roots(ray).into_iter().flatten().filter(in_range).map(hit)
+        let ray = *ray;
+        self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray)).map(move |t| self.hit_at(&ray, t))
+    }
+
+    /// The hit at a known `t`.
+    pub(crate) fn hit_at(&self, ray: &Ray, t: f64) -> ShapeHit {
+        ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) }
     }
 
     /// Where the line crosses it.

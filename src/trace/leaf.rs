@@ -4,7 +4,16 @@ use super::Part;
 use super::nearest::Nearest;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Corners};
-use crate::shape::{Shape, ShapeHit};
+use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod};
+
+/// How primitives are met: exactly, or by a textbook's method where there are several.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Methods {
+    /// Of triangles.
+    pub triangle: TriangleMethod,
+    /// Of spheres.
+    pub sphere: SphereMethod,
+}
 
 /// Whose hit it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,5 +59,31 @@ pub(super) fn offer_triangle(nearest: &mut Nearest, ray: &Ray, corners: &impl Co
 pub(super) fn offer_shape(nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
     if let Some(hit) = shape.intersect(local) {
         nearest.offer(hit.t, id.of_shape(&hit));
+    }
+}
+
+impl Methods {
+    /// [`offer_triangle`] by the chosen method, which sees corners in f32.
+    #[inline]
+    pub(super) fn offer_triangle(self, nearest: &mut Nearest, ray: &Ray, corners: &impl Corners, id: Id) {
+        if self.triangle == TriangleMethod::Exact {
+            offer_triangle(nearest, ray, corners, id);
+        } else if let Some(hit) = self.triangle.intersect(ray, corners.rounded().map(|corner| corner.as_vec3())) {
+            nearest.offer(hit.t, id.hit(hit.t, hit.u as f32, hit.v as f32));
+        }
+    }
+
+    /// [`offer_shape`] by the chosen method.
+    #[inline]
+    pub(super) fn offer_shape(self, nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
+        match shape {
+            Shape::Sphere(sphere) if self.sphere != SphereMethod::Exact => {
+                let roots = self.sphere.roots(local, sphere).into_iter().flatten();
+                if let Some(hit) = roots.map(|t| shape.hit_at(local, t)).find(|hit| hit.is_within(local)) {
+                    nearest.offer(hit.t, id.of_shape(&hit));
+                }
+            }
+            _ => offer_shape(nearest, local, shape, id),
+        }
     }
 }

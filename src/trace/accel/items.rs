@@ -6,7 +6,7 @@ use crate::math::{Aabb, Affine3, DVec3, Vec3, is_traceable};
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::shape::triangle::Placed;
-use crate::trace::leaf::{Id, offer_shape, offer_triangle};
+use crate::trace::leaf::{Id, Methods};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -15,6 +15,7 @@ pub(super) struct Items {
     triangles: Vec<[Vec3; 3]>,
     shapes: Vec<Shape>,
     ids: Vec<Id>,
+    methods: Methods,
 }
 
 /// What an index is built from.
@@ -42,8 +43,8 @@ pub(super) struct Through<'a> {
 
 impl Items {
     /// The primitives of `parts`, but for those without bounds and those that nothing can hit.
-    pub fn new(parts: &[Part]) -> (Self, Boxes) {
-        let mut items = Self { triangles: Vec::new(), shapes: Vec::new(), ids: Vec::new() };
+    pub fn new(parts: &[Part], methods: Methods) -> (Self, Boxes) {
+        let mut items = Self { triangles: Vec::new(), shapes: Vec::new(), ids: Vec::new(), methods };
         let mut list = Boxes { boxes: Vec::new(), groups: Vec::new() };
         for part in parts {
             let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
@@ -90,11 +91,11 @@ impl Items {
             id.instance = through.instance;
         }
         match (self.triangles.get(item), through) {
-            (Some(corners), None) => offer_triangle(nearest, ray, corners, id),
+            (Some(corners), None) => self.methods.offer_triangle(nearest, ray, corners, id),
             (Some(&corners), Some(Through { to_world, .. })) => {
-                offer_triangle(nearest, ray, &Placed { corners, to_world }, id);
+                self.methods.offer_triangle(nearest, ray, &Placed { corners, to_world }, id);
             }
-            (None, _) => offer_shape(nearest, local, &self.shapes[item - self.triangles.len()], id),
+            (None, _) => self.methods.offer_shape(nearest, local, &self.shapes[item - self.triangles.len()], id),
         }
     }
 

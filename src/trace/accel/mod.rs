@@ -41,6 +41,7 @@ use items::{Boxes, Input, Items, Through, reach};
 use placed::{Placed, Spread, stray_of_shapes};
 use ray::{IndexRay, limit};
 
+pub use super::leaf::Methods;
 pub use cell::Cell;
 pub use grid::Resolution;
 pub use kind::{Accel, Accelerator, Built};
@@ -52,6 +53,8 @@ pub struct Options {
     pub grid: Option<Resolution>,
     /// How long the BSP tree may be divided; 10 seconds where none is given. It does not change hits.
     pub bsp_time: Option<Duration>,
+    /// How triangles and spheres are met. Only the exact methods give the hits of brute force.
+    pub methods: Methods,
 }
 
 /// Which of many boxes a ray may pass.
@@ -194,7 +197,7 @@ impl<I: Index> Accelerated<I> {
 
 impl<I: Index> Level<I> {
     fn build(parts: &[Part], options: &Options) -> Self {
-        let (items, boxes) = Items::new(parts);
+        let (items, boxes) = Items::new(parts, options.methods);
         let index = I::build(&items.input(&boxes), options);
         Self { bounds: boxes.bounds(), items, index }
     }
