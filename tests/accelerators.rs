@@ -332,6 +332,19 @@ fn an_accelerator_is_compared_with_embree() {
     assert!(output.status.success() && table.contains("native_wrong                   0"), "{table}");
 }
 
+#[cfg(feature = "embree")]
+#[test]
+fn accelerators_are_measured_beside_the_engines() {
+    let args =
+        ["bench", "terrain20", "--modes", "default", "--rays", "primary,shadow", "--size", "64", "--repeat", "1"];
+    let output = twincast(&[&args[..], &["--accel", "grid,kd-tree", "--grid", "9"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    assert!(table.contains("native grid") && table.contains("native kd-tree"), "{table}");
+    let output = twincast(&[&args[..], &["--accel", "octree", "--grid", "9"]].concat());
+    assert_eq!(output.status.code(), Some(2), "a resolution without a grid");
+}
+
 #[test]
 fn scaling_prints_a_table_or_one_document_and_draws() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,6 +6,9 @@
 //! the pieces that are left are the children that it passes, near ones first (the parametric way of Revelles, Ureña, Lastra 2000,
 //! *An efficient parametric algorithm for octree traversal*, but for its table of next children: that is made for one t a plane, and
 //! here a plane has two, between which the ray is on both sides).
+//!
+//! The whole is a cube, so some planes lie beyond the reach that the ray's pad counts with. Their own rounding is larger, but items
+//! are farther from them than that.
 
 use super::items::Input;
 use super::ray::{IndexRay, Range};

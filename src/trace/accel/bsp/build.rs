@@ -53,7 +53,8 @@ struct Side {
 struct Builder<'a> {
     input: &'a Input<'a>,
     tree: Bsp,
-    deadline: Instant,
+    /// None where it may take any time.
+    deadline: Option<Instant>,
     /// References that may still be added.
     room: usize,
     /// Why it stopped, and the items in cells that it would have divided.
@@ -75,7 +76,7 @@ pub(super) fn build(input: &Input<'_>, options: &Options) -> Bsp {
     let [each, besides] = MOST_REFERENCES;
     let longest = options.bsp_time.unwrap_or(LONGEST);
     let room = input.boxes.len().saturating_mul(each) + besides;
-    let mut builder = Builder { input, tree, deadline: Instant::now() + longest, room, stopped: None };
+    let mut builder = Builder { input, tree, deadline: Instant::now().checked_add(longest), room, stopped: None };
     builder.run(Cell { items: input.all(), body: Polyhedron::of_box(&bounds), depth: 0, parent: None });
     let cells = builder.tree.leaves.len();
     builder.tree.stopped = builder.stopped.map(|(why, items)| {
@@ -139,7 +140,7 @@ impl Builder<'_> {
     fn may_go_on(&mut self, items: usize) -> bool {
         let why = if self.room == 0 {
             "at its most references"
-        } else if Instant::now() >= self.deadline {
+        } else if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
             "at its time limit"
         } else {
             return true;

@@ -75,7 +75,7 @@ impl Grid {
         if self.entries.is_empty() {
             return limit;
         }
-        // The items may reach out by nothing, but the walk may be off by the slack.
+        // Items end at the sides of the grid, but the walk may be off by the slack.
         let slack = self.width * SLACK;
         let max = self.min + self.width * self.counts.as_dvec3();
         let range = ray.within(self.min - slack, max + slack, limit);
