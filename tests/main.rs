@@ -1,5 +1,6 @@
 //! One test binary: what crosses modules, file by file.
 
+mod accelerators;
 mod allocation;
 mod bench;
 mod cache;

@@ -2,11 +2,11 @@
 
 use twincast::math::Vec3;
 use twincast::scene::{Mesh, Scene};
-use twincast::trace::accel::{Accel, Options as AccelOptions};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::{Bvh, Isa, Options, Preset};
 use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 
+use crate::accelerators::assert_accelerators;
 use crate::scenes::{self, Random};
 
 /// Closest hits by single rays and packets, with every preset and instruction set, and occlusion, against brute force.
@@ -41,17 +41,7 @@ fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
             assert_eq!(brute.occluded(ray), expected.is_some());
         }
     }
-    for accel in Accel::ALL.into_iter().filter(|accel| !matches!(accel, Accel::Bvh | Accel::Brute)) {
-        let tracer = accel.build(world, &AccelOptions::default()).tracer;
-        let name = accel.name();
-        for (ray, expected) in rays.iter().zip(&expected) {
-            assert_eq!(tracer.closest(ray), *expected, "{name} {ray:?}");
-            assert_eq!(tracer.occluded(ray), expected.is_some(), "occluded {name} {ray:?}");
-        }
-        let mut occluded = vec![false; rays.len()];
-        tracer.occluded_batch(rays, &mut occluded, Batch::default());
-        assert!(occluded.iter().zip(&expected).all(|(a, b)| *a == b.is_some()), "occluded batch {name}");
-    }
+    assert_accelerators(world, rays, &expected);
     expected.iter().flatten().count()
 }
 

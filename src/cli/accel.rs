@@ -110,7 +110,10 @@ fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {
     let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(side).collect();
     match sides.as_deref() {
         Some(&[n]) => Ok(Resolution::Longest(n)),
-        Some(&[x, y, z]) => Ok(Resolution::Axes(UVec3::new(x, y, z))),
+        Some(&[x, y, z]) if u64::from(x) * u64::from(y) * u64::from(z) <= Resolution::MOST_CELLS => {
+            Ok(Resolution::Axes(UVec3::new(x, y, z)))
+        }
+        Some(&[_, _, _]) => Err(format!("expected at most {} cells in all", Resolution::MOST_CELLS)),
         _ => Err(format!("expected N or XxYxZ, each 1 to {}, as in 64 or 100x20x100", Resolution::MOST)),
     }
 }

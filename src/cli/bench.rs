@@ -7,11 +7,11 @@ use clap::{Args, ValueEnum};
 use super::accel::{AccelArg, AccelOptions};
 use super::common::UpAxis;
 use super::engine::BackendArg;
-use super::{interrupt, outputs, progress, say};
-use crate::error::{Error, Result};
+use super::scaling;
+use crate::error::Result;
 #[cfg(feature = "embree")]
 use crate::lab::bench::Kind;
-use crate::lab::bench::{SIDE, Scaling, processor, scaling_chart};
+use crate::lab::bench::SIDE;
 
 /// Measure builds and rays of native and Embree, in turn
 ///
@@ -66,7 +66,7 @@ pub(super) struct BenchArgs {
 
     /// Threads that build and trace; 0 is one for each core
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
-    threads: usize,
+    pub(super) threads: usize,
 
     /// Instructions that both engines may use at most (default: what the processor has)
     #[arg(long, value_enum)]
@@ -90,15 +90,15 @@ pub(super) struct BenchArgs {
 
     /// Most triangles of --scaling
     #[arg(long, value_name = "N", default_value_t = 1_000_000, requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
-    max: u64,
+    pub(super) max: u64,
 
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 
     /// Draw the rates: bars from zero with their ranges, for each scene and kind of ray
     #[arg(long, value_name = "FILE.svg", value_parser = parse_chart)]
-    chart: Option<PathBuf>,
+    pub(super) chart: Option<PathBuf>,
 }
 
 fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
@@ -161,35 +161,10 @@ enum ModeArg {
 
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
     if args.scaling {
-        return scaling(args);
+        return scaling::run(args);
     }
     BackendArg::Both.check_available()?;
     bench(args)
-}
-
-/// Time against the number of triangles.
-fn scaling(args: &BenchArgs) -> Result<()> {
-    let cancel = interrupt::install()?;
-    outputs::check(&[], &args.chart, [])?;
-    let bar = progress::spinner("measuring", args.json);
-    let on_step = |what: &str| bar.set_message(what.to_owned());
-    let scaling = Scaling { max: args.max, cancel: Some(cancel), on_step: Some(&on_step) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
-    let report = pool.install(|| scaling.run());
-    bar.finish_and_clear();
-    let report = report?;
-    if let Some(path) = &args.chart {
-        let threads = pool.current_num_threads();
-        let notes = [format!("{}; builds on {threads} threads, rays on one", processor())];
-        outputs::write_text(path, &scaling_chart(&report, &notes))?;
-    }
-    if args.json {
-        let document = serde_json::to_string(&report);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
-    } else {
-        say(report.to_string().trim_end())
-    }
 }
 
 #[cfg(not(feature = "embree"))]

@@ -52,7 +52,7 @@ pub(super) struct CompareArgs {
 
     /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
     /// code 1 if any of this program's own differs on one
-    #[arg(long, conflicts_with_all = ["accel", "diff", "cache", "spp"])]
+    #[arg(long, conflicts_with_all = ["accel", "diff", "folder", "spp"])]
     all: bool,
 
     /// Most seconds that brute force takes with --all

@@ -22,6 +22,7 @@ mod picture;
 mod progress;
 mod render;
 mod report;
+mod scaling;
 mod summary;
 
 use std::io::{ErrorKind, Write};

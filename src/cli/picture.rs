@@ -27,7 +27,11 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// How samples are spread: sobol, blue-noise, halton, stratified or independent
+    /// Shadow rays to each light with a surface, where a ray hits
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    light_samples: u32,
+
+    /// How samples are spread: sobol, blue-noise, halton, stratified, grid or independent
     #[arg(long, value_name = "NAME", default_value_t)]
     sampler: Sampling,
 
@@ -91,6 +95,7 @@ impl PictureArgs {
             seed: self.seed.or(request.seed).unwrap_or(usual.seed),
             sampling: self.sampler,
             filter: self.filter,
+            light_samples: self.light_samples,
             max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
             batch: Batch { width, coherent: true },
             tile_order: match self.tile_order {

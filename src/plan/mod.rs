@@ -117,6 +117,7 @@ fn gives_light(light: &Light) -> bool {
         Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. } => {
             *color != Vec3::ZERO
         }
+        Light::Area { radiance, .. } => *radiance != Vec3::ZERO,
     }
 }
 

@@ -58,6 +58,8 @@ pub struct Settings {
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
+    /// Shadow rays to each extended light where a ray hits.
+    pub light_samples: u32,
     /// How often a ray may be mirrored or refracted; what it would see after that is black.
     pub max_depth: u32,
 }
@@ -75,6 +77,7 @@ impl Default for Settings {
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
+            light_samples: 1,
             max_depth: 5,
         }
     }
@@ -98,6 +101,8 @@ pub struct Renderer<'a> {
     view: View,
     sampler: Sampler,
     filter: FilterSampler,
+    /// Of all shadow rays of a pixel to a light.
+    light_sampler: Sampler,
     lights: Vec<LightSource>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
@@ -123,12 +128,16 @@ impl<'a> Renderer<'a> {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
         let view = View::new(&camera, world.centre, width, height)?;
+        if settings.light_samples == 0 {
+            return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
+        }
         let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
             view,
             sampler: Sampler::new(sampling, spp, seed),
+            light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
             // A single sample is the pixel's middle, whatever the filter.
             filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
             lights: Vec::new(),
@@ -220,6 +229,6 @@ impl<'a> Renderer<'a> {
     }
 
     fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
-        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::Lens))
+        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS))
     }
 }

@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use crate::math::{DVec3, Vec3, Vec4};
+use crate::math::{DVec2, DVec3, Vec3, Vec4};
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::light::LightSource;
@@ -21,7 +21,7 @@ use crate::shade::{SurfacePoint, whitted};
 use crate::trace::{Batch, Tracer};
 
 use super::camera::View;
-use super::sampler::Pattern;
+use super::sampler::{Dimension, Pattern};
 use super::{Renderer, tiles::Tile};
 
 /// Camera rays that are made at a time: enough for vectors of any width, few enough for registers and a little stack.
@@ -63,6 +63,17 @@ struct Path {
     pixel: u32,
     /// Share of what the ray sees that reaches the pixel.
     weight: Vec3,
+    /// Number of the ray in the sample's tree of rays: 0 for the camera's, 2 n + 1 and 2 n + 2 for those that n sends on.
+    branch: u32,
+}
+
+/// Which rays are followed.
+#[derive(Clone, Copy)]
+struct Stage {
+    /// Of each pixel's samples.
+    sample: u32,
+    /// How often they were sent on.
+    depth: u32,
 }
 
 /// A ray that hit something.
@@ -83,7 +94,7 @@ impl Renderer<'_> {
             self.camera_hits(tracer, sample, buffers);
             buffers.radiance.clear();
             buffers.radiance.resize(tile.len(), Vec4::ZERO);
-            self.radiance(tracer, 0, 0, buffers);
+            self.radiance(tracer, Stage { sample, depth: 0 }, 0, buffers);
             let Buffers { patterns, sums, radiance, .. } = &mut *buffers;
             for ((sum, radiance), pixel) in sums.iter_mut().zip(radiance).zip(patterns) {
                 let negative = self.filter.has_negative() && self.place(pixel, sample).1 < 0.0;
@@ -132,7 +143,7 @@ impl Renderer<'_> {
         rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
         hits.resize(patterns.len(), None);
         let known = paths.len();
-        paths.resize(patterns.len(), Path { pixel: 0, weight: Vec3::ONE });
+        paths.resize(patterns.len(), Path { pixel: 0, weight: Vec3::ONE, branch: 0 });
         paths.iter_mut().zip(0..).skip(known).for_each(|(path, pixel)| path.pixel = pixel);
         let (groups, rest) = match &self.view {
             View::Pinhole(pinhole) => {
@@ -152,11 +163,12 @@ impl Renderer<'_> {
 
     /// Adds what the rays that `buffers.hits` belongs to see, those of `waves[depth]` from `first` on, and follows what is
     /// sent on from there.
-    fn radiance<T: Tracer>(&self, tracer: &T, depth: u32, first: usize, buffers: &mut Buffers) {
+    fn radiance<T: Tracer>(&self, tracer: &T, stage: Stage, first: usize, buffers: &mut Buffers) {
+        let Stage { sample, depth } = stage;
         self.shade(depth, first, buffers);
         let batch = if depth == 0 { self.settings.batch } else { self.incoherent() };
-        for light in &self.lights {
-            add_light(tracer, light, batch, buffers);
+        for light in 0..self.lights.len() {
+            self.add_light(tracer, light, sample, batch, buffers);
         }
         if depth == self.plan.depth {
             return;
@@ -170,7 +182,7 @@ impl Renderer<'_> {
             hits.clear();
             hits.resize(rays.len(), None);
             tracer.closest_batch(rays, hits, self.incoherent());
-            self.radiance(tracer, depth + 1, range.start, buffers);
+            self.radiance(tracer, Stage { sample, depth: depth + 1 }, range.start, buffers);
         }
     }
 
@@ -205,19 +217,60 @@ impl Renderer<'_> {
         wave.paths.clear();
         for Lit { path, direction, point, .. } in lit {
             let material = self.material(point);
-            let mut send = |share: Vec3, direction: &dyn Fn() -> Option<DVec3>| {
+            let mut send = |which: u32, share: Vec3, direction: &dyn Fn() -> Option<DVec3>| {
                 let weight = path.weight * share;
                 if weight.max_element() <= FAINT {
                     return;
                 }
                 if let Some(direction) = direction() {
                     wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
-                    wave.paths.push(Path { weight, ..*path });
+                    let branch = path.branch.wrapping_mul(2).wrapping_add(which);
+                    wave.paths.push(Path { weight, branch, ..*path });
                 }
             };
             let direction = direction.as_dvec3().normalize();
-            send(material.reflection, &|| Some(whitted::reflected(direction, point)));
-            send(material.transmission, &|| whitted::refracted(direction, point, f64::from(material.ior)));
+            send(1, material.reflection, &|| Some(whitted::reflected(direction, point)));
+            send(2, material.transmission, &|| whitted::refracted(direction, point, f64::from(material.ior)));
+        }
+    }
+
+    /// Adds what of a light reaches what was hit.
+    fn add_light<T: Tracer>(&self, tracer: &T, light: usize, sample: u32, batch: Batch, buffers: &mut Buffers) {
+        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, occluded, .. } = buffers;
+        let (index, light) = (light as u32, &self.lights[light]);
+        let count = if light.is_extended() { self.settings.light_samples } else { 1 };
+        shadow_rays.clear();
+        shadow_light.clear();
+        for Lit { path, point, shading, .. } in lit.iter() {
+            let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
+            for k in 0..count {
+                let even = if light.is_extended() {
+                    let dimension = Dimension::light(index, path.branch);
+                    self.light_sampler.pair(&patterns[path.pixel as usize], sample * count + k, dimension)
+                } else {
+                    DVec2::ZERO
+                };
+                let Some(arriving) = light.illuminate(point.position, even) else { continue };
+                if !shading.faces(arriving.to_light) {
+                    continue;
+                }
+                let reflected = weight * shading.reflect(&arriving);
+                if light.casts_shadows {
+                    shadow_rays.push(LightSource::shadow_ray(point, &arriving));
+                    shadow_light.push((path.pixel, reflected));
+                } else {
+                    radiance[path.pixel as usize] += reflected.extend(0.0);
+                }
+            }
+        }
+        if shadow_rays.is_empty() {
+            return;
+        }
+        occluded.clear();
+        occluded.resize(shadow_rays.len(), false);
+        tracer.occluded_batch(shadow_rays, occluded, batch);
+        for ((pixel, reflected), _) in shadow_light.iter().zip(occluded).filter(|(_, occluded)| !**occluded) {
+            radiance[*pixel as usize] += reflected.extend(0.0);
         }
     }
 
@@ -240,35 +293,6 @@ impl Renderer<'_> {
                 lights.iter().map(|&i| LightSource::new(&self.scene.lights[i], self.world.centre)).collect()
             }
         }
-    }
-}
-
-/// Adds what of a light reaches what was hit.
-fn add_light<T: Tracer>(tracer: &T, light: &LightSource, batch: Batch, buffers: &mut Buffers) {
-    let Buffers { radiance, lit, shadow_rays, shadow_light, occluded, .. } = buffers;
-    shadow_rays.clear();
-    shadow_light.clear();
-    for Lit { path, point, shading, .. } in lit.iter() {
-        let Some(arriving) = light.illuminate(point.position) else { continue };
-        if !shading.faces(arriving.to_light) {
-            continue;
-        }
-        let reflected = path.weight * shading.reflect(&arriving);
-        if light.casts_shadows {
-            shadow_rays.push(light.shadow_ray(point, arriving.to_light));
-            shadow_light.push((path.pixel, reflected));
-        } else {
-            radiance[path.pixel as usize] += reflected.extend(0.0);
-        }
-    }
-    if shadow_rays.is_empty() {
-        return;
-    }
-    occluded.clear();
-    occluded.resize(shadow_rays.len(), false);
-    tracer.occluded_batch(shadow_rays, occluded, batch);
-    for ((pixel, reflected), _) in shadow_light.iter().zip(occluded).filter(|(_, occluded)| !**occluded) {
-        radiance[*pixel as usize] += reflected.extend(0.0);
     }
 }
 

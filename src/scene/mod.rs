@@ -16,7 +16,7 @@ mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use instance::{Group, Instance};
-pub use light::{Attenuation, Light};
+pub use light::{AreaShape, Attenuation, Light};
 pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;

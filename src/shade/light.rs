@@ -4,12 +4,10 @@
 //! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
 
 use super::SurfacePoint;
-use crate::math::{DAffine3, DVec3, Vec3, gamma};
+use super::area::{self, short_of};
+use crate::math::{DAffine3, DVec2, DVec3, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Attenuation, Light};
-
-/// Chained f32 roundings in the test of a ray against a lamp, of its centre and of its radius; generous.
-const LAMP_ROUNDINGS: u32 = 32;
 
 /// A light as the renderer uses it, in world coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +24,8 @@ pub struct Illumination {
     pub to_light: DVec3,
     /// Linear RGB that a white matte surface facing the light would reflect.
     pub color: Vec3,
+    /// Up to where the way must be free, world coordinates; none for all of it.
+    pub end: Option<DVec3>,
 }
 
 impl LightSource {
@@ -44,13 +44,28 @@ impl LightSource {
         Self { light, casts_shadows: false }
     }
 
-    /// What arrives at `point` if nothing is in between; none where the light does not reach.
-    pub fn illuminate(&self, point: DVec3) -> Option<Illumination> {
+    /// Whether what arrives depends on which part of the light is asked.
+    pub const fn is_extended(&self) -> bool {
+        matches!(self.light, Light::Area { .. })
+    }
+
+    /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
+    /// asked that `even`, a point of the unit square, chooses.
+    pub fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
         match &self.light {
-            Light::Directional { direction, color } => Some(Illumination { to_light: -*direction, color: *color }),
-            Light::Point { position, color, attenuation, range, .. } => {
-                from_point(point, *position, *color, attenuation, *range)
+            Light::Directional { direction, color } => {
+                Some(Illumination { to_light: -*direction, color: *color, end: None })
             }
+            Light::Point { position, color, attenuation, range, radius } => {
+                let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
+                if *radius > 0.0 {
+                    // Within the lamp nothing is in between.
+                    let way = ((*position - point).length() - radius).max(0.0);
+                    arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point));
+                }
+                Some(arriving)
+            }
+            Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, even),
             Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
                 let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
                 arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
@@ -59,18 +74,11 @@ impl LightSource {
         }
     }
 
-    /// The ray that must be free for the light to reach `surface`, which it does along `to_light`.
-    pub fn shadow_ray(&self, surface: &SurfacePoint, to_light: DVec3) -> Ray {
-        match &self.light {
-            Light::Directional { .. } => surface.spawn(to_light.as_vec3(), f32::INFINITY),
-            Light::Point { position, radius, .. } if *radius > 0.0 => {
-                // Short of the lamp by what f32 may move its surface, so that the lamp does not shade itself.
-                let slack = f64::from(gamma(LAMP_ROUNDINGS)) * (position.abs().max_element() + radius);
-                let reach = (position - surface.position).length() - radius - slack;
-                // Inside the lamp nothing is in between.
-                surface.spawn_to(surface.position + to_light * reach.max(0.0))
-            }
-            Light::Point { position, .. } | Light::Spot { position, .. } => surface.spawn_to(*position),
+    /// The ray that must be free for `arriving` to reach `surface`.
+    pub fn shadow_ray(surface: &SurfacePoint, arriving: &Illumination) -> Ray {
+        match arriving.end {
+            None => surface.spawn(arriving.to_light.as_vec3(), f32::INFINITY),
+            Some(end) => surface.spawn_to(end),
         }
     }
 }
@@ -86,8 +94,11 @@ fn from_point(
     let distance = offset.length();
     let color = color * (attenuation.factor(distance as f32) * window(distance, range));
     // At the light itself there is neither a direction nor, with 1 / d^2, a finite colour.
-    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO)
-        .then(|| Illumination { to_light: offset / distance, color })
+    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO).then(|| Illumination {
+        to_light: offset / distance,
+        color,
+        end: Some(position),
+    })
 }
 
 /// 1 near the light, 0 from `range` on.
@@ -122,7 +133,7 @@ mod tests {
 
     #[test]
     fn attenuates_by_the_polynomial() {
-        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap();
+        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap();
         // At distance 2: 1 / (1 + 0.5 * 2 + 0.25 * 4) = 1/3.
         assert!((arriving.color - Vec3::new(2.0, 4.0, 8.0) / 3.0).length() < 1e-6);
         assert_eq!(arriving.to_light, DVec3::Y);
@@ -130,10 +141,10 @@ mod tests {
 
     #[test]
     fn the_range_window_is_gltfs() {
-        let full = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap().color;
-        let half = spot(4.0).illuminate(DVec3::Y).unwrap().color;
+        let full = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
+        let half = spot(4.0).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
         assert!((half - full * (1.0 - 0.5f32.powi(4))).length() < 1e-6);
-        assert_eq!(spot(2.0).illuminate(DVec3::Y), None);
+        assert_eq!(spot(2.0).illuminate(DVec3::Y, DVec2::ZERO), None);
     }
 
     #[test]
@@ -156,6 +167,6 @@ mod tests {
             range: 1.0,
             radius: 0.0,
         };
-        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO), None);
+        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO, DVec2::ZERO), None);
     }
 }

@@ -7,10 +7,10 @@
 
 use super::line::{Interval, Line, NO_ROOTS, PRECISION, Roots};
 use super::quadric::Inside;
-use super::round::{disk_reach, outwards, tangents, turn};
+use super::round::{disk_reach, outwards, turn};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Bounded, Formula, Number, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable, tangents};
 
 /// A surface of revolution with a straight side.
 pub(super) struct Frustum {

@@ -1,7 +1,7 @@
 //! Twincast's own scene format.
 
 use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
+use twincast::scene::{AreaShape, Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
 use twincast::{Shape, World};
 
 use super::{Files, obj, refused, refused_bytes};
@@ -53,6 +53,8 @@ fn the_documentation_has_every_key() {
         "[[light]]\ntype = \"point\"\nposition = [0, 0, 0]",
         "[[light]]\ntype = \"spot\"\nposition = [0, 0, 0]\ndirection = [1, 0, 0]\nouter_angle = 3",
         "[[light]]\ntype = \"directional\"\ndirection = [1, 0, 0]",
+        "[[light]]\ntype = \"sphere\"\nposition = [0, 0, 0]\nradius = 1\nradiance = 1",
+        "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nhalf_edges = [[1, 0, 0], [0, 1, 0]]\nradiance = 1",
         "[material.a]",
         "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1",
         "[[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]",
@@ -114,6 +116,9 @@ fn lights_and_materials() {
     let [
         Light::Directional { direction, .. },
         Light::Point { radius, range, .. },
+        Light::Area { shape: AreaShape::Rectangle { centre, half_edges }, radiance },
+        Light::Area { shape: AreaShape::Disk { normal, .. }, .. },
+        Light::Area { shape: AreaShape::Sphere { radius: ball, .. }, .. },
         Light::Spot { inner_angle, outer_angle, .. },
     ] = scene.lights.as_slice()
     else {
@@ -122,6 +127,8 @@ fn lights_and_materials() {
     assert!((*direction - DVec3::new(-1.0, -2.0, -1.0).normalize()).length() < 1e-15);
     assert_eq!((*range, (*radius * 10.0).round()), (30.0, 1.0));
     assert!((inner_angle.to_degrees() - 20.0).abs() < 1e-4 && (outer_angle.to_degrees() - 30.0).abs() < 1e-4);
+    assert_eq!((*centre, *half_edges), (DVec3::Y * 3.0, [DVec3::X * 0.5, DVec3::Z * 0.5]));
+    assert_eq!((*radiance, *normal, *ball), (Vec3::new(10.0, 9.0, 8.0), DVec3::NEG_Y, 0.25));
     let glass = &scene.materials[0];
     assert_eq!((glass.name.as_str(), glass.diffuse, glass.ambient), ("glass", Vec3::splat(0.02), Vec3::splat(0.02)));
     assert_eq!((glass.transmission, glass.ior, glass.shininess), (Vec3::splat(0.85), 1.5, 100.0));
@@ -223,6 +230,16 @@ fn faults_are_told_with_line_and_remedy() {
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
+        (
+            "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nradiance = 1\nhalf_edges = [[1, 0, 0], [2, 0, 0]]\n",
+            5,
+            "two vectors that are not parallel",
+        ),
+        (
+            "[[light]]\ntype = \"disk\"\nposition = [0, 0, 0]\ndirection = [0, 1, 0]\nradius = -1\n",
+            5,
+            "a length above 0",
+        ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"orthographic\"\n", 1, "\"height\""),
         (

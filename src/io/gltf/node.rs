@@ -185,6 +185,8 @@ fn move_light(light: &Light, transform: &DAffine3) -> Light {
     let mut moved = light.clone();
     match &mut moved {
         Light::Directional { direction, .. } => *direction = along,
+        // No extension has any.
+        Light::Area { .. } => {}
         Light::Point { position, .. } => *position = transform.translation,
         Light::Spot { position, direction, .. } => (*position, *direction) = (transform.translation, along),
     }

@@ -6,8 +6,8 @@ use std::io::{self, Write};
 use super::Unsayable;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
 use crate::scene::{
-    Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request, Scene, Specular,
-    ThinLens,
+    AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request, Scene,
+    Specular, ThinLens,
 };
 use crate::shape::{Shape, Sphere};
 
@@ -150,6 +150,22 @@ fn write_light(light: &Light, out: &mut dyn Write) -> io::Result<()> {
             writeln!(out, "[[light]]\ntype = \"point\"\ncolor = {}", list(*color))?;
             place(out, *position, *attenuation, *range)?;
             writeln!(out, "radius = {radius}")?;
+        }
+        Light::Area { shape, radiance } => {
+            let (kind, keys) = match shape {
+                AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+                    let (centre, a, b) = (list_f64(*centre), list_f64(*a), list_f64(*b));
+                    ("rectangle", format!("position = {centre}\nhalf_edges = [{a}, {b}]"))
+                }
+                AreaShape::Disk { centre, normal, radius } => {
+                    let (centre, normal) = (list_f64(*centre), list_f64(*normal));
+                    ("disk", format!("position = {centre}\ndirection = {normal}\nradius = {radius}"))
+                }
+                AreaShape::Sphere { centre, radius } => {
+                    ("sphere", format!("position = {}\nradius = {radius}", list_f64(*centre)))
+                }
+            };
+            writeln!(out, "[[light]]\ntype = \"{kind}\"\nradiance = {}\n{keys}", list(*radiance))?;
         }
         Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
             writeln!(out, "[[light]]\ntype = \"spot\"\ncolor = {}", list(*color))?;

@@ -2,7 +2,9 @@
 
 use super::table::{Read, Table, Value};
 use crate::math::{DVec2, DVec3, Vec3};
-use crate::scene::{Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Specular, ThinLens};
+use crate::scene::{
+    AreaShape, Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Specular, ThinLens,
+};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u64 = 65_536;
@@ -102,14 +104,30 @@ enum Kind {
     Directional,
     Point,
     Spot,
+    Rectangle,
+    Disk,
+    Sphere,
 }
 
 /// `[[light]]`.
 pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
-    let kinds = [("directional", Kind::Directional), ("point", Kind::Point), ("spot", Kind::Spot)];
+    let kinds = [
+        ("directional", Kind::Directional),
+        ("point", Kind::Point),
+        ("spot", Kind::Spot),
+        ("rectangle", Kind::Rectangle),
+        ("disk", Kind::Disk),
+        ("sphere", Kind::Sphere),
+    ];
     let kind = table.need("type")?.choice(&kinds)?;
+    if matches!(kind, Kind::Rectangle | Kind::Disk | Kind::Sphere) {
+        let light = Light::Area { shape: area(kind, &mut table)?, radiance: table.need("radiance")?.color()? };
+        table.finish()?;
+        return Ok(light);
+    }
     let color = table.optional("color", |value| value.color())?.unwrap_or(Vec3::ONE);
     let light = match kind {
+        Kind::Rectangle | Kind::Disk | Kind::Sphere => unreachable!("returned above"),
         Kind::Directional => Light::Directional { direction: table.need("direction")?.direction()?, color },
         Kind::Point => {
             let (position, attenuation, range) = place(&mut table)?;
@@ -133,6 +151,26 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
     };
     table.finish()?;
     Ok(light)
+}
+
+/// The surface of a light.
+fn area(kind: Kind, table: &mut Table<'_>) -> Read<AreaShape> {
+    let centre = table.need("position")?.vector()?;
+    Ok(match kind {
+        Kind::Rectangle => {
+            let value = table.need("half_edges")?;
+            let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
+            match edges[..] {
+                [a, b] if a.cross(b).length() > 0.0 => AreaShape::Rectangle { centre, half_edges: [a, b] },
+                _ => return Err(value.unlike("two vectors that are not parallel")),
+            }
+        }
+        Kind::Disk => {
+            let normal = table.need("direction")?.direction()?;
+            AreaShape::Disk { centre, normal, radius: length(table.need("radius")?)? }
+        }
+        _ => AreaShape::Sphere { centre, radius: length(table.need("radius")?)? },
+    })
 }
 
 /// Position, attenuation and range of a light.

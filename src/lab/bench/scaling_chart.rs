@@ -36,6 +36,13 @@ fn color(accel: &str) -> &'static str {
     COLORS.iter().find(|(name, _)| *name == accel).map_or(GREY, |(_, color)| color)
 }
 
+/// What a point is drawn by.
+type Value = fn(&Point) -> f64;
+
+/// The left and the right plot of a row.
+const VALUES: [(&str, Value); 2] =
+    [("microseconds a ray", |p| p.microseconds_a_ray), ("milliseconds to build", |p| p.build_seconds * 1e3)];
+
 /// One line of a plot.
 struct Series {
     color: &'static str,
@@ -54,31 +61,22 @@ pub fn scaling_chart(report: &ScalingReport, notes: &[String]) -> String {
     y += 22.0;
     legend(&mut svg, y, report);
     y += 12.0;
+    let places = [MARGIN, 2.0 * MARGIN + PANEL.0];
     for family in Family::ALL {
-        let series = |value: fn(&Point) -> f64| series(report, family, value);
-        let name = family.name();
-        let left = (MARGIN, y);
-        let right = (2.0 * MARGIN + PANEL.0, y);
-        plot(&mut svg, left, &format!("{name}: microseconds a ray"), "triangles", &series(|p| p.microseconds_a_ray));
-        plot(
-            &mut svg,
-            right,
-            &format!("{name}: milliseconds to build"),
-            "triangles",
-            &series(|p| p.build_seconds * 1e3),
-        );
+        for ((what, value), x) in VALUES.into_iter().zip(places) {
+            let title = format!("{}: {what}", family.name());
+            plot(&mut svg, (x, y), &title, "triangles", &series(report, family, value));
+        }
         y += PANEL.1 + MARGIN;
     }
     if let Some(first) = report.grids.first() {
-        let given = |value: fn(&Point) -> f64| {
+        let given = |value: Value| {
             let of = |swept: &Swept| Some((f64::from(swept.cells?), value(&swept.point)));
             report.grids.iter().filter_map(of).collect::<Vec<_>>()
         };
         let own = report.grids.iter().find(|swept| swept.cells.is_none()).map(|swept| &swept.point);
         let name = format!("grids of {} scattered triangles", first.point.primitives);
-        let values: [(&str, fn(&Point) -> f64); 2] =
-            [("microseconds a ray", |p| p.microseconds_a_ray), ("milliseconds to build", |p| p.build_seconds * 1e3)];
-        for ((what, value), x) in values.into_iter().zip([MARGIN, 2.0 * MARGIN + PANEL.0]) {
+        for ((what, value), x) in VALUES.into_iter().zip(places) {
             let mut lines = vec![Series { color: color("grid"), points: given(value) }];
             if let Some(own) = own {
                 // The grid's own choice, as a level to compare with.
@@ -117,7 +115,7 @@ fn legend(svg: &mut Svg, y: f64, report: &ScalingReport) {
     }
 }
 
-fn series(report: &ScalingReport, family: Family, value: fn(&Point) -> f64) -> Vec<Series> {
+fn series(report: &ScalingReport, family: Family, value: Value) -> Vec<Series> {
     let of = |(name, color): (&'static str, &'static str)| {
         let points = report.points.iter().filter(|point| point.family == family && point.accel == name);
         Series { color, points: points.map(|point| (point.primitives as f64, value(point))).collect() }

@@ -29,13 +29,16 @@ pub enum Sampling {
     Halton,
     /// One sample in each cell of a grid, with its rows and columns evenly filled.
     Stratified,
+    /// The middles of a grid's cells, the same for every pixel: shows bands where others show noise.
+    Grid,
     /// Random numbers.
     Independent,
 }
 
 impl Sampling {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Sobol, Self::BlueNoise, Self::Halton, Self::Stratified, Self::Independent];
+    pub const ALL: [Self; 6] =
+        [Self::Sobol, Self::BlueNoise, Self::Halton, Self::Stratified, Self::Grid, Self::Independent];
 
     /// As flags and scenes have it.
     pub const fn name(self) -> &'static str {
@@ -44,6 +47,7 @@ impl Sampling {
             Self::BlueNoise => "blue-noise",
             Self::Halton => "halton",
             Self::Stratified => "stratified",
+            Self::Grid => "grid",
             Self::Independent => "independent",
         }
     }
@@ -66,11 +70,18 @@ impl FromStr for Sampling {
 
 /// What a pair of numbers is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Dimension {
+pub(super) struct Dimension(u32);
+
+impl Dimension {
     /// The point on the pixel.
-    Film = 0,
+    pub(super) const FILM: Self = Self(0);
     /// The point on the lens.
-    Lens = 1,
+    pub(super) const LENS: Self = Self(1);
+
+    /// The point on a light, as asked by the ray of a pixel's tree of rays that has the number `branch`.
+    pub(super) const fn light(light: u32, branch: u32) -> Self {
+        Self(branch.wrapping_mul(0x9e37_79b9).wrapping_add(2).wrapping_add(light))
+    }
 }
 
 /// The sample points of every pixel.
@@ -109,14 +120,14 @@ impl Sampler {
     #[inline]
     pub fn pattern(&self, x: u32, y: u32) -> Pattern {
         // A single sample is not hashed: every pixel has the same.
-        let film = if self.spp == 1 { [0; 4] } else { self.key([x, y], Dimension::Film) };
+        let film = if self.spp == 1 { [0; 4] } else { self.key([x, y], Dimension::FILM) };
         Pattern { x, y, film }
     }
 
     /// Where in the unit square the pixel's `sample` of the film is; in the middle for a single one.
     #[inline]
     pub(super) fn film(&self, pixel: &Pattern, sample: u32) -> DVec2 {
-        if self.spp == 1 { DVec2::splat(0.5) } else { self.spread(pixel, pixel.film, sample, Dimension::Film) }
+        if self.spp == 1 { DVec2::splat(0.5) } else { self.spread(pixel, pixel.film, sample, Dimension::FILM) }
     }
 
     /// Where in the unit square a sample of any other pair of dimensions is. A single one is not in the middle, so that
@@ -132,6 +143,7 @@ impl Sampler {
             Sampling::BlueNoise => blue_noise::point(place, sample, self.spp, self.key([0, 0], dimension)),
             Sampling::Halton => halton::point(sample, key),
             Sampling::Stratified => stratified::point(sample, self.spp, key, self.hash(place, sample, dimension)),
+            Sampling::Grid => stratified::grid(sample, self.spp),
             Sampling::Independent => {
                 let [x, y, ..] = self.hash(place, sample, dimension);
                 DVec2::new(unit(x), unit(y))
@@ -142,13 +154,13 @@ impl Sampler {
     /// Numbers for all samples of a pixel.
     #[inline]
     fn key(&self, pixel: [u32; 2], dimension: Dimension) -> [u32; 4] {
-        self.mix(pixel, 0, 2 * dimension as u32)
+        self.mix(pixel, 0, dimension.0.wrapping_mul(2))
     }
 
     /// Numbers for one sample of a pixel.
     #[inline]
     fn hash(&self, pixel: [u32; 2], sample: u32, dimension: Dimension) -> [u32; 4] {
-        self.mix(pixel, sample, 2 * dimension as u32 + 1)
+        self.mix(pixel, sample, dimension.0.wrapping_mul(2).wrapping_add(1))
     }
 
     #[inline]
@@ -190,7 +202,7 @@ mod tests {
             assert_eq!(film(1, 9, 3, 4, 0), DVec2::splat(0.5), "{sampling}");
             let sampler = Sampler::new(sampling, 4, 0);
             let pixel = sampler.pattern(3, 4);
-            assert_ne!(sampler.pair(&pixel, 0, Dimension::Lens), sampler.film(&pixel, 0));
+            assert_ne!(sampler.pair(&pixel, 0, Dimension::LENS), sampler.film(&pixel, 0));
         }
     }
 
@@ -205,7 +217,7 @@ mod tests {
                     let place = |i: u32| sampler.pair(&sampler.pattern(i % 200, i / 200), i % spp, dimension);
                     (0..20_000).map(place).collect()
                 };
-                let (film, lens) = (places(Dimension::Film), places(Dimension::Lens));
+                let (film, lens) = (places(Dimension::FILM), places(Dimension::LENS));
                 let n = film.len() as f64;
                 assert!(film.iter().all(|p| p.min_element() >= 0.0 && p.max_element() < 1.0));
                 let mean = film.iter().sum::<DVec2>() / n;

@@ -17,6 +17,13 @@ pub(super) fn point(sample: u32, spp: u32, key: [u32; 4], jitter: [u32; 4]) -> D
     DVec2::new((column + (row + jx) / f64::from(n)) / f64::from(m), (f64::from(s) + jy) / f64::from(spp))
 }
 
+/// The middle of the `sample`th of at least `spp` cells.
+pub(super) fn grid(sample: u32, spp: u32) -> DVec2 {
+    let m = spp.isqrt();
+    let n = spp.div_ceil(m);
+    DVec2::new((f64::from(sample % m) + 0.5) / f64::from(m), (f64::from(sample / m) + 0.5) / f64::from(n))
+}
+
 /// The `i`th element of a permutation of `0..length` that `key` chooses: Kensler's, a hash of the next power of two
 /// that is repeated until it falls inside.
 pub(super) const fn permute(mut i: u32, length: u32, key: u32) -> u32 {

@@ -17,7 +17,7 @@ const BINS: usize = 16;
 /// Most items that are left together because no split is worth it.
 const LEAF: usize = 8;
 /// What a node costs, in tests of an item.
-const NODE_COST: f32 = 0.5;
+const NODE_COST: f32 = 0.2;
 /// From this depth on halves are made, so that the tree is never deeper than [`STACK`].
 const DEEP: usize = 64;
 /// Halving 2^32 items takes 32 levels more.
@@ -77,11 +77,11 @@ impl Index for Binary {
                 let mut next = None;
                 // The far one first, so that it is what waits if both are entered.
                 for i in [1 - near, near] {
-                    if !ranges[i].is_empty() {
-                        if let Some(other) = next.replace((children[i], ranges[i].from)) {
-                            stack[waiting] = other;
-                            waiting += 1;
-                        }
+                    if !ranges[i].is_empty()
+                        && let Some(other) = next.replace((children[i], ranges[i].from))
+                    {
+                        stack[waiting] = other;
+                        waiting += 1;
                     }
                 }
                 if let Some((child, _)) = next {

@@ -17,7 +17,7 @@ use super::{Cell, Index, Options};
 use crate::math::{Aabb, DVec3, Vec3};
 
 /// What going through a node costs, in tests of an item.
-const NODE_COST: f32 = 0.3;
+const NODE_COST: f32 = 0.15;
 /// What is left of a cost where one side is empty (Wald, Havran 2006).
 const EMPTY_BONUS: f32 = 0.8;
 /// Bins an axis.

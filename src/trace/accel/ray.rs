@@ -11,7 +11,7 @@
 //!
 //! The hit's own t is rounded too, to f64 and then to f32: by 2^-23 of itself in all. That goes into the range.
 
-use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF_64};
+use crate::math::{Aabb, BVec3, DVec3, UNIT_ROUNDOFF_64};
 use crate::ray::Ray;
 use crate::trace::nearest::Nearest;
 
@@ -73,7 +73,7 @@ impl IndexRay {
             pad,
             early: origin + forward,
             late: origin - forward,
-            backwards: [reciprocal.x < 0.0, reciprocal.y < 0.0, reciprocal.z < 0.0],
+            backwards: reciprocal.cmplt(DVec3::ZERO).into(),
             begin: tmin - tmin * T_ERROR - f64::from(f32::MIN_POSITIVE),
         }
     }
@@ -86,17 +86,19 @@ impl IndexRay {
     /// Where it is within the box, up to `limit`.
     #[inline]
     pub fn within(&self, min: DVec3, max: DVec3, limit: f64) -> Range {
+        let backwards = BVec3::from_array(self.backwards);
+        let first = DVec3::select(backwards, max, min);
+        let second = DVec3::select(backwards, min, max);
+        let from = (first - self.early) * self.reciprocal;
+        let to = (second - self.late) * self.reciprocal;
         let mut range = Range { from: self.begin, to: limit };
         for axis in 0..3 {
-            let (first, second) = if self.backwards[axis] { (max[axis], min[axis]) } else { (min[axis], max[axis]) };
-            let from = (first - self.early[axis]) * self.reciprocal[axis];
-            let to = (second - self.late[axis]) * self.reciprocal[axis];
             // NaN leaves the range as it is.
-            if from > range.from {
-                range.from = from;
+            if from[axis] > range.from {
+                range.from = from[axis];
             }
-            if to < range.to {
-                range.to = to;
+            if to[axis] < range.to {
+                range.to = to[axis];
             }
         }
         range

@@ -1,35 +1,27 @@
-//! A uniform grid, walked cell by cell (Amanatides, Woo 1987, *A fast voxel traversal algorithm for ray tracing*).
+//! How many cells a grid has, and what is in them.
 //!
 //! Cells are cubes as far as possible, a few to an item (Cleary, Wyvill 1988, *Analysis of an algorithm for fast ray tracing using uniform
-//! space subdivision*); cells and their items are filled by counting, in linear time. Where scales are mixed, a teapot in a stadium, a
-//! cell with too many items gets a grid of its own (Jevans, Wyvill 1989, *Adaptive voxel subdivision for ray tracing*).
-//!
-//! A step adds a constant to the t of the next plane, and rounds: the walk may pass a plane a little early or late and name a
-//! cell that the ray misses by a hair. So items lie in every cell within [`SLACK`] of a cell's width, far more than all steps
-//! together round. A ray that is known less well than that (from very far away, or into a tiny nested grid) takes another way,
-//! [`Grid::halve`], which treats the cells as leaves of a tree of boxes.
+//! space subdivision*). Items are counted in each cell first and filled in then, in linear time and without a list for each cell. Where scales
+//! are mixed, a teapot in a stadium, a cell with too many items gets a grid of its own (Jevans, Wyvill 1989, *Adaptive voxel subdivision for ray
+//! tracing*).
 
-use super::items::{Input, bounds_of};
-use super::ray::IndexRay;
-use super::{Index, Options};
-use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF_64, UVec3};
+use super::{Block, Grid, NESTED, SLACK};
+use crate::math::{Aabb, DVec3, UVec3};
+use crate::trace::accel::items::bounds_of;
 
 /// Cells for each item, where no resolution is asked for.
 const DENSITY: f64 = 3.0;
-/// By how much of a cell's width items reach into the neighbours.
-const SLACK: f64 = 1.0 / 128.0;
 /// More items in a cell than this make a nested grid, if that helps.
 const CROWD: usize = 24;
 /// Grids within grids.
 const DEEPEST: u32 = 6;
-/// Marks an entry of a cell that names a nested grid.
-const NESTED: u32 = 1 << 31;
 /// References for each item: beyond, a coarser grid serves better.
 const MOST_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
 const MOST_ENTRIES: usize = 1 << 30;
 
-/// How many cells a grid has.
+/// How many cells a grid has. Halved along all axes as often as it takes to have no more than [`Resolution::MOST_CELLS`], and than
+/// a billion references to items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
     /// So many along the longest side; cubes.
@@ -41,67 +33,38 @@ pub enum Resolution {
 impl Resolution {
     /// Most cells along an axis.
     pub const MOST: u32 = 2048;
+    /// Most cells: 1 GB of numbers that say where their items are.
+    pub const MOST_CELLS: u64 = 1 << 28;
 
     fn counts(self, bounds: &Aabb) -> UVec3 {
-        match self {
-            Self::Axes(counts) => counts.clamp(UVec3::ONE, UVec3::splat(Self::MOST)),
+        let counts = match self {
+            Self::Axes(counts) => counts,
             Self::Longest(count) => {
                 let size = bounds.max.as_dvec3() - bounds.min.as_dvec3();
                 let edge = size.max_element() / f64::from(count);
                 // A point has no longest side: 0 / 0 is cast to 0.
-                (size / edge).round().as_uvec3().clamp(UVec3::ONE, UVec3::splat(Self::MOST))
+                (size / edge).round().as_uvec3()
             }
+        };
+        let mut counts = counts.clamp(UVec3::ONE, UVec3::splat(Self::MOST));
+        while cells(counts) > Self::MOST_CELLS {
+            counts = halved(counts);
         }
+        counts
     }
 }
 
-/// The index.
-pub(super) struct Grid {
-    min: DVec3,
-    /// Of a cell.
-    width: DVec3,
-    counts: UVec3,
-    /// Where the entries of each cell begin, and where the last ones end.
-    starts: Vec<u32>,
-    /// Items, or the one nested grid of a cell.
-    entries: Vec<u32>,
-    nested: Vec<Grid>,
+fn cells(counts: UVec3) -> u64 {
+    counts.as_u64vec3().element_product()
 }
 
-impl Index for Grid {
-    const REPEATS: bool = true;
-
-    fn build(input: &Input<'_>, options: &Options) -> Self {
-        Self::over(input.boxes, &input.all(), &input.bounds(), options.grid, 0)
-    }
-
-    fn visit(&self, ray: &IndexRay, limit: f64, each: &mut impl FnMut(u32) -> f64) {
-        self.enter(ray, limit, each);
-    }
-
-    fn bytes(&self) -> usize {
-        let own = size_of_val(&self.starts[..]) + size_of_val(&self.entries[..]) + size_of_val(&self.nested[..]);
-        own + self.nested.iter().map(Self::bytes).sum::<usize>()
-    }
-
-    fn note(&self) -> Option<String> {
-        let UVec3 { x, y, z } = self.counts;
-        let nested = self.nested.len();
-        (!self.entries.is_empty())
-            .then(|| format!("a grid of {x} x {y} x {z} cells, {nested} of them with grids of their own"))
-    }
-}
-
-/// Cells from one corner to another, both included.
-#[derive(Clone, Copy)]
-struct Block {
-    low: UVec3,
-    high: UVec3,
+fn halved(counts: UVec3) -> UVec3 {
+    (counts / 2).max(UVec3::ONE)
 }
 
 impl Grid {
     /// Over some of the boxes, as far as they are within `bounds`.
-    fn over(boxes: &[Aabb], items: &[u32], bounds: &Aabb, resolution: Option<Resolution>, depth: u32) -> Self {
+    pub fn over(boxes: &[Aabb], items: &[u32], bounds: &Aabb, resolution: Option<Resolution>, depth: u32) -> Self {
         let mut counts = match resolution {
             Some(resolution) => resolution.counts(bounds),
             None => counts_for(bounds, items.len()),
@@ -110,7 +73,7 @@ impl Grid {
         let mut grid = Self::empty(bounds, counts);
         // Where items are larger than cells, fewer cells lose nothing.
         while grid.references(boxes, items) > most && counts.max_element() > 1 {
-            counts = (counts / 2).max(UVec3::ONE);
+            counts = halved(counts);
             grid = Self::empty(bounds, counts);
         }
         grid.fill(boxes, items);
@@ -130,13 +93,12 @@ impl Grid {
         // A flat grid has a thickness, so that no cell is without width.
         let least = ((max - min).max_element() * 1e-6).max(min.abs().max(max.abs()).max_element() * 1e-12).max(1e-300);
         let width = (max - min).max(DVec3::splat(least)) / counts.as_dvec3();
-        // The outermost items reach over the edge by the slack as well.
         Self { min, width, counts, starts: Vec::new(), entries: Vec::new(), nested: Vec::new() }
     }
 
     /// Sorts the items into the cells by counting.
     fn fill(&mut self, boxes: &[Aabb], items: &[u32]) {
-        let mut starts = vec![0u32; self.counts.as_u64vec3().element_product() as usize + 1];
+        let mut starts = vec![0u32; cells(self.counts) as usize + 1];
         for &item in items {
             self.each_cell(self.cells_of(&boxes[item as usize]), |cell| starts[cell + 1] += 1);
         }
@@ -230,104 +192,6 @@ impl Grid {
                 }
             }
         }
-    }
-
-    fn cell(&self, [x, y, z]: [u32; 3]) -> usize {
-        (z as usize * self.counts.y as usize + y as usize) * self.counts.x as usize + x as usize
-    }
-
-    /// Visits what the ray passes and gives the new limit.
-    fn enter(&self, ray: &IndexRay, limit: f64, each: &mut impl FnMut(u32) -> f64) -> f64 {
-        if self.entries.is_empty() {
-            return limit;
-        }
-        // The items may reach out by nothing, but the walk may be off by the slack.
-        let slack = self.width * SLACK;
-        let max = self.min + self.width * self.counts.as_dvec3();
-        let range = ray.within(self.min - slack, max + slack, limit);
-        if range.is_empty() {
-            limit
-        } else if (ray.pad + self.steps_error(ray)).cmple(slack).all() {
-            self.walk(ray, range.from, limit, each)
-        } else {
-            self.halve(ray, Block { low: UVec3::ZERO, high: self.counts - 1 }, limit, each)
-        }
-    }
-
-    /// How far all steps of a walk together may be off: each adds a rounded width, by an addition that rounds.
-    fn steps_error(&self, ray: &IndexRay) -> DVec3 {
-        ray.span * (4.0 * UNIT_ROUNDOFF_64 * f64::from(self.counts.max_element()))
-    }
-
-    /// From cell to cell.
-    fn walk(&self, ray: &IndexRay, from: f64, mut limit: f64, each: &mut impl FnMut(u32) -> f64) -> f64 {
-        let start = (ray.origin + ray.direction * from - self.min) / self.width;
-        let counts = self.counts.to_array();
-        let (mut at, mut next, mut step, mut along, mut left) = ([0; 3], [0.0; 3], [0.0; 3], [0; 3], [0; 3]);
-        let strides = [1, counts[0] as isize, counts[0] as isize * counts[1] as isize];
-        for axis in 0..3 {
-            // A cast saturates: what is below goes to 0.
-            at[axis] = (start[axis] as u32).min(counts[axis] - 1);
-            let is_back = ray.backwards[axis];
-            let plane = self.min[axis] + f64::from(at[axis] + u32::from(!is_back)) * self.width[axis];
-            let reciprocal = ray.reciprocal[axis];
-            next[axis] = if reciprocal.is_finite() { (plane - ray.origin[axis]) * reciprocal } else { f64::INFINITY };
-            step[axis] = self.width[axis] * reciprocal.abs();
-            along[axis] = if is_back { -strides[axis] } else { strides[axis] };
-            left[axis] = if is_back { at[axis] } else { counts[axis] - 1 - at[axis] };
-        }
-        let mut cell = self.cell(at);
-        loop {
-            limit = self.cell_items(cell, ray, limit, each);
-            let axis = if next[0] < next[1] {
-                if next[0] < next[2] { 0 } else { 2 }
-            } else if next[1] < next[2] {
-                1
-            } else {
-                2
-            };
-            if next[axis] > limit || left[axis] == 0 {
-                return limit;
-            }
-            left[axis] -= 1;
-            next[axis] += step[axis];
-            cell = cell.wrapping_add_signed(along[axis]);
-        }
-    }
-
-    #[inline]
-    fn cell_items(&self, cell: usize, ray: &IndexRay, mut limit: f64, each: &mut impl FnMut(u32) -> f64) -> f64 {
-        for &entry in &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-            limit = if entry & NESTED == 0 {
-                each(entry)
-            } else {
-                self.nested[(entry & !NESTED) as usize].enter(ray, limit, each)
-            };
-        }
-        limit
-    }
-
-    /// The cells as a tree: the longer way, which takes any pad.
-    fn halve(&self, ray: &IndexRay, block: Block, limit: f64, each: &mut impl FnMut(u32) -> f64) -> f64 {
-        let Block { low, high } = block;
-        let slack = self.width * SLACK;
-        let min = self.min + low.as_dvec3() * self.width - slack;
-        let max = self.min + (high + 1).as_dvec3() * self.width + slack;
-        if ray.within(min, max, limit).is_empty() {
-            return limit;
-        }
-        let size = high - low;
-        if size == UVec3::ZERO {
-            return self.cell_items(self.cell(low.to_array()), ray, limit, each);
-        }
-        let axis = (0..3).max_by_key(|&axis| size[axis]).unwrap_or(0);
-        let middle = low[axis] + size[axis] / 2;
-        let mut halves = [block, block];
-        halves[0].high[axis] = middle;
-        halves[1].low[axis] = middle + 1;
-        let near = usize::from(ray.backwards[axis]);
-        let limit = self.halve(ray, halves[near], limit, each);
-        self.halve(ray, halves[1 - near], limit, each)
     }
 }
 
