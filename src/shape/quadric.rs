@@ -68,7 +68,7 @@ fn is_good([a, b, c, e, s]: &[Bounded; 5]) -> bool {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::line::Line;
+    use crate::shape::line::Line;
     use super::*;
     use crate::math::expansion::Expansion;
     use crate::math::number::Number;
