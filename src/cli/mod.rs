@@ -45,7 +45,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
-    Compare(compare::CompareArgs),
+    Compare(Box<compare::CompareArgs>),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
     Make(make::MakeArgs),

@@ -68,12 +68,12 @@ fn is_good([a, b, c, e, s]: &[Bounded; 5]) -> bool {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::line::Line;
     use super::*;
     use crate::math::expansion::Expansion;
     use crate::math::number::Number;
     use crate::math::{DVec3, Vec3};
     use crate::ray::Ray;
+    use crate::shape::line::Line;
 
     /// Holds the short form of the discriminant against its definition, in exact arithmetic. `quadric` makes one that is
     /// seen from a line, of points that it may ask for by number.
