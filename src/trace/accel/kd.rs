@@ -13,7 +13,7 @@ use rayon::join;
 
 use super::items::Input;
 use super::ray::IndexRay;
-use super::{Cell, Index, Options};
+use super::{Cell, Index, Options, share};
 use crate::math::{Aabb, DVec3, Vec3};
 
 /// What going through a node costs, in tests of an item.
@@ -26,6 +26,8 @@ const BINS: usize = 32;
 const FEW: usize = 32;
 /// From this many items on, children are built side by side.
 const MANY: usize = 1 << 12;
+/// References for each item that cutting may add in all; every cell has its share.
+const MOST_REFERENCES: usize = 12;
 /// Levels of planes at most, whatever the depth by number of items.
 const STACK: usize = 80;
 
@@ -61,6 +63,8 @@ struct Part<'a> {
     items: Vec<u32>,
     /// How many more planes may cut it.
     depth: u32,
+    /// How many more references there may be in it.
+    room: usize,
 }
 
 impl Index for KdTree {
@@ -69,9 +73,10 @@ impl Index for KdTree {
     fn build(input: &Input<'_>, _: &Options) -> Self {
         let bounds = input.bounds();
         let items = input.all();
+        let room = MOST_REFERENCES * items.len();
         // As deep as Havran 2000 found to pay, plus some for uneven scenes.
         let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
-        let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32) };
+        let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32), room };
         let mut tree = Self { bounds, nodes: Vec::new(), items: Vec::new() };
         tree.place(whole.build());
         tree
@@ -177,18 +182,20 @@ impl<'a> Part<'a> {
             return Branch::Leaf(self.items);
         };
         let many = self.items.len() >= MANY;
-        let [below, above] = self.cut(axis, plane);
+        let [below, above] = match self.cut(axis, plane) {
+            Ok(parts) => parts,
+            Err(whole) => return Branch::Leaf(whole.items),
+        };
         let children =
             if many { join(|| below.build(), || above.build()).into() } else { [below.build(), above.build()] };
         Branch::Plane { axis, plane, children: Box::new(children) }
     }
 
-    /// The parts below and above a plane. What lies within it goes above.
-    fn cut(self, axis: usize, plane: f32) -> [Self; 2] {
-        let Self { boxes, bounds, items, depth } = self;
+    /// The parts below and above a plane, what lies within it above; or the whole, where there is no room for both.
+    fn cut(self, axis: usize, plane: f32) -> Result<[Self; 2], Self> {
         let (mut below, mut above) = (Vec::new(), Vec::new());
-        for item in items {
-            let Aabb { min, max } = boxes[item as usize];
+        for &item in &self.items {
+            let Aabb { min, max } = self.boxes[item as usize];
             let is_below = min[axis] < plane;
             if is_below {
                 below.push(item);
@@ -197,10 +204,15 @@ impl<'a> Part<'a> {
                 above.push(item);
             }
         }
-        let (mut lower, mut upper) = (bounds, bounds);
+        let references = below.len() + above.len();
+        let Some(left) = (self.items.len() + self.room).checked_sub(references) else { return Err(self) };
+        let (mut lower, mut upper) = (self.bounds, self.bounds);
         (lower.max[axis], upper.min[axis]) = (plane, plane);
-        let part = |bounds, items| Part { boxes, bounds, items, depth: depth - 1 };
-        [part(lower, below), part(upper, above)]
+        let part = |bounds, items: Vec<u32>| {
+            let room = share(left, items.len(), references);
+            Part { boxes: self.boxes, bounds, items, depth: self.depth - 1, room }
+        };
+        Ok([part(lower, below), part(upper, above)])
     }
 
     /// The sides of an item's box, as far as it is in the cell.

@@ -83,6 +83,11 @@ trait Index: Sized + Send + Sync {
     }
 }
 
+/// What a part gets of the room that there is for references, by how many of all references are its own.
+fn share(room: usize, own: usize, all: usize) -> usize {
+    (room as u128 * own as u128 / all.max(1) as u128) as usize
+}
+
 /// A tracer over indices of one kind.
 struct Accelerated<I> {
     fixed: Level<I>,

@@ -12,7 +12,7 @@
 
 use super::items::Input;
 use super::ray::{IndexRay, Range};
-use super::{Index, Options};
+use super::{Index, Options, share};
 use crate::math::{Aabb, DVec3};
 
 /// Most items that are not told apart.
@@ -20,7 +20,10 @@ const LEAF: usize = 6;
 /// Levels of cells. A leaf is then 2^-20 of the whole.
 const DEEPEST: u32 = 20;
 /// References that eight children may have for each of their parent's: beyond, the parent stays a leaf.
-const MOST_REFERENCES: usize = 4;
+const MOST_OF_CHILDREN: usize = 3;
+/// References for each item that splitting may add in all; every cell has its share. Where boxes overlap, each level would add more than
+/// the one before.
+const MOST_REFERENCES: usize = 12;
 
 /// The index.
 pub(super) struct Octree {
@@ -68,7 +71,8 @@ impl Index for Octree {
             tree.min = bounds.min.as_dvec3();
             tree.half = (bounds.max.as_dvec3() - tree.min).max_element() * 0.5;
             tree.nodes.push(Node { first: 0, count: 0 });
-            tree.split(0, input.boxes, input.all(), tree.root(), 0);
+            let room = MOST_REFERENCES * input.boxes.len();
+            tree.split(0, input.boxes, input.all(), tree.root(), 0, room);
         }
         tree
     }
@@ -93,21 +97,25 @@ impl Octree {
         Cell { middle: self.min + self.half, half: self.half }
     }
 
-    /// Gives `node` children, or makes it a leaf.
-    fn split(&mut self, node: usize, boxes: &[Aabb], items: Vec<u32>, cell: Cell, depth: u32) {
-        let children = (items.len() > LEAF && depth < DEEPEST).then(|| deal(boxes, &items, cell)).flatten();
+    /// Gives `node` children, or makes it a leaf; there is room for so many references more.
+    fn split(&mut self, node: usize, boxes: &[Aabb], items: Vec<u32>, cell: Cell, depth: u32, room: usize) {
+        let most = (MOST_OF_CHILDREN * items.len()).min(items.len() + room);
+        let children = (items.len() > LEAF && depth < DEEPEST).then(|| deal(boxes, &items, cell, most)).flatten();
         let Some(children) = children else {
             self.nodes[node] = Node { first: self.items.len() as u32, count: items.len() as u32 };
             self.items.extend(items);
             return;
         };
+        let references = children.iter().map(Vec::len).sum::<usize>();
+        let left = room - (references - items.len());
         drop(items);
         let first = self.nodes.len();
         self.nodes[node] = Node { first: first as u32, count: INNER };
         self.nodes.resize(first + 8, Node { first: 0, count: 0 });
         for (octant, items) in children.into_iter().enumerate() {
             if !items.is_empty() {
-                self.split(first + octant, boxes, items, cell.child(octant), depth + 1);
+                let room = share(left, items.len(), references);
+                self.split(first + octant, boxes, items, cell.child(octant), depth + 1, room);
             }
         }
     }
@@ -163,8 +171,8 @@ impl Octree {
     }
 }
 
-/// The items of each octant; None where that does not tell them apart.
-fn deal(boxes: &[Aabb], items: &[u32], cell: Cell) -> Option<[Vec<u32>; 8]> {
+/// The items of each octant; None where these would be more than `most` in all.
+fn deal(boxes: &[Aabb], items: &[u32], cell: Cell, most: usize) -> Option<[Vec<u32>; 8]> {
     let middle = cell.middle;
     // On each axis, whether a box reaches below and above the middle; one within the plane is above.
     let touched = |item: u32| {
@@ -179,7 +187,7 @@ fn deal(boxes: &[Aabb], items: &[u32], cell: Cell) -> Option<[Vec<u32>; 8]> {
             counts[octant] += 1;
         }
     }
-    if counts.iter().sum::<usize>() > MOST_REFERENCES * items.len() {
+    if counts.iter().sum::<usize>() > most {
         return None;
     }
     let mut children = counts.map(Vec::with_capacity);

@@ -15,7 +15,7 @@ const DENSITY: f64 = 3.0;
 const CROWD: usize = 24;
 /// Grids within grids.
 const DEEPEST: u32 = 6;
-/// References for each item: beyond, a coarser grid serves better.
+/// References for each item: beyond, a coarser grid serves better. Half as many in each grid within a grid, for these multiply.
 const MOST_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
 const MOST_ENTRIES: usize = 1 << 30;
@@ -69,7 +69,7 @@ impl Grid {
             Some(resolution) => resolution.counts(bounds),
             None => counts_for(bounds, items.len()),
         };
-        let most = if resolution.is_some() { MOST_ENTRIES } else { MOST_REFERENCES * items.len() };
+        let most = if resolution.is_some() { MOST_ENTRIES } else { (MOST_REFERENCES >> depth).max(2) * items.len() };
         let mut grid = Self::empty(bounds, counts);
         // Where items are larger than cells, fewer cells lose nothing.
         while grid.references(boxes, items) > most && counts.max_element() > 1 {
