@@ -84,6 +84,21 @@ fn instances_and_spheres() {
     assert!(hits > 200, "{hits} hits");
 }
 
+/// Directions so short that 1/d overflows on an axis, in trees whose nodes are mostly empty.
+#[test]
+fn short_directions() {
+    for count in [1, 9, 20, 60, 150] {
+        let mesh = scenes::soup(count, 0.3, count as u64);
+        let mut rays = Vec::new();
+        for (i, target) in mesh.positions.iter().enumerate() {
+            let along = [Vec3::X, Vec3::NEG_Y, Vec3::new(1e-3, 0.0, -1.0), Vec3::new(0.0, 1.0, 1.0)][i % 4];
+            let length = [1e-20, 1e-30, 1e-36][i % 3];
+            rays.push(Ray::new(target.lerp(Vec3::ZERO, 0.01) - along * 3.0, along * length));
+        }
+        assert_parity(&scenes::of_mesh(mesh), &rays);
+    }
+}
+
 #[test]
 fn degenerate_meshes() {
     let mut mesh = scenes::soup(1000, 0.3, 11);

@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
+use super::common::by_name;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
 use crate::math::UVec3;
@@ -126,13 +127,11 @@ impl AccelArgs {
 }
 
 fn parse_triangle_method(name: &str) -> std::result::Result<TriangleMethod, String> {
-    let found = TriangleMethod::ALL.into_iter().find(|method| method.name() == name);
-    found.ok_or_else(|| format!("expected one of {}", TriangleMethod::ALL.map(TriangleMethod::name).join(", ")))
+    by_name(TriangleMethod::ALL, TriangleMethod::name, name)
 }
 
 fn parse_sphere_method(name: &str) -> std::result::Result<SphereMethod, String> {
-    let found = SphereMethod::ALL.into_iter().find(|method| method.name() == name);
-    found.ok_or_else(|| format!("expected one of {}", SphereMethod::ALL.map(SphereMethod::name).join(", ")))
+    by_name(SphereMethod::ALL, SphereMethod::name, name)
 }
 
 fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {

@@ -119,6 +119,16 @@ impl FromStr for Size {
     }
 }
 
+/// That of `all` which has the name.
+pub(super) fn by_name<T: Copy, const N: usize>(
+    all: [T; N],
+    name_of: impl Fn(T) -> &'static str,
+    name: &str,
+) -> std::result::Result<T, String> {
+    let found = all.into_iter().find(|&one| name_of(one) == name);
+    found.ok_or_else(|| format!("expected one of {}", all.map(name_of).join(", ")))
+}
+
 /// Three finite numbers with commas between.
 pub(crate) fn parse_vector(text: &str) -> std::result::Result<DVec3, String> {
     let numbers: Option<Vec<f64>> =
@@ -149,6 +159,7 @@ pub(crate) fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::{Filter, Sampling};
 
     #[test]
     fn sizes() {
@@ -165,6 +176,18 @@ mod tests {
         for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,2,inf", "a,b,c"] {
             assert!(parse_vector(bad).is_err(), "{bad:?}");
         }
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for filter in Filter::ALL {
+            assert_eq!(by_name(Filter::ALL, Filter::name, filter.name()), Ok(filter));
+        }
+        for sampling in Sampling::ALL {
+            assert_eq!(by_name(Sampling::ALL, Sampling::name, sampling.name()), Ok(sampling));
+        }
+        let unknown = by_name(Filter::ALL, Filter::name, "lanczos").unwrap_err();
+        assert_eq!(unknown, "expected one of box, tent, gaussian, mitchell, blackman-harris");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use super::common::{Size, parse_vector};
+use super::common::{Size, by_name, parse_vector};
 use crate::math::Vec3;
 use crate::render::{Filter, Sampling, Settings, TileOrder};
 use crate::scene::Request;
@@ -32,11 +32,11 @@ pub(super) struct PictureArgs {
     light_samples: u32,
 
     /// How samples are spread: sobol, blue-noise, halton, stratified, grid or independent
-    #[arg(long, value_name = "NAME", default_value_t)]
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_sampling)]
     sampler: Sampling,
 
     /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
-    #[arg(long, value_name = "NAME", default_value_t)]
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_filter)]
     filter: Filter,
 
     /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
@@ -106,6 +106,14 @@ impl PictureArgs {
             background: self.background,
         }
     }
+}
+
+fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {
+    by_name(Sampling::ALL, Sampling::name, name)
+}
+
+fn parse_filter(name: &str) -> std::result::Result<Filter, String> {
+    by_name(Filter::ALL, Filter::name, name)
 }
 
 fn parse_color(text: &str) -> std::result::Result<Vec3, String> {

@@ -5,7 +5,6 @@
 //! alternative, would make a pixel depend on its neighbours' samples and on the order in which threads add them.
 
 use std::fmt;
-use std::str::FromStr;
 
 use crate::math::DVec2;
 
@@ -79,15 +78,6 @@ impl fmt::Display for Filter {
     }
 }
 
-impl FromStr for Filter {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|s| s.name() == name).ok_or_else(|| format!("expected one of {}", known()))
-    }
-}
-
 /// Steps of the table; the filter is taken as constant within each.
 const STEPS: usize = 1024;
 
@@ -148,14 +138,6 @@ impl FilterSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_are_read_back() {
-        for filter in Filter::ALL {
-            assert_eq!(filter.name().parse(), Ok(filter));
-        }
-        assert!("lanczos".parse::<Filter>().unwrap_err().contains("mitchell"));
-    }
 
     #[test]
     fn shapes_are_those_of_their_sources() {

@@ -12,7 +12,6 @@ mod sobol;
 mod stratified;
 
 use std::fmt;
-use std::str::FromStr;
 
 use crate::math::DVec2;
 pub(crate) use hash::pcg4d;
@@ -56,15 +55,6 @@ impl Sampling {
 impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-impl FromStr for Sampling {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|s| s.name() == name).ok_or_else(|| format!("expected one of {}", known()))
     }
 }
 
@@ -178,14 +168,6 @@ fn unit(bits: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_are_read_back() {
-        for sampling in Sampling::ALL {
-            assert_eq!(sampling.name().parse(), Ok(sampling));
-        }
-        assert!("sobel".parse::<Sampling>().unwrap_err().contains("sobol, blue-noise"));
-    }
 
     /// All but the grid, which is the same for every pixel and every pair.
     fn scattered() -> impl Iterator<Item = Sampling> {

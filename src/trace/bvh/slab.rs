@@ -7,8 +7,8 @@
 //! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations.)
 //!
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
-//! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. What still overflows turns into a pad that
-//! lets everything pass.
+//! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows is left
+//! open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
 
 use super::filter::{Filter, Filters};
 use super::node::Node;
@@ -36,6 +36,10 @@ const SMALLEST: f32 = 1e-18;
 /// Products of this size are not trusted to be finite after a sum.
 const HUGE: f32 = 1e37;
 
+/// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
+/// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
+const OPEN: f32 = f32::MIN_POSITIVE;
+
 impl SlabRay {
     /// `reach` is the tree's, `blur` by how much more than its own rounding the ray may be off (1: not at all).
     #[inline(always)]
@@ -56,11 +60,13 @@ impl SlabRay {
             let kept = if component.abs() < smallest { smallest.copysign(component) } else { component };
             let reciprocal = 1.0 / kept;
             let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * blur * span[axis] + stray);
-            let pad = if reciprocal.abs() * span[axis] < HUGE { width } else { f32::INFINITY };
             let offset = -ray.origin[axis] * reciprocal;
-            slab.reciprocal[axis] = reciprocal;
-            slab.near_offset[axis] = offset - pad;
-            slab.far_offset[axis] = offset + pad;
+            let is_small = reciprocal.abs() * span[axis] < HUGE && width < HUGE;
+            (slab.reciprocal[axis], slab.near_offset[axis], slab.far_offset[axis]) = if is_small {
+                (reciprocal, offset - width, offset + width)
+            } else {
+                (OPEN.copysign(reciprocal), -f32::MAX, f32::MAX)
+            };
             slab.side[axis] = u32::from(reciprocal < 0.0);
         }
         slab
@@ -144,10 +150,12 @@ pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> ([ReadyRay; 8], u3
         let reciprocal = splat(1.0).div(kept);
         let steep = reciprocal.abs();
         let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
-        let is_small = steep.mul(span[axis]).less(splat(HUGE));
-        let pad = S::V8::select(is_small, width, splat(f32::INFINITY));
+        let is_small = steep.mul(span[axis]).less(splat(HUGE)).and(width.less(splat(HUGE)));
         let offset = zero.sub(origin[axis]).mul(reciprocal);
-        (reciprocals[axis], near[axis], far[axis]) = (reciprocal, offset.sub(pad), offset.add(pad));
+        let open = S::V8::select(is_negative, splat(-OPEN), splat(OPEN));
+        reciprocals[axis] = S::V8::select(is_small, reciprocal, open);
+        near[axis] = S::V8::select(is_small, offset.sub(width), splat(-f32::MAX));
+        far[axis] = S::V8::select(is_small, offset.add(width), splat(f32::MAX));
         sides[axis] = S::V8::select(is_negative, splat(f32::from_bits(1)), zero);
     }
     // Rounded down, for t is rounded before it is held against it.
