@@ -9,8 +9,8 @@
 //! | `kd` | a kd-tree: planes across the axes, by the surface area heuristic (Wald, Havran 2006, *On building fast kd-trees*) |
 //! | `bsp` | a BSP tree: planes of the scene's own polygons (Ize, Wald, Parker 2008, *Ray tracing with the BSP tree*) |
 //!
-//! An accelerator is an [`Index`] over boxes that knows no primitive: it says which items a ray may hit, near ones first. One
-//! tracer, [`Accelerated`], does the rest with any of them: an index over what is fixed, one over each object, one over the
+//! An accelerator is an `Index` over boxes that knows no primitive: it says which items a ray may hit, near ones first. One
+//! tracer, `Accelerated`, does the rest with any of them: an index over what is fixed, one over each object, one over the
 //! places where objects stand. Primitives are tested by the very code of brute force, so hits are the same to the bit as long
 //! as no index loses an item; `ray` has the bounds on rounding by which none does. A tracer for each accelerator, the
 //! alternative, would have its own leaves, levels and proofs, seven times.
