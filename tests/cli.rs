@@ -411,3 +411,28 @@ fn both_engines_render_and_agree() {
     assert!(folder.render("native.exr", &[]).status.success());
     assert_eq!(folder.picture("both.exr"), folder.picture("native.exr"));
 }
+
+#[test]
+fn scenes_are_made_by_rule() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let list = text(&twincast(&["make", "--list"]).stdout);
+    for name in ["sphereflake", "tetra", "gears", "mount", "rings", "tree", "terrain", "lattice", "city"] {
+        assert!(list.contains(name), "{name} in {list}");
+    }
+    let output = twincast(&["make", "sphereflake", "--size", "2", "-o", &path("a.nff")]);
+    assert!(output.status.success() && text(&output.stdout).contains("92 primitives"), "{output:?}");
+    let output = twincast(&["render", &path("a.nff"), "--size", "20x10", "-q", "-o", &path("a.png")]);
+    assert!(output.status.success(), "{output:?}");
+    for (args, words) in [
+        (["make", "spherflake", "-o", &path("b.nff"), "-q"], "there are sphereflake, tetra"),
+        (["make", "sphereflake", "-o", &path("b.ply"), "-q"], "PLY holds triangles, and this scene has a sphere"),
+        (["make", "tetra", "-o", &path("b.obj"), "-q"], "scenes are written as .nff, .ply, .toml"),
+        (["make", "tetra", "-o", &path("b.nff"), "--size=13"], "--size 13: tetra goes to 12"),
+    ] {
+        let (code, message) = fails(&args);
+        assert!(code == 2 && message.contains(words), "{code}: {message}");
+    }
+    let (code, message) = fails(&["make", "tetra", "-o", &path("none/b.nff")]);
+    assert!(code == 4 && message.contains("does not exist"), "{message}");
+}

@@ -1,5 +1,6 @@
 //! One test binary: what crosses modules, file by file.
 
+mod accelerators;
 mod allocation;
 mod bench;
 mod cache;
@@ -10,6 +11,7 @@ mod embree;
 mod image;
 mod io;
 mod layering;
+mod minray;
 mod mutation;
 mod parity;
 mod queries;

@@ -13,7 +13,7 @@ use twincast::World;
 use twincast::io::{LoadOptions, Normals, load};
 
 use crate::allocation;
-use crate::io::{gltf, model, obj, ply, stl};
+use crate::io::{course, gltf, model, nff, obj, ply, stl, toml};
 
 /// Broken files in all, over all seeds of the corpus.
 const FILES: usize = 24_000;
@@ -54,6 +54,9 @@ fn corpus() -> Vec<Seed> {
         seed("ply big", "ply", ply::binary(true)),
         seed("stl text", "stl", stl::text().into()),
         seed("stl binary", "stl", stl::binary(b"solid")),
+        seed("course", "test", course::TEXT.into()),
+        seed("nff", "nff", nff::TEXT.into()),
+        seed("toml", "toml", toml::text().into()),
         seed("gltf", "gltf", gltf::rich().into()),
         seed("glb", "glb", gltf::glb(gltf::rich_with_binary(), &gltf::triangle_bytes())),
     ];

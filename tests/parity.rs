@@ -6,6 +6,7 @@ use twincast::trace::brute::Brute;
 use twincast::trace::bvh::{Bvh, Isa, Options, Preset};
 use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 
+use crate::accelerators::assert_accelerators;
 use crate::scenes::{self, Random};
 
 /// Closest hits by single rays and packets, with every preset and instruction set, and occlusion, against brute force.
@@ -40,6 +41,7 @@ fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
             assert_eq!(brute.occluded(ray), expected.is_some());
         }
     }
+    assert_accelerators(world, rays, &expected);
     expected.iter().flatten().count()
 }
 
@@ -127,6 +129,21 @@ fn extreme_placements() {
         hits += assert_parity(&scene, &rays);
     }
     assert!(hits > 500, "{hits} hits");
+}
+
+/// Directions so short that 1/d overflows on an axis, in trees whose nodes are mostly empty.
+#[test]
+fn short_directions() {
+    for count in [1, 9, 20, 60, 150] {
+        let mesh = scenes::soup(count, 0.3, count as u64);
+        let mut rays = Vec::new();
+        for (i, target) in mesh.positions.iter().enumerate() {
+            let along = [Vec3::X, Vec3::NEG_Y, Vec3::new(1e-3, 0.0, -1.0), Vec3::new(0.0, 1.0, 1.0)][i % 4];
+            let length = [1e-20, 1e-30, 1e-36][i % 3];
+            rays.push(Ray::new(target.lerp(Vec3::ZERO, 0.01) - along * 3.0, along * length));
+        }
+        assert_parity(&scenes::of_mesh(mesh), &rays);
+    }
 }
 
 #[test]

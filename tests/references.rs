@@ -1,4 +1,4 @@
-//! Every scene of `scenes/` looks as its reference picture does, on every engine.
+//! Every scene of `scenes/` looks as its reference picture does, on every engine, at the size that it asks for.
 //!
 //! `TWINCAST_REFRESH=1` writes the references anew; look at them before you commit them.
 
@@ -31,7 +31,11 @@ fn pictures(path: &Path) -> Vec<(&'static str, Image)> {
     assert_eq!(warnings, []);
     let world = World::new(&scene).expect("sound");
     let camera = scene.cameras.first().expect("a camera").clone();
-    let settings = Settings { width: WIDTH, height: HEIGHT, ..Settings::default() };
+    let usual = Settings::default();
+    let request = &scene.request;
+    let [width, height] = request.size.unwrap_or([WIDTH, HEIGHT]);
+    let (spp, max_depth) = (request.spp.unwrap_or(usual.spp), request.max_depth.unwrap_or(usual.max_depth));
+    let settings = Settings { width, height, spp, max_depth, ..usual };
     let renderer = Renderer::new(&scene, &world, camera, settings).expect("sound settings");
     let control = Control::default();
     let native = renderer.render(&Bvh::build(&world), control).expect("rendered");

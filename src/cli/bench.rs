@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::accel::{AccelArg, AccelOptions};
 use super::common::UpAxis;
 use super::engine::BackendArg;
+use super::scaling;
 use crate::error::Result;
 #[cfg(feature = "embree")]
 use crate::lab::bench::Kind;
@@ -24,7 +26,9 @@ Examples:
   twincast bench bunny.obj
   twincast bench scan.obj --up-axis z --rays primary,shadow --repeat 9
   twincast bench terrain1000 architecture instances --json --chart rates.svg
-  twincast bench terrain3162 --modes default,fast,robust --threads 2")]
+  twincast bench terrain3162 --modes default,fast,robust --threads 2
+  twincast bench bunny.obj --modes default --accel binary-bvh,grid,octree,kd-tree
+  twincast bench --scaling --max 10000000 --chart scaling.svg")]
 pub(super) struct BenchArgs {
     /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
     /// placements of one mesh)
@@ -62,7 +66,7 @@ pub(super) struct BenchArgs {
 
     /// Threads that build and trace; 0 is one for each core
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
-    threads: usize,
+    pub(super) threads: usize,
 
     /// Instructions that both engines may use at most (default: what the processor has)
     #[arg(long, value_enum)]
@@ -72,13 +76,29 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
 
+    /// Other accelerators to measure beside these modes: brute, groups, binary-bvh, grid, octree, kd-tree, bsp
+    #[arg(long, value_name = "NAME,...", value_enum, value_delimiter = ',', hide_possible_values = true)]
+    accel: Vec<AccelArg>,
+
+    #[command(flatten)]
+    options: AccelOptions,
+
+    /// Measure time against the number of triangles instead, for every accelerator: builds on all threads, rays on one. One that takes
+    /// over 10 seconds for a step is not asked for more
+    #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid"])]
+    scaling: bool,
+
+    /// Most triangles of --scaling
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
+    pub(super) max: u64,
+
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 
     /// Draw the rates: bars from zero with their ranges, for each scene and kind of ray
     #[arg(long, value_name = "FILE.svg", value_parser = parse_chart)]
-    chart: Option<PathBuf>,
+    pub(super) chart: Option<PathBuf>,
 }
 
 fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
@@ -140,6 +160,9 @@ enum ModeArg {
 }
 
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
+    if args.scaling {
+        return scaling::run(args);
+    }
     BackendArg::Both.check_available()?;
     bench(args)
 }
@@ -165,6 +188,7 @@ mod with_embree {
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::trace::World;
+    use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Options, Quality};
 
@@ -196,6 +220,7 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
+        let options = args.options.choose(&args.accel.iter().map(|accel| accel.accel()).collect::<Vec<_>>())?;
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
@@ -206,7 +231,9 @@ mod with_embree {
             interrupt::check()?;
             let costs = Arc::default();
             let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
-            let contenders: Vec<_> = modes.map(|mode| contender(mode, threads, isa, &costs)).collect();
+            let modes = modes.map(|mode| contender(mode, threads, isa, &costs));
+            let others = args.accel.iter().map(|accel| other(accel.accel(), &options));
+            let contenders: Vec<_> = modes.chain(others).collect();
             let setup = Setup {
                 subject: &subject,
                 contenders: &contenders,
@@ -274,6 +301,18 @@ mod with_embree {
             ModeArg::Compact => embree("compact", Options { compact: true, ..medium }),
             ModeArg::High => embree("high", Options { quality: Quality::High, ..medium }),
         }
+    }
+
+    /// Another accelerator, which answers as native.
+    fn other(accel: Accel, options: &accel::Options) -> Contender {
+        let options = options.clone();
+        let build = move |world: &World| {
+            let start = Instant::now();
+            let built = accel.build(world, &options);
+            let seconds = start.elapsed().as_secs_f64();
+            Ok(Built { seconds, bytes: built.bytes, sah_cost: None, tracer: Box::new(built) })
+        };
+        Contender { backend: "native", mode: accel.name(), build: Box::new(build) }
     }
 
     fn build_native(world: &World, preset: Preset, isa: Isa) -> Built {

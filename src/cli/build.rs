@@ -51,6 +51,11 @@ impl Build {
 }
 
 impl BuildArgs {
+    /// Whether anything is asked of the native BVH.
+    pub(super) fn is_given(&self) -> bool {
+        self.max_memory.is_some() || self.build.wanted().is_some()
+    }
+
     /// How to build the native tree over so many triangles; none where only Embree renders.
     ///
     /// # Errors

@@ -25,6 +25,10 @@ pub(super) struct CacheArgs {
 }
 
 impl CacheArgs {
+    pub(super) const fn is_given(&self) -> bool {
+        self.folder.is_some()
+    }
+
     /// The folder, if one is named; made where it is missing.
     ///
     /// # Errors

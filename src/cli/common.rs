@@ -6,19 +6,16 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 
 use super::progress;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Result, Warning};
 use crate::io::{self, LoadOptions};
-use crate::math::{DAabb, DVec3};
+use crate::math::DVec3;
 use crate::render::LARGEST_SIDE;
-use crate::scene::{Camera, Scene};
-
-/// Vertical angle of view where none is given, degrees.
-const DEFAULT_FOV: f64 = 40.0;
+use crate::scene::Scene;
 
 /// A scene file and how to read it.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SceneArgs {
-    /// Scene file: .glb, .gltf, .obj, .ply or .stl
+    /// Scene file: .glb, .gltf, .obj, .ply, .stl, .nff, .test or .toml
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
 
@@ -104,86 +101,6 @@ impl SceneArgs {
     }
 }
 
-/// Where to look from: a camera of the file by name, or flags. Without either, the file's first camera, else a view of
-/// everything.
-#[derive(Clone, Debug, Default, Args)]
-#[command(next_help_heading = "Camera")]
-pub(crate) struct CameraArgs {
-    /// Camera of the file, by name (default: its first; without any, a view of the whole scene)
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "fov"])]
-    camera: Option<String>,
-
-    /// Position, in metres with +y up, as --unit and --up-axis leave the scene
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
-    eye: Option<DVec3>,
-
-    /// Point in the middle of the picture (default: the middle of the scene)
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
-    look_at: Option<DVec3>,
-
-    /// Direction that points up in the picture (default: 0,1,0)
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
-    up: Option<DVec3>,
-
-    /// Vertical angle of view, degrees (default: 40)
-    #[arg(long, value_name = "DEG", value_parser = parse_fov, requires = "eye")]
-    fov: Option<f64>,
-}
-
-impl CameraArgs {
-    /// The camera, and in words where it comes from.
-    pub(crate) fn choose(&self, scene: &Scene, aspect: f64) -> Result<(Camera, String)> {
-        let bounds = scene.bounds();
-        if let Some(eye) = self.eye {
-            return Ok((self.flagged(eye, &bounds)?, "from the flags".to_owned()));
-        }
-        if let Some(name) = &self.camera {
-            let found = scene.cameras.iter().find(|camera| camera.name == *name);
-            let camera = found.ok_or_else(|| Error::Usage(unknown_camera(name, &scene.cameras)))?;
-            return Ok((camera.clone(), format!("{name:?} of the file")));
-        }
-        Ok(match scene.cameras.first() {
-            Some(camera) if camera.name.is_empty() => (camera.clone(), "the file's first".to_owned()),
-            Some(camera) => (camera.clone(), format!("{:?}, the file's first", camera.name)),
-            None => (Camera::framing(&bounds, aspect), "framed on the scene".to_owned()),
-        })
-    }
-
-    fn flagged(&self, eye: DVec3, bounds: &DAabb) -> Result<Camera> {
-        let target = self.look_at.unwrap_or_else(|| bounds.centre());
-        let up = self.up.unwrap_or(DVec3::Y);
-        let fov = self.fov.unwrap_or(DEFAULT_FOV).to_radians();
-        Camera::look_at(eye, target, up, fov).ok_or_else(|| {
-            Error::Usage(if eye == target {
-                format!("--eye {} and --look-at {} are one point", list(eye), list(target))
-            } else {
-                format!("--up {} must be neither zero nor along the view from --eye to --look-at", list(up))
-            })
-        })
-    }
-}
-
-fn unknown_camera(name: &str, cameras: &[Camera]) -> String {
-    let names: Vec<_> = cameras.iter().filter(|c| !c.name.is_empty()).map(|c| format!("{:?}", c.name)).collect();
-    let known = if names.is_empty() { "none that has a name".to_owned() } else { names.join(", ") };
-    format!("no camera {name:?} in the scene; it has {known}")
-}
-
-/// The camera as flags that give it again.
-pub(crate) fn camera_flags(camera: &Camera, bounds: &DAabb) -> String {
-    let forward = -camera.frame.z_axis;
-    // Any point ahead would do; one as far as the middle of the scene reads well.
-    let ahead = (bounds.centre() - camera.eye).dot(forward);
-    let target = camera.eye + forward * if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
-    let (eye, target, up) = (list(camera.eye), list(target), list(camera.frame.y_axis));
-    format!("--eye {eye} --look-at {target} --up {up} --fov {}", camera.fov_y.to_degrees())
-}
-
-fn list(v: DVec3) -> String {
-    // Adding zero makes -0 print as 0.
-    format!("{},{},{}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
-}
-
 /// Pixels of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size {
@@ -200,6 +117,16 @@ impl FromStr for Size {
             .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
             .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, as in 1280x720"))
     }
+}
+
+/// That of `all` which has the name.
+pub(super) fn by_name<T: Copy, const N: usize>(
+    all: [T; N],
+    name_of: impl Fn(T) -> &'static str,
+    name: &str,
+) -> std::result::Result<T, String> {
+    let found = all.into_iter().find(|&one| name_of(one) == name);
+    found.ok_or_else(|| format!("expected one of {}", all.map(name_of).join(", ")))
 }
 
 /// Three finite numbers with commas between.
@@ -229,15 +156,10 @@ pub(crate) fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
     bytes.map(|bytes| bytes as u64).ok_or_else(|| "expected a size as in 1.6G, 500M or 123456 (bytes)".to_owned())
 }
 
-/// An angle of view in degrees.
-fn parse_fov(text: &str) -> std::result::Result<f64, String> {
-    let degrees = text.parse().ok().filter(|&degrees: &f64| degrees > 0.0 && degrees < 180.0);
-    degrees.ok_or_else(|| "expected an angle above 0 and below 180 degrees".to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::{Filter, Sampling};
 
     #[test]
     fn sizes() {
@@ -249,15 +171,23 @@ mod tests {
     }
 
     #[test]
-    fn vectors_and_angles() {
+    fn vectors() {
         assert_eq!(parse_vector("1,-2.5, 3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
         for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,2,inf", "a,b,c"] {
             assert!(parse_vector(bad).is_err(), "{bad:?}");
         }
-        assert_eq!(parse_fov("179.5"), Ok(179.5));
-        for bad in ["0", "180", "-3", "nan", "x"] {
-            assert!(parse_fov(bad).is_err(), "{bad:?}");
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for filter in Filter::ALL {
+            assert_eq!(by_name(Filter::ALL, Filter::name, filter.name()), Ok(filter));
         }
+        for sampling in Sampling::ALL {
+            assert_eq!(by_name(Sampling::ALL, Sampling::name, sampling.name()), Ok(sampling));
+        }
+        let unknown = by_name(Filter::ALL, Filter::name, "lanczos").unwrap_err();
+        assert_eq!(unknown, "expected one of box, tent, gaussian, mitchell, blackman-harris");
     }
 
     #[test]
@@ -276,42 +206,5 @@ mod tests {
         for bad in ["", "G", "-1G", "0", "1X", "nan", "inf", "1e30", "1 2M", "1.2.3G"] {
             assert!(parse_bytes(bad).is_err(), "{bad:?}");
         }
-    }
-
-    #[test]
-    fn printed_flags_give_the_camera_again() {
-        let bounds = DAabb { min: DVec3::new(1e7, 0.0, -3.0), max: DVec3::new(1e7 + 4.0, 2.0, 5.0) };
-        let camera = Camera::framing(&bounds, 1.5);
-        let flags = camera_flags(&camera, &bounds);
-        let words: Vec<_> = flags.split(' ').collect();
-        assert_eq!([words[0], words[2], words[4], words[6]], ["--eye", "--look-at", "--up", "--fov"]);
-        let args = CameraArgs {
-            eye: parse_vector(words[1]).ok(),
-            look_at: parse_vector(words[3]).ok(),
-            up: parse_vector(words[5]).ok(),
-            fov: parse_fov(words[7]).ok(),
-            camera: None,
-        };
-        let again = args.flagged(args.eye.unwrap(), &bounds).unwrap();
-        assert_eq!(again.eye, camera.eye);
-        assert!((again.fov_y - camera.fov_y).abs() < 1e-12);
-        let turned = [again.frame.x_axis - camera.frame.x_axis, again.frame.z_axis - camera.frame.z_axis];
-        assert!(turned.iter().all(|d| d.length() < 1e-8), "{turned:?}");
-    }
-
-    #[test]
-    fn cameras_that_cannot_be_are_bad_usage() {
-        let bounds = DAabb { min: DVec3::ZERO, max: DVec3::ONE };
-        let at_target = CameraArgs { eye: Some(DVec3::ONE), look_at: Some(DVec3::ONE), ..CameraArgs::default() };
-        let upright = CameraArgs { eye: Some(DVec3::Y), look_at: Some(DVec3::ZERO), ..CameraArgs::default() };
-        for (args, word) in [(at_target, "one point"), (upright, "--up 0,1,0")] {
-            let error = args.flagged(args.eye.unwrap(), &bounds).unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().contains(word), "{error}");
-        }
-        let front = Camera { name: "front".to_owned(), ..Camera::framing(&bounds, 1.0) };
-        let scene = Scene { cameras: vec![front], ..Scene::default() };
-        let args = CameraArgs { camera: Some("back".to_owned()), ..CameraArgs::default() };
-        let error = args.choose(&scene, 1.0).unwrap_err();
-        assert!(error.exit_code() == 2 && error.to_string().contains("\"front\""), "{error}");
     }
 }

@@ -1,13 +1,19 @@
 //! `twincast compare`: both engines on the rays of a picture and on difficult ones, every difference judged.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
+use super::accel::AccelArgs;
 use super::cache::CacheArgs;
-use super::common::{CameraArgs, SceneArgs, Size};
+use super::camera::CameraArgs;
+use super::common::{SceneArgs, Size};
 use super::engine::BackendArg;
-use crate::error::Result;
+use super::{interrupt, say, warn};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Scene};
 
 /// Compare native with Embree on every ray of a picture and on difficult rays
 ///
@@ -19,7 +25,9 @@ use crate::error::Result;
 Examples:
   twincast compare bunny.glb
   twincast compare scan.ply --up-axis z --size 1920x1080 --random 1000000 --json
-  twincast compare part.stl --diff difference.png")]
+  twincast compare part.stl --diff difference.png
+  twincast compare bunny.glb --accel kd-tree
+  twincast compare bunny.glb --all")]
 pub(super) struct CompareArgs {
     #[command(flatten)]
     scene: SceneArgs,
@@ -44,6 +52,18 @@ pub(super) struct CompareArgs {
     seed: u64,
 
     #[command(flatten)]
+    accel: AccelArgs,
+
+    /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
+    /// code 1 if any of this program's own differs on one
+    #[arg(long, conflicts_with_all = ["accel", "diff", "folder", "spp"])]
+    all: bool,
+
+    /// Most seconds that brute force takes with --all
+    #[arg(long, value_name = "SECONDS", default_value_t = 10, requires = "all")]
+    seconds: u64,
+
+    #[command(flatten)]
     cache: CacheArgs,
 
     /// Print the counts as one JSON document, and nothing else
@@ -55,7 +75,30 @@ pub(super) struct CompareArgs {
     diff: Option<PathBuf>,
 }
 
+impl CompareArgs {
+    /// The scene, and from where it is seen.
+    fn view(&self) -> Result<(Scene, Camera)> {
+        let (scene, warnings) = self.scene.load()?;
+        warn(&warnings);
+        interrupt::check()?;
+        let (camera, _) = self.camera.choose(&scene, f64::from(self.size.width) / f64::from(self.size.height))?;
+        Ok((scene, camera))
+    }
+
+    /// Says what came of it, as was asked for.
+    fn print(&self, report: &(impl Serialize + Display)) -> Result<()> {
+        if self.json {
+            let document = serde_json::to_string(report);
+            return say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?);
+        }
+        say(report.to_string().trim_end())
+    }
+}
+
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
+    if args.all {
+        return compare_all(args);
+    }
     BackendArg::Both.check_available()?;
     compare(args)
 }
@@ -67,31 +110,31 @@ fn compare(_: &CompareArgs) -> Result<()> {
 
 #[cfg(feature = "embree")]
 fn compare(args: &CompareArgs) -> Result<()> {
-    use super::{cache, interrupt, outputs, progress, say, warn};
-    use crate::error::Error;
+    use super::{cache, outputs, progress};
     use crate::image::Metadata;
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer, Settings};
+    use crate::trace::accel::{Accel, Built};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
     use crate::trace::{Tracer, World};
 
+    let (accel, options) = args.accel.choose(BackendArg::Both, None, &args.cache)?;
     let diff = args.diff.as_slice();
     outputs::check(diff, None, [&args.scene.scene])?;
     let cache = args.cache.open(BackendArg::Both)?;
     let cancel = interrupt::install()?;
-    let (scene, warnings) = args.scene.load()?;
-    warn(&warnings);
-    interrupt::check()?;
-
+    let (scene, camera) = args.view()?;
     let Size { width, height } = args.size;
-    let (camera, _) = args.camera.choose(&scene, f64::from(width) / f64::from(height))?;
     let world = World::new(&scene)?;
     let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
-    let (native, _) = cache::bvh(cache.as_ref(), &world, bvh::Options::default());
+    let native = match accel {
+        Accel::Bvh => Built::from(cache::bvh(cache.as_ref(), &world, bvh::Options::default()).0),
+        _ => accel.build(&world, &options),
+    };
     let embree = Embree::new(&world, &Options::default())?;
     let brute = (world.primitive_count() < BRUTE_LIMIT).then(|| Brute::new(&world));
     interrupt::check()?;
@@ -117,11 +160,38 @@ fn compare(args: &CompareArgs) -> Result<()> {
         outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default())?;
     }
     let report = &comparison.report;
-    if args.json {
-        let document = serde_json::to_string(report);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
-    } else {
-        say(report.to_string().trim_end())?;
-    }
+    args.print(report)?;
+    report.check()
+}
+
+/// Every accelerator against brute force.
+fn compare_all(args: &CompareArgs) -> Result<()> {
+    use super::progress;
+    use crate::lab::{Entrant, all};
+    use crate::render::{Control, Renderer, Settings};
+    use crate::trace::World;
+    use crate::trace::accel::Accel;
+
+    let options = args.accel.options.choose(&Accel::ALL)?;
+    let cancel = interrupt::install()?;
+    let (scene, camera) = args.view()?;
+    let Size { width, height } = args.size;
+    let world = World::new(&scene)?;
+    let settings = Settings { width, height, spp: 1, seed: args.seed, ..Settings::default() };
+    let renderer = Renderer::new(&scene, &world, camera, settings)?;
+    let bar = progress::bar(Entrant::all().len() as u64, "comparing", args.json);
+    let setup = all::Setup {
+        scene: &args.scene.scene.display().to_string(),
+        renderer: &renderer,
+        size: (width, height),
+        random: args.random,
+        seed: args.seed,
+        longest: std::time::Duration::from_secs(args.seconds),
+        options: &options,
+    };
+    let report = setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)) });
+    bar.finish_and_clear();
+    let report = report?;
+    args.print(&report)?;
     report.check()
 }

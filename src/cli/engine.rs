@@ -10,6 +10,7 @@ use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::render::{Control, Counted, Renderer};
+use crate::trace::accel::{Accel, Options as AccelOptions};
 use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
 use crate::trace::{Tracer, Width, World};
 
@@ -54,10 +55,12 @@ pub(super) struct Pass {
     pub(super) render_seconds: f64,
     /// Bytes the engine uses for the scene.
     pub(super) bytes: usize,
-    pub(super) camera_rays: u64,
+    pub(super) closest_rays: u64,
     pub(super) shadow_rays: u64,
     /// What became of the native tree's file.
     pub(super) cache: Option<CacheReport>,
+    /// What there is to say about how the engine was built.
+    pub(super) notes: Vec<String>,
 }
 
 /// What both engines were made to render.
@@ -69,6 +72,8 @@ pub(super) struct Job<'a> {
     pub(super) quiet: bool,
     /// How well the native tree is worth building.
     pub(super) build: Preset,
+    /// How the native engine searches the scene.
+    pub(super) accel: &'a (Accel, AccelOptions),
     /// Where native trees are kept.
     pub(super) cache: Option<&'a Cache>,
 }
@@ -86,7 +91,10 @@ impl Job<'_> {
     pub(super) fn run(&self, backend: BackendArg) -> Result<Outcome> {
         backend.check_available()?;
         match backend {
-            BackendArg::Native => Ok(Outcome { passes: vec![self.native()?.1], verdict: None }),
+            BackendArg::Native if self.accel.0 == Accel::Bvh => {
+                Ok(Outcome { passes: vec![self.native()?.1], verdict: None })
+            }
+            BackendArg::Native => Ok(Outcome { passes: vec![self.accelerated()?], verdict: None }),
             #[cfg(feature = "embree")]
             BackendArg::Embree => Ok(Outcome { passes: vec![self.embree()?.1], verdict: None }),
             #[cfg(feature = "embree")]
@@ -109,6 +117,15 @@ impl Job<'_> {
         };
         let (bvh, pass) = self.pass(&bar, build, |_| "native (BVH)".to_owned(), Bvh::bytes)?;
         Ok((bvh, Pass { cache: report, ..pass }))
+    }
+
+    /// By another accelerator than the native BVH.
+    fn accelerated(&self) -> Result<Pass> {
+        let (accel, options) = self.accel;
+        let bar = progress::spinner("building", self.quiet);
+        let build = || Ok(accel.build(self.world, options));
+        let (built, pass) = self.pass(&bar, build, |_| format!("native ({})", accel.name()), |built| built.bytes)?;
+        Ok(Pass { notes: built.notes, ..pass })
     }
 
     #[cfg(feature = "embree")]
@@ -162,10 +179,12 @@ impl Job<'_> {
         let render_seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
 
-        let (camera_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
+        let (closest_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
         let bytes = bytes(&tracer);
         let image = image?;
-        let pass = Pass { engine, image, build_seconds, render_seconds, bytes, camera_rays, shadow_rays, cache: None };
+        let (cache, notes) = (None, Vec::new());
+        let pass =
+            Pass { engine, image, build_seconds, render_seconds, bytes, closest_rays, shadow_rays, cache, notes };
         Ok((tracer, pass))
     }
 }

@@ -1,9 +1,9 @@
 //! What a picture's file says about its camera.
 
 use crate::image::Metadata;
-use crate::math::{DAffine3, DMat4};
+use crate::math::{DAffine3, DMat4, DVec2};
 use crate::render::Settings;
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection};
 
 /// Nearest distance of the depth range that `worldToScreen` maps to -1..1; the far end is infinite. Rays know neither.
 const NEAR: f64 = 0.01;
@@ -12,10 +12,16 @@ const NEAR: f64 = 0.01;
 pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Metadata {
     let aspect = f64::from(settings.width) / f64::from(settings.height);
     let world_to_camera = DMat4::from(DAffine3::from_mat3_translation(camera.frame, camera.eye).inverse());
-    let world_to_screen = projection(camera.fov_y, aspect) * world_to_camera;
+    let half = camera.projection.half_extent(aspect).unwrap_or(DVec2::ONE);
+    let to_screen = match camera.projection {
+        Projection::Perspective(_) => Some(perspective(half, camera.shift)),
+        Projection::Orthographic(_) => Some(orthographic(half, camera.shift)),
+        // No matrix does it.
+        Projection::Equirectangular => None,
+    };
     Metadata {
         world_to_camera: Some(world_to_camera.to_cols_array()),
-        world_to_screen: Some(world_to_screen.to_cols_array()),
+        world_to_screen: to_screen.map(|matrix| (matrix * world_to_camera).to_cols_array()),
         fovcot: Some(aspect),
         samples_per_pixel: Some(settings.spp),
         render_time_seconds: Some(seconds),
@@ -23,14 +29,24 @@ pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Me
     }
 }
 
-/// OpenGL's perspective with the far plane at infinity.
-fn projection(fov_y: f64, aspect: f64) -> DMat4 {
-    let f = 1.0 / libm::tan(fov_y / 2.0);
+/// OpenGL's perspective with the far plane at infinity, for a picture of the given half extent at distance 1, moved by
+/// `shift`.
+fn perspective(half: DVec2, shift: DVec2) -> DMat4 {
     DMat4::from_cols_array_2d(&[
-        [f / aspect, 0.0, 0.0, 0.0],
-        [0.0, f, 0.0, 0.0],
-        [0.0, 0.0, -1.0, -1.0],
+        [1.0 / half.x, 0.0, 0.0, 0.0],
+        [0.0, 1.0 / half.y, 0.0, 0.0],
+        [2.0 * shift.x, 2.0 * shift.y, -1.0, -1.0],
         [0.0, 0.0, -2.0 * NEAR, 0.0],
+    ])
+}
+
+/// OpenGL's parallel projection, with the depth range of the other one's near end.
+fn orthographic(half: DVec2, shift: DVec2) -> DMat4 {
+    DMat4::from_cols_array_2d(&[
+        [1.0 / half.x, 0.0, 0.0, 0.0],
+        [0.0, 1.0 / half.y, 0.0, 0.0],
+        [0.0, 0.0, -NEAR, 0.0],
+        [-2.0 * shift.x, -2.0 * shift.y, -1.0, 1.0],
     ])
 }
 
@@ -47,11 +63,17 @@ mod tests {
     fn the_screen_matrix_agrees_with_the_rays() {
         let settings = Settings { width: 40, height: 20, spp: 1, ..Settings::default() };
         let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 0.0), DVec3::Y, 0.7).unwrap();
-        let metadata = metadata(&camera, &settings, 0.0);
+        let camera = Camera { shift: DVec2::new(0.25, -0.125), ..camera };
+        agrees(&settings, camera.clone());
+        agrees(&settings, Camera { projection: Projection::Orthographic(3.0), ..camera });
+    }
+
+    fn agrees(settings: &Settings, camera: Camera) {
+        let metadata = metadata(&camera, settings, 0.0);
         let to_camera = DMat4::from_cols_array(&metadata.world_to_camera.unwrap());
         let to_screen = DMat4::from_cols_array(&metadata.world_to_screen.unwrap());
         let (scene, world) = (Scene::default(), World::default());
-        let renderer = Renderer::new(&scene, &world, camera, settings).unwrap();
+        let renderer = Renderer::new(&scene, &world, camera, settings.clone()).unwrap();
         for (x, y) in [(0, 0), (39, 3), (17, 19)] {
             let ray = renderer.camera_ray(x, y, 0);
             let point = ray.origin.as_dvec3() + ray.direction.as_dvec3() * 7.0;

@@ -3,21 +3,27 @@
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
+mod accel;
 mod bench;
 mod build;
 mod cache;
+mod camera;
 mod common;
 mod compare;
 mod completions;
 mod engine;
 mod info;
 mod interrupt;
+mod make;
 mod man;
 mod metadata;
 mod outputs;
+mod picture;
 mod progress;
 mod render;
 mod report;
+mod scaling;
+mod summary;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -39,9 +45,10 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
-    Compare(compare::CompareArgs),
+    Compare(Box<compare::CompareArgs>),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
+    Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -53,6 +60,7 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Bench(args) => bench::run(args),
             Self::Info(args) => info::run(args),
+            Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),
         }

@@ -10,8 +10,7 @@ pub(super) fn bar(count: u64, what: &str, quiet: bool) -> ProgressBar {
     show(Some(count), "{msg} [{bar:40}] {percent:>3} %, {elapsed} of {duration}", what, quiet)
 }
 
-/// The time that something takes whose end is not known, in the place of a bar: Embree's builds.
-#[cfg(feature = "embree")]
+/// The time that something takes whose end is not known, in the place of a bar: builds by Embree, and by accelerators that do not tell.
 pub(super) fn spinner(what: &str, quiet: bool) -> ProgressBar {
     show(None, "{msg} {spinner} {elapsed}", what, quiet)
 }

@@ -3,23 +3,28 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::accel::AccelArgs;
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
-use super::common::{CameraArgs, SceneArgs, Size, camera_flags, parse_vector};
+use super::camera::{CameraArgs, camera_flags};
+use super::common::{SceneArgs, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
-use super::report::{EngineStats, Rays, Stats, Summary, counted, grouped, peak_memory, size, time};
+use super::picture::PictureArgs;
+use super::report::{EngineStats, Stats, peak_memory};
+use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
+use crate::io;
 use crate::math::{DVec3, Vec3};
-use crate::plan::BuildChoice;
-use crate::render::{Renderer, Settings, TileOrder};
-use crate::scene::{Geometry, Light, Scene};
+use crate::render::Renderer;
+use crate::scene::{Geometry, Light, Request, Scene};
+use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
-use crate::trace::{Batch, Primitives, Width, World};
+use crate::trace::{Primitives, World};
 
 /// Render a scene
 #[derive(Debug, Args)]
@@ -29,26 +34,23 @@ Examples:
   twincast render scan.ply --up-axis z --unit mm --normals smooth -o scan.exr -o scan.png
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
   twincast render large.ply --cache ~/.cache/twincast -o large.png
+  twincast render bunny.glb --accel kd-tree -o bunny.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
 
-    /// Picture to write; the suffix decides the format (may be repeated)
-    #[arg(short, long, value_name = "FILE", required_unless_present = "print_camera")]
+    /// Picture to write; the suffix decides the format (may be repeated; default: what the scene names, in the current
+    /// folder)
+    #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
 
     /// Engine
     #[arg(long, value_enum, default_value_t)]
     backend: BackendArg,
 
-    /// Pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720")]
-    size: Size,
-
-    /// Samples a pixel; 1 is the pixel's centre
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    spp: u32,
+    #[command(flatten)]
+    picture: PictureArgs,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -66,31 +68,18 @@ pub(super) struct RenderArgs {
     #[arg(short, long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     threads: usize,
 
-    /// Chooses among equally good sample patterns
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-
     /// Write times, rays, rays a second and memory as JSON
     #[arg(long, value_name = "FILE.json", requires = "output")]
     stats: Option<PathBuf>,
 
-    /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
-    #[arg(long, value_name = "N")]
-    packet: Option<Packet>,
+    #[command(flatten)]
+    accel: AccelArgs,
 
     #[command(flatten)]
     build: BuildArgs,
 
     #[command(flatten)]
     cache: CacheArgs,
-
-    /// Order of the tiles; never changes a picture
-    #[arg(long, value_enum, default_value_t)]
-    tile_order: Order,
-
-    /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
-    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
-    background: Option<Vec3>,
 
     /// Light with hard shadows that comes from this direction, in place of the scene's lights
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
@@ -109,39 +98,21 @@ pub(super) struct RenderArgs {
     camera: CameraArgs,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Packet {
-    #[value(name = "1")]
-    One,
-    #[value(name = "4")]
-    Four,
-    #[value(name = "8")]
-    Eight,
-    #[value(name = "16")]
-    Sixteen,
-}
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Order {
-    /// Row by row from the top
-    Scanline,
-    /// Along a curve from neighbour to neighbour
-    #[default]
-    Hilbert,
-    /// From the middle outwards
-    Spiral,
-}
-
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
+    let accel = args.accel.choose(args.backend, Some(&args.build), &args.cache)?;
+    if args.backend == BackendArg::Both && accel.0 != Accel::Bvh {
+        let name = accel.0.name();
+        let problem = "renders by itself; twincast compare --accel holds it against Embree";
+        return Err(Error::Usage(format!("--accel {name} {problem}")));
+    }
     let cancel = interrupt::install()?;
-    outputs::check(
-        &args.output,
-        &args.stats,
-        [Some(&args.scene.scene), args.reference.as_ref()].into_iter().flatten(),
-    )?;
+    if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
+        return Err(no_picture());
+    }
+    outputs::check(&args.output, &args.stats, args.inputs())?;
     let cache = args.cache.open(args.backend)?;
-    let reference = args.reference.as_deref().map(|path| read_reference(path, args.size)).transpose()?;
+    let reference = args.reference.as_deref().map(image::read).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
@@ -155,25 +126,35 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
-        let aspect = f64::from(args.size.width) / f64::from(args.size.height);
+        let settings = args.picture.settings(&scene.request, args.backend.best_width());
+        let (width, height) = (settings.width, settings.height);
+        args.check_reference(reference.as_ref(), width, height)?;
+        let pictures = args.pictures(&scene.request)?;
+        let aspect = f64::from(width) / f64::from(height);
         let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
         if args.print_camera {
             say(camera_flags(&camera, &scene.bounds()))?;
-            if args.output.is_empty() {
+            if pictures.is_empty() {
                 return Ok(());
             }
         }
 
         let start = Instant::now();
         let world = World::new(&scene)?;
-        let settings = args.settings();
         let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
         let prepare_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let pixels = u64::from(width) * u64::from(height);
         let stored = stored_triangles(&world);
-        let build = args.build.choose(args.backend, stored, pixels * u64::from(args.spp), pixels, renderer.plan())?;
+        // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
+        let build = match accel.0 {
+            Accel::Bvh => {
+                let samples = pixels * u64::from(settings.spp);
+                args.build.choose(args.backend, stored, samples, pixels, renderer.plan())?
+            }
+            _ => None,
+        };
         let job = Job {
             world: &world,
             renderer: &renderer,
@@ -181,6 +162,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
+            accel: &accel,
             cache: cache.as_ref(),
         };
         let outcome = job.run(args.backend)?;
@@ -188,13 +170,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 
         let start = Instant::now();
         let metadata = metadata(&camera, &settings, picture.render_seconds);
-        outputs::write_pictures(&args.output, &picture.image, &metadata)?;
+        outputs::write_pictures(&pictures, &picture.image, &metadata)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
             triangles: placed_triangles(&scene),
-            size: [settings.width, settings.height],
+            size: [width, height],
             spp: settings.spp,
             threads: rayon::current_num_threads(),
             packet: settings.batch.width.rays(),
@@ -202,93 +184,60 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             prepare_seconds,
             write_seconds,
             peak_memory: peak_memory(),
-            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
+            engines: outcome
+                .passes
+                .iter()
+                .map(|pass| EngineStats::new(pass, stored, pixels * u64::from(settings.spp)))
+                .collect(),
         };
         if let Some(path) = &args.stats {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            say(args.summary(&scene, &renderer, &camera_source, build.as_ref(), &stats))?;
+            let mut summary = Rendered {
+                scene: &scene,
+                renderer: &renderer,
+                camera: &camera_source,
+                build: build.as_ref(),
+                stats: &stats,
+            }
+            .summary(args.verbose);
+            pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
+            say(summary)?;
         }
         args.judge(&outcome, reference.as_ref())
     })
 }
 
 impl RenderArgs {
-    fn settings(&self) -> Settings {
-        let width = match self.packet {
-            None => self.backend.best_width(),
-            Some(Packet::One) => Width::One,
-            Some(Packet::Four) => Width::Four,
-            Some(Packet::Eight) => Width::Eight,
-            Some(Packet::Sixteen) => Width::Sixteen,
-        };
-        Settings {
-            width: self.size.width,
-            height: self.size.height,
-            spp: self.spp,
-            seed: self.seed,
-            batch: Batch { width, coherent: true },
-            tile_order: match self.tile_order {
-                Order::Scanline => TileOrder::Scanline,
-                Order::Hilbert => TileOrder::Hilbert,
-                Order::Spiral => TileOrder::Spiral,
-            },
-            background: self.background,
+    /// The pictures to write: those of the flags, else the one that the scene names.
+    fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
+        if !self.output.is_empty() || self.print_camera {
+            return Ok(self.output.clone());
         }
+        // Of what a scene names the folder is left out: a scene must not choose whose files are replaced.
+        let named = request.output.as_ref().and_then(|name| Path::new(name).file_name());
+        let Some(picture) = named.map(PathBuf::from) else {
+            return Err(no_picture());
+        };
+        let pictures = vec![picture];
+        outputs::check(&pictures, &self.stats, self.inputs())?;
+        Ok(pictures)
     }
 
-    fn summary(
-        &self,
-        scene: &Scene,
-        renderer: &Renderer,
-        camera_source: &str,
-        build: Option<&BuildChoice>,
-        stats: &Stats,
-    ) -> Summary {
-        let mut summary = Summary::default();
-        let parts = [
-            counted(stats.triangles, "triangle", "triangles"),
-            counted(scene.materials.len() as u64, "material", "materials"),
-            counted(scene.lights.len() as u64, "light", "lights"),
-        ];
-        summary.line("scene", format_args!("{}: {}", stats.scene, parts.join(", ")));
-        if self.verbose {
-            summary.line("plan", renderer.plan());
-            if let Some(build) = build {
-                summary.line("build", format_args!("{}: {}", build.preset.name(), build.why));
-            }
+    /// The files it reads.
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        [Some(&self.scene.scene), self.reference.as_ref()].into_iter().flatten()
+    }
+
+    fn check_reference(&self, reference: Option<&Image>, width: u32, height: u32) -> Result<()> {
+        let (Some(picture), Some(path)) = (reference, &self.reference) else { return Ok(()) };
+        if (picture.width, picture.height) == (width, height) {
+            return Ok(());
         }
-        summary.line("camera", camera_source);
-        let [width, height] = stats.size;
-        let samples = counted(u64::from(stats.spp), "sample", "samples");
-        let threads = counted(stats.threads as u64, "thread", "threads");
-        summary.line("picture", format_args!("{width}x{height}, {samples} a pixel, {threads}"));
-        if self.verbose {
-            summary.line("load", format_args!("{}, prepare {}", time(stats.load_seconds), time(stats.prepare_seconds)));
-        }
-        for engine in &stats.engines {
-            let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
-            summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
-            if self.verbose {
-                if let Some(cache) = &engine.cache {
-                    summary.line("cache", cache);
-                }
-                let Rays { camera, shadow } = &engine.rays;
-                let speed = engine.rays_per_second / 1e6;
-                let (camera, shadow) = (grouped(*camera), grouped(*shadow));
-                summary.line("rays", format_args!("{camera} camera + {shadow} shadow, {speed:.2} million a second"));
-                let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
-                summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
-            }
-        }
-        if let (true, Some(peak)) = (self.verbose, stats.peak_memory) {
-            summary.line("peak", format_args!("{} of memory for everything", size(peak)));
-        }
-        for path in self.output.iter().chain(&self.stats) {
-            summary.line("wrote", path.display());
-        }
-        summary
+        let own = format_args!("{}x{}", picture.width, picture.height);
+        let message = format!("--reference {}: it is {own}, and the picture {width}x{height}", path.display());
+        Err(Error::Usage(message))
     }
 
     /// Says how the checks that were asked for went; an error where one did not hold.
@@ -312,13 +261,8 @@ impl RenderArgs {
     }
 }
 
-fn read_reference(path: &Path, size: Size) -> Result<Image> {
-    let picture = image::read(path)?;
-    if (picture.width, picture.height) == (size.width, size.height) {
-        return Ok(picture);
-    }
-    let (own, Size { width, height }) = (format_args!("{}x{}", picture.width, picture.height), size);
-    Err(Error::Usage(format!("--reference {}: it is {own} and --size is {width}x{height}", path.display())))
+fn no_picture() -> Error {
+    Error::Usage("no picture to write: name one with --output FILE; the scene names none".to_owned())
 }
 
 fn placed_triangles(scene: &Scene) -> u64 {
@@ -351,10 +295,4 @@ pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
 fn parse_direction(text: &str) -> std::result::Result<DVec3, String> {
     let direction = parse_vector(text)?.try_normalize();
     direction.ok_or_else(|| "expected a direction, which is not zero".to_owned())
-}
-
-fn parse_color(text: &str) -> std::result::Result<Vec3, String> {
-    let color = parse_vector(text)?.as_vec3();
-    let valid = color.is_finite() && color.cmpge(Vec3::ZERO).all();
-    valid.then_some(color).ok_or_else(|| "expected three numbers of at least 0".to_owned())
 }

@@ -39,28 +39,34 @@ pub(super) struct EngineStats {
     /// What became of the native tree's file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) cache: Option<CacheStats>,
+    /// What there is to say about how it was built.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) notes: Vec<String>,
 }
 
 /// Rays by kind.
 #[derive(Debug, Serialize)]
 pub(super) struct Rays {
     pub(super) camera: u64,
+    /// Mirrored and refracted.
+    pub(super) sent_on: u64,
     pub(super) shadow: u64,
 }
 
 impl EngineStats {
-    /// `stored` triangles were built.
-    pub(super) fn new(pass: &Pass, stored: u64) -> Self {
-        let rays = Rays { camera: pass.camera_rays, shadow: pass.shadow_rays };
+    /// `stored` triangles were built, and `camera` rays began at the camera.
+    pub(super) fn new(pass: &Pass, stored: u64, camera: u64) -> Self {
+        let rays = Rays { camera, sent_on: pass.closest_rays - camera, shadow: pass.shadow_rays };
         Self {
             backend: pass.engine.clone(),
             build_seconds: pass.build_seconds,
             render_seconds: pass.render_seconds,
-            rays_per_second: (rays.camera + rays.shadow) as f64 / pass.render_seconds.max(1e-9),
+            rays_per_second: (pass.closest_rays + pass.shadow_rays) as f64 / pass.render_seconds.max(1e-9),
             rays,
             bytes: pass.bytes,
             bytes_per_triangle: (stored > 0).then(|| pass.bytes as f64 / stored as f64),
             cache: pass.cache.as_ref().map(CacheStats::new),
+            notes: pass.notes.clone(),
         }
     }
 }

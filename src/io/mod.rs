@@ -7,24 +7,33 @@
 
 mod check;
 mod compact;
+mod course;
 mod gltf;
+mod nff;
 mod obj;
+mod parts;
 mod ply;
 mod polygon;
 mod records;
+mod save;
+mod statement;
 mod stl;
+mod suggest;
 mod text;
 mod texture;
+mod toml;
 mod weld;
 
 use std::path::Path;
 use std::sync::Arc;
 
+pub use self::save::{SAVE_SUFFIXES, save};
+
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Mesh, Scene};
+use crate::scene::{Attenuation, Geometry, Light, Mesh, Scene};
 
 /// How a file is understood.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,7 +47,7 @@ pub struct LoadOptions {
 }
 
 /// The axis that points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UpAxis {
     /// +y, as in glTF.
     #[default]
@@ -48,7 +57,7 @@ pub enum UpAxis {
 }
 
 /// The length unit of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Unit {
     /// 1 m.
     #[default]
@@ -62,7 +71,7 @@ pub enum Unit {
 }
 
 /// Where shading normals come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Normals {
     /// The file's; flat where it has none (and, in OBJ, smooth where it has smoothing groups).
     #[default]
@@ -77,7 +86,17 @@ pub enum Normals {
 type Placeless<T> = std::result::Result<T, String>;
 
 /// The suffixes that [`load`] knows.
-pub const SUFFIXES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+pub const SUFFIXES: [&str; 8] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test", "toml"];
+
+/// Whether a file of this name may say where its picture is to be written ([`Request::output`](crate::scene::Request)).
+pub(crate) fn may_name_a_picture(path: &Path) -> bool {
+    matches!(suffix(path).as_str(), "test" | "toml")
+}
+
+/// What decides the format, in lower case.
+fn suffix(path: &Path) -> String {
+    path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
 
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
@@ -100,7 +119,7 @@ pub fn load_watched(
     options: &LoadOptions,
     on_bytes: Option<&(dyn Fn(u64) + Sync)>,
 ) -> Result<(Scene, Vec<Warning>)> {
-    let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let suffix = suffix(path);
     // First, so that a directory, a missing or an empty file is called that, whatever its name.
     let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(on_bytes);
     if file.is_empty() {
@@ -109,9 +128,12 @@ pub fn load_watched(
     let mut warnings = Vec::new();
     let mut scene = match suffix.as_str() {
         "glb" | "gltf" => gltf::load(path, &file, &mut warnings)?,
+        "nff" => nff::load(path, &file, &mut warnings)?,
         "obj" => obj::load(path, &file, &mut warnings)?,
         "ply" => ply::load(path, &file, &mut warnings)?,
         "stl" => stl::load(path, &file, &mut warnings)?,
+        "test" => course::load(path, &file)?,
+        "toml" => toml::load(path, &file, &mut warnings)?,
         _ => {
             let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
             return Err(Error::input(path, "", message));
@@ -184,6 +206,15 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
         Geometry::Mesh(mesh) => Some(mesh),
         Geometry::Shapes { .. } => None,
     })
+}
+
+/// Of formats that describe all light: where a file has no lights there is darkness, a light of no colour. With none at
+/// all the renderer would add a headlight, which is for formats that know shapes alone.
+fn light_or_darkness(lights: &mut Vec<Light>) {
+    if lights.is_empty() {
+        let (position, color, attenuation) = (DVec3::ZERO, Vec3::ZERO, Attenuation::NONE);
+        lights.push(Light::Point { position, color, attenuation, range: f64::INFINITY, radius: 0.0 });
+    }
 }
 
 /// What the system says about a file, as a message.

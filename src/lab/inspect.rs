@@ -127,6 +127,7 @@ impl Inspection {
             Light::Directional { .. } => "directional",
             Light::Point { .. } => "point",
             Light::Spot { .. } => "spot",
+            Light::Area { .. } => "area",
         });
         Self {
             triangles: meshes.iter().map(|m| m.triangles).sum(),

@@ -3,12 +3,14 @@
 //! [`oracle`] answers exactly, slowly, and alone: it shares no code with any tracer. [`rounding`] says how far an
 //! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that differ on a
 //! ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be difficult.
-//! [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`mod@bench`] times the engines against
+//! [`all`] does so for every accelerator at once. [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`mod@bench`] times the engines against
 //! each other.
 
+pub mod all;
 pub mod bench;
 mod classify;
 pub mod compare;
+mod entrants;
 pub mod exact;
 pub(crate) mod exact_shapes;
 pub mod inspect;
@@ -20,5 +22,6 @@ pub mod rounding;
 
 pub use classify::{Answers, Class, classify_closest, classify_occluded, is_boundary, ulps};
 pub use compare::{Comparison, Report, Setup};
+pub use entrants::Entrant;
 pub use paired::{Asked, Difference, Paired, Tally};
 pub use pixels::{PixelReport, explain_pixels};

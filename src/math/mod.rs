@@ -7,7 +7,9 @@
 pub mod expansion;
 pub mod number;
 
-pub use glam::{Affine3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
+pub use glam::{
+    Affine3, BVec3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, UVec3, Vec2, Vec3, Vec4,
+};
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.
 pub const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;
@@ -29,6 +31,15 @@ pub const fn gamma(n: u32) -> f32 {
 pub const fn gamma64(n: u32) -> f64 {
     let nu = n as f64 * UNIT_ROUNDOFF_64;
     nu / (1.0 - nu)
+}
+
+/// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al. 2017, *Building an orthonormal
+/// basis, revisited*).
+pub fn tangents(n: DVec3) -> [DVec3; 2] {
+    let sign = 1f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
 /// Whether a vertex may take part in tracing: finite, and small enough not to overflow.

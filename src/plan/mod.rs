@@ -47,6 +47,8 @@ pub struct Plan {
     pub lighting: Lighting,
     /// Whether ambient light is added.
     pub ambient: bool,
+    /// How often rays may be mirrored or refracted; 0 where no material does either.
+    pub depth: u32,
     /// Linear RGB behind everything, which then is opaque; none leaves it transparent.
     pub background: Option<Vec3>,
     /// Primitives as placed.
@@ -56,8 +58,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for a scene. `background` stands in for the scene's own.
-    pub fn new(scene: &Scene, world: &World, background: Option<Vec3>) -> Self {
+    /// The plan for a scene. `background` stands in for the scene's own, `max_depth` limits how often rays are sent on.
+    pub fn new(scene: &Scene, world: &World, background: Option<Vec3>, max_depth: u32) -> Self {
         let geometries = placed_geometries(scene);
         let used: BTreeSet<u32> = geometries.iter().map(|g| g.material()).collect();
         let default = Material::default();
@@ -72,6 +74,8 @@ impl Plan {
             }
         };
         let lit = lighting != Lighting::None && lighting != Lighting::Lights(Vec::new());
+        let sends_on = |m: &&Material| m.reflection != Vec3::ZERO || m.transmission != Vec3::ZERO;
+        let depth = if materials.iter().any(sends_on) { max_depth } else { 0 };
         let ambient = scene.ambient != Vec3::ZERO && materials.iter().any(|m| m.ambient != Vec3::ZERO);
         let meshes = || {
             geometries.iter().filter_map(|g| match g {
@@ -80,17 +84,17 @@ impl Plan {
             })
         };
         let attributes = Attributes {
-            normals: lit && meshes().any(|m| !m.normals.is_empty()),
+            normals: (lit || depth > 0) && meshes().any(|m| !m.normals.is_empty()),
             uvs: (lit || ambient) && materials.iter().any(|m| m.diffuse_texture.is_some()),
             colors: (lit || ambient) && meshes().any(|m| !m.colors.is_empty()),
         };
-        let own_background = (scene.background != Vec3::ZERO).then_some(scene.background);
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
             lighting,
             ambient,
-            background: background.or(own_background),
+            depth,
+            background: background.or(scene.background),
             primitives: world.primitive_count(),
             materials: materials.len(),
         }
@@ -113,6 +117,7 @@ fn gives_light(light: &Light) -> bool {
         Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. } => {
             *color != Vec3::ZERO
         }
+        Light::Area { radiance, .. } => *radiance != Vec3::ZERO,
     }
 }
 
@@ -139,6 +144,9 @@ impl fmt::Display for Plan {
         for (_, name) in parts.iter().filter(|(on, _)| *on) {
             write!(f, ", {name}")?;
         }
+        if self.depth > 0 {
+            write!(f, ", mirrored and refracted rays to depth {}", self.depth)?;
+        }
         write!(f, ", {} {}", self.materials, if self.materials == 1 { "material" } else { "materials" })
     }
 }
@@ -159,7 +167,7 @@ mod tests {
     }
 
     fn plan(scene: &Scene) -> Plan {
-        Plan::new(scene, &World::new(scene).unwrap(), None)
+        Plan::new(scene, &World::new(scene).unwrap(), None, 5)
     }
 
     #[test]
@@ -181,6 +189,18 @@ mod tests {
         assert!(plan.shadows() && !plan.attributes.uvs, "the textured material is not used");
         scene.lights.pop();
         assert!(!self::plan(&scene).shadows());
+    }
+
+    #[test]
+    fn depth_is_for_mirrors_and_glass_that_are_there() {
+        let mut scene = scene();
+        scene.materials.push(Material { reflection: Vec3::ONE, ..Material::default() });
+        assert_eq!(plan(&scene).depth, 0, "nothing is made of the mirror");
+        let black = Material { diffuse: Vec3::ZERO, ..Material::default() };
+        scene.materials[0] = Material { transmission: Vec3::X, ..black };
+        let plan = plan(&scene);
+        assert_eq!((plan.depth, plan.lighting), (5, Lighting::None));
+        assert!(plan.attributes.normals, "they bend the ray");
     }
 
     #[test]

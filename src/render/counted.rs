@@ -18,7 +18,7 @@ impl<'a, T> Counted<'a, T> {
         Self { tracer, closest: AtomicU64::new(0), occluded: AtomicU64::new(0) }
     }
 
-    /// Rays whose nearest hit was asked for so far: camera rays.
+    /// Rays whose nearest hit was asked for so far: camera rays, mirrored and refracted ones.
     pub fn closest_rays(&self) -> u64 {
         self.closest.load(Ordering::Relaxed)
     }

@@ -6,6 +6,7 @@
 mod camera;
 mod counted;
 mod film;
+mod filter;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
@@ -14,19 +15,22 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
+pub use filter::Filter;
+pub use sampler::Sampling;
 pub use tiles::TileOrder;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{Vec3, Vec4};
+use crate::math::{DVec2, Vec3, Vec4};
 use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Material, Scene};
 use crate::shade::light::LightSource;
 use crate::trace::{Batch, Tracer, World};
-use camera::Pinhole;
+use camera::View;
 use film::Film;
-use sampler::Sampler;
+use filter::FilterSampler;
+use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
@@ -44,25 +48,37 @@ pub struct Settings {
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How samples become a pixel.
+    pub filter: Filter,
     /// How rays are bundled; never changes a native picture.
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
+    /// Shadow rays to each extended light where a ray hits.
+    pub light_samples: u32,
+    /// How often a ray may be mirrored or refracted; what it would see after that is black.
+    pub max_depth: u32,
 }
 
 impl Default for Settings {
-    /// 1280 x 720 pixels of 4 samples.
+    /// 1280 x 720 pixels of 4 samples, 5 mirrors deep.
     fn default() -> Self {
         Self {
             width: 1280,
             height: 720,
             spp: 4,
             seed: 0,
+            sampling: Sampling::default(),
+            filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
             background: None,
+            light_samples: 1,
+            max_depth: 5,
         }
     }
 }
@@ -82,8 +98,11 @@ pub struct Renderer<'a> {
     world: &'a World,
     settings: Settings,
     plan: Plan,
-    pinhole: Pinhole,
+    view: View,
     sampler: Sampler,
+    filter: FilterSampler,
+    /// Of all shadow rays of a pixel to a light.
+    light_sampler: Sampler,
     lights: Vec<LightSource>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
@@ -95,10 +114,10 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and an
-    /// angle of view outside (0, 180) degrees.
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and a
+    /// camera that cannot be.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
-        let Settings { width, height, spp, seed, .. } = settings;
+        let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         for side in [width, height] {
             if side == 0 || side > LARGEST_SIDE {
                 let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
@@ -108,16 +127,19 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
-        if !(camera.fov_y > 0.0 && camera.fov_y < std::f64::consts::PI) {
-            let degrees = camera.fov_y.to_degrees();
-            return Err(Error::Usage(format!("angle of view {degrees}: must be above 0 and below 180 degrees")));
+        let view = View::new(&camera, world.centre, width, height)?;
+        if settings.light_samples == 0 {
+            return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
         }
-        let plan = Plan::new(scene, world, settings.background);
+        let plan = Plan::new(scene, world, settings.background, settings.max_depth);
         let mut renderer = Self {
             scene,
             world,
-            pinhole: Pinhole::new(&camera, world.centre, width, height),
-            sampler: Sampler::new(spp, seed),
+            view,
+            sampler: Sampler::new(sampling, spp, seed),
+            light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
+            // A single sample is the pixel's middle, whatever the filter.
+            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
             lights: Vec::new(),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
@@ -194,8 +216,19 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and its weight.
+    #[inline]
+    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, f32) {
+        let (within, weight) = self.filter.place(self.sampler.film(pixel, sample));
+        (pixel.corner() + within, weight)
+    }
+
     /// The camera ray of one sample of a pixel.
     pub fn camera_ray(&self, x: u32, y: u32, sample: u32) -> Ray {
-        self.pinhole.ray(self.sampler.place(&self.sampler.pattern(x, y), sample))
+        self.ray(&self.sampler.pattern(x, y), sample)
+    }
+
+    fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
+        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS))
     }
 }

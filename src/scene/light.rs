@@ -1,4 +1,4 @@
-//! Light sources without extent.
+//! Light sources.
 
 use crate::math::{DAffine3, DVec3, Vec3};
 
@@ -46,6 +46,9 @@ pub enum Light {
         attenuation: Attenuation,
         /// Nothing farther than this is lit; infinite by default.
         range: f64,
+        /// Of the lamp around the point: shadow rays end at its surface, so that a ball may stand there and glow.
+        /// 0 for a bare point.
+        radius: f64,
     },
     /// From a point, into a cone.
     Spot {
@@ -64,6 +67,42 @@ pub enum Light {
         /// Half-angle from which there is none, radians; above `inner_angle`.
         outer_angle: f32,
     },
+    /// From a surface, each point of which shines alike to all sides it faces: shadows are soft. It cannot be seen itself;
+    /// a shape of a material with emission in its place can, and is not in its way.
+    Area {
+        /// Where.
+        shape: AreaShape,
+        /// Linear RGB that it would show if it were seen: what a white matte surface reflects that sees nothing else.
+        radiance: Vec3,
+    },
+}
+
+/// The surface of a light.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AreaShape {
+    /// A rectangle or any parallelogram; shines to the side of the edges' cross product.
+    Rectangle {
+        /// The middle.
+        centre: DVec3,
+        /// From the middle to the middles of two sides that meet.
+        half_edges: [DVec3; 2],
+    },
+    /// A disk; shines to the side of its normal.
+    Disk {
+        /// The middle.
+        centre: DVec3,
+        /// Unit vector.
+        normal: DVec3,
+        /// Above 0.
+        radius: f64,
+    },
+    /// A ball.
+    Sphere {
+        /// The middle.
+        centre: DVec3,
+        /// Above 0.
+        radius: f64,
+    },
 }
 
 impl Light {
@@ -75,8 +114,38 @@ impl Light {
         if let Self::Point { position, .. } | Self::Spot { position, .. } = self {
             *position = transform.transform_point3(*position);
         }
+        let scale = transform.matrix3.determinant().abs().cbrt();
         if let Self::Point { range, .. } | Self::Spot { range, .. } = self {
-            *range *= transform.matrix3.determinant().abs().cbrt();
+            *range *= scale;
+        }
+        match self {
+            Self::Point { radius, .. } => *radius *= scale,
+            Self::Area { shape, .. } => shape.transform(transform, scale),
+            Self::Directional { .. } | Self::Spot { .. } => {}
+        }
+    }
+}
+
+impl AreaShape {
+    /// Moves it; `scale` is how much longer lengths become on average.
+    fn transform(&mut self, transform: &DAffine3, scale: f64) {
+        match self {
+            Self::Rectangle { centre, half_edges } => {
+                *centre = transform.transform_point3(*centre);
+                *half_edges = half_edges.map(|edge| transform.transform_vector3(edge));
+                if transform.matrix3.determinant() < 0.0 {
+                    half_edges.swap(0, 1);
+                }
+            }
+            Self::Disk { centre, normal, radius } => {
+                *centre = transform.transform_point3(*centre);
+                *normal = transform.transform_vector3(*normal).normalize();
+                *radius *= scale;
+            }
+            Self::Sphere { centre, radius } => {
+                *centre = transform.transform_point3(*centre);
+                *radius *= scale;
+            }
         }
     }
 }

@@ -13,7 +13,7 @@ pub enum Specular {
     BlinnPhong,
 }
 
-/// A Phong material. Colours are linear RGB.
+/// A Phong material that may also be a mirror, or let light through (Whitted 1980). Colours are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, for messages; may be empty.
@@ -26,6 +26,12 @@ pub struct Material {
     pub specular: Vec3,
     /// Exponent of the highlight, at least 0.
     pub shininess: f32,
+    /// Share of what the mirrored ray sees; no ray is traced where it is zero.
+    pub reflection: Vec3,
+    /// Share of what the refracted ray sees; no ray is traced where it is zero.
+    pub transmission: Vec3,
+    /// Index of refraction of what is behind the surface, relative to what is in front of it; above 0.
+    pub ior: f32,
     /// Light the surface gives off by itself.
     pub emission: Vec3,
     /// Multiplies `diffuse` (and `ambient`); index into [`Scene::textures`](crate::Scene::textures).
@@ -43,6 +49,9 @@ impl Default for Material {
             diffuse: Vec3::splat(0.8),
             specular: Vec3::ZERO,
             shininess: 1.0,
+            reflection: Vec3::ZERO,
+            transmission: Vec3::ZERO,
+            ior: 1.5,
             emission: Vec3::ZERO,
             diffuse_texture: None,
             model: Specular::default(),

@@ -9,16 +9,20 @@ mod light;
 mod material;
 mod mesh;
 mod procedural;
+mod recipes;
+mod request;
 mod rocks;
 mod texture;
 
-pub use camera::Camera;
+pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use instance::{Group, Instance};
-pub use light::{Attenuation, Light};
+pub use light::{AreaShape, Attenuation, Light};
 pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};
+pub use recipes::{RECIPES, Recipe};
+pub use request::Request;
 pub use rocks::rocks;
 pub use texture::{Filter, Texture, Wrap};
 
@@ -44,8 +48,10 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Light that reaches every point from everywhere, linear RGB.
     pub ambient: Vec3,
-    /// What a ray that hits nothing sees, linear RGB.
-    pub background: Vec3,
+    /// What a ray that hits nothing sees, linear RGB; none where the picture is to be transparent.
+    pub background: Option<Vec3>,
+    /// What the file wants of a render.
+    pub request: Request,
 }
 
 /// Something rays can hit: triangles, or shapes of any other kind.

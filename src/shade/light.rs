@@ -4,7 +4,8 @@
 //! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
 
 use super::SurfacePoint;
-use crate::math::{DAffine3, DVec3, Vec3};
+use super::area::{self, short_of};
+use crate::math::{DAffine3, DVec2, DVec3, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Attenuation, Light};
 
@@ -23,6 +24,8 @@ pub struct Illumination {
     pub to_light: DVec3,
     /// Linear RGB that a white matte surface facing the light would reflect.
     pub color: Vec3,
+    /// Up to where the way must be free, world coordinates; none for all of it.
+    pub end: Option<DVec3>,
 }
 
 impl LightSource {
@@ -36,18 +39,33 @@ impl LightSource {
     /// A white light at the viewer's `eye` (world coordinates), the same at any distance. Its shadows lie where the
     /// viewer cannot see them, so that none are traced.
     pub fn headlight(eye: DVec3) -> Self {
-        let light =
-            Light::Point { position: eye, color: Vec3::ONE, attenuation: Attenuation::NONE, range: f64::INFINITY };
+        let (attenuation, range) = (Attenuation::NONE, f64::INFINITY);
+        let light = Light::Point { position: eye, color: Vec3::ONE, attenuation, range, radius: 0.0 };
         Self { light, casts_shadows: false }
     }
 
-    /// What arrives at `point` if nothing is in between; none where the light does not reach.
-    pub fn illuminate(&self, point: DVec3) -> Option<Illumination> {
+    /// Whether what arrives depends on which part of the light is asked.
+    pub const fn is_extended(&self) -> bool {
+        matches!(self.light, Light::Area { .. })
+    }
+
+    /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
+    /// asked that `even`, a point of the unit square, chooses.
+    pub fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
         match &self.light {
-            Light::Directional { direction, color } => Some(Illumination { to_light: -*direction, color: *color }),
-            Light::Point { position, color, attenuation, range } => {
-                from_point(point, *position, *color, attenuation, *range)
+            Light::Directional { direction, color } => {
+                Some(Illumination { to_light: -*direction, color: *color, end: None })
             }
+            Light::Point { position, color, attenuation, range, radius } => {
+                let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
+                if *radius > 0.0 {
+                    // Within the lamp nothing is in between.
+                    let way = ((*position - point).length() - radius).max(0.0);
+                    arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point));
+                }
+                Some(arriving)
+            }
+            Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, even),
             Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
                 let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
                 arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
@@ -56,11 +74,11 @@ impl LightSource {
         }
     }
 
-    /// The ray that must be free for the light to reach `surface`, which it does along `to_light`.
-    pub fn shadow_ray(&self, surface: &SurfacePoint, to_light: DVec3) -> Ray {
-        match &self.light {
-            Light::Directional { .. } => surface.spawn(to_light.as_vec3(), f32::INFINITY),
-            Light::Point { position, .. } | Light::Spot { position, .. } => surface.spawn_to(*position),
+    /// The ray that must be free for `arriving` to reach `surface`.
+    pub fn shadow_ray(surface: &SurfacePoint, arriving: &Illumination) -> Ray {
+        match arriving.end {
+            None => surface.spawn(arriving.to_light.as_vec3(), f32::INFINITY),
+            Some(end) => surface.spawn_to(end),
         }
     }
 }
@@ -76,8 +94,11 @@ fn from_point(
     let distance = offset.length();
     let color = color * (attenuation.factor(distance as f32) * window(distance, range));
     // At the light itself there is neither a direction nor, with 1 / d^2, a finite colour.
-    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO)
-        .then(|| Illumination { to_light: offset / distance, color })
+    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO).then(|| Illumination {
+        to_light: offset / distance,
+        color,
+        end: Some(position),
+    })
 }
 
 /// 1 near the light, 0 from `range` on.
@@ -112,7 +133,7 @@ mod tests {
 
     #[test]
     fn attenuates_by_the_polynomial() {
-        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap();
+        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap();
         // At distance 2: 1 / (1 + 0.5 * 2 + 0.25 * 4) = 1/3.
         assert!((arriving.color - Vec3::new(2.0, 4.0, 8.0) / 3.0).length() < 1e-6);
         assert_eq!(arriving.to_light, DVec3::Y);
@@ -120,10 +141,10 @@ mod tests {
 
     #[test]
     fn the_range_window_is_gltfs() {
-        let full = spot(f64::INFINITY).illuminate(DVec3::Y).unwrap().color;
-        let half = spot(4.0).illuminate(DVec3::Y).unwrap().color;
+        let full = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
+        let half = spot(4.0).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
         assert!((half - full * (1.0 - 0.5f32.powi(4))).length() < 1e-6);
-        assert_eq!(spot(2.0).illuminate(DVec3::Y), None);
+        assert_eq!(spot(2.0).illuminate(DVec3::Y, DVec2::ZERO), None);
     }
 
     #[test]
@@ -144,7 +165,8 @@ mod tests {
             color: Vec3::ONE,
             attenuation: Attenuation::INVERSE_SQUARE,
             range: 1.0,
+            radius: 0.0,
         };
-        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO), None);
+        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO, DVec2::ZERO), None);
     }
 }

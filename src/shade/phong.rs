@@ -92,7 +92,7 @@ mod tests {
 
     fn from(degrees: f64) -> Illumination {
         let to_light = DVec3::new(-degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
-        Illumination { to_light, color: Vec3::splat(2.0) }
+        Illumination { to_light, color: Vec3::splat(2.0), end: None }
     }
 
     /// Viewer and light 30 and 50 degrees from the normal, on opposite sides: the mirrored light is 20 degrees off the

@@ -5,7 +5,7 @@
 //! simpler way, `origin + t * direction` from the engine's t, would carry every engine's own rounding into the picture
 //! and put the point off the surface by an error that grows with the distance travelled.
 
-use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, gamma};
+use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, gamma, gamma64};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Mesh, Scene};
 use crate::shape::{Shape, ShapeHit};
@@ -206,13 +206,18 @@ fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> 
     };
     // A named shape that f64 says is missed is met where the ray comes closest to what the engine said.
     let root = select_root(shape, &local, t).unwrap_or(ShapeHit { t: f64::from(t), uv: Vec2::ZERO });
-    let on_shape = local.origin.as_dvec3() + local.direction.as_dvec3() * root.t;
+    let (from, along) = (local.origin.as_dvec3(), local.direction.as_dvec3() * root.t);
+    let on_shape = from + along;
     let position = to_world.transform_point3(on_shape);
     let normal = cofactor(&to_world.matrix3) * shape.normal(on_shape);
     let outwards = normal.try_normalize().unwrap_or_else(|| -direction.normalize());
     // None of a plane: the rounding of a point on it is that of its coordinates.
     let extent = to_world.matrix3 * shape.bounds().size().max(Vec3::ZERO).as_dvec3();
-    let error = f64::from(gamma(TEST_ROUNDINGS)) * extent.length() + rounding_error(position, outwards, placement);
+    // Not relative to where the point is, for it may be zero: what f64 rounds off on the way there.
+    let travelled = to_world.matrix3.abs() * (from.abs() + along.abs());
+    let error = f64::from(gamma(TEST_ROUNDINGS)) * extent.length()
+        + rounding_error(position, outwards, placement)
+        + gamma64(TEST_ROUNDINGS) * travelled.dot(outwards.abs());
     SurfacePoint {
         parameters: [f64::from(root.uv.x), f64::from(root.uv.y)],
         uv: root.uv,

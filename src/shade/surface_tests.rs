@@ -2,7 +2,9 @@ use super::*;
 use crate::math::Affine3;
 use crate::render::sampler::pcg4d;
 use crate::scene::{Group, Instance, Material};
-use crate::shape::Sphere;
+use crate::shape::{Plane, Sphere};
+use crate::trace::Tracer;
+use crate::trace::brute::Brute;
 
 /// A stream of numbers in [0, 1).
 struct Random(u32);
@@ -180,6 +182,24 @@ fn attributes_are_interpolated_and_can_be_switched_off() {
     assert_eq!((point.uv, point.color), (Vec2::new(0.25, 0.5), Vec4::new(0.25, 0.5, 0.0, 1.0)));
     let bare = SurfacePoint::new(&scene, &world, &ray, &hit(2.0), Attributes::default());
     assert_eq!((bare.uv, bare.color), (Vec2::ZERO, Vec4::ONE));
+}
+
+/// A plane has no extent, and zero no rounding of its own: the way there must be enough to leave it.
+#[test]
+fn rays_leave_a_plane_at_zero() {
+    let plane = Shape::Plane(Plane::new(Vec3::ZERO, Vec3::Y).unwrap());
+    let geometry = Geometry::Shapes { shapes: vec![plane], material: 0 };
+    let scene = Scene::from_geometries(vec![geometry], vec![Material::default()]);
+    let world = World::new(&scene).unwrap();
+    let brute = Brute::new(&world);
+    for direction in [Vec3::NEG_Y, Vec3::new(0.3, -1.0, 0.7)] {
+        let ray = Ray::new(direction * -7.0, direction);
+        let hit = brute.closest(&ray).unwrap();
+        let point = SurfacePoint::new(&scene, &world, &ray, &hit, Attributes::ALL);
+        for away in [Vec3::Y, Vec3::NEG_Y, Vec3::new(1.0, 1e-3, 0.0)] {
+            assert!(!brute.occluded(&point.spawn(away, f32::INFINITY)), "{point:?}");
+        }
+    }
 }
 
 /// A sphere placed twice is traced as an object, under a transform that makes it an ellipsoid.

@@ -5,12 +5,12 @@
 //! through the rim between them; testing the side and two disks by themselves, the simpler way, loses rays there. Open,
 //! they are hit at the lateral surface's roots, where those are between the end planes.
 
-use super::InvalidShape;
 use super::line::{Interval, Line, NO_ROOTS, PRECISION, Roots};
 use super::quadric::Inside;
-use super::round::{disk_reach, outwards, tangents, turn};
+use super::round::{disk_reach, outwards, turn};
+use super::{InvalidShape, in_f32};
 use crate::math::number::{Bounded, Formula, Number, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable, tangents};
 
 /// A surface of revolution with a straight side.
 pub(super) struct Frustum {
@@ -40,6 +40,11 @@ impl Frustum {
             outwards(centre, disk_reach(self.axis(), self.radii[k].into()))
         };
         disk(0).union(disk(1))
+    }
+
+    /// The ends, moved.
+    pub fn moved_ends(&self, offset: DVec3) -> [Vec3; 2] {
+        self.ends.map(|end| in_f32(end.as_dvec3() + offset))
     }
 
     fn axis(&self) -> DVec3 {

@@ -5,12 +5,12 @@
 //! w = d x (r0 a + k f), which follows from Lagrange's identity. It cancels only where the line touches the cone, and
 //! no point is squared that lies farther away than it must.
 
+use super::InvalidShape;
 use super::axis::Frustum;
 use super::line::{Line, Roots};
 use super::quadric::Quadric;
-use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, plus, times, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 
 /// A cone, or a part of one.
@@ -45,18 +45,15 @@ impl Cone {
         InvalidShape::unless_radius(larger)
     }
 
-    fn frustum(&self) -> Frustum {
+    /// What it has in common with other surfaces around an axis.
+    pub(super) fn frustum(&self) -> Frustum {
         let radii = [self.base_radius, self.apex_radius];
         Frustum { ends: [self.base, self.apex], radii, capped: self.capped }
     }
 
-    pub(super) fn bounds(&self) -> Aabb {
-        self.frustum().bounds()
-    }
-
     pub(super) fn translated(&self, offset: DVec3) -> Self {
-        let moved = |p: Vec3| in_f32(p.as_dvec3() + offset);
-        Self { base: moved(self.base), apex: moved(self.apex), ..*self }
+        let [base, apex] = self.frustum().moved_ends(offset);
+        Self { base, apex, ..*self }
     }
 
     #[inline]
@@ -70,11 +67,6 @@ impl Cone {
             line,
         };
         frustum.roots(&line, seen.solve(), Widening(&seen).signs()[0] > 0)
-    }
-
-    /// The unit normal and the parameters.
-    pub(super) fn at(&self, point: DVec3) -> (DVec3, Vec2) {
-        self.frustum().at(point)
     }
 }
 
@@ -121,17 +113,14 @@ impl Formula<1> for Widening<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quadric::tests::assert_discriminant;
+    use super::super::quadric::tests::assert_discriminants;
     use super::*;
 
     #[test]
     fn the_short_discriminant_is_the_discriminant() {
-        for i in 0..50 {
-            let x = i as f32;
-            let v = |k: f32| Vec3::new((x * k).sin(), x + k, (x + k * k).cos());
-            let line = Line::new(&Ray::new(v(1.0), v(2.1)), 8.0);
-            let radii = [0.3, f64::from((x * 0.1).sin().abs())];
-            assert_discriminant(&Seen { base: line.place(v(0.3)), apex: line.place(v(0.7)), radii, line });
+        for apex_radius in [0.0, 0.2, 0.3, 1.7] {
+            let radii = [0.3, apex_radius];
+            assert_discriminants(|line, v| Seen { base: v(0.3), apex: v(0.7), radii, line });
         }
     }
 }

@@ -4,12 +4,12 @@
 //! |(x - p) x a|^2 = r^2 a^2. The discriminant is a^2 (r^2 |d x a|^2 - (a . m)^2): whether the line passes the axis at a
 //! distance below r.
 
+use super::InvalidShape;
 use super::axis::Frustum;
 use super::line::{Line, Roots};
 use super::quadric::Quadric;
-use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 
 /// A cylinder.
@@ -40,17 +40,14 @@ impl Cylinder {
         InvalidShape::unless_radius(self.radius)
     }
 
-    fn frustum(&self) -> Frustum {
+    /// What it has in common with other surfaces around an axis.
+    pub(super) fn frustum(&self) -> Frustum {
         Frustum { ends: [self.base, self.apex], radii: [self.radius; 2], capped: self.capped }
     }
 
-    pub(super) fn bounds(&self) -> Aabb {
-        self.frustum().bounds()
-    }
-
     pub(super) fn translated(&self, offset: DVec3) -> Self {
-        let moved = |p: Vec3| in_f32(p.as_dvec3() + offset);
-        Self { base: moved(self.base), apex: moved(self.apex), ..*self }
+        let [base, apex] = self.frustum().moved_ends(offset);
+        Self { base, apex, ..*self }
     }
 
     #[inline]
@@ -60,11 +57,6 @@ impl Cylinder {
         let seen =
             Seen { base: line.place(self.base), apex: line.place(self.apex), radius: line.length(self.radius), line };
         frustum.roots(&line, seen.solve(), false)
-    }
-
-    /// The unit normal and the parameters.
-    pub(super) fn at(&self, point: DVec3) -> (DVec3, Vec2) {
-        self.frustum().at(point)
     }
 }
 
@@ -93,16 +85,11 @@ impl Formula<5> for Seen {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quadric::tests::assert_discriminant;
+    use super::super::quadric::tests::assert_discriminants;
     use super::*;
 
     #[test]
     fn the_short_discriminant_is_the_discriminant() {
-        for i in 0..50 {
-            let x = i as f32;
-            let v = |k: f32| Vec3::new((x * k).sin(), x + k, (x + k * k).cos());
-            let line = Line::new(&Ray::new(v(1.0), v(2.1)), 8.0);
-            assert_discriminant(&Seen { base: line.place(v(0.3)), apex: line.place(v(0.7)), radius: 0.3, line });
-        }
+        assert_discriminants(|line, v| Seen { base: v(0.3), apex: v(0.7), radius: 0.3, line });
     }
 }

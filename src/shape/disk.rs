@@ -6,10 +6,10 @@
 
 use super::flat::Flat;
 use super::line::{Line, NO_ROOTS, Roots};
-use super::round::{disk_reach, outwards, tangents, turn};
+use super::round::{disk_reach, outwards, turn};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable, tangents};
 use crate::ray::Ray;
 
 /// A disk.

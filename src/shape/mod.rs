@@ -76,6 +76,18 @@ pub struct ShapeHit {
     pub uv: Vec2,
 }
 
+impl ShapeHit {
+    /// Whether it lies within the ray's range.
+    pub(crate) fn is_within(&self, ray: &Ray) -> bool {
+        is_within(self.t, ray)
+    }
+}
+
+fn is_within(t: f64, ray: &Ray) -> bool {
+    let t = t as f32;
+    ray.tmin <= t && t <= ray.tmax && t.is_finite()
+}
+
 /// Why numbers make no shape, and what would.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -170,8 +182,8 @@ impl Shape {
             Self::Plane(_) => Aabb::EMPTY,
             Self::Disk(disk) => disk.bounds(),
             Self::Cuboid(cuboid) => cuboid.bounds(),
-            Self::Cylinder(cylinder) => cylinder.bounds(),
-            Self::Cone(cone) => cone.bounds(),
+            Self::Cylinder(cylinder) => cylinder.frustum().bounds(),
+            Self::Cone(cone) => cone.frustum().bounds(),
             Self::Ellipsoid(ellipsoid) => ellipsoid.bounds(),
             Self::Polygon(polygon) => polygon.bounds(),
         }
@@ -185,14 +197,13 @@ impl Shape {
     /// Every intersection with `tmin <= t <= tmax`, the nearest first; an even number over the whole line for closed
     /// shapes, of which a line that touches crosses twice in one place.
     pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
-        let (tmin, tmax) = (ray.tmin, ray.tmax);
-        let in_range = move |&t: &f64| {
-            let t = t as f32;
-            tmin <= t && t <= tmax && t.is_finite()
-        };
-        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let hit = move |t: f64| ShapeHit { t, uv: self.uv(origin + direction * t) };
-        self.roots(ray).into_iter().flatten().filter(in_range).map(hit)
+        let ray = *ray;
+        self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray)).map(move |t| self.hit_at(&ray, t))
+    }
+
+    /// The hit at a known `t`.
+    pub(crate) fn hit_at(&self, ray: &Ray, t: f64) -> ShapeHit {
+        ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) }
     }
 
     /// Where the line crosses it.
@@ -219,8 +230,8 @@ impl Shape {
             Self::Plane(plane) => plane.normal(),
             Self::Disk(disk) => disk.normal(),
             Self::Cuboid(cuboid) => cuboid.normal(point),
-            Self::Cylinder(cylinder) => cylinder.at(point).0,
-            Self::Cone(cone) => cone.at(point).0,
+            Self::Cylinder(cylinder) => cylinder.frustum().at(point).0,
+            Self::Cone(cone) => cone.frustum().at(point).0,
             Self::Ellipsoid(ellipsoid) => ellipsoid.normal(point),
             Self::Polygon(polygon) => polygon.normal(),
         }
@@ -233,8 +244,8 @@ impl Shape {
             Self::Plane(plane) => plane.uv(point),
             Self::Disk(disk) => disk.uv(point),
             Self::Cuboid(cuboid) => cuboid.uv(point),
-            Self::Cylinder(cylinder) => cylinder.at(point).1,
-            Self::Cone(cone) => cone.at(point).1,
+            Self::Cylinder(cylinder) => cylinder.frustum().at(point).1,
+            Self::Cone(cone) => cone.frustum().at(point).1,
             Self::Ellipsoid(ellipsoid) => ellipsoid.uv(point),
             Self::Polygon(polygon) => polygon.uv(point),
         }

@@ -2,9 +2,8 @@
 
 use super::flat::Flat;
 use super::line::{Line, Roots};
-use super::round::tangents;
 use super::{InvalidShape, in_f32};
-use crate::math::{DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{DVec3, Vec2, Vec3, is_traceable, tangents};
 use crate::ray::Ray;
 
 /// An unbounded plane.

@@ -71,12 +71,21 @@ pub(super) mod tests {
     use super::*;
     use crate::math::expansion::Expansion;
     use crate::math::number::Number;
+    use crate::math::{DVec3, Vec3};
+    use crate::ray::Ray;
+    use crate::shape::line::Line;
 
-    /// Holds the short form of the discriminant against its definition, in exact arithmetic.
+    /// Holds the short form of the discriminant against its definition, in exact arithmetic. `quadric` makes one that is
+    /// seen from a line, of points that it may ask for by number.
     #[track_caller]
-    pub fn assert_discriminant(quadric: &impl Formula<5>) {
-        let [a, b, c, e, s] = quadric.evaluate::<Expansion>();
-        let difference = b.mul(&b).sub(&a.mul(&c)).sub(&s.mul(&s).mul(&e));
-        assert_eq!(difference.signum(), 0, "{} {}", b.estimate(), e.estimate());
+    pub fn assert_discriminants<Q: Formula<5>>(quadric: impl Fn(Line, &dyn Fn(f32) -> DVec3) -> Q) {
+        for i in 0..50 {
+            let x = i as f32;
+            let v = |k: f32| Vec3::new((x * k).sin(), x + k, (x + k * k).cos());
+            let line = Line::new(&Ray::new(v(1.0), v(2.1)), 8.0);
+            let [a, b, c, e, s] = quadric(line, &|k| line.place(v(k))).evaluate::<Expansion>();
+            let difference = b.mul(&b).sub(&a.mul(&c)).sub(&s.mul(&s).mul(&e));
+            assert_eq!(difference.signum(), 0, "{} {}", b.estimate(), e.estimate());
+        }
     }
 }

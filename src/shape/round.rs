@@ -28,12 +28,3 @@ pub(super) fn turn(y: f64, x: f64) -> f32 {
     let turn = libm::atan2(y, x) / std::f64::consts::TAU;
     (turn + if turn < 0.0 { 1.0 } else { 0.0 }) as f32
 }
-
-/// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al. 2017, *Building an orthonormal
-/// basis, revisited*).
-pub(super) fn tangents(n: DVec3) -> [DVec3; 2] {
-    let sign = 1f64.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
-}

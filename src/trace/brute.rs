@@ -5,12 +5,13 @@
 
 use std::sync::Arc;
 
+use super::leaf::{offer_shape, offer_triangle};
 use super::nearest::Nearest;
 use super::{Part, Primitives, Tracer, World};
 use crate::math::{Affine3, DVec3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
-use crate::shape::triangle::{self, Placed};
+use crate::shape::triangle::Placed;
 
 /// A tracer without an accelerator.
 pub struct Brute {
@@ -68,8 +69,7 @@ impl Brute {
             match &self.parts[i] {
                 Prepared::Triangles { corners, lanes, primitives } => {
                     each_candidate(lanes, corners.len(), ray, |k| {
-                        let Some(hit) = triangle::intersect(ray, &corners[k]) else { return };
-                        nearest.offer(hit.t, triangle_hit(&hit, part, part.instance, primitives[k]));
+                        offer_triangle(&mut nearest, ray, &corners[k], part.id(part.instance, primitives[k]));
                     });
                 }
                 Prepared::Shapes(shapes) => offer_shapes(&mut nearest, ray, shapes, part, part.instance),
@@ -86,8 +86,7 @@ impl Brute {
                     Prepared::Triangles { corners, primitives, .. } => {
                         each_candidate(lanes, corners.len(), ray, |k| {
                             let placed = Placed { corners: corners[k], to_world: &placement.to_world };
-                            let Some(hit) = triangle::intersect(ray, &placed) else { return };
-                            nearest.offer(hit.t, triangle_hit(&hit, part, placement.instance, primitives[k]));
+                            offer_triangle(&mut nearest, ray, &placed, part.id(placement.instance, primitives[k]));
                         });
                     }
                     Prepared::Shapes(shapes) => {
@@ -110,16 +109,9 @@ impl Tracer for Brute {
     }
 }
 
-fn triangle_hit(hit: &triangle::TriangleHit, part: &Part, instance: u32, primitive: u32) -> Hit {
-    Hit { t: hit.t as f32, u: hit.u as f32, v: hit.v as f32, primitive, geometry: part.geometry, instance }
-}
-
 fn offer_shapes(nearest: &mut Nearest, ray: &Ray, shapes: &[Shape], part: &Part, instance: u32) {
     for (primitive, shape) in shapes.iter().enumerate() {
-        if let Some(hit) = shape.intersect(ray) {
-            let (primitive, geometry) = (primitive as u32, part.geometry);
-            nearest.offer(hit.t, Hit { t: hit.t as f32, u: hit.uv.x, v: hit.uv.y, primitive, geometry, instance });
-        }
+        offer_shape(nearest, ray, shape, part.id(instance, primitive as u32));
     }
 }
 

@@ -4,10 +4,12 @@
 //! `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive) wins; a ray that
 //! [is not valid](Ray::is_valid) misses.
 
+pub mod accel;
 pub mod brute;
 pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
+mod leaf;
 mod limits;
 mod nearest;
 mod unbounded;

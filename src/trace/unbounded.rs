@@ -5,10 +5,11 @@
 //! coordinate), so that a ray would meet every leaf; placed by a transform it would overflow. Bounds of scenes leave
 //! planes out, so that one plane does not move the centre or the camera.
 
+use super::leaf::{Id, offer_shape};
 use super::nearest::Nearest;
 use super::{Placement, Primitives, World};
 use crate::ray::{Hit, Ray};
-use crate::shape::{Shape, ShapeHit};
+use crate::shape::Shape;
 
 /// All of them in a world.
 pub(super) struct Unbounded(Vec<Entry>);
@@ -17,8 +18,7 @@ struct Entry {
     shape: Shape,
     /// None where the shape stands in world coordinates.
     placement: Option<Placement>,
-    /// Instance, geometry and primitive.
-    id: (u32, u32, u32),
+    id: Id,
 }
 
 impl Unbounded {
@@ -34,7 +34,7 @@ impl Unbounded {
             let Primitives::Shapes(shapes) = &part.primitives else { continue };
             let instance = placement.map_or(part.instance, |placement| placement.instance);
             for (shape, primitive) in shapes.iter().zip(0..).filter(|(shape, _)| shape.is_unbounded()) {
-                let id = (instance, part.geometry, primitive);
+                let id = Id { instance, geometry: part.geometry, primitive };
                 entries.push(Entry { shape: shape.clone(), placement: placement.cloned(), id });
             }
         }
@@ -50,9 +50,7 @@ impl Unbounded {
     pub fn offer(&self, ray: &Ray, nearest: &mut Nearest) {
         for entry in &self.0 {
             let local = entry.placement.as_ref().map_or(*ray, |placement| placement.object_ray(ray));
-            if let Some(hit) = entry.shape.intersect(&local) {
-                nearest.offer(hit.t, entry.hit(&hit));
-            }
+            offer_shape(nearest, &local, &entry.shape, entry.id);
         }
     }
 
@@ -60,14 +58,7 @@ impl Unbounded {
     pub fn gather(&self, ray: &Ray, hits: &mut Vec<(f64, Hit)>) {
         for entry in &self.0 {
             let local = entry.placement.as_ref().map_or(*ray, |placement| placement.object_ray(ray));
-            hits.extend(entry.shape.intersect_all(&local).map(|hit| (hit.t, entry.hit(&hit))));
+            hits.extend(entry.shape.intersect_all(&local).map(|hit| (hit.t, entry.id.of_shape(&hit))));
         }
-    }
-}
-
-impl Entry {
-    fn hit(&self, hit: &ShapeHit) -> Hit {
-        let (instance, geometry, primitive) = self.id;
-        Hit { t: hit.t as f32, u: hit.uv.x, v: hit.uv.y, primitive, geometry, instance }
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Attenuation, Filter, Light, Wrap};
+use twincast::scene::{Attenuation, Filter, Fov, Light, Projection, Wrap};
 
 use super::{Files, corners, meshes, obj, refused};
 
@@ -148,7 +148,10 @@ fn everything_is_where_it_belongs() {
         assert_eq!((texture.name.as_str(), &texture.pixels[..]), ("two", &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
 
         let eye = &scene.cameras[0];
-        assert_eq!((eye.name.as_str(), eye.eye, eye.fov_y), ("eye", DVec3::new(0.0, 0.0, 4.0), 0.5));
+        assert_eq!(
+            (eye.name.as_str(), eye.eye, eye.projection),
+            ("eye", DVec3::new(0.0, 0.0, 4.0), Projection::Perspective(Fov::Vertical(0.5)))
+        );
         assert_eq!(eye.frame, twincast::math::DMat3::IDENTITY);
         let pi = std::f32::consts::PI;
         let [Light::Spot { position, direction, color, inner_angle, outer_angle, .. }, sun, bulb] = &scene.lights[..]
@@ -159,7 +162,7 @@ fn everything_is_where_it_belongs() {
         assert!((color.x - 1.0 / pi).abs() < 1e-7 && (*inner_angle, *outer_angle) == (0.25, 0.5));
         let Light::Directional { direction, color } = sun else { panic!("{sun:?}") };
         assert!(*direction == DVec3::NEG_Z && color.abs_diff_eq(Vec3::splat(3.0 / pi), 1e-6));
-        let Light::Point { position, color, attenuation, range } = bulb else { panic!("{bulb:?}") };
+        let Light::Point { position, color, attenuation, range, radius: 0.0 } = bulb else { panic!("{bulb:?}") };
         assert!(color.abs_diff_eq(Vec3::new(2.0, 1.0, 0.0) / pi, 1e-6));
         let expected = (DVec3::new(0.0, 0.0, 4.0), Attenuation::INVERSE_SQUARE, 7.0);
         assert_eq!((*position, *attenuation, *range), expected);
@@ -224,6 +227,17 @@ fn deep_hierarchies() {
 }
 
 #[test]
+fn orthographic_cameras() {
+    let camera = json!({"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 1.5, "zfar": 9, "znear": 1}});
+    let (scene, warnings) = changed(&[("/cameras/0", camera)]).load("a.gltf");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(scene.cameras[0].projection, Projection::Orthographic(3.0));
+    refused(&changed(&[("/cameras/0", json!({"type": "orthographic"}))]), "a.gltf", "/cameras/0", "neither");
+    let flat = json!({"type": "orthographic", "orthographic": {"ymag": 0}});
+    refused(&changed(&[("/cameras/0", flat)]), "a.gltf", "/cameras/0/orthographic/ymag", "height of 0");
+}
+
+#[test]
 fn what_is_not_rendered_is_a_warning() {
     let say = |changes: &[(&str, Value)], place: &str, words: &str| {
         let (_, warnings) = changed(changes).load("a.gltf");
@@ -235,7 +249,6 @@ fn what_is_not_rendered_is_a_warning() {
     say(&[("/meshes/0/primitives/1/targets", json!([{}]))], "/meshes", "morph");
     say(&[("/nodes/1/skin", json!(0))], "/skins", "skins");
     say(&[("/extensionsUsed", json!(["EXT_new", "KHR_lights_punctual"]))], "/extensionsUsed", "EXT_new");
-    say(&[("/cameras/0", json!({"type": "orthographic"}))], "/cameras/0", "orthographic");
     let two = json!([{"attributes": {"POSITION": 0}}]);
     let nodes = json!([{"mesh": 0}, {"mesh": 0, "scale": [1, 0, 1], "name": "flat"}, {}, {}]);
     say(

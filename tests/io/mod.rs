@@ -1,10 +1,14 @@
 //! Scene files: what is in the scene, and what is said about files that are wrong.
 
+pub mod course;
 pub mod gltf;
 mod models;
+pub mod nff;
 pub mod obj;
 pub mod ply;
+mod save;
 pub mod stl;
+pub mod toml;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -89,12 +93,12 @@ fn files_that_are_no_scenes() {
     refused(&files, "folder.obj", "", "directory");
     refused(&files, "empty.obj", "", "empty");
     refused(&files, "absent.obj", "", "No such file");
-    refused(&files, "scene.xyz", "", "glb, gltf, obj, ply, stl");
-    refused(&files, "none", "", "glb, gltf, obj, ply, stl");
-    for name in ["empty.ply", "empty.stl", "empty.gltf", "empty.glb"] {
+    refused(&files, "scene.xyz", "", "glb, gltf, nff, obj, ply, stl, test, toml");
+    refused(&files, "none", "", "glb, gltf, nff, obj, ply, stl, test, toml");
+    for name in ["empty.ply", "empty.stl", "empty.gltf", "empty.glb", "empty.nff", "empty.test", "empty.toml"] {
         refused_bytes(name, "", "", "empty");
     }
-    for suffix in ["obj", "ply", "stl", "glb", "gltf"] {
+    for suffix in ["obj", "ply", "stl", "glb", "gltf", "nff", "test", "toml"] {
         let files = Files::one(&format!("noise.{suffix}"), [0x9e, 0, 0xff, b'\n', 7, 0x80, 0]);
         assert!(load(&files.path(&format!("noise.{suffix}")), &LoadOptions::default()).is_err(), "{suffix}");
     }

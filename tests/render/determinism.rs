@@ -4,16 +4,18 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use twincast::math::{DAffine3, DVec3, Vec3, Vec4};
 use twincast::render::{Control, Counted, TileOrder};
-use twincast::scene::{Attenuation, Camera, Geometry, Instance, Light, Material};
+use twincast::scene::{Attenuation, Camera, Fov, Geometry, Instance, Light, Material, Projection};
 use twincast::{Batch, Error, Renderer, Scene, Settings, Width, World};
 
 use super::{engines, floor, matte, render, settings, torus};
 
-/// Shiny, smooth, shadowed, with two lights: everything a picture depends on.
+/// Shiny, smooth, mirrored, of glass, shadowed, with two lights: everything a picture depends on.
 fn busy_scene(place: DVec3) -> Scene {
     let shiny = Material { specular: Vec3::splat(0.4), shininess: 20.0, ..matte(0.6) };
+    let shiny = Material { reflection: Vec3::splat(0.3), transmission: Vec3::new(0.2, 0.3, 0.4), ..shiny };
+    let mirror = Material { reflection: Vec3::splat(0.2), ..matte(0.8) };
     let mut scene =
-        Scene::from_geometries(vec![Geometry::Mesh(torus(24, DVec3::ZERO)), floor(6.0, 1)], vec![shiny, matte(0.8)]);
+        Scene::from_geometries(vec![Geometry::Mesh(torus(24, DVec3::ZERO)), floor(6.0, 1)], vec![shiny, mirror]);
     scene.groups[0].geometries = 0..1;
     scene.groups.push(twincast::scene::Group { name: String::new(), geometries: 1..2 });
     let below = DAffine3::from_translation(DVec3::Y * -1.5);
@@ -25,6 +27,7 @@ fn busy_scene(place: DVec3) -> Scene {
             color: Vec3::splat(20.0),
             attenuation: Attenuation::INVERSE_SQUARE,
             range: 30.0,
+            radius: 0.0,
         },
     ];
     let camera = Camera::look_at(DVec3::new(4.0, 5.0, 7.0), DVec3::ZERO, DVec3::Y, 0.7).unwrap();
@@ -119,15 +122,19 @@ fn instances_look_like_what_they_are_instances_of() {
 fn only_planned_rays_are_traced() {
     let lit = busy_scene(DVec3::ZERO);
     let unlit = Scene { lights: Vec::new(), ..lit.clone() };
-    for (scene, shadows) in [(&lit, true), (&unlit, false)] {
+    let mut plain = lit.clone();
+    for material in &mut plain.materials {
+        (material.reflection, material.transmission) = (Vec3::ZERO, Vec3::ZERO);
+    }
+    for (scene, shadows, sends_on) in [(&lit, true, true), (&unlit, false, true), (&plain, true, false)] {
         let world = World::new(scene).unwrap();
         let renderer = Renderer::new(scene, &world, scene.cameras[0].clone(), settings(20, 10, 2)).unwrap();
         for engine in engines(&world) {
             let counted = Counted::new(&engine);
             renderer.render(&counted, Control::default()).unwrap();
-            assert_eq!(counted.closest_rays(), 400);
+            assert_eq!(counted.closest_rays() > 400, sends_on, "{}", engine.name);
             assert_eq!(counted.occluded_rays() > 0, shadows, "{}", engine.name);
-            assert!(counted.occluded_rays() <= 800);
+            assert!(counted.occluded_rays() <= 2 * counted.closest_rays());
         }
     }
 }
@@ -186,7 +193,7 @@ fn impossible_settings_are_bad_usage() {
         assert!(matches!(refused.err(), Some(Error::Usage(_))));
     }
     for fov_y in [0.0, -1.0, std::f64::consts::PI, f64::NAN] {
-        let camera = Camera { fov_y, ..scene.cameras[0].clone() };
+        let camera = Camera { projection: Projection::Perspective(Fov::Vertical(fov_y)), ..scene.cameras[0].clone() };
         assert!(matches!(Renderer::new(&scene, &world, camera, settings(1, 1, 1)).err(), Some(Error::Usage(_))));
     }
 }

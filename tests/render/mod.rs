@@ -1,8 +1,10 @@
 //! Pictures: against closed forms, and against themselves under everything that must not change them.
 
+mod camera;
 mod determinism;
 mod shading;
 mod toy;
+mod whitted;
 
 use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Camera, Geometry, Material, Mesh};

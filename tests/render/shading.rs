@@ -2,8 +2,10 @@
 
 use twincast::image::Image;
 use twincast::math::{DVec3, Vec2, Vec3, Vec4};
-use twincast::scene::{Attenuation, Filter, Geometry, Light, Material, Specular, Texture, Wrap};
-use twincast::{Renderer, Scene, Shape, Sphere, World};
+use twincast::scene::{
+    AreaShape, Attenuation, Camera, Filter, Geometry, Light, Material, Mesh, Specular, Texture, Wrap,
+};
+use twincast::{Disk, Renderer, Scene, Settings, Shape, Sphere, World};
 
 use super::{engines, floor, from_above, matte, render, settings};
 
@@ -61,6 +63,7 @@ fn lights_add_up_and_weaken_with_distance() {
         color: Vec3::splat(2.0),
         attenuation,
         range: f64::INFINITY,
+        radius: 0.0,
     };
     // 1 / (1 + 0.25 * 4 + 0.125 * 16) = 1/4.
     let one = 2.0 * 0.25 * 0.8;
@@ -125,7 +128,7 @@ fn a_ball_casts_a_round_shadow() {
     let shapes = Geometry::Shapes { shapes: vec![ball.clone()], material: 0 };
     let sun = Light::Directional { direction: DVec3::NEG_Y, color: Vec3::ONE };
     let scene = Scene { lights: vec![sun], ..Scene::from_geometries(vec![floor(5.0, 0), shapes], vec![matte(0.5)]) };
-    let camera = twincast::scene::Camera::look_at(DVec3::new(0.0, 2.0, 9.0), DVec3::ZERO, DVec3::Y, 0.5).unwrap();
+    let camera = Camera::look_at(DVec3::new(0.0, 2.0, 9.0), DVec3::ZERO, DVec3::Y, 0.5).unwrap();
     let world = World::new(&scene).unwrap();
     let renderer = Renderer::new(&scene, &world, camera.clone(), settings(80, 60, 1)).unwrap();
     for engine in engines(&world) {
@@ -158,8 +161,7 @@ fn surfaces_do_not_shadow_themselves() {
         let geometries = vec![Geometry::Shapes { shapes: vec![ball.clone()], material: 0 }];
         let scene = Scene { lights: vec![light], ..Scene::from_geometries(geometries, vec![matte(1.0)]) };
         let (s, centre) = (f64::from(size), DVec3::X * f64::from(place));
-        let camera =
-            twincast::scene::Camera::look_at(centre + DVec3::new(2.0, 1.0, 3.0) * s, centre, DVec3::Y, 0.6).unwrap();
+        let camera = Camera::look_at(centre + DVec3::new(2.0, 1.0, 3.0) * s, centre, DVec3::Y, 0.6).unwrap();
         let world = World::new(&scene).unwrap();
         let renderer = Renderer::new(&scene, &world, camera.clone(), settings(50, 50, 1)).unwrap();
         for engine in engines(&world) {
@@ -195,5 +197,69 @@ fn alpha_is_coverage_and_a_background_is_opaque() {
         let red = twincast::Settings { background: Some(Vec3::X), ..settings(2, 2, 16) };
         let image = render(&scene, &from_above(), &red, &engine);
         assert!(image.pixels.iter().all(|p| p.w == 1.0 && p.x > 0.99 && p.y <= 0.25), "{:?}", image.pixels);
+    }
+}
+
+/// Under a bright ceiling panel: what a fan of shadow rays finds free is the share of the panel that is seen.
+#[test]
+fn soft_shadows_have_the_width_of_similar_triangles() {
+    // A panel 2 wide at height 8 (x along the width), a wide board at height 4 whose edge is at x = 0: on the floor the
+    // edge of the shadow runs from x = -1, where the whole panel is seen, to x = 1, where none is.
+    let panel = Light::Area {
+        shape: AreaShape::Rectangle { centre: DVec3::Y * 8.0, half_edges: [DVec3::X, DVec3::Z] },
+        radiance: Vec3::splat(50.0),
+    };
+    let board = |x: f32, z: f32| Vec3::new(x, 4.0, z);
+    let corners = vec![board(0.0, 50.0), board(50.0, 50.0), board(50.0, -50.0), board(0.0, -50.0)];
+    let board = Geometry::Mesh(Mesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]));
+    let open = Scene { lights: vec![panel], ..Scene::from_geometries(vec![floor(50.0, 0)], vec![matte(1.0)]) };
+    let shaded =
+        Scene { lights: open.lights.clone(), ..Scene::from_geometries(vec![floor(50.0, 0), board], vec![matte(1.0)]) };
+    let settings = Settings { light_samples: 256, ..settings(1, 1, 1) };
+    let seen = |scene: &Scene, x: f64| {
+        let world = World::new(scene).unwrap();
+        // From beside the board, below it.
+        let camera = Camera::look_at(DVec3::new(-20.0, 2.0, 0.0), DVec3::X * x, DVec3::Y, 1e-3).unwrap();
+        let pixels: Vec<_> = engines(&world).iter().map(|e| render(scene, &camera, &settings, e).pixels[0].x).collect();
+        assert!(pixels.windows(2).all(|pair| pair[0] == pair[1]), "engines differ: {pixels:?}");
+        f64::from(pixels[0])
+    };
+    for (x, share) in [(-1.2, 1.0), (-1.02, 1.0), (-0.5, 0.75), (0.0, 0.5), (0.5, 0.25), (1.02, 0.0)] {
+        let got = seen(&shaded, x) / seen(&open, x);
+        assert!((got - share).abs() < 0.02, "{x}: {got} of the light, not {share}");
+    }
+}
+
+/// A glowing quad where the light is must not be in its light's way, nor may a glowing ball.
+#[test]
+fn lights_that_can_be_seen_do_not_shade_themselves() {
+    let place = DVec3::new(37.0, 53.0, 11.0);
+    let glow = Material { emission: Vec3::ONE, diffuse: Vec3::ZERO, ..Material::default() };
+    let ball = Shape::Sphere(Sphere { centre: place.as_vec3(), radius: 6.0 });
+    let away = place.normalize();
+    let disk = Shape::Disk(Disk::new(place.as_vec3(), -away.as_vec3(), 6.0).unwrap());
+    for (shape, light) in [
+        (ball, AreaShape::Sphere { centre: place, radius: 6.0 }),
+        (disk, AreaShape::Disk { centre: place, normal: -away, radius: 6.0 }),
+    ] {
+        let light = Light::Area { shape: light, radiance: Vec3::ONE };
+        let bare =
+            Scene { lights: vec![light.clone()], ..Scene::from_geometries(vec![floor(5.0, 0)], vec![matte(1.0)]) };
+        let shapes = Geometry::Shapes { shapes: vec![shape], material: 1 };
+        let lamp = Scene {
+            lights: vec![light],
+            ..Scene::from_geometries(vec![floor(5.0, 0), shapes], vec![matte(1.0), glow.clone()])
+        };
+        for seed in 0..20 {
+            let settings = Settings { light_samples: 16, seed, ..settings(1, 1, 1) };
+            let [with, without] = [&lamp, &bare].map(|scene| {
+                let world = World::new(scene).unwrap();
+                engines(&world)
+                    .iter()
+                    .map(|e| render(scene, &from_above(), &settings, e).pixels[0].x)
+                    .collect::<Vec<_>>()
+            });
+            assert!(with[0] > 0.0 && with == without, "{with:?} {without:?}");
+        }
     }
 }

@@ -5,8 +5,8 @@
 use super::Document;
 use super::schema::{Camera as CameraSource, Lights, Node};
 use crate::error::{Result, Warning};
-use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
-use crate::scene::{Attenuation, Camera, Instance, Light, Scene};
+use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
+use crate::scene::{Attenuation, Camera, Fov, Instance, Light, Projection, Scene};
 
 /// Places everything that the document's scene (the first, where it names none) shows. `groups` has the group of each
 /// mesh.
@@ -116,15 +116,21 @@ fn make_camera(
     transform: &DAffine3,
     warnings: &mut Vec<Warning>,
 ) -> Result<Option<Camera>> {
-    let Some(perspective) = &source.perspective else {
-        let message = "orthographic cameras are not supported; this one is left out";
-        warnings.push(document.warning(format!("/cameras/{index}"), message));
-        return Ok(None);
+    let projection = match (&source.perspective, &source.orthographic) {
+        (Some(perspective), _) => Projection::Perspective(Fov::Vertical(perspective.yfov)),
+        // Half the height before any scale of the node, which is left out as for angles of view.
+        (None, Some(orthographic)) => Projection::Orthographic(2.0 * orthographic.ymag.abs()),
+        (None, None) => {
+            let message = "neither perspective nor orthographic; the camera needs one of them";
+            return Err(document.error(format!("/cameras/{index}"), message));
+        }
     };
-    let fov_y = perspective.yfov;
-    if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
-        let message = format!("an angle of view of {fov_y} radians; it has to lie between 0 and pi");
-        return Err(document.error(format!("/cameras/{index}/perspective/yfov"), message));
+    if projection.half_extent(1.0).is_none() {
+        let (what, message) = match projection {
+            Projection::Perspective(_) => ("perspective/yfov", "an angle of view that does not lie between 0 and pi"),
+            _ => ("orthographic/ymag", "a height of 0 or one that is not finite"),
+        };
+        return Err(document.error(format!("/cameras/{index}/{what}"), message));
     }
     let back = transform.transform_vector3(DVec3::Z).try_normalize();
     let right = back.and_then(|b| transform.transform_vector3(DVec3::Y).cross(b).try_normalize());
@@ -135,7 +141,8 @@ fn make_camera(
     };
     let name = if node.name.is_empty() { source.name.clone() } else { node.name.clone() };
     let frame = DMat3::from_cols(right, back.cross(right), back);
-    Ok(Some(Camera { name, eye: transform.translation, frame, fov_y }))
+    let eye = transform.translation;
+    Ok(Some(Camera { name, eye, frame, projection, shift: DVec2::ZERO, lens: None, distortion: None }))
 }
 
 /// The lights of `KHR_lights_punctual`, at the origin, along -z.
@@ -158,7 +165,7 @@ fn lights(document: &Document<'_>) -> Result<Vec<Light>> {
         }
         match light.kind.as_str() {
             "directional" => Ok(Light::Directional { direction, color }),
-            "point" => Ok(Light::Point { position, color, attenuation, range }),
+            "point" => Ok(Light::Point { position, color, attenuation, range, radius: 0.0 }),
             "spot" => {
                 let (inner_angle, outer_angle) = (light.spot.inner_cone_angle, light.spot.outer_cone_angle);
                 if !(inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2) {
@@ -178,6 +185,8 @@ fn move_light(light: &Light, transform: &DAffine3) -> Light {
     let mut moved = light.clone();
     match &mut moved {
         Light::Directional { direction, .. } => *direction = along,
+        // No extension has any.
+        Light::Area { .. } => {}
         Light::Point { position, .. } => *position = transform.translation,
         Light::Spot { position, direction, .. } => (*position, *direction) = (transform.translation, along),
     }

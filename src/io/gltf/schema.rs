@@ -209,6 +209,13 @@ pub(super) struct Camera {
     #[serde(default)]
     pub(super) name: String,
     pub(super) perspective: Option<Perspective>,
+    pub(super) orthographic: Option<Orthographic>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Orthographic {
+    /// Half the height of the view.
+    pub(super) ymag: f64,
 }
 
 #[derive(Deserialize)]

@@ -24,6 +24,8 @@ mod pixel_loop;
 mod rays;
 mod report;
 mod run;
+mod scaling;
+mod scaling_chart;
 mod subject;
 mod svg;
 
@@ -32,4 +34,6 @@ pub use machine::processor;
 pub use rays::{BLOCK, Kind, RaySet, SIDE, View};
 pub use report::{BuildRow, Ratio, Report, Spread, TraversalRow};
 pub use run::{AnyTracer, Build, Built, Contender, Setup, WIDTHS};
+pub use scaling::{Family, Point, Scaling, ScalingReport, Swept};
+pub use scaling_chart::scaling_chart;
 pub use subject::Subject;

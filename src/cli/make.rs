@@ -1,0 +1,81 @@
+//! `twincast make`: scenes by rule, written to a file.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::report::{counted, grouped};
+use super::say;
+use crate::error::{Error, Result};
+use crate::io;
+use crate::output::check_writable;
+use crate::scene::{RECIPES, Recipe};
+
+/// Make a scene by rule, at any size
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  twincast make --list
+  twincast make sphereflake --size 5 -o flake.nff
+  twincast make lattice --size 10 -o teapots.toml
+  twincast make terrain --size 4096 -o terrain.ply")]
+pub(super) struct MakeArgs {
+    /// What to make; --list names all
+    #[arg(required_unless_present = "list")]
+    name: Option<String>,
+
+    /// How much of it; --list says what it counts
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    size: Option<u32>,
+
+    /// File to write; the suffix decides the format: .nff, .ply (triangles alone) or .toml
+    #[arg(short, long, value_name = "FILE", required_unless_present = "list")]
+    output: Option<PathBuf>,
+
+    /// Name everything that can be made
+    #[arg(long, conflicts_with_all = ["name", "size", "output"])]
+    list: bool,
+
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &MakeArgs) -> Result<()> {
+    let (Some(name), Some(output)) = (&args.name, &args.output) else {
+        return say(list());
+    };
+    let recipe = RECIPES.iter().find(|recipe| recipe.name == *name).ok_or_else(|| {
+        let names = RECIPES.map(|recipe| recipe.name).join(", ");
+        Error::Usage(format!("nothing is called {name:?}; there are {names}"))
+    })?;
+    let size = args.size.unwrap_or(recipe.usual);
+    if size > recipe.largest {
+        let message = format!("--size {size}: {name} goes to {} ({})", recipe.largest, recipe.size);
+        return Err(Error::Usage(message));
+    }
+    check_writable(output)?;
+    let scene = recipe.make(size);
+    io::save(&scene, output)?;
+    if args.quiet {
+        return Ok(());
+    }
+    let count = scene.primitive_count();
+    say(format_args!(
+        "{name} of size {size}: {} in {}\nwrote {}",
+        counted(count, "primitive", "primitives"),
+        counted(scene.instances.len() as u64, "placement", "placements"),
+        output.display()
+    ))
+}
+
+fn list() -> String {
+    let line = |Recipe { name, about, size, usual, largest, .. }: &Recipe| {
+        format!(
+            "{name:<12} {about}\n{:<12} --size: {size}; {usual} unless given, at most {}",
+            "",
+            grouped((*largest).into())
+        )
+    };
+    RECIPES.iter().map(line).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,123 @@
+//! What picture to make: flags, and what the scene asks for.
+
+use clap::{Args, ValueEnum};
+
+use super::common::{Size, by_name, parse_vector};
+use crate::math::Vec3;
+use crate::render::{Filter, Sampling, Settings, TileOrder};
+use crate::scene::Request;
+use crate::trace::{Batch, Width};
+
+/// Everything about a picture but its camera.
+#[derive(Clone, Debug, Args)]
+pub(super) struct PictureArgs {
+    /// Pixels (default: the scene's, else 1280x720)
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+
+    /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    spp: Option<u32>,
+
+    /// How often a ray may be mirrored or refracted; what it would see after that is black (default: the scene's, else 5)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    max_depth: Option<u32>,
+
+    /// Chooses among equally good sample patterns (default: the scene's, else 0)
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// Shadow rays to each light with a surface, where a ray hits
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    light_samples: u32,
+
+    /// How samples are spread: sobol, blue-noise, halton, stratified, grid or independent
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_sampling)]
+    sampler: Sampling,
+
+    /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_filter)]
+    filter: Filter,
+
+    /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
+    #[arg(long, value_name = "N")]
+    packet: Option<Packet>,
+
+    /// Order of the tiles; never changes a picture
+    #[arg(long, value_enum, default_value_t)]
+    tile_order: Order,
+
+    /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
+    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
+    background: Option<Vec3>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Packet {
+    #[value(name = "1")]
+    One,
+    #[value(name = "4")]
+    Four,
+    #[value(name = "8")]
+    Eight,
+    #[value(name = "16")]
+    Sixteen,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Order {
+    /// Row by row from the top
+    Scanline,
+    /// Along a curve from neighbour to neighbour
+    #[default]
+    Hilbert,
+    /// From the middle outwards
+    Spiral,
+}
+
+impl PictureArgs {
+    /// What the flags say, else the scene's file, else what is usual.
+    pub(super) fn settings(&self, request: &Request, usual_width: Width) -> Settings {
+        let usual = Settings::default();
+        let size = self.size.map(|size| [size.width, size.height]).or(request.size);
+        let [columns, rows] = size.unwrap_or([usual.width, usual.height]);
+        let width = match self.packet {
+            None => usual_width,
+            Some(Packet::One) => Width::One,
+            Some(Packet::Four) => Width::Four,
+            Some(Packet::Eight) => Width::Eight,
+            Some(Packet::Sixteen) => Width::Sixteen,
+        };
+        Settings {
+            width: columns,
+            height: rows,
+            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
+            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            sampling: self.sampler,
+            filter: self.filter,
+            light_samples: self.light_samples,
+            max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
+            batch: Batch { width, coherent: true },
+            tile_order: match self.tile_order {
+                Order::Scanline => TileOrder::Scanline,
+                Order::Hilbert => TileOrder::Hilbert,
+                Order::Spiral => TileOrder::Spiral,
+            },
+            background: self.background,
+        }
+    }
+}
+
+fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {
+    by_name(Sampling::ALL, Sampling::name, name)
+}
+
+fn parse_filter(name: &str) -> std::result::Result<Filter, String> {
+    by_name(Filter::ALL, Filter::name, name)
+}
+
+fn parse_color(text: &str) -> std::result::Result<Vec3, String> {
+    let color = parse_vector(text)?.as_vec3();
+    let valid = color.is_finite() && color.cmpge(Vec3::ZERO).all();
+    valid.then_some(color).ok_or_else(|| "expected three numbers of at least 0".to_owned())
+}

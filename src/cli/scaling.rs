@@ -1,0 +1,30 @@
+//! `twincast bench --scaling`: time against the number of triangles, for every accelerator.
+
+use super::bench::BenchArgs;
+use super::{interrupt, outputs, progress, say};
+use crate::error::{Error, Result};
+use crate::lab::bench::{Scaling, processor, scaling_chart};
+
+pub(super) fn run(args: &BenchArgs) -> Result<()> {
+    let cancel = interrupt::install()?;
+    outputs::check(&[], &args.chart, [])?;
+    let bar = progress::spinner("measuring", args.json);
+    let on_step = |what: &str| bar.set_message(what.to_owned());
+    let scaling = Scaling { max: args.max, cancel: Some(cancel), on_step: Some(&on_step) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    let report = pool.install(|| scaling.run());
+    bar.finish_and_clear();
+    let report = report?;
+    if let Some(path) = &args.chart {
+        let threads = pool.current_num_threads();
+        let notes = [format!("{}; builds on {threads} threads, rays on one", processor())];
+        outputs::write_text(path, &scaling_chart(&report, &notes))?;
+    }
+    if args.json {
+        let document = serde_json::to_string(&report);
+        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
+    } else {
+        say(report.to_string().trim_end())
+    }
+}

@@ -1,0 +1,71 @@
+//! What a render says of itself when it is done.
+
+use super::report::{Rays, Stats, Summary, counted, grouped, size, time};
+use crate::plan::BuildChoice;
+use crate::render::Renderer;
+use crate::scene::Scene;
+
+/// A render that is done.
+pub(super) struct Rendered<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) renderer: &'a Renderer<'a>,
+    /// Where the camera is from, in words.
+    pub(super) camera: &'a str,
+    pub(super) build: Option<&'a BuildChoice>,
+    pub(super) stats: &'a Stats,
+}
+
+impl Rendered<'_> {
+    pub(super) fn summary(&self, verbose: bool) -> Summary {
+        let mut summary = Summary::default();
+        let parts = [
+            counted(self.stats.triangles, "triangle", "triangles"),
+            counted(self.scene.materials.len() as u64, "material", "materials"),
+            counted(self.scene.lights.len() as u64, "light", "lights"),
+        ];
+        summary.line("scene", format_args!("{}: {}", self.stats.scene, parts.join(", ")));
+        if verbose {
+            summary.line("plan", self.renderer.plan());
+            if let Some(build) = self.build {
+                summary.line("build", format_args!("{}: {}", build.preset.name(), build.why));
+            }
+        }
+        summary.line("camera", self.camera);
+        let [width, height] = self.stats.size;
+        let samples = counted(u64::from(self.stats.spp), "sample", "samples");
+        let threads = counted(self.stats.threads as u64, "thread", "threads");
+        summary.line("picture", format_args!("{width}x{height}, {samples} a pixel, {threads}"));
+        if verbose {
+            summary.line(
+                "load",
+                format_args!("{}, prepare {}", time(self.stats.load_seconds), time(self.stats.prepare_seconds)),
+            );
+        }
+        for engine in &self.stats.engines {
+            let (build, render) = (time(engine.build_seconds), time(engine.render_seconds));
+            summary.line("backend", format_args!("{}: build {build}, render {render}", engine.backend));
+            for note in &engine.notes {
+                summary.line("built", note);
+            }
+            if verbose {
+                if let Some(cache) = &engine.cache {
+                    summary.line("cache", cache);
+                }
+                let Rays { camera, sent_on, shadow } = &engine.rays;
+                let speed = engine.rays_per_second / 1e6;
+                let (camera, shadow) = (grouped(*camera), grouped(*shadow));
+                let sent_on = if *sent_on > 0 { format!(" + {} sent on", grouped(*sent_on)) } else { String::new() };
+                summary.line(
+                    "rays",
+                    format_args!("{camera} camera{sent_on} + {shadow} shadow, {speed:.2} million a second"),
+                );
+                let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
+                summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
+            }
+        }
+        if let (true, Some(peak)) = (verbose, self.stats.peak_memory) {
+            summary.line("peak", format_args!("{} of memory for everything", size(peak)));
+        }
+        summary
+    }
+}

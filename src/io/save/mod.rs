@@ -1,0 +1,71 @@
+//! Writing scenes: `.nff`, `.toml` and binary `.ply`, by the suffix.
+//!
+//! Numbers are written as the shortest decimals that give them back to the bit. What a format cannot say is an error
+//! before anything is written, not an approximation: [`Unsayable`] names it, and a format that can.
+
+mod nff;
+mod ply;
+mod toml;
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::output::write_atomically;
+use crate::scene::{Geometry, Scene};
+
+/// The suffixes that [`save`] knows.
+pub const SAVE_SUFFIXES: [&str; 3] = ["nff", "ply", "toml"];
+
+/// What a format has no words for, in words.
+type Unsayable = String;
+
+/// A writer that does not fail for lack of words.
+type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
+
+/// Writes `scene` to `path`. The suffix, in any case, decides the format: one of [`SAVE_SUFFIXES`].
+///
+/// # Errors
+/// [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, say); [`Error::Output`] where
+/// the file cannot be written, which leaves an old one whole.
+pub fn save(scene: &Scene, path: &Path) -> Result<()> {
+    let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+    type Check = fn(&Scene) -> std::result::Result<(), Unsayable>;
+    let (check, write): (Check, Writer) = match suffix.as_str() {
+        "nff" => (nff::check, nff::write),
+        "ply" => (ply::check, ply::write),
+        "toml" => (toml::check, toml::write),
+        _ => {
+            let known = SAVE_SUFFIXES.map(|suffix| format!(".{suffix}")).join(", ");
+            return Err(Error::Usage(format!("{}: scenes are written as {known}", path.display())));
+        }
+    };
+    check(scene).map_err(|message| Error::Usage(format!("{}: {message}", path.display())))?;
+    write_atomically(path, |part| {
+        let write_all = || {
+            let mut file = BufWriter::with_capacity(1 << 16, File::create(part)?);
+            write(scene, &mut file)?;
+            file.into_inner()?.sync_all()
+        };
+        write_all().map_err(|error: io::Error| Error::output(path, format!("cannot be written: {error}")))
+    })
+}
+
+/// Every geometry where it is placed.
+fn placed(scene: &Scene) -> impl Iterator<Item = (&Geometry, &DAffine3)> {
+    scene.instances.iter().flat_map(|instance| {
+        scene.group_geometries(instance.group).map(|(_, geometry)| (geometry, &instance.transform))
+    })
+}
+
+/// Numbers with spaces between.
+fn spaced(v: Vec3) -> String {
+    format!("{} {} {}", v.x, v.y, v.z)
+}
+
+/// The same in double precision.
+fn spaced_f64(v: DVec3) -> String {
+    format!("{} {} {}", v.x, v.y, v.z)
+}

@@ -1,0 +1,91 @@
+//! Binary PLY, little-endian: one mesh of everything, in scene coordinates. Polygons are divided into triangles; materials,
+//! lights and cameras have no place in it.
+
+use std::io::{self, Write};
+
+use super::{Unsayable, placed};
+use crate::io::polygon::triangulate;
+use crate::math::DVec3;
+use crate::scene::{Geometry, Scene};
+use crate::shape::{Polygon, Shape};
+
+/// Whether there is nothing but triangles and polygons, few enough for 32-bit indices.
+pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
+    let other = placed(scene).find_map(|(geometry, _)| match geometry {
+        Geometry::Mesh(_) => None,
+        Geometry::Shapes { shapes, .. } => shapes.iter().find(|shape| !matches!(shape, Shape::Polygon(_))),
+    });
+    if let Some(shape) = other {
+        return Err(format!("PLY holds triangles, and this scene has a {}; write .nff or .toml", shape.name()));
+    }
+    let [vertices, triangles] = counts(scene);
+    let most = vertices.max(triangles);
+    let fits = i32::try_from(most).is_ok();
+    if fits { Ok(()) } else { Err(format!("{most} vertices or triangles; PLY's indices go to 2^31")) }
+}
+
+/// Vertices and triangles.
+fn counts(scene: &Scene) -> [u64; 2] {
+    let count = |geometry: &Geometry| match geometry {
+        Geometry::Mesh(mesh) => [mesh.positions.len() as u64, mesh.triangles.len() as u64],
+        Geometry::Shapes { shapes, .. } => {
+            let corners = polygons(shapes).map(|polygon| polygon.corners().len() as u64);
+            corners.fold([0, 0], |[v, t], corners| [v + corners, t + corners - 2])
+        }
+    };
+    placed(scene).map(|(geometry, _)| count(geometry)).fold([0, 0], |[a, b], [c, d]| [a + c, b + d])
+}
+
+fn polygons(shapes: &[Shape]) -> impl Iterator<Item = &Polygon> {
+    shapes.iter().filter_map(|shape| match shape {
+        Shape::Polygon(polygon) => Some(polygon.as_ref()),
+        _ => None,
+    })
+}
+
+pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
+    let [vertices, triangles] = counts(scene);
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
+    )?;
+    for (geometry, transform) in placed(scene) {
+        let mut vertex = |p: DVec3| {
+            let p = transform.transform_point3(p).as_vec3();
+            out.write_all(bytemuck::bytes_of(&p.to_array().map(|x| x.to_bits().to_le())))
+        };
+        match geometry {
+            Geometry::Mesh(mesh) => {
+                mesh.positions.iter().try_for_each(|p| vertex(mesh.origin + p.as_dvec3()))?;
+            }
+            Geometry::Shapes { shapes, .. } => {
+                polygons(shapes).flat_map(Polygon::corners).try_for_each(|p| vertex(p.as_dvec3()))?;
+            }
+        }
+    }
+    let mut first = 0u32;
+    let mut face = |first: u32, corners: &[u32; 3]| {
+        out.write_all(&[3])?;
+        out.write_all(bytemuck::bytes_of(&corners.map(|i| (first + i).to_le())))
+    };
+    for (geometry, _) in placed(scene) {
+        match geometry {
+            Geometry::Mesh(mesh) => {
+                mesh.triangles.iter().try_for_each(|corners| face(first, corners))?;
+                first += mesh.positions.len() as u32;
+            }
+            Geometry::Shapes { shapes, .. } => {
+                for polygon in polygons(shapes) {
+                    let corners: Vec<DVec3> = polygon.corners().iter().map(|p| p.as_dvec3()).collect();
+                    let mut triangles = Vec::new();
+                    triangulate(&corners, &mut triangles)
+                        .ok_or_else(|| io::Error::other("a polygon is too large to divide into triangles"))?;
+                    triangles.iter().try_for_each(|corners| face(first, corners))?;
+                    first += corners.len() as u32;
+                }
+            }
+        }
+    }
+    Ok(())
+}

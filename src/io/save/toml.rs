@@ -1,0 +1,237 @@
+//! Twincast's own format, as docs/SCENES.md describes it. Groups that are placed more than once, or moved, are written as
+//! groups; the others at the top of the file.
+
+use std::io::{self, Write};
+
+use super::Unsayable;
+use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
+use crate::scene::{
+    AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request, Scene,
+    Specular, ThinLens,
+};
+use crate::shape::{Shape, Sphere};
+
+/// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
+pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
+    let is_coloured = |geometry: &Geometry| matches!(geometry, Geometry::Mesh(mesh) if !mesh.colors.is_empty());
+    if !scene.textures.is_empty() || scene.geometries.iter().any(is_coloured) {
+        return Err("textures and colours of vertices are not written; include the file they are in".to_owned());
+    }
+    Ok(())
+}
+
+pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
+    render(scene, out)?;
+    for camera in &scene.cameras {
+        write_camera(camera, out)?;
+    }
+    for light in &scene.lights {
+        write_light(light, out)?;
+    }
+    for (material, index) in scene.materials.iter().zip(0..) {
+        write_material(material, index, out)?;
+    }
+    // At the top of the file things are placed once, as they are.
+    let mut uses = vec![0; scene.groups.len()];
+    for instance in &scene.instances {
+        // One that moves its group counts as several.
+        uses[instance.group as usize] += if instance.transform == DAffine3::IDENTITY { 1 } else { 2 };
+    }
+    let tops: Vec<bool> = uses.into_iter().map(|uses| uses == 1).collect();
+    for (group, &top) in (0..).zip(&tops) {
+        let prefix = if top { String::new() } else { format!("group.g{group}.") };
+        for (_, geometry) in scene.group_geometries(group) {
+            match geometry {
+                Geometry::Mesh(mesh) => write_mesh(mesh, &prefix, out)?,
+                Geometry::Shapes { shapes, material } => {
+                    for shape in shapes {
+                        write_shape(shape, &prefix, out)?;
+                        writeln!(out, "material = \"m{material}\"\n")?;
+                    }
+                }
+            }
+        }
+    }
+    for instance in scene.instances.iter().filter(|instance| !tops[instance.group as usize]) {
+        let DAffine3 { matrix3, translation } = instance.transform;
+        let rows = [0, 1, 2].map(|i| {
+            let row = matrix3.row(i);
+            format!("[{}, {}, {}, {}]", row.x, row.y, row.z, translation[i])
+        });
+        writeln!(out, "[[instance]]\ngroup = \"g{}\"\nname = {}", instance.group, quoted(&instance.name))?;
+        writeln!(out, "transform = {{ matrix = [{}] }}\n", rows.join(", "))?;
+    }
+    Ok(())
+}
+
+/// A text in quotes, as TOML has them.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from('"');
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => quoted += &format!("\\u{:04X}", u32::from(c)),
+            c => quoted.push(c),
+        }
+    }
+    quoted + "\""
+}
+
+/// A vector as a list.
+fn list(v: Vec3) -> String {
+    format!("[{}, {}, {}]", v.x, v.y, v.z)
+}
+
+fn list_f64(v: DVec3) -> String {
+    format!("[{}, {}, {}]", v.x, v.y, v.z)
+}
+
+fn lists<T>(items: &[T], list: impl Fn(&T) -> String) -> String {
+    format!("[{}]", items.iter().map(list).collect::<Vec<_>>().join(", "))
+}
+
+fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
+    let Request { size, spp, seed, max_depth, output } = &scene.request;
+    writeln!(out, "[render]")?;
+    if let Some([width, height]) = size {
+        writeln!(out, "size = [{width}, {height}]")?;
+    }
+    let numbers = [("spp", spp.map(u64::from)), ("seed", *seed), ("max_depth", max_depth.map(u64::from))];
+    for (key, number) in numbers.into_iter().filter_map(|(key, number)| Some((key, number?))) {
+        writeln!(out, "{key} = {number}")?;
+    }
+    if let Some(output) = output {
+        writeln!(out, "output = {}", quoted(output))?;
+    }
+    if let Some(background) = scene.background {
+        writeln!(out, "background = {}", list(background))?;
+    }
+    writeln!(out, "ambient = {}\n", list(scene.ambient))
+}
+
+fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(&camera.name), list_f64(camera.eye))?;
+    let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
+    writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
+    match camera.projection {
+        Projection::Perspective(Fov::Vertical(vertical)) => writeln!(out, "fov = {}", vertical.to_degrees())?,
+        Projection::Perspective(Fov::Horizontal(horizontal)) => writeln!(out, "fov_x = {}", horizontal.to_degrees())?,
+        Projection::Perspective(Fov::Both { horizontal, vertical }) => {
+            writeln!(out, "fov_x = {}\nfov = {}", horizontal.to_degrees(), vertical.to_degrees())?;
+        }
+        Projection::Orthographic(height) => writeln!(out, "projection = \"orthographic\"\nheight = {height}")?,
+        Projection::Equirectangular => writeln!(out, "projection = \"equirectangular\"")?,
+    }
+    if let Some(ThinLens { radius, focus, blades }) = camera.lens {
+        writeln!(out, "lens = {{ radius = {radius}, focus = {focus}, blades = {blades} }}")?;
+    }
+    if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
+        writeln!(out, "distortion = [{k1}, {k2}, {k3}, {p1}, {p2}]")?;
+    }
+    if camera.shift != DVec2::ZERO {
+        writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;
+    }
+    writeln!(out)
+}
+
+fn write_light(light: &Light, out: &mut dyn Write) -> io::Result<()> {
+    let place = |out: &mut dyn Write, position: DVec3, attenuation: Attenuation, range: f64| {
+        writeln!(out, "position = {}", list_f64(position))?;
+        let Attenuation { constant, linear, quadratic } = attenuation;
+        writeln!(out, "attenuation = [{constant}, {linear}, {quadratic}]")?;
+        if range.is_finite() { writeln!(out, "range = {range}") } else { Ok(()) }
+    };
+    match light {
+        Light::Directional { direction, color } => {
+            writeln!(out, "[[light]]\ntype = \"directional\"\ncolor = {}", list(*color))?;
+            writeln!(out, "direction = {}", list_f64(*direction))?;
+        }
+        Light::Point { position, color, attenuation, range, radius } => {
+            writeln!(out, "[[light]]\ntype = \"point\"\ncolor = {}", list(*color))?;
+            place(out, *position, *attenuation, *range)?;
+            writeln!(out, "radius = {radius}")?;
+        }
+        Light::Area { shape, radiance } => {
+            let (kind, keys) = match shape {
+                AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+                    let (centre, a, b) = (list_f64(*centre), list_f64(*a), list_f64(*b));
+                    ("rectangle", format!("position = {centre}\nhalf_edges = [{a}, {b}]"))
+                }
+                AreaShape::Disk { centre, normal, radius } => {
+                    let (centre, normal) = (list_f64(*centre), list_f64(*normal));
+                    ("disk", format!("position = {centre}\ndirection = {normal}\nradius = {radius}"))
+                }
+                AreaShape::Sphere { centre, radius } => {
+                    ("sphere", format!("position = {}\nradius = {radius}", list_f64(*centre)))
+                }
+            };
+            writeln!(out, "[[light]]\ntype = \"{kind}\"\nradiance = {}\n{keys}", list(*radiance))?;
+        }
+        Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
+            writeln!(out, "[[light]]\ntype = \"spot\"\ncolor = {}", list(*color))?;
+            place(out, *position, *attenuation, *range)?;
+            writeln!(out, "direction = {}", list_f64(*direction))?;
+            writeln!(out, "inner_angle = {}", inner_angle.to_degrees())?;
+            writeln!(out, "outer_angle = {}", outer_angle.to_degrees())?;
+        }
+    }
+    writeln!(out)
+}
+
+fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::Result<()> {
+    let Material { ambient, diffuse, specular, reflection, transmission, emission, shininess, ior, .. } = material;
+    writeln!(out, "[material.m{index}]\nambient = {}\ndiffuse = {}", list(*ambient), list(*diffuse))?;
+    writeln!(out, "specular = {}\nshininess = {shininess}", list(*specular))?;
+    let model = match material.model {
+        Specular::Phong => "phong",
+        Specular::BlinnPhong => "blinn-phong",
+    };
+    writeln!(out, "model = \"{model}\"\nreflection = {}", list(*reflection))?;
+    writeln!(out, "transmission = {}\nior = {ior}\nemission = {}\n", list(*transmission), list(*emission))
+}
+
+fn write_mesh(mesh: &Mesh, prefix: &str, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[[{prefix}mesh]]\nname = {}\nmaterial = \"m{}\"", quoted(&mesh.name), mesh.material)?;
+    // One item a line: a mesh in one line is more than editors take.
+    fn column<T>(out: &mut dyn Write, key: &str, items: &[T], line: impl Fn(&T) -> String) -> io::Result<()> {
+        writeln!(out, "{key} = [")?;
+        items.iter().try_for_each(|item| writeln!(out, "    {},", line(item)))?;
+        writeln!(out, "]")
+    }
+    column(out, "positions", &mesh.positions, |p| list_f64(mesh.origin + p.as_dvec3()))?;
+    column(out, "triangles", &mesh.triangles, |[a, b, c]| format!("[{a}, {b}, {c}]"))?;
+    if !mesh.normals.is_empty() {
+        column(out, "normals", &mesh.normals, |n| list(*n))?;
+    }
+    if !mesh.uvs.is_empty() {
+        column(out, "uvs", &mesh.uvs, |uv| format!("[{}, {}]", uv.x, uv.y))?;
+    }
+    writeln!(out)
+}
+
+/// The table of a shape, all but its material.
+fn write_shape(shape: &Shape, prefix: &str, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[[{prefix}{}]]", shape.name())?;
+    match shape {
+        Shape::Sphere(Sphere { centre, radius }) => writeln!(out, "centre = {}\nradius = {radius}", list(*centre)),
+        Shape::Plane(plane) => writeln!(out, "point = {}\nnormal = {}", list(plane.point), list(plane.normal)),
+        Shape::Disk(disk) => {
+            writeln!(out, "centre = {}\nnormal = {}\nradius = {}", list(disk.centre), list(disk.normal), disk.radius)
+        }
+        Shape::Cuboid(cuboid) => writeln!(out, "min = {}\nmax = {}", list(cuboid.min), list(cuboid.max)),
+        Shape::Cylinder(c) => {
+            writeln!(out, "base = {}\napex = {}\nradius = {}", list(c.base), list(c.apex), c.radius)?;
+            writeln!(out, "capped = {}", c.capped)
+        }
+        Shape::Cone(c) => {
+            writeln!(out, "base = {}\nbase_radius = {}", list(c.base), c.base_radius)?;
+            writeln!(out, "apex = {}\napex_radius = {}\ncapped = {}", list(c.apex), c.apex_radius, c.capped)
+        }
+        Shape::Ellipsoid(ellipsoid) => {
+            let Mat3 { x_axis, y_axis, z_axis } = ellipsoid.axes;
+            let axes = lists(&[x_axis, y_axis, z_axis], |axis| list(*axis));
+            writeln!(out, "centre = {}\naxes = {axes}", list(ellipsoid.centre))
+        }
+        Shape::Polygon(polygon) => writeln!(out, "corners = {}", lists(polygon.corners(), |p| list(*p))),
+    }
+}

@@ -1,0 +1,207 @@
+//! Groups, and groups of groups, unrolled: the scene has one list of instances, each with the whole path of its names.
+
+use std::collections::BTreeMap;
+
+use super::include::Placed;
+use super::table::{Fault, Read, Table, Value};
+use crate::io::suggest::suggestion;
+use crate::math::{DAffine3, DMat3, DQuat, DVec3};
+use crate::scene::{Instance, Scene};
+
+/// Groups within groups within groups.
+const DEEPEST: usize = 64;
+/// Most placements of groups, unrolled: about 2 GB.
+const MOST: u64 = 10_000_000;
+
+/// What stands in a group, or at the top of the file.
+#[derive(Default)]
+pub(super) struct Body {
+    /// Index into [`Scene::groups`] of its own primitives, if it has any.
+    pub(super) own: Option<u32>,
+    pub(super) children: Vec<Child>,
+}
+
+/// What is placed in a body.
+pub(super) struct Child {
+    pub(super) name: String,
+    pub(super) transform: DAffine3,
+    pub(super) target: Target,
+    /// Where it stands in the text.
+    pub(super) at: usize,
+}
+
+pub(super) enum Target {
+    /// A group of the file.
+    Group(String),
+    /// What a mesh file holds.
+    File(Vec<Placed>),
+}
+
+/// The bodies of a file; the top has no name.
+pub(super) struct Groups<'a> {
+    pub(super) top: Body,
+    pub(super) named: BTreeMap<&'a str, Body>,
+}
+
+/// What a body comes to.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// Placements, its own and those in it.
+    count: u64,
+    /// Groups within groups.
+    depth: usize,
+}
+
+impl Groups<'_> {
+    /// Adds an instance for each placement to the scene.
+    pub(super) fn unroll(&self, scene: &mut Scene) -> Read<()> {
+        // First, so that nothing is unrolled that never ends or never fits.
+        let mut extents = BTreeMap::new();
+        for (name, body) in &self.named {
+            if !extents.contains_key(name) {
+                self.extent(body, &mut vec![name], &mut extents)?;
+            }
+        }
+        let Extent { count, .. } = self.extent(&self.top, &mut Vec::new(), &mut extents)?;
+        if count > MOST {
+            let message = format!("{count} placements of groups, those in groups counted; at most {MOST} are unrolled");
+            return Err(Fault { at: 0, message });
+        }
+        self.place(&self.top, "", &DAffine3::IDENTITY, scene)
+    }
+
+    /// What a body comes to. `path` names the groups that are being looked at.
+    fn extent<'s>(
+        &'s self,
+        body: &'s Body,
+        path: &mut Vec<&'s str>,
+        known: &mut BTreeMap<&'s str, Extent>,
+    ) -> Read<Extent> {
+        let mut sum = Extent { count: 1, depth: 0 };
+        for child in &body.children {
+            let fault = |message| Fault { at: child.at, message };
+            let inner = match &child.target {
+                Target::File(placed) => Extent { count: placed.len() as u64, depth: 0 },
+                Target::Group(name) if path.contains(&name.as_str()) => {
+                    return Err(fault(format!("group {name:?} contains itself: {} > {name}", path.join(" > "))));
+                }
+                Target::Group(name) => match known.get(name.as_str()) {
+                    Some(&extent) => extent,
+                    // The recursion ends there, and the depth that is known to be too large below.
+                    None if path.len() > DEEPEST => Extent { count: 0, depth: DEEPEST },
+                    None => {
+                        let (name, inner) = self.find(name, child.at)?;
+                        path.push(name);
+                        let extent = self.extent(inner, path, known)?;
+                        path.pop();
+                        extent
+                    }
+                },
+            };
+            sum.count = sum.count.saturating_add(inner.count);
+            sum.depth = sum.depth.max(inner.depth + 1);
+            if sum.depth > DEEPEST {
+                return Err(fault(format!("groups are nested more than {DEEPEST} deep")));
+            }
+        }
+        if let Some(name) = path.last() {
+            known.insert(name, sum);
+        }
+        Ok(sum)
+    }
+
+    fn find(&self, name: &str, at: usize) -> Read<(&str, &Body)> {
+        self.named.get_key_value(name).map(|(name, body)| (*name, body)).ok_or_else(|| {
+            let near = suggestion(name, self.named.keys().copied());
+            Fault { at, message: format!("no [group.{name}]{near}") }
+        })
+    }
+
+    fn place(&self, body: &Body, path: &str, transform: &DAffine3, scene: &mut Scene) -> Read<()> {
+        if let Some(group) = body.own {
+            scene.instances.push(Instance { name: path.to_owned(), group, transform: *transform });
+        }
+        for child in &body.children {
+            let (name, transform) = (joined(path, &child.name), *transform * child.transform);
+            if !is_invertible(&transform) {
+                let message = format!("{name:?} has a transform that nothing undoes; no scale may be 0");
+                return Err(Fault { at: child.at, message });
+            }
+            match &child.target {
+                Target::Group(group) => self.place(self.find(group, child.at)?.1, &name, &transform, scene)?,
+                Target::File(placed) => scene.instances.extend(placed.iter().map(|inner| Instance {
+                    name: joined(&name, &inner.name),
+                    group: inner.group,
+                    transform: transform * inner.transform,
+                })),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn joined(path: &str, name: &str) -> String {
+    match (path, name) {
+        ("", name) => name.to_owned(),
+        (path, "") => path.to_owned(),
+        (path, name) => format!("{path}/{name}"),
+    }
+}
+
+fn is_invertible(transform: &DAffine3) -> bool {
+    transform.is_finite() && transform.matrix3.determinant().is_normal() && transform.inverse().is_finite()
+}
+
+/// The value of `transform`: a step, or a list of steps of which the last is applied to the group first, as with the
+/// matrix stacks of graphics libraries.
+pub(super) fn transform(value: Value<'_>) -> Read<DAffine3> {
+    if !value.is_list() {
+        return step(value);
+    }
+    let mut transform = DAffine3::IDENTITY;
+    for item in value.items()? {
+        transform *= step(item)?;
+    }
+    Ok(transform)
+}
+
+/// One of `{ translate = [x, y, z] }`, `{ rotate = [x, y, z, degrees] }`, `{ scale = s }` (or three factors) and
+/// `{ matrix = [[...], [...], [...]] }`, by rows of four.
+fn step(value: Value<'_>) -> Read<DAffine3> {
+    let mut table: Table<'_> = value.table("a step of \"transform\"".to_owned())?;
+    let steps = [
+        table.optional("translate", |value| Ok(DAffine3::from_translation(value.vector()?)))?,
+        table.optional("rotate", rotation)?,
+        table.optional("scale", |value| {
+            let factors = if value.is_list() { value.vector()? } else { DVec3::splat(value.number()?) };
+            Ok(DAffine3::from_scale(factors))
+        })?,
+        table.optional("matrix", |value| {
+            let rows = value.items()?.map(Value::numbers::<4>).collect::<Read<Vec<_>>>()?;
+            let &[x, y, z] = rows.as_slice() else {
+                return Err(value.fault("\"matrix\" wants three rows of four numbers"));
+            };
+            let column = |k: usize| DVec3::new(x[k], y[k], z[k]);
+            let matrix = DMat3::from_cols(column(0), column(1), column(2));
+            Ok(DAffine3::from_mat3_translation(matrix, column(3)))
+        })?,
+    ];
+    let mut given = steps.into_iter().flatten();
+    let (first, second) = (given.next(), given.next());
+    match (first, second) {
+        (Some(step), None) => table.finish().map(|()| step),
+        (Some(_), Some(_)) => Err(value.fault("a step does one thing; write [{ translate = ... }, { scale = ... }]")),
+        (None, _) => {
+            table.finish()?;
+            Err(value.fault("an empty step; it may be translate, rotate, scale or matrix"))
+        }
+    }
+}
+
+fn rotation(value: Value<'_>) -> Read<DAffine3> {
+    let [x, y, z, degrees] = value.numbers()?;
+    let axis = DVec3::new(x, y, z).try_normalize();
+    let axis = axis.ok_or_else(|| value.fault("\"rotate\" wants an axis, not all 0, and degrees"))?;
+    let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
+    Ok(DAffine3::from_quat(DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize()))
+}

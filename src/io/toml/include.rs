@@ -1,0 +1,112 @@
+//! Mesh files that a scene includes.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::table::{Read, Table, Value};
+use crate::error::{Error, Result, Warning};
+use crate::io::{LoadOptions, Normals, Unit, UpAxis, load};
+use crate::math::DAffine3;
+use crate::scene::{Geometry, Scene};
+
+/// Formats that hold meshes. A scene within a scene would bring a second camera and other light.
+const SUFFIXES: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];
+
+/// What is included once, however often it is named.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Include {
+    path: PathBuf,
+    up_axis: UpAxis,
+    unit: Unit,
+    normals: Normals,
+    /// In place of the file's own.
+    material: Option<u32>,
+}
+
+/// A placement within an included file.
+#[derive(Clone)]
+pub(super) struct Placed {
+    pub(super) name: String,
+    /// Index into [`Scene::groups`].
+    pub(super) group: u32,
+    pub(super) transform: DAffine3,
+}
+
+/// The files included so far.
+#[derive(Default)]
+pub(super) struct Includes(HashMap<Include, Vec<Placed>>);
+
+impl Include {
+    /// The keys of `[[file]]` that say what is read. `folder` is the scene file's.
+    pub(super) fn read(table: &mut Table<'_>, folder: &Path, material: Option<u32>) -> Read<Self> {
+        let value = table.need("path")?;
+        let name = value.text()?;
+        let path = folder.join(name);
+        let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+        if !SUFFIXES.contains(&suffix.as_str()) {
+            return Err(value.fault(format!("{name:?} is no mesh file; known are {}", SUFFIXES.join(", "))));
+        }
+        let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];
+        let units = [("m", Unit::Metre), ("cm", Unit::Centimetre), ("mm", Unit::Millimetre), ("in", Unit::Inch)];
+        let kinds = [("file", Normals::File), ("flat", Normals::Flat), ("smooth", Normals::Smooth)];
+        fn choice<T: Copy + Default>(table: &mut Table<'_>, key: &'static str, choices: &[(&str, T)]) -> Read<T> {
+            Ok(table.optional(key, |value: Value<'_>| value.choice(choices))?.unwrap_or_default())
+        }
+        Ok(Self {
+            path,
+            up_axis: choice(table, "up_axis", &axes)?,
+            unit: choice(table, "unit", &units)?,
+            normals: choice(table, "normals", &kinds)?,
+            material,
+        })
+    }
+}
+
+impl Includes {
+    /// Adds what the file holds to `scene`, unless it is there, and gives its placements.
+    ///
+    /// # Errors
+    /// Those of the file, which name it.
+    pub(super) fn add(
+        &mut self,
+        include: Include,
+        scene: &mut Scene,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Vec<Placed>> {
+        if let Some(placed) = self.0.get(&include) {
+            return Ok(placed.clone());
+        }
+        let Include { up_axis, unit, normals, .. } = include;
+        let (mut file, odd) = load(&include.path, &LoadOptions { up_axis, unit, normals })?;
+        warnings.extend(odd);
+        let too_many = |_| Error::input(&include.path, "", "more than 2^32 geometries, together with the scene's");
+        let geometries = u32::try_from(scene.geometries.len() + file.geometries.len()).map_err(too_many)?;
+        let first = geometries - file.geometries.len() as u32;
+        let (groups, materials) = (scene.groups.len() as u32, scene.materials.len() as u32);
+        let textures = scene.textures.len() as u32;
+        for geometry in &mut file.geometries {
+            let (Geometry::Mesh(crate::scene::Mesh { material, .. }) | Geometry::Shapes { material, .. }) = geometry;
+            *material = include.material.unwrap_or(*material + materials);
+        }
+        for texture in file.materials.iter_mut().filter_map(|material| material.diffuse_texture.as_mut()) {
+            *texture += textures;
+        }
+        for group in &mut file.groups {
+            group.geometries = group.geometries.start + first..group.geometries.end + first;
+        }
+        scene.geometries.append(&mut file.geometries);
+        scene.groups.append(&mut file.groups);
+        if include.material.is_none() {
+            scene.materials.append(&mut file.materials);
+            scene.textures.append(&mut file.textures);
+        }
+        let place = |instance: crate::scene::Instance| Placed {
+            name: instance.name,
+            group: instance.group + groups,
+            transform: instance.transform,
+        };
+        let placed: Vec<_> = file.instances.into_iter().map(place).collect();
+        self.0.insert(include, placed.clone());
+        Ok(placed)
+    }
+}

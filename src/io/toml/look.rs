@@ -1,0 +1,259 @@
+//! What is seen of shapes, and from where: materials, lights, cameras, and what the file asks of a render.
+
+use super::table::{Read, Table, Value};
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::scene::{
+    AreaShape, Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Specular, ThinLens,
+};
+
+/// Longest side of a picture.
+const LONGEST_SIDE: u64 = 65_536;
+/// Vertical angle of view where none is given, degrees.
+const USUAL_FOV: f64 = 40.0;
+
+/// How lights and surfaces go together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shading {
+    /// Lights are those of the file.
+    Phong,
+    /// As in Heckbert's `minray`: spheres that glow are lights too, and who misses everything sees the ambient light.
+    Minray,
+}
+
+/// `[render]`.
+pub(super) struct Render {
+    pub(super) request: Request,
+    /// None for a transparent picture.
+    pub(super) background: Option<Vec3>,
+    pub(super) ambient: Vec3,
+    pub(super) shading: Shading,
+    pub(super) headlight: bool,
+}
+
+impl Render {
+    pub(super) fn read(table: Option<Table<'_>>) -> Read<Self> {
+        let mut render = Self {
+            request: Request::default(),
+            background: None,
+            ambient: Vec3::ZERO,
+            shading: Shading::Phong,
+            headlight: true,
+        };
+        let Some(mut table) = table else { return Ok(render) };
+        let side = |length: f64| {
+            (length.fract() == 0.0 && (1.0..=LONGEST_SIDE as f64).contains(&length)).then_some(length as u32)
+        };
+        render.request = Request {
+            size: table.optional("size", |value| {
+                let [width, height] = value.numbers::<2>()?.map(side);
+                let size = width.zip(height).map(|(width, height)| [width, height]);
+                size.ok_or_else(|| value.fault(format!("\"size\" wants two whole numbers from 1 to {LONGEST_SIDE}")))
+            })?,
+            spp: table.optional("spp", |value| value.whole(1..=65_536))?.map(|spp| spp as u32),
+            seed: table.optional("seed", |value| value.whole(0..=u64::MAX))?,
+            max_depth: table.optional("max_depth", |value| value.whole(0..=u32::MAX.into()))?.map(|depth| depth as u32),
+            output: table.optional("output", |value| value.text())?.map(str::to_owned),
+        };
+        render.ambient = table.optional("ambient", |value| value.color())?.unwrap_or_default();
+        let background = table.optional("background", |value| value.color())?;
+        let shadings = [("phong", Shading::Phong), ("minray", Shading::Minray)];
+        render.shading = table.optional("shading", |value| value.choice(&shadings))?.unwrap_or(render.shading);
+        render.headlight = table.optional("headlight", |value| value.flag())?.unwrap_or(true);
+        render.background = background.or(match render.shading {
+            Shading::Phong => None,
+            Shading::Minray => Some(render.ambient),
+        });
+        table.finish()?;
+        Ok(render)
+    }
+}
+
+/// `[material.NAME]`. A texture is left to the caller.
+pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
+    let plain = Material::default();
+    let mut color = |key| table.optional(key, |value| value.color());
+    let diffuse = color("diffuse")?.unwrap_or(plain.diffuse);
+    let (ambient, specular) = (color("ambient")?.unwrap_or(diffuse), color("specular")?.unwrap_or(plain.specular));
+    let (reflection, transmission) =
+        (color("reflection")?.unwrap_or_default(), color("transmission")?.unwrap_or_default());
+    let emission = color("emission")?.unwrap_or_default();
+    let models = [("phong", Specular::Phong), ("blinn-phong", Specular::BlinnPhong)];
+    Ok(Material {
+        name: name.to_owned(),
+        ambient,
+        diffuse,
+        specular,
+        shininess: table.optional("shininess", |value| value.share())?.unwrap_or(plain.shininess),
+        reflection,
+        transmission,
+        ior: match table.get("ior") {
+            None => plain.ior,
+            Some(value) => {
+                let ior = value.share()?;
+                if ior > 0.0 { ior } else { return Err(value.fault("\"ior\" wants a number above 0")) }
+            }
+        },
+        emission,
+        model: table.optional("model", |value| value.choice(&models))?.unwrap_or(plain.model),
+        ..plain
+    })
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Directional,
+    Point,
+    Spot,
+    Rectangle,
+    Disk,
+    Sphere,
+}
+
+/// `[[light]]`.
+pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
+    let kinds = [
+        ("directional", Kind::Directional),
+        ("point", Kind::Point),
+        ("spot", Kind::Spot),
+        ("rectangle", Kind::Rectangle),
+        ("disk", Kind::Disk),
+        ("sphere", Kind::Sphere),
+    ];
+    let kind = table.need("type")?.choice(&kinds)?;
+    let light = match kind {
+        Kind::Directional => {
+            Light::Directional { direction: table.need("direction")?.direction()?, color: color(&mut table)? }
+        }
+        Kind::Point => {
+            let color = color(&mut table)?;
+            let (position, attenuation, range) = place(&mut table)?;
+            let radius = table.optional("radius", |value| value.share())?.unwrap_or(0.0).into();
+            Light::Point { position, color, attenuation, range, radius }
+        }
+        Kind::Spot => {
+            let color = color(&mut table)?;
+            let (position, attenuation, range) = place(&mut table)?;
+            let direction = table.need("direction")?.direction()?;
+            let outer = table.need("outer_angle")?;
+            let outer_angle = outer.share()?;
+            let inner_angle = table.optional("inner_angle", |value| value.share())?.unwrap_or(0.0);
+            if !(inner_angle < outer_angle && outer_angle <= 90.0) {
+                return Err(outer.fault(format!(
+                    "\"outer_angle\" of {outer_angle} degrees; it must be above \"inner_angle\", {inner_angle}, and at most 90"
+                )));
+            }
+            let (inner_angle, outer_angle) = (inner_angle.to_radians(), outer_angle.to_radians());
+            Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle }
+        }
+        Kind::Rectangle => {
+            let centre = table.need("position")?.vector()?;
+            let value = table.need("half_edges")?;
+            let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
+            let half_edges = match edges[..] {
+                [a, b] if a.cross(b).length() > 0.0 => [a, b],
+                _ => return Err(value.unlike("two vectors that are not parallel")),
+            };
+            area(AreaShape::Rectangle { centre, half_edges }, &mut table)?
+        }
+        Kind::Disk => {
+            let (centre, normal) = (table.need("position")?.vector()?, table.need("direction")?.direction()?);
+            area(AreaShape::Disk { centre, normal, radius: length(table.need("radius")?)? }, &mut table)?
+        }
+        Kind::Sphere => {
+            let centre = table.need("position")?.vector()?;
+            area(AreaShape::Sphere { centre, radius: length(table.need("radius")?)? }, &mut table)?
+        }
+    };
+    table.finish()?;
+    Ok(light)
+}
+
+/// What a light without a surface shows.
+fn color(table: &mut Table<'_>) -> Read<Vec3> {
+    Ok(table.optional("color", |value| value.color())?.unwrap_or(Vec3::ONE))
+}
+
+/// A light with a surface.
+fn area(shape: AreaShape, table: &mut Table<'_>) -> Read<Light> {
+    Ok(Light::Area { shape, radiance: table.need("radiance")?.color()? })
+}
+
+/// Position, attenuation and range of a light.
+fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
+    let position = table.need("position")?.vector()?;
+    let attenuation = table.optional("attenuation", |value| {
+        let [constant, linear, quadratic] = value.color()?.to_array();
+        let is_zero = constant + linear + quadratic == 0.0;
+        if is_zero {
+            return Err(value.fault("\"attenuation\" divides by zero; one number must be above 0"));
+        }
+        Ok(Attenuation { constant, linear, quadratic })
+    })?;
+    let range = table.optional("range", |value| {
+        let range = value.number()?;
+        if range > 0.0 { Ok(range) } else { Err(value.fault("\"range\" wants a number above 0")) }
+    })?;
+    Ok((position, attenuation.unwrap_or(Attenuation::NONE), range.unwrap_or(f64::INFINITY)))
+}
+
+/// `[[camera]]`.
+pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
+    let (eye, target) = (table.need("eye")?.vector()?, table.need("look_at")?.vector()?);
+    let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
+    let mut camera = Camera::look_at(eye, target, up, 1.0)
+        .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    camera.projection = projection(&mut table)?;
+    camera.lens = table.optional("lens", lens)?;
+    let bends = table.get("distortion");
+    if let (Some(value), false) = (bends, matches!(camera.projection, Projection::Perspective(_))) {
+        return Err(value.fault("\"distortion\" is for perspective cameras alone"));
+    }
+    camera.distortion = bends
+        .map(|value| {
+            let [k1, k2, k3, p1, p2] = value.numbers()?;
+            Ok(Distortion { k1, k2, k3, p1, p2 })
+        })
+        .transpose()?;
+    camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
+    camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
+    table.finish()?;
+    Ok(camera)
+}
+
+fn projection(table: &mut Table<'_>) -> Read<Projection> {
+    let kinds = ["perspective", "orthographic", "equirectangular"].map(|name| (name, name));
+    match table.optional("projection", |value| value.choice(&kinds))? {
+        Some("orthographic") => Ok(Projection::Orthographic(length(table.need("height")?)?)),
+        Some("equirectangular") => Ok(Projection::Equirectangular),
+        _ => {
+            let vertical = table.optional("fov", angle)?;
+            let horizontal = table.optional("fov_x", angle)?;
+            Ok(Projection::Perspective(match (horizontal, vertical) {
+                (None, vertical) => Fov::Vertical(vertical.unwrap_or(USUAL_FOV.to_radians())),
+                (Some(horizontal), None) => Fov::Horizontal(horizontal),
+                (Some(horizontal), Some(vertical)) => Fov::Both { horizontal, vertical },
+            }))
+        }
+    }
+}
+
+/// `lens = { radius, focus, blades }`.
+fn lens(value: Value<'_>) -> Read<ThinLens> {
+    let mut table = value.table("\"lens\"".to_owned())?;
+    let (radius, focus) = (length(table.need("radius")?)?, length(table.need("focus")?)?);
+    let blades = table.optional("blades", |value| value.whole(0..=100))?.unwrap_or(0) as u32;
+    table.finish()?;
+    Ok(ThinLens { radius, focus, blades })
+}
+
+fn length(value: Value<'_>) -> Read<f64> {
+    let length = value.number()?;
+    if length > 0.0 { Ok(length) } else { Err(value.unlike("a length above 0")) }
+}
+
+/// An angle of view, in radians.
+fn angle(value: Value<'_>) -> Read<f64> {
+    let degrees = value.number()?;
+    let inside = degrees > 0.0 && degrees < 180.0;
+    if inside { Ok(degrees.to_radians()) } else { Err(value.unlike("degrees above 0 and below 180")) }
+}

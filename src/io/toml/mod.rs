@@ -1,0 +1,222 @@
+//! Twincast's own scene format: TOML (Preston-Werner and others, *TOML 1.1*), for whatever the renderer has. docs/SCENES.md
+//! describes every key.
+//!
+//! The document is parsed into a tree that knows its places ([`table`]). The top of the file and each group are bodies:
+//! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
+//! ([`group`]). What is seen of it all, and from where, is in [`look`]. A key that nobody reads is refused.
+
+mod group;
+mod include;
+mod look;
+mod primitives;
+mod table;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use ::toml::de::DeTable;
+
+use self::group::{Body, Child, Groups, Target};
+use self::include::{Include, Includes};
+use self::look::{Render, Shading};
+use self::table::{Fault, Read, Table, Value};
+use super::suggest::suggestion;
+use super::{light_or_darkness, texture};
+use crate::error::{Error, Result, Warning};
+use crate::math::{DAffine3, Vec3};
+use crate::memory::Mapped;
+use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture};
+use crate::shape::Shape;
+
+/// What stops the reading of a file: something in it, or in a file it names.
+enum Stop {
+    Here(Fault),
+    Elsewhere(Error),
+}
+
+impl From<Fault> for Stop {
+    fn from(fault: Fault) -> Self {
+        Self::Here(fault)
+    }
+}
+
+/// Reads a scene file.
+pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
+    let fault = |at: usize, message: String| {
+        let line = 1 + memchr::memchr_iter(b'\n', &file[..at.min(file.len())]).count();
+        Error::input(path, format!("line {line}"), message)
+    };
+    let text = str::from_utf8(file).map_err(|e| fault(e.valid_up_to(), "bytes that are no UTF-8".to_owned()))?;
+    let document = DeTable::parse(text).map_err(|error| {
+        // Its messages may span lines and quote the file.
+        let message: String = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+        fault(error.span().map_or(0, |span| span.start), format!("not TOML: {}", shortened(&message)))
+    })?;
+    let mut reader = Reader {
+        folder: path.parent().unwrap_or(Path::new("")),
+        scene: Scene::default(),
+        warnings,
+        materials: BTreeMap::new(),
+        plain: None,
+        includes: Includes::default(),
+    };
+    match reader.read(Table::new(document.get_ref(), 0, "the file")) {
+        Ok(()) => {
+            let scene = reader.scene;
+            file.done(file);
+            Ok(scene)
+        }
+        Err(Stop::Here(Fault { at, message })) => Err(fault(at, shortened(&message))),
+        Err(Stop::Elsewhere(error)) => Err(error),
+    }
+}
+
+/// Names in a file may be of any length; messages may not.
+fn shortened(message: &str) -> String {
+    let mut short: String = message.chars().take(600).collect();
+    if short.len() < message.len() {
+        short.push('…');
+    }
+    short
+}
+
+struct Reader<'a> {
+    /// What names of files are relative to.
+    folder: &'a Path,
+    scene: Scene,
+    warnings: &'a mut Vec<Warning>,
+    /// Indices by name.
+    materials: BTreeMap<String, u32>,
+    /// The index of the material of primitives that name none, once there is one.
+    plain: Option<u32>,
+    includes: Includes,
+}
+
+impl Reader<'_> {
+    fn read(&mut self, mut top: Table<'_>) -> std::result::Result<(), Stop> {
+        let render = Render::read(top.get("render").map(|value| value.table("[render]".to_owned())).transpose()?)?;
+        (self.scene.ambient, self.scene.background) = (render.ambient, render.background);
+        self.scene.request = render.request;
+        for table in top.tables("camera")? {
+            self.scene.cameras.push(look::camera(table)?);
+        }
+        for table in top.tables("light")? {
+            self.scene.lights.push(look::light(table)?);
+        }
+        for (name, table) in top.named_tables("material")? {
+            self.material(name, table)?;
+        }
+        let mut named = BTreeMap::new();
+        for (name, mut table) in top.named_tables("group")? {
+            let body = self.body(name, &mut table)?;
+            table.finish()?;
+            named.insert(name, body);
+        }
+        let body = self.body("", &mut top)?;
+        top.finish()?;
+        Groups { top: body, named }.unroll(&mut self.scene)?;
+        if render.shading == Shading::Minray {
+            let lamps = lamps(&self.scene);
+            self.scene.lights.extend(lamps);
+        }
+        if !render.headlight || render.shading == Shading::Minray {
+            light_or_darkness(&mut self.scene.lights);
+        }
+        Ok(())
+    }
+
+    fn material(&mut self, name: &str, mut table: Table<'_>) -> std::result::Result<(), Stop> {
+        let mut material = look::material(name, &mut table)?;
+        if let Some(value) = table.get("texture") {
+            let path = self.folder.join(value.text()?);
+            let picture: Option<Texture> = texture::open(&path).map_err(Stop::Elsewhere)?;
+            let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
+            material.diffuse_texture = Some(self.scene.textures.len() as u32);
+            self.scene.textures.push(picture);
+        }
+        table.finish()?;
+        self.materials.insert(name.to_owned(), self.scene.materials.len() as u32);
+        self.scene.materials.push(material);
+        Ok(())
+    }
+
+    /// What stands in a group, or at the top of the file.
+    fn body(&mut self, name: &str, table: &mut Table<'_>) -> std::result::Result<Body, Stop> {
+        let geometries = primitives::geometries(table, &mut |table| self.material_of(table))?;
+        let mut body = Body::default();
+        for mut file in table.tables("file")? {
+            body.children.push(self.file(&mut file)?);
+            file.finish()?;
+        }
+        for mut instance in table.tables("instance")? {
+            let value = instance.need("group")?;
+            let group = value.text()?;
+            let name = instance.optional("name", Value::text)?.unwrap_or(group).to_owned();
+            let transform = instance.optional("transform", group::transform)?.unwrap_or(DAffine3::IDENTITY);
+            body.children.push(Child { name, transform, target: Target::Group(group.to_owned()), at: value.at });
+            instance.finish()?;
+        }
+        if !geometries.is_empty() {
+            let first = self.scene.geometries.len() as u32;
+            self.scene.geometries.extend(geometries);
+            body.own = Some(self.scene.groups.len() as u32);
+            let geometries = first..self.scene.geometries.len() as u32;
+            self.scene.groups.push(Group { name: name.to_owned(), geometries });
+        }
+        Ok(body)
+    }
+
+    fn file(&mut self, table: &mut Table<'_>) -> std::result::Result<Child, Stop> {
+        let material = table.get("material").map(|value| self.named_material(value)).transpose()?;
+        let include = Include::read(table, self.folder, material)?;
+        let at = table.need("path")?.at;
+        let name = table.optional("name", Value::text)?.unwrap_or_default().to_owned();
+        let transform = table.optional("transform", group::transform)?.unwrap_or(DAffine3::IDENTITY);
+        let placed = self.includes.add(include, &mut self.scene, self.warnings).map_err(Stop::Elsewhere)?;
+        Ok(Child { name, transform, target: Target::File(placed), at })
+    }
+
+    /// The material that a primitive's table names, or the plain one.
+    fn material_of(&mut self, table: &mut Table<'_>) -> Read<u32> {
+        match table.get("material") {
+            Some(value) => self.named_material(value),
+            None => Ok(*self.plain.get_or_insert_with(|| {
+                self.scene.materials.push(Material::default());
+                self.scene.materials.len() as u32 - 1
+            })),
+        }
+    }
+
+    fn named_material(&self, value: Value<'_>) -> Read<u32> {
+        let name = value.text()?;
+        let found = self.materials.get(name).copied();
+        found.ok_or_else(|| {
+            let near = suggestion(name, self.materials.keys().map(String::as_str));
+            value.fault(format!("no [material.{name}]{near}"))
+        })
+    }
+}
+
+/// A light for each sphere that glows, where it stands: the light at its middle, the sphere its lamp.
+fn lamps(scene: &Scene) -> Vec<Light> {
+    let mut lamps = Vec::new();
+    for instance in &scene.instances {
+        let scale = instance.transform.matrix3.determinant().abs().cbrt();
+        for (_, geometry) in scene.group_geometries(instance.group) {
+            let Geometry::Shapes { shapes, material } = geometry else { continue };
+            let color = scene.materials[*material as usize].emission;
+            let spheres = shapes.iter().filter_map(|shape| match shape {
+                Shape::Sphere(sphere) if color != Vec3::ZERO => Some(sphere),
+                _ => None,
+            });
+            lamps.extend(spheres.map(|sphere| Light::Point {
+                position: instance.transform.transform_point3(sphere.centre.as_dvec3()),
+                color,
+                attenuation: Attenuation::NONE,
+                range: f64::INFINITY,
+                radius: f64::from(sphere.radius) * scale,
+            }));
+        }
+    }
+    lamps
+}

@@ -1,0 +1,157 @@
+//! The primitives of a body: the top of the file, or a group. One table each.
+
+use std::sync::Arc;
+
+use super::table::{Fault, Read, Table, Value};
+use crate::io::parts::Parts;
+use crate::math::{DVec3, Mat3, Vec2, Vec3};
+use crate::scene::{Geometry, Mesh};
+use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Shape, Sphere};
+
+/// Material of a primitive by its name.
+pub(super) type Materials<'a> = dyn FnMut(&mut Table<'_>) -> Read<u32> + 'a;
+
+/// Reads a shape of its table; material and unknown keys are left to the caller.
+type ReadShape = fn(&mut Table<'_>) -> Read<Shape>;
+
+/// Each shape by its key.
+const SHAPES: [(&str, ReadShape); 8] = [
+    ("sphere", sphere),
+    ("plane", plane),
+    ("disk", disk),
+    ("box", cuboid),
+    ("cylinder", cylinder),
+    ("cone", cone),
+    ("ellipsoid", ellipsoid),
+    ("polygon", polygon),
+];
+
+/// All primitives of a body, sorted by material, then the meshes.
+pub(super) fn geometries(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
+    let mut parts = Parts::default();
+    for (key, read) in SHAPES {
+        for mut table in body.tables(key)? {
+            let shape = read(&mut table)?;
+            shape.check().map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
+            parts.shape(material(&mut table)?, shape);
+            table.finish()?;
+        }
+    }
+    for mut table in body.tables("triangle")? {
+        let corners = list(table.need("corners")?, Value::vector)?;
+        let corners: [DVec3; 3] =
+            corners.try_into().map_err(|_| table.fault("a [[triangle]] has three \"corners\""))?;
+        let material = material(&mut table)?;
+        parts.triangle(material, corners).map_err(|message| table.fault(message))?;
+        table.finish()?;
+    }
+    let mut geometries = parts.into_geometries();
+    for mut table in body.tables("mesh")? {
+        let mesh = Mesh { material: material(&mut table)?, ..mesh(&mut table)? };
+        table.finish()?;
+        geometries.push(Geometry::Mesh(mesh));
+    }
+    Ok(geometries)
+}
+
+fn list<'t, T>(value: Value<'t>, read: impl Fn(Value<'t>) -> Read<T>) -> Read<Vec<T>> {
+    value.items()?.map(read).collect()
+}
+
+fn point(table: &mut Table<'_>, key: &'static str) -> Read<Vec3> {
+    Ok(table.need(key)?.vector()?.as_vec3())
+}
+
+fn length(table: &mut Table<'_>, key: &'static str) -> Read<f32> {
+    Ok(table.need(key)?.number()? as f32)
+}
+
+fn capped(table: &mut Table<'_>) -> Read<bool> {
+    Ok(table.optional("capped", Value::flag)?.unwrap_or(true))
+}
+
+fn sphere(table: &mut Table<'_>) -> Read<Shape> {
+    Ok(Shape::Sphere(Sphere { centre: point(table, "centre")?, radius: length(table, "radius")? }))
+}
+
+fn plane(table: &mut Table<'_>) -> Read<Shape> {
+    Ok(Shape::Plane(Plane { point: point(table, "point")?, normal: point(table, "normal")? }))
+}
+
+fn disk(table: &mut Table<'_>) -> Read<Shape> {
+    let (centre, normal) = (point(table, "centre")?, point(table, "normal")?);
+    Ok(Shape::Disk(Disk { centre, normal, radius: length(table, "radius")? }))
+}
+
+fn cuboid(table: &mut Table<'_>) -> Read<Shape> {
+    Ok(Shape::Cuboid(Cuboid { min: point(table, "min")?, max: point(table, "max")? }))
+}
+
+fn cylinder(table: &mut Table<'_>) -> Read<Shape> {
+    let (base, apex, radius) = (point(table, "base")?, point(table, "apex")?, length(table, "radius")?);
+    Ok(Shape::Cylinder(Cylinder { base, apex, radius, capped: capped(table)? }))
+}
+
+fn cone(table: &mut Table<'_>) -> Read<Shape> {
+    let (base, base_radius) = (point(table, "base")?, length(table, "base_radius")?);
+    let (apex, apex_radius) = (point(table, "apex")?, table.optional("apex_radius", Value::number)?);
+    let apex_radius = apex_radius.unwrap_or(0.0) as f32;
+    Ok(Shape::Cone(Cone { base, base_radius, apex, apex_radius, capped: capped(table)? }))
+}
+
+fn ellipsoid(table: &mut Table<'_>) -> Read<Shape> {
+    let centre = point(table, "centre")?;
+    let radii = table.optional("radii", Value::vector)?;
+    let axes = table.optional("axes", |value| list(value, Value::vector))?;
+    let axes = match (radii, axes.as_deref()) {
+        (Some(radii), None) => Mat3::from_diagonal(radii.as_vec3()),
+        (None, Some(&[x, y, z])) => Mat3::from_cols(x.as_vec3(), y.as_vec3(), z.as_vec3()),
+        _ => {
+            return Err(table.fault("an [[ellipsoid]] has either \"radii\", three numbers, or \"axes\", three vectors"));
+        }
+    };
+    Ok(Shape::Ellipsoid(Ellipsoid { centre, axes }))
+}
+
+fn polygon(table: &mut Table<'_>) -> Read<Shape> {
+    let corners = list(table.need("corners")?, Value::vector)?;
+    let polygon = Polygon::new(corners.into_iter().map(|p| p.as_vec3()).collect());
+    polygon.map(|polygon| Shape::Polygon(Arc::new(polygon))).map_err(|problem| table.fault(problem.to_string()))
+}
+
+/// `[[mesh]]`, without its material.
+fn mesh(table: &mut Table<'_>) -> Read<Mesh> {
+    let positions = list(table.need("positions")?, Value::vector)?;
+    let corner = |value: Value<'_>| {
+        let last = positions.len().checked_sub(1).ok_or_else(|| value.fault("\"triangles\" without \"positions\""))?;
+        value.whole(0..=last as u64).map(|index| index as u32)
+    };
+    let triangle = |value: Value<'_>| -> Read<[u32; 3]> {
+        let corners = list(value, corner)?;
+        corners.try_into().map_err(|_| value.fault("a triangle is a list of three indices"))
+    };
+    let triangles = list(table.need("triangles")?, triangle)?;
+    let normals = table.optional("normals", |value| {
+        let normals = list(value, |normal| Ok(normal.vector()?.normalize_or_zero().as_vec3()))?;
+        as_many(value, "normals", normals, positions.len())
+    })?;
+    let uvs = table.optional("uvs", |value| {
+        let uvs = list(value, |uv| Ok(Vec2::from_array(uv.numbers::<2>()?.map(|x| x as f32))))?;
+        as_many(value, "uvs", uvs, positions.len())
+    })?;
+    let mut mesh = Mesh {
+        name: table.optional("name", Value::text)?.unwrap_or_default().to_owned(),
+        normals: normals.unwrap_or_default(),
+        uvs: uvs.unwrap_or_default(),
+        triangles: Arc::new(triangles),
+        ..Mesh::default()
+    };
+    mesh.set_positions(&positions);
+    Ok(mesh)
+}
+
+/// Whether an attribute is there for every vertex.
+fn as_many<T>(value: Value<'_>, what: &str, list: Vec<T>, positions: usize) -> Result<Vec<T>, Fault> {
+    let count = list.len();
+    if count == positions { Ok(list) } else { Err(value.fault(format!("{count} {what} for {positions} positions"))) }
+}

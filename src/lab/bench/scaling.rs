@@ -1,0 +1,274 @@
+//! Time against the number of primitives, for every accelerator: which are linear, which are not, and from where on it matters.
+//!
+//! Two families of triangles: *scattered* ones of no order, with edges of about the distance to the next, which is what grids are
+//! good at; and a *terrain*, a mesh in which most of space is empty. The same rays for all accelerators, from a sphere around the scene to points in its
+//! bounds; the best of a few passes counts, since whatever else the machine does makes passes slower and never faster. An accelerator
+//! that takes longer than a limit for a step is not asked for more primitives.
+//!
+//! A grid is as good as its resolution: a second series traces one scene with grids from too coarse to too fine.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::lab::Entrant;
+use crate::lab::rays::Random;
+use crate::math::Vec3;
+use crate::ray::Ray;
+use crate::scene::{self, Geometry, Material, Mesh, Scene};
+use crate::trace::accel::{Accel, Options, Resolution};
+use crate::trace::{Tracer, World};
+
+/// Rays of a pass.
+const RAYS: u64 = 1 << 14;
+/// Rays that are traced together, between looks at the clock.
+const CHUNK: usize = 64;
+/// Passes, of which the best counts.
+const PASSES: usize = 5;
+/// How long a pass takes at most; with what was traced by then it ends.
+const PASS: Duration = Duration::from_millis(500);
+/// An accelerator that took so long to build, or so long for 2^14 rays, is not asked for more primitives.
+const LONGEST: Duration = Duration::from_secs(10);
+/// Triangles in the series over resolutions.
+const SWEPT: u64 = 100_000;
+/// Grids of that series, cells along the longest side.
+const RESOLUTIONS: [u32; 9] = [2, 4, 8, 16, 32, 64, 128, 256, 512];
+
+/// What is measured.
+pub struct Scaling<'a> {
+    /// Most primitives.
+    pub max: u64,
+    /// Stops it once set.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Called before each step, with what it is.
+    pub on_step: Option<&'a (dyn Fn(&str) + Sync)>,
+}
+
+/// A kind of scene that can have any number of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Small triangles without order.
+    Scattered,
+    /// A height field.
+    Terrain,
+}
+
+/// One accelerator and one number of primitives.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// The scene.
+    pub family: Family,
+    /// The accelerator.
+    pub accel: &'static str,
+    /// Triangles.
+    pub primitives: u64,
+    /// Seconds to build it, on all threads.
+    pub build_seconds: f64,
+    /// Microseconds for a ray, on one thread.
+    pub microseconds_a_ray: f64,
+    /// Memory for each triangle.
+    pub bytes_a_primitive: f64,
+    /// What there is to say about how it was built.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+/// One grid of the series over resolutions.
+#[derive(Clone, Debug, Serialize)]
+pub struct Swept {
+    /// Cells along the longest side; none for the grid's own choice.
+    pub cells: Option<u32>,
+    /// As in [`Point`].
+    pub point: Point,
+}
+
+/// What was measured. Serialises as the document of `bench --scaling --json`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ScalingReport {
+    /// One for each family, accelerator and number.
+    pub points: Vec<Point>,
+    /// Where accelerators were given up.
+    pub stopped: Vec<String>,
+    /// The grid by its resolution.
+    pub grids: Vec<Swept>,
+}
+
+impl Family {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Scattered, Self::Terrain];
+
+    /// As in the reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scattered => "scattered",
+            Self::Terrain => "terrain",
+        }
+    }
+
+    /// A scene of about so many triangles.
+    fn mesh(self, count: u64) -> Mesh {
+        match self {
+            Self::Scattered => scattered(count),
+            Self::Terrain => scene::terrain(((count as f64 / 2.0).sqrt().round() as u32).max(1)),
+        }
+    }
+}
+
+/// Triangles in the cube [-1, 1]^3, of half the size of the room that each of them has.
+fn scattered(count: u64) -> Mesh {
+    let size = 1.0 / (count as f32).cbrt();
+    let corners = (0..count).into_par_iter().flat_map_iter(|i| {
+        let mut random = Random::new(1, i);
+        let middle = random.vector();
+        [0; 3].map(|_| middle + random.vector() * size)
+    });
+    let triangles = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh::new(corners.collect(), triangles)
+}
+
+/// From a sphere around the world to points in its bounds.
+fn rays(world: &World) -> Vec<Ray> {
+    let bounds = world.bounds();
+    let (centre, half) = (bounds.centre(), bounds.size() * 0.5);
+    let ray = |i| {
+        let mut random = Random::new(2, i);
+        let from = centre + random.direction() * (2.0 * half.length());
+        let to: Vec3 = centre + random.vector() * half;
+        Ray::new(from, to - from)
+    };
+    (0..RAYS).map(ray).collect()
+}
+
+impl Scaling<'_> {
+    /// Measures all families, accelerators and numbers in turn, then the grids.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] once `cancel` is set, and those of Embree.
+    pub fn run(&self) -> Result<ScalingReport> {
+        let mut report = ScalingReport::default();
+        for family in Family::ALL {
+            let mut entrants = Entrant::all();
+            let mut count = 10;
+            while count <= self.max && !entrants.is_empty() {
+                let world = world(family.mesh(count))?;
+                let rays = rays(&world);
+                let mut kept = Vec::new();
+                for entrant in entrants {
+                    self.step(&format!("{} {count}: {}", family.name(), entrant.name()))?;
+                    let point = measure(&world, &rays, family, entrant, &Options::default())?;
+                    let longest = LONGEST.as_secs_f64();
+                    let (build, trace) = (point.build_seconds, point.microseconds_a_ray * 1e-6 * RAYS as f64);
+                    if build.max(trace) < longest {
+                        kept.push(entrant);
+                    } else if count < self.max {
+                        let (name, what) = (entrant.name(), if build > trace { "building" } else { "tracing" });
+                        let scene = family.name();
+                        report.stopped.push(format!("{scene}: {name} ends at {count}, {what} takes over {longest} s"));
+                    }
+                    report.points.push(point);
+                }
+                entrants = kept;
+                // 10, 30, 100, 300 ...
+                count = if count.to_string().starts_with('1') { count * 3 } else { count / 3 * 10 };
+            }
+        }
+        self.sweep(&mut report)?;
+        Ok(report)
+    }
+
+    fn sweep(&self, report: &mut ScalingReport) -> Result<()> {
+        let (family, grid) = (Family::Scattered, Entrant::Accel(Accel::Grid));
+        let world = world(family.mesh(SWEPT.min(self.max)))?;
+        let rays = rays(&world);
+        for cells in RESOLUTIONS.into_iter().map(Some).chain([None]) {
+            self.step(&format!("grid of {}", cells.map_or("its own choice".to_owned(), |n| n.to_string())))?;
+            let options = Options { grid: cells.map(Resolution::Longest), ..Options::default() };
+            let point = measure(&world, &rays, family, grid, &options)?;
+            report.grids.push(Swept { cells, point });
+        }
+        Ok(())
+    }
+
+    fn step(&self, what: &str) -> Result<()> {
+        if let Some(on_step) = self.on_step {
+            on_step(what);
+        }
+        let cancelled = self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        if cancelled { Err(Error::Interrupted) } else { Ok(()) }
+    }
+}
+
+fn world(mesh: Mesh) -> Result<World> {
+    World::new(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]))
+}
+
+fn measure(world: &World, rays: &[Ray], family: Family, entrant: Entrant, options: &Options) -> Result<Point> {
+    let start = Instant::now();
+    let built = entrant.build(world, options)?;
+    let build_seconds = start.elapsed().as_secs_f64();
+    let best = (0..PASSES).map(|_| pass(&built, rays)).fold(f64::INFINITY, f64::min);
+    let primitives = world.primitive_count();
+    Ok(Point {
+        family,
+        accel: entrant.name(),
+        primitives,
+        build_seconds,
+        microseconds_a_ray: best * 1e6,
+        bytes_a_primitive: built.bytes as f64 / primitives as f64,
+        notes: built.notes,
+    })
+}
+
+/// Seconds for a ray.
+fn pass(tracer: &impl Tracer, rays: &[Ray]) -> f64 {
+    let start = Instant::now();
+    let (mut hits, mut traced) = ([None; CHUNK], 0);
+    for rays in rays.chunks(CHUNK) {
+        tracer.closest_batch(rays, &mut hits[..rays.len()], Default::default());
+        std::hint::black_box(&hits);
+        traced += rays.len();
+        if start.elapsed() > PASS {
+            break;
+        }
+    }
+    start.elapsed().as_secs_f64() / traced as f64
+}
+
+impl fmt::Display for ScalingReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let head = |f: &mut fmt::Formatter<'_>, first: &str| {
+            writeln!(f, "  {first:<12}{:>12}{:>12}{:>14}", "build, ms", "us a ray", "B a triangle")
+        };
+        let row = |f: &mut fmt::Formatter<'_>, name: &str, point: &Point| {
+            let Point { build_seconds, microseconds_a_ray, bytes_a_primitive, .. } = point;
+            let build = build_seconds * 1e3;
+            writeln!(f, "  {name:<12}{build:>12.2}{microseconds_a_ray:>12.3}{bytes_a_primitive:>14.1}")
+        };
+        for same in self.points.chunk_by(|a, b| (a.family, a.primitives) == (b.family, b.primitives)) {
+            writeln!(f, "{}, {} triangles", same[0].family.name(), same[0].primitives)?;
+            head(f, "")?;
+            same.iter().try_for_each(|point| row(f, point.accel, point))?;
+            let notes = same.iter().filter(|point| point.accel != Accel::Grid.name());
+            for (name, note) in notes.flat_map(|point| point.notes.iter().map(|note| (point.accel, note))) {
+                writeln!(f, "  {name}: {note}")?;
+            }
+            writeln!(f)?;
+        }
+        for stopped in &self.stopped {
+            writeln!(f, "{stopped}")?;
+        }
+        if let Some(first) = self.grids.first() {
+            writeln!(f, "\ngrids, {} scattered triangles", first.point.primitives)?;
+            head(f, "cells a side")?;
+            for Swept { cells, point } in &self.grids {
+                row(f, &cells.map_or("own choice".to_owned(), |n| n.to_string()), point)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+//! From a point of the film to a ray.
+//!
+//! Directions and origins are computed in f64 and rounded once.
+
+mod general;
+mod pinhole;
+
+use crate::error::{Error, Result};
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::ray::Ray;
+use crate::scene::{Camera, Projection};
+
+use general::General;
+pub(super) use pinhole::Pinhole;
+
+/// A camera in front of a film of given size, in world coordinates.
+#[derive(Clone, Debug)]
+pub(super) enum View {
+    /// A perspective that is sharp everywhere and bends nothing.
+    Pinhole(Pinhole),
+    /// Any other.
+    General(Box<General>),
+}
+
+impl View {
+    /// `centre` is [`World::centre`](crate::World).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for angles, heights and lenses that cannot be, for parts that do not go together, and for a view
+    /// so narrow that neighbouring pixels would have the same ray.
+    pub(super) fn new(camera: &Camera, centre: DVec3, width: u32, height: u32) -> Result<Self> {
+        let size = DVec2::new(f64::from(width), f64::from(height));
+        let half = camera.projection.half_extent(size.x / size.y).ok_or_else(|| {
+            Error::Usage(match camera.projection {
+                Projection::Perspective(fov) => {
+                    format!("angle of view {fov}: must be above 0 and below 180 degrees")
+                }
+                Projection::Orthographic(height) => format!("a view of height {height} m: must be above 0"),
+                Projection::Equirectangular => "a view that cannot be".to_owned(),
+            })
+        })?;
+        if let Projection::Perspective(_) = camera.projection {
+            check_resolution(half, size)?;
+        }
+        let view = General::new(camera, centre, size, half)?;
+        let plain = matches!(camera.projection, Projection::Perspective(_))
+            && camera.lens.is_none()
+            && camera.distortion.is_none();
+        Ok(if plain { Self::Pinhole(Pinhole::new(camera, centre, size, half)) } else { Self::General(Box::new(view)) })
+    }
+
+    /// The ray through a point of the film in pixels, from its top left corner, and through the point of the lens that
+    /// `lens` gives, evenly over the unit square. Points of the film that the lens does not reach have a ray that is not
+    /// valid, and sees nothing.
+    pub(super) fn ray(&self, film: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
+        match self {
+            Self::Pinhole(pinhole) => pinhole.ray(film),
+            Self::General(view) => {
+                let lens = if view.has_lens() { lens() } else { DVec2::ZERO };
+                view.ray(film, lens)
+            }
+        }
+    }
+}
+
+/// Unit vectors in f32 differ by 2^-24 at least where a component is near 1; twice that tells every two pixels apart.
+fn check_resolution(half: DVec2, size: DVec2) -> Result<()> {
+    const STEP: f64 = 1.2e-7;
+    if half.x * 2.0 >= STEP * size.x && half.y * 2.0 >= STEP * size.y {
+        return Ok(());
+    }
+    let smallest = 2.0 * libm::atan(STEP * size.y / 2.0).to_degrees();
+    Err(Error::Usage(format!(
+        "an angle of view so small that neighbouring pixels would have the same ray: take at least {smallest:.2e} degrees \
+         (vertical), or fewer pixels"
+    )))
+}
+
+/// A ray that hits nothing.
+fn no_ray(origin: Vec3) -> Ray {
+    Ray::new(origin, Vec3::ZERO)
+}

@@ -1,0 +1,140 @@
+//! Points of a light's surface, chosen evenly: by area for flat ones, by the cone they fill for spheres (Shirley, Wang,
+//! Zimmerman 1996, *Monte Carlo techniques for direct lighting calculations*).
+
+use super::light::Illumination;
+use crate::math::{DVec2, DVec3, Vec3, gamma, tangents};
+use crate::scene::AreaShape;
+
+/// Chained f32 roundings in the test of a ray against what stands in a light's place; generous.
+const ROUNDINGS: u32 = 32;
+
+/// What arrives at `point` from the part of the light that `even`, a point of the unit square, chooses, as if all of it
+/// shone like that part; none where the light turns its back.
+pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: DVec2) -> Option<Illumination> {
+    match *shape {
+        AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+            let at = even * 2.0 - 1.0;
+            // The cross product of the halves is a quarter of the area.
+            flat(point, centre + a * at.x + b * at.y, a.cross(b) * 4.0, radiance)
+        }
+        AreaShape::Disk { centre, normal, radius } => {
+            let [x, y] = tangents(normal);
+            let (distance, angle) = (radius * even.x.sqrt(), even.y * std::f64::consts::TAU);
+            let at = centre + (x * libm::cos(angle) + y * libm::sin(angle)) * distance;
+            flat(point, at, normal * (std::f64::consts::PI * radius * radius), radiance)
+        }
+        AreaShape::Sphere { centre, radius } => sphere(point, centre, radius, radiance, even),
+    }
+}
+
+/// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
+/// sends on 1 / pi.
+fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumination> {
+    let offset = at - point;
+    let squared = offset.length_squared();
+    let to_light = offset.try_normalize()?;
+    let facing = -to_light.dot(area);
+    if facing <= 0.0 {
+        return None;
+    }
+    let color = radiance * (facing / (std::f64::consts::PI * squared)) as f32;
+    color.is_finite().then(|| Illumination { to_light, color, end: Some(short_of(at, to_light, point)) })
+}
+
+/// From a direction of the cone that the sphere fills.
+fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, even: DVec2) -> Option<Illumination> {
+    let offset = centre - point;
+    let distance = offset.length();
+    let axis = offset.try_normalize().unwrap_or(DVec3::Y);
+    // 1 - cos of the cone's half angle, without the difference; of all directions for a point inside.
+    let sine = (radius / distance).min(1.0);
+    let opening = if distance > radius { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 };
+    let height = even.x * opening;
+    let (cosine, off_axis) = (1.0 - height, (height * (2.0 - height)).max(0.0).sqrt());
+    let [x, y] = tangents(axis);
+    let angle = even.y * std::f64::consts::TAU;
+    let to_light = axis * cosine + (x * libm::cos(angle) + y * libm::sin(angle)) * off_axis;
+    // The solid angle is 2 pi times the opening.
+    let color = radiance * (2.0 * opening) as f32;
+    let half_chord = (radius * radius - (distance * off_axis).powi(2)).max(0.0).sqrt();
+    let way = distance * cosine + if distance > radius { -half_chord } else { half_chord };
+    let at = point + to_light * way.max(0.0);
+    Some(Illumination { to_light, color, end: Some(short_of(at, to_light, point)) })
+}
+
+/// A point before `at` on the way from `point`, by what f32 may move the surface there: what stands in the light's place must
+/// not be in its way.
+pub(super) fn short_of(at: DVec3, to_light: DVec3, point: DVec3) -> DVec3 {
+    let slack = f64::from(gamma(ROUNDINGS)) * (at.abs().max_element() + (at - point).length());
+    at - to_light * slack.min((at - point).dot(to_light).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean over a grid, of colour times the cosine at a surface whose normal is `normal`.
+    fn reflected(shape: &AreaShape, point: DVec3, normal: DVec3) -> f64 {
+        let side = 400;
+        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let each = (0..side * side).filter_map(|k| illuminate(shape, Vec3::ONE, point, even(k)));
+        each.map(|light| f64::from(light.color.x) * light.to_light.dot(normal).max(0.0)).sum::<f64>()
+            / f64::from(side * side)
+    }
+
+    /// Form factors from Howell, *A catalog of radiation heat transfer configuration factors*.
+    #[test]
+    fn form_factors() {
+        let (r, d) = (0.7, 2.0);
+        let up = DVec3::Y * d;
+        // B-17: a sphere, its centre above the element: (r / d)^2, times the cosine for an element that leans.
+        let ball = AreaShape::Sphere { centre: up, radius: r };
+        for lean in [0.0, 0.5, 1.0f64] {
+            let normal = DVec3::new(lean.sin(), lean.cos(), 0.0);
+            let got = reflected(&ball, DVec3::ZERO, normal);
+            assert!((got - (r / d).powi(2) * lean.cos()).abs() < 1e-5, "{lean}: {got}");
+        }
+        // B-12: a parallel disk over the element: r^2 / (d^2 + r^2).
+        let disk = AreaShape::Disk { centre: up, normal: DVec3::NEG_Y, radius: r };
+        assert!((reflected(&disk, DVec3::ZERO, DVec3::Y) - r * r / (d * d + r * r)).abs() < 1e-5);
+        // B-3: a parallel rectangle a x b with a corner over the element, at distance c.
+        let (a, b) = (1.5, 0.8);
+        let corner = AreaShape::Rectangle {
+            centre: DVec3::new(a / 2.0, d, b / 2.0),
+            half_edges: [DVec3::X * a / 2.0, DVec3::Z * b / 2.0],
+        };
+        let (x, y) = (a / d, b / d);
+        let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
+        let expected = (x / p * (y / p).atan() + y / q * (x / q).atan()) / std::f64::consts::TAU;
+        assert!((reflected(&corner, DVec3::ZERO, DVec3::Y) - expected).abs() < 1e-5, "X x Z is -Y: it shines down");
+        let back = AreaShape::Disk { centre: up, normal: DVec3::Y, radius: r };
+        assert_eq!(reflected(&back, DVec3::ZERO, DVec3::Y), 0.0, "behind it is dark");
+    }
+
+    #[test]
+    fn within_a_ball_of_light_everything_is_as_bright() {
+        let ball = AreaShape::Sphere { centre: DVec3::new(0.1, 0.2, 0.3), radius: 2.0 };
+        assert!((reflected(&ball, DVec3::ZERO, DVec3::Y) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn shadow_rays_end_short_of_the_light() {
+        let centre = DVec3::new(100.0, 50.0, 0.0);
+        for shape in [
+            AreaShape::Sphere { centre, radius: 3.0 },
+            AreaShape::Disk { centre, normal: DVec3::new(-2.0, -1.0, 0.0).normalize(), radius: 3.0 },
+        ] {
+            for k in 0..100 {
+                let even = DVec2::new(f64::from(k % 10) + 0.5, f64::from(k / 10) + 0.5) / 10.0;
+                let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, even).unwrap();
+                let end = arriving.end.unwrap();
+                let beyond = match shape {
+                    AreaShape::Sphere { .. } => (end - centre).length() - 3.0,
+                    _ => (centre - end).dot(centre.normalize()),
+                };
+                assert!(beyond > 1e-5 && beyond < 2e-2, "{shape:?}: {beyond}");
+                assert!((end.normalize() - arriving.to_light).length() < 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! A kd-tree: a BSP tree of planes across the axes (Wald, Havran 2006, *On building fast kd-trees for ray tracing, and on doing that in O(N
+//! log N)*).
+//!
+//! Each plane is where the surface area heuristic expects rays to cost least: cells that are empty, or large with little in them, are
+//! cut off early. An item lies in every cell that its box, cut off at the cell, reaches. Large cells choose among 32 planes an axis, counted in bins (Hunt, Mark, Stoll
+//! 2006, *Fast kd-tree construction with an adaptive error-bounded heuristic*; Shevtsov, Soupikov, Kapustin 2007), small ones among the sides of all boxes. Sorting the
+//! sides once and keeping them sorted, as Wald and Havran do, finds slightly better planes and takes three times as long to build and to read.
+//!
+//! A ray carries its range of t from cell to cell and visits the near child first; a far child that begins behind the
+//! nearest hit is left out.
+
+use rayon::join;
+
+use super::items::Input;
+use super::ray::IndexRay;
+use super::{Cell, Index, Options, share};
+use crate::math::{Aabb, DVec3, Vec3};
+
+/// What going through a node costs, in tests of an item.
+const NODE_COST: f32 = 0.15;
+/// What is left of a cost where one side is empty (Wald, Havran 2006).
+const EMPTY_BONUS: f32 = 0.8;
+/// Bins an axis.
+const BINS: usize = 32;
+/// Up to this many items the sides of all boxes are tried.
+const FEW: usize = 32;
+/// From this many items on, children are built side by side.
+const MANY: usize = 1 << 12;
+/// References for each item that cutting may add in all; every cell has its share.
+const MOST_REFERENCES: usize = 12;
+/// Levels of planes at most, whatever the depth by number of items.
+const STACK: usize = 80;
+
+/// The index.
+pub(super) struct KdTree {
+    bounds: Aabb,
+    /// The root first; a node's lower child follows it.
+    nodes: Vec<Node>,
+    items: Vec<u32>,
+}
+
+/// 8 bytes.
+#[derive(Clone, Copy)]
+struct Node {
+    /// The plane's coordinate; of a leaf, the bits of its first item's number.
+    plane: f32,
+    /// Below, in two bits, the axis, or [`LEAF`]. Above, the upper child; of a leaf, how many items it has.
+    link: u32,
+}
+
+const LEAF: u32 = 3;
+
+/// A tree that is being built.
+enum Branch {
+    Leaf(Vec<u32>),
+    Plane { axis: usize, plane: f32, children: Box<[Branch; 2]> },
+}
+
+/// A cell with everything that is in it.
+struct Part<'a> {
+    boxes: &'a [Aabb],
+    bounds: Aabb,
+    items: Vec<u32>,
+    /// How many more planes may cut it.
+    depth: u32,
+    /// How many more references there may be in it.
+    room: usize,
+}
+
+impl Index for KdTree {
+    const REPEATS: bool = true;
+
+    fn build(input: &Input<'_>, _: &Options) -> Self {
+        let bounds = input.bounds();
+        let items = input.all();
+        let room = MOST_REFERENCES * items.len();
+        // As deep as Havran 2000 found to pay, plus some for uneven scenes.
+        let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
+        let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32), room };
+        let mut tree = Self { bounds, nodes: Vec::new(), items: Vec::new() };
+        tree.place(whole.build());
+        tree
+    }
+
+    fn visit(&self, ray: &IndexRay, mut limit: f64, each: &mut impl FnMut(u32) -> f64) {
+        if self.bounds.is_empty() {
+            return;
+        }
+        let mut range = ray.within_box(&self.bounds, limit);
+        if range.is_empty() {
+            return;
+        }
+        let (mut stack, mut waiting) = ([(0, range); STACK], 0);
+        let mut at = 0;
+        loop {
+            let node = self.nodes[at as usize];
+            let axis = node.link & 3;
+            if axis != LEAF {
+                let (near, far) = ray.split(axis as usize, node.plane.into(), range);
+                let (below, above) = (at + 1, node.link >> 2);
+                let (first, second) = if ray.backwards[axis as usize] { (above, below) } else { (below, above) };
+                if near.is_empty() {
+                    (at, range) = (second, far);
+                } else {
+                    if !far.is_empty() {
+                        stack[waiting] = (second, far);
+                        waiting += 1;
+                    }
+                    (at, range) = (first, near);
+                }
+                if !range.is_empty() {
+                    continue;
+                }
+            } else {
+                for &item in &self.items[node.plane.to_bits() as usize..][..(node.link >> 2) as usize] {
+                    limit = each(item);
+                }
+            }
+            loop {
+                if waiting == 0 {
+                    return;
+                }
+                waiting -= 1;
+                (at, range) = stack[waiting];
+                if range.from <= limit {
+                    range = range.until(limit);
+                    break;
+                }
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.items[..])
+    }
+
+    fn locate(&self, point: Vec3) -> Option<Cell> {
+        let mut cell = Cell::within(&self.bounds, point)?;
+        let mut at = 0;
+        loop {
+            let node = self.nodes[at];
+            let axis = (node.link & 3) as usize;
+            if axis == LEAF as usize {
+                cell.number = at as u32;
+                cell.items.extend(&self.items[node.plane.to_bits() as usize..][..(node.link >> 2) as usize]);
+                return Some(cell);
+            }
+            let (normal, plane) = (DVec3::AXES[axis], f64::from(node.plane));
+            let is_above = point[axis] >= node.plane;
+            at = if is_above { (node.link >> 2) as usize } else { at + 1 };
+            cell.sides.push(if is_above { (-normal, -plane) } else { (normal, plane) });
+        }
+    }
+}
+
+impl KdTree {
+    /// Appends a branch, depth first.
+    fn place(&mut self, branch: Branch) {
+        match branch {
+            Branch::Leaf(items) => {
+                let first = f32::from_bits(self.items.len() as u32);
+                self.nodes.push(Node { plane: first, link: (items.len() as u32) << 2 | LEAF });
+                self.items.extend(items);
+            }
+            Branch::Plane { axis, plane, children } => {
+                let at = self.nodes.len();
+                self.nodes.push(Node { plane, link: 0 });
+                let [below, above] = *children;
+                self.place(below);
+                self.nodes[at].link = (self.nodes.len() as u32) << 2 | axis as u32;
+                self.place(above);
+            }
+        }
+    }
+}
+
+impl<'a> Part<'a> {
+    fn build(self) -> Branch {
+        let count = self.items.len() as f32;
+        let split = if self.depth > 0 && self.items.len() > 1 { self.best_split() } else { None };
+        let Some(Split { axis, plane, .. }) = split.filter(|split| split.cost < count) else {
+            return Branch::Leaf(self.items);
+        };
+        let many = self.items.len() >= MANY;
+        let [below, above] = match self.cut(axis, plane) {
+            Ok(parts) => parts,
+            Err(whole) => return Branch::Leaf(whole.items),
+        };
+        let children =
+            if many { join(|| below.build(), || above.build()).into() } else { [below.build(), above.build()] };
+        Branch::Plane { axis, plane, children: Box::new(children) }
+    }
+
+    /// The parts below and above a plane, what lies within it above; or the whole, where there is no room for both.
+    fn cut(self, axis: usize, plane: f32) -> Result<[Self; 2], Self> {
+        let (mut below, mut above) = (Vec::new(), Vec::new());
+        for &item in &self.items {
+            let Aabb { min, max } = self.boxes[item as usize];
+            let is_below = min[axis] < plane;
+            if is_below {
+                below.push(item);
+            }
+            if !is_below || max[axis] > plane {
+                above.push(item);
+            }
+        }
+        let references = below.len() + above.len();
+        let Some(left) = (self.items.len() + self.room).checked_sub(references) else { return Err(self) };
+        let (mut lower, mut upper) = (self.bounds, self.bounds);
+        (lower.max[axis], upper.min[axis]) = (plane, plane);
+        let part = |bounds, items: Vec<u32>| {
+            let room = share(left, items.len(), references);
+            Part { boxes: self.boxes, bounds, items, depth: self.depth - 1, room }
+        };
+        Ok([part(lower, below), part(upper, above)])
+    }
+
+    /// The sides of an item's box, as far as it is in the cell.
+    fn extent(&self, item: u32, axis: usize) -> (f32, f32) {
+        let Aabb { min, max } = self.boxes[item as usize];
+        (min[axis].max(self.bounds.min[axis]), max[axis].min(self.bounds.max[axis]))
+    }
+
+    fn best_split(&self) -> Option<Split> {
+        let of_axis = |axis| if self.items.len() <= FEW { self.sweep(axis) } else { self.bins(axis) };
+        (0..3).filter_map(of_axis).min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// Every side of a box, in order.
+    fn sweep(&self, axis: usize) -> Option<Split> {
+        let mut begins = [0.0; FEW];
+        let mut ends = [0.0; FEW];
+        for (i, &item) in self.items.iter().enumerate() {
+            (begins[i], ends[i]) = self.extent(item, axis);
+        }
+        let count = self.items.len();
+        let (begins, ends) = (&mut begins[..count], &mut ends[..count]);
+        begins.sort_unstable_by(f32::total_cmp);
+        ends.sort_unstable_by(f32::total_cmp);
+        let chooser = Chooser::new(&self.bounds, axis);
+        let counts = |plane: f32| {
+            let below = begins.partition_point(|&begin| begin < plane);
+            (below, count - ends.partition_point(|&end| end <= plane))
+        };
+        let planes = begins.iter().chain(ends.iter());
+        planes.filter_map(|&plane| chooser.split(plane, counts(plane))).min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// Planes at equal distances.
+    fn bins(&self, axis: usize) -> Option<Split> {
+        let (start, end) = (self.bounds.min[axis], self.bounds.max[axis]);
+        let plane = |bin: usize| start + (end - start) * (bin as f32 / BINS as f32);
+        let scale = BINS as f32 / (end - start);
+        if !scale.is_finite() {
+            return None;
+        }
+        let bin = |x: f32| (((x - start) * scale) as usize).min(BINS - 1);
+        let (mut begins, mut ends) = ([0; BINS], [0; BINS]);
+        for &item in &self.items {
+            let (from, to) = self.extent(item, axis);
+            begins[bin(from)] += 1;
+            ends[bin(to)] += 1;
+        }
+        let chooser = Chooser::new(&self.bounds, axis);
+        let (mut below, mut passed) = (0, 0);
+        let mut best: Option<Split> = None;
+        for bin in 1..BINS {
+            below += begins[bin - 1];
+            passed += ends[bin - 1];
+            let split = chooser.split(plane(bin), (below, self.items.len() - passed));
+            best = best.into_iter().chain(split).min_by(|a, b| a.cost.total_cmp(&b.cost));
+        }
+        best
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Split {
+    axis: usize,
+    plane: f32,
+    /// In tests of an item.
+    cost: f32,
+}
+
+/// The surface area heuristic along an axis of a cell.
+struct Chooser {
+    axis: usize,
+    start: f32,
+    end: f32,
+    /// Of the sides across the axis, and of a slice of length 1 along it, over the whole.
+    across: f32,
+    along: f32,
+}
+
+impl Chooser {
+    fn new(bounds: &Aabb, axis: usize) -> Self {
+        let size = bounds.size();
+        let (a, b) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
+        let whole = bounds.half_area().max(f32::MIN_POSITIVE);
+        let (start, end) = (bounds.min[axis], bounds.max[axis]);
+        Self { axis, start, end, across: a * b / whole, along: (a + b) / whole }
+    }
+
+    /// None for a plane that does not divide the cell.
+    fn split(&self, plane: f32, (below, above): (usize, usize)) -> Option<Split> {
+        if !(self.start < plane && plane < self.end) {
+            return None;
+        }
+        let share = |length: f32| self.across + self.along * length;
+        let items = share(plane - self.start) * below as f32 + share(self.end - plane) * above as f32;
+        let bonus = if below == 0 || above == 0 { EMPTY_BONUS } else { 1.0 };
+        Some(Split { axis: self.axis, plane, cost: bonus * (NODE_COST + items) })
+    }
+}

@@ -1,0 +1,89 @@
+//! What one primitive gives to the nearest hit: the leaf of every tracer that asks them one by one.
+
+use super::Part;
+use super::nearest::Nearest;
+use crate::ray::{Hit, Ray};
+use crate::shape::triangle::{self, Corners};
+use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod};
+
+/// How primitives are met: exactly, or by a textbook's method where there are several.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Methods {
+    /// Of triangles.
+    pub triangle: TriangleMethod,
+    /// Of spheres.
+    pub sphere: SphereMethod,
+}
+
+/// Whose hit it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Id {
+    pub instance: u32,
+    pub geometry: u32,
+    pub primitive: u32,
+}
+
+impl Id {
+    /// A hit with this id; a triangle's parameters are the weights of its second and third corner.
+    #[inline]
+    fn hit(self, t: f64, u: f32, v: f32) -> Hit {
+        let Self { instance, geometry, primitive } = self;
+        Hit { t: t as f32, u, v, primitive, geometry, instance }
+    }
+
+    /// A hit of a shape.
+    #[inline]
+    pub fn of_shape(self, hit: &ShapeHit) -> Hit {
+        self.hit(hit.t, hit.uv.x, hit.uv.y)
+    }
+}
+
+impl Part {
+    /// The id of one of its primitives, in its place.
+    #[inline]
+    pub(super) fn id(&self, instance: u32, primitive: u32) -> Id {
+        Id { instance, geometry: self.geometry, primitive }
+    }
+}
+
+/// Offers where `ray`, in the world, meets a triangle.
+#[inline]
+pub(super) fn offer_triangle(nearest: &mut Nearest, ray: &Ray, corners: &impl Corners, id: Id) {
+    if let Some(hit) = triangle::intersect(ray, corners) {
+        nearest.offer(hit.t, id.hit(hit.t, hit.u as f32, hit.v as f32));
+    }
+}
+
+/// Offers where `local`, the ray in the shape's coordinates, meets it.
+#[inline]
+pub(super) fn offer_shape(nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
+    if let Some(hit) = shape.intersect(local) {
+        nearest.offer(hit.t, id.of_shape(&hit));
+    }
+}
+
+impl Methods {
+    /// [`offer_triangle`] by the chosen method, which sees corners in f32.
+    #[inline]
+    pub(super) fn offer_triangle(self, nearest: &mut Nearest, ray: &Ray, corners: &impl Corners, id: Id) {
+        if self.triangle == TriangleMethod::Exact {
+            offer_triangle(nearest, ray, corners, id);
+        } else if let Some(hit) = self.triangle.intersect(ray, corners.rounded().map(|corner| corner.as_vec3())) {
+            nearest.offer(hit.t, id.hit(hit.t, hit.u as f32, hit.v as f32));
+        }
+    }
+
+    /// [`offer_shape`] by the chosen method.
+    #[inline]
+    pub(super) fn offer_shape(self, nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
+        match shape {
+            Shape::Sphere(sphere) if self.sphere != SphereMethod::Exact => {
+                let roots = self.sphere.roots(local, sphere).into_iter().flatten();
+                if let Some(hit) = roots.map(|t| shape.hit_at(local, t)).find(|hit| hit.is_within(local)) {
+                    nearest.offer(hit.t, id.of_shape(&hit));
+                }
+            }
+            _ => offer_shape(nearest, local, shape, id),
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Scenes that are written and read again.
+
+use twincast::io::save;
+use twincast::math::{DVec3, Vec3};
+use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, Projection, RECIPES, Scene};
+use twincast::{Error, Shape};
+
+use super::Files;
+
+/// Shapes as texts and triangles as corners in scene coordinates, each sorted; groups, names and order do not matter.
+fn contents(scene: &Scene) -> (Vec<String>, Vec<[[u32; 3]; 3]>) {
+    let (mut shapes, mut triangles) = (Vec::new(), Vec::new());
+    for instance in &scene.instances {
+        for (_, geometry) in scene.group_geometries(instance.group) {
+            let color = scene.materials[geometry.material() as usize].diffuse;
+            match geometry {
+                Geometry::Mesh(mesh) => triangles.extend(mesh.triangles.iter().map(|corners| {
+                    corners.map(|i| {
+                        let p = mesh.origin + mesh.positions[i as usize].as_dvec3();
+                        (instance.transform.transform_point3(p).as_vec3() + 0.0).to_array().map(f32::to_bits)
+                    })
+                })),
+                Geometry::Shapes { shapes: list, .. } => {
+                    assert_eq!(instance.transform, Default::default(), "none of the recipes moves shapes");
+                    // A polygon's own numbers follow from its corners.
+                    shapes.extend(list.iter().map(|shape| match shape {
+                        Shape::Polygon(polygon) => format!("{color} {:?}", polygon.corners()),
+                        other => format!("{color} {other:?}"),
+                    }));
+                }
+            }
+        }
+    }
+    shapes.sort();
+    triangles.sort();
+    (shapes, triangles)
+}
+
+fn angle(camera: &Camera) -> f64 {
+    match camera.projection {
+        Projection::Perspective(Fov::Vertical(angle)) => angle,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn close(a: DVec3, b: DVec3) -> bool {
+    (a - b).length() <= 1e-9 * (1.0 + a.length())
+}
+
+#[test]
+fn scenes_come_back_from_nff_and_toml() {
+    let files = Files::one("empty", "");
+    for recipe in RECIPES {
+        let scene = recipe.make(2);
+        for suffix in ["nff", "toml"] {
+            let name = format!("{}.{suffix}", recipe.name);
+            save(&scene, &files.path(&name)).unwrap();
+            let again = files.scene(&name);
+            assert!(contents(&again) == contents(&scene), "{name}");
+            assert_eq!((again.lights, again.background), (scene.lights.clone(), scene.background), "{name}");
+            assert_eq!(again.request.size, scene.request.size);
+            let [a, b] = [&again.cameras[0], &scene.cameras[0]];
+            assert!(close(a.eye, b.eye) && (angle(a) - angle(b)).abs() < 1e-12, "{name}: {a:?} {b:?}");
+            assert!((0..3).all(|k| close(a.frame.col(k), b.frame.col(k))), "{name}");
+            let looks = |m: &Material| (m.specular, m.shininess, m.reflection, m.transmission, m.model);
+            let expected: Vec<_> = scene.materials.iter().map(looks).collect();
+            assert!(again.materials.iter().map(looks).all(|look| expected.contains(&look)), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_lattice_stays_one_mesh_in_toml() {
+    let files = Files::one("empty", "");
+    let scene = RECIPES.iter().find(|recipe| recipe.name == "lattice").unwrap().make(3);
+    save(&scene, &files.path("a.toml")).unwrap();
+    let again = files.scene("a.toml");
+    assert_eq!((again.geometries.len(), again.instances.len()), (1, 27));
+    assert_eq!(again.instances[5].name, scene.instances[5].name);
+    assert_eq!(again.instances[5].transform, scene.instances[5].transform);
+}
+
+#[test]
+fn triangles_come_back_from_ply() {
+    let files = Files::one("empty", "");
+    for (name, triangles) in [("terrain", 2 * 25), ("gears", 125 * (2 * 94 + 96 * 2) + 2), ("lattice", 0)] {
+        let scene = RECIPES.iter().find(|recipe| recipe.name == name).unwrap().make(5);
+        save(&scene, &files.path("a.ply")).unwrap();
+        let again = files.scene("a.ply");
+        if triangles > 0 {
+            assert_eq!(again.primitive_count(), triangles, "{name}");
+        } else {
+            assert_eq!(contents(&again), contents(&scene));
+        }
+        let [a, b] = [again.bounds(), scene.bounds()];
+        assert!((a.min - b.min).length() + (a.max - b.max).length() < 1e-5 * b.radius(), "{name}: {a:?} {b:?}");
+    }
+}
+
+#[test]
+fn what_a_format_cannot_say_is_bad_usage() {
+    let files = Files::one("old.ply", "old");
+    let refused = |scene: &Scene, name: &str, words: &str| {
+        let error = save(scene, &files.path(name)).unwrap_err();
+        assert!(matches!(&error, Error::Usage(message) if message.contains(words)), "{error}");
+        assert_eq!(error.exit_code(), 2);
+    };
+    let flake = RECIPES[0].make(1);
+    refused(&flake, "old.ply", "this scene has a sphere; write .nff or .toml");
+    assert_eq!(std::fs::read(files.path("old.ply")).unwrap(), b"old");
+    refused(&flake, "a.obj", "scenes are written as .nff, .ply, .toml");
+    refused(&flake, "a", "scenes are written as");
+
+    let disk = Shape::Disk(twincast::Disk { centre: Vec3::ZERO, normal: Vec3::Y, radius: 1.0 });
+    let shapes = Geometry::Shapes { shapes: vec![disk], material: 0 };
+    refused(&Scene::from_geometries(vec![shapes], vec![Material::default()]), "a.nff", "NFF has no disks");
+    let glowing = Material { emission: Vec3::ONE, ..Material::default() };
+    let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+    refused(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![glowing]), "a.nff", "emission");
+}
+
+/// All shapes there are, and a name that needs care, through the format that has words for all.
+#[test]
+fn every_shape_comes_back_from_toml() {
+    let files = Files::one("all.toml", super::toml::text());
+    let mut scene = files.scene("all.toml");
+    scene.instances[1].name = "a \"b\" \\ \u{7} é".to_owned();
+    save(&scene, &files.path("again.toml")).unwrap();
+    let again = files.scene("again.toml");
+    let kinds = |scene: &Scene| {
+        let mut kinds = Vec::new();
+        for geometry in &scene.geometries {
+            match geometry {
+                Geometry::Mesh(mesh) => kinds.push(format!("{:?} {:?}", mesh.positions, mesh.triangles)),
+                Geometry::Shapes { shapes, .. } => kinds.extend(shapes.iter().map(|shape| format!("{shape:?}"))),
+            }
+        }
+        kinds.sort();
+        kinds
+    };
+    assert_eq!(kinds(&again), kinds(&scene));
+    let names = |scene: &Scene| scene.instances.iter().map(|i| (i.name.clone(), i.transform)).collect::<Vec<_>>();
+    let placed: Vec<_> = names(&scene).into_iter().skip(1).collect();
+    assert!(placed.iter().all(|instance| names(&again).contains(instance)), "{:?}", names(&again));
+    assert_eq!(again.cameras.len(), scene.cameras.len());
+    for (a, b) in again.cameras.iter().zip(&scene.cameras) {
+        assert_eq!((&a.name, a.eye, a.shift, a.lens, a.distortion), (&b.name, b.eye, b.shift, b.lens, b.distortion));
+        let [extent, expected] = [a, b].map(|camera| camera.projection.half_extent(1.5).unwrap());
+        assert!((extent - expected).length() < 1e-12, "{:?} {:?}", a.projection, b.projection);
+    }
+    // Degrees and radians round once each.
+    assert_eq!(format!("{:.6?}", again.lights), format!("{:.6?}", scene.lights));
+    assert_eq!(
+        (again.request, again.ambient, &again.cameras[0].name),
+        (scene.request, scene.ambient, &scene.cameras[0].name)
+    );
+}

@@ -1,0 +1,291 @@
+//! Twincast's own scene format.
+
+use twincast::math::{DVec2, DVec3, Vec3};
+use twincast::scene::{AreaShape, Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
+use twincast::{Shape, World};
+
+use super::{Files, obj, refused, refused_bytes};
+
+/// The examples of the documentation, without their fences.
+fn examples() -> Vec<String> {
+    let text = include_str!("../../docs/SCENES.md");
+    text.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
+}
+
+const SPHERE: &str = "\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
+
+/// A scene that has most of what there is.
+pub fn text() -> String {
+    let with_files = |example: &&String| !example.contains("wood.png") && !example.contains("[[file]]");
+    examples().iter().filter(with_files).map(String::as_str).collect()
+}
+
+/// A folder with the scene and with what the examples refer to.
+fn files(text: &str) -> Files {
+    Files::one("a.toml", text).and("wood.png", obj::picture()).and("mesh.obj", TRIANGLE)
+}
+
+fn scene(text: &str) -> Scene {
+    files(text).scene("a.toml")
+}
+
+#[test]
+fn every_example_of_the_documentation_is_a_scene() {
+    let examples = examples();
+    assert!(examples.len() >= 7, "{}", examples.len());
+    for example in &examples {
+        let has_primitives = ["[[sphere]]", "[[file]]", "[[instance]]"].iter().any(|word| example.contains(word));
+        let scene = scene(&if has_primitives { example.clone() } else { format!("{example}{SPHERE}") });
+        World::new(&scene).expect("it can be traced");
+    }
+    // All of them at once.
+    assert_eq!(scene(&examples.concat()).materials.len(), 5);
+}
+
+#[test]
+fn the_documentation_has_every_key() {
+    let text = include_str!("../../docs/SCENES.md");
+    // What a table of this kind says when it is asked for a key it does not know.
+    for table in [
+        "[render]",
+        "[[camera]]\neye = [0, 0, 1]\nlook_at = [0, 0, 0]",
+        "[[light]]\ntype = \"point\"\nposition = [0, 0, 0]",
+        "[[light]]\ntype = \"spot\"\nposition = [0, 0, 0]\ndirection = [1, 0, 0]\nouter_angle = 3",
+        "[[light]]\ntype = \"directional\"\ndirection = [1, 0, 0]",
+        "[[light]]\ntype = \"sphere\"\nposition = [0, 0, 0]\nradius = 1\nradiance = 1",
+        "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nhalf_edges = [[1, 0, 0], [0, 1, 0]]\nradiance = 1",
+        "[material.a]",
+        "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1",
+        "[[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]",
+        "[[disk]]\ncentre = [0, 0, 0]\nnormal = [1, 0, 0]\nradius = 1",
+        "[[box]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]",
+        "[[cylinder]]\nbase = [0, 0, 0]\napex = [1, 1, 1]\nradius = 1",
+        "[[cone]]\nbase = [0, 0, 0]\napex = [1, 1, 1]\nbase_radius = 1",
+        "[[ellipsoid]]\ncentre = [0, 0, 0]\nradii = [1, 1, 1]",
+        "[[polygon]]\ncorners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "[[triangle]]\ncorners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        "[[mesh]]\npositions = []\ntriangles = []",
+        "[[file]]\npath = \"mesh.obj\"",
+        "[[instance]]\ngroup = \"a\"",
+        "[group.a]",
+    ] {
+        let source = files(&format!("{table}\nzzzzzz = 1\n"));
+        let options = twincast::io::LoadOptions::default();
+        let message = twincast::io::load(&source.path("a.toml"), &options).unwrap_err().to_string();
+        let (_, keys) = message.split_once("it knows ").unwrap_or_else(|| panic!("{message}"));
+        for key in keys.split(", ") {
+            let documented = [format!("{key} = "), format!("[[{key}]]"), format!(".{key}]]")];
+            assert!(documented.iter().any(|form| text.contains(form)), "{key} of {table}");
+        }
+    }
+}
+
+#[test]
+fn what_the_file_asks_of_a_render() {
+    let scene = scene(&(examples()[0].clone() + &examples()[1] + SPHERE));
+    let request = &scene.request;
+    assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
+    assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
+    assert_eq!((scene.background, scene.ambient), (Some(Vec3::new(0.1, 0.2, 0.4)), Vec3::splat(0.1)));
+    let camera = &scene.cameras[0];
+    assert_eq!(
+        (camera.name.as_str(), camera.eye, camera.shift),
+        ("front", DVec3::new(0.0, 1.0, 5.0), DVec2::new(0.25, 0.0))
+    );
+    let both = Fov::Both { horizontal: 60f64.to_radians(), vertical: 40f64.to_radians() };
+    assert_eq!(camera.projection, Projection::Perspective(both));
+    assert_eq!(camera.lens, Some(ThinLens { radius: 0.02, focus: 5.0, blades: 6 }));
+    assert_eq!(camera.distortion, Some(Distortion { k1: -0.28, k2: 0.07, k3: 0.0, p1: 0.001, p2: 0.0 }));
+    let plan = &scene.cameras[1];
+    assert_eq!((plan.name.as_str(), plan.projection), ("plan", Projection::Orthographic(3.0)));
+    assert_eq!((plan.frame.y_axis, plan.lens, plan.distortion), (DVec3::NEG_Z, None, None));
+    assert!(scene.lights.is_empty());
+    let only = scene_of_camera("fov_x = 60\n");
+    assert_eq!(only.cameras[0].projection, Projection::Perspective(Fov::Horizontal(60f64.to_radians())));
+    assert_eq!(scene_of_camera("").cameras[0].projection, Projection::Perspective(Fov::Vertical(40f64.to_radians())));
+}
+
+fn scene_of_camera(keys: &str) -> Scene {
+    scene(&format!("[[camera]]\neye = [0, 1, 5]\nlook_at = [0, 0, 0]\n{keys}{SPHERE}"))
+}
+
+#[test]
+fn lights_and_materials() {
+    let scene = scene(&(examples()[2].clone() + &examples()[3] + SPHERE));
+    let [
+        Light::Directional { direction, .. },
+        Light::Point { radius, range, .. },
+        Light::Area { shape: AreaShape::Rectangle { centre, half_edges }, radiance },
+        Light::Area { shape: AreaShape::Disk { normal, .. }, .. },
+        Light::Area { shape: AreaShape::Sphere { radius: ball, .. }, .. },
+        Light::Spot { inner_angle, outer_angle, .. },
+    ] = scene.lights.as_slice()
+    else {
+        panic!("{:?}", scene.lights)
+    };
+    assert!((*direction - DVec3::new(-1.0, -2.0, -1.0).normalize()).length() < 1e-15);
+    assert_eq!((*range, (*radius * 10.0).round()), (30.0, 1.0));
+    assert!((inner_angle.to_degrees() - 20.0).abs() < 1e-4 && (outer_angle.to_degrees() - 30.0).abs() < 1e-4);
+    assert_eq!((*centre, *half_edges), (DVec3::Y * 3.0, [DVec3::X * 0.5, DVec3::Z * 0.5]));
+    assert_eq!((*radiance, *normal, *ball), (Vec3::new(10.0, 9.0, 8.0), DVec3::NEG_Y, 0.25));
+    let glass = &scene.materials[0];
+    assert_eq!((glass.name.as_str(), glass.diffuse, glass.ambient), ("glass", Vec3::splat(0.02), Vec3::splat(0.02)));
+    assert_eq!((glass.transmission, glass.ior, glass.shininess), (Vec3::splat(0.85), 1.5, 100.0));
+    assert_eq!((glass.model, glass.emission), (Specular::BlinnPhong, Vec3::new(0.0, 0.0, 0.01)));
+    assert_eq!((scene.materials[1].diffuse_texture, scene.textures.len()), (Some(0), 1));
+}
+
+#[test]
+fn every_primitive_arrives() {
+    let scene = scene(&examples()[4]);
+    let mut kinds = Vec::new();
+    for geometry in &scene.geometries {
+        match geometry {
+            Geometry::Mesh(mesh) => kinds.push(if mesh.name.is_empty() { "triangle" } else { "mesh" }),
+            Geometry::Shapes { shapes, .. } => kinds.extend(shapes.iter().map(Shape::name)),
+        }
+    }
+    kinds.sort_unstable();
+    let expected =
+        ["box", "cone", "cylinder", "disk", "ellipsoid", "ellipsoid", "mesh", "plane", "polygon", "sphere", "triangle"];
+    assert_eq!(kinds, expected);
+    let red = scene.materials.iter().position(|m| m.name == "red").unwrap() as u32;
+    assert_eq!(scene.geometries.iter().filter(|g| g.material() == red).count(), 1);
+}
+
+#[test]
+fn groups_in_groups_are_unrolled() {
+    let scene = scene(&examples()[6]);
+    let names: Vec<_> = scene.instances.iter().map(|instance| instance.name.as_str()).collect();
+    assert_eq!(names, ["forest/left", "forest/right", "twin/left", "twin/right"]);
+    assert!(scene.instances.iter().all(|i| i.group == scene.instances[0].group) && scene.groups.len() == 1);
+    // The tree's top, (0, 3, 0): scaled to (0, 4.5, 0), turned about y, moved; then halved and moved back by 6.
+    let top = |i: usize| scene.instances[i].transform.transform_point3(DVec3::new(0.0, 3.0, 0.0));
+    for (i, expected) in
+        [[-2.0, 3.0, 0.0], [2.0, 4.5, 0.0], [-1.0, 1.5, -6.0], [1.0, 2.25, -6.0]].into_iter().enumerate()
+    {
+        assert!((top(i) - DVec3::from(expected)).length() < 1e-12, "{i}: {}", top(i));
+    }
+    // Turned by 30 degrees about y: x goes to (cos, 0, -sin).
+    let x = scene.instances[1].transform.matrix3.x_axis;
+    assert!((x - DVec3::new(0.75f64.sqrt(), 0.0, -0.5)).length() < 1e-12, "{x}");
+}
+
+#[test]
+fn files_are_included_once() {
+    let file = "[[group.g.file]]\npath = \"mesh.obj\"\nname = \"m\"\n";
+    let twice = "[[instance]]\ngroup = \"g\"\ntransform = {translate = [0, 5, 0]}\n[[file]]\npath = \"mesh.obj\"\n";
+    let red =
+        "[material.red]\ndiffuse = [1, 0, 0]\n[[file]]\npath = \"mesh.obj\"\nmaterial = \"red\"\nup_axis = \"z\"\n";
+    let scene = scene(&format!("{red}{twice}{file}"));
+    let groups: Vec<_> = scene.instances.iter().map(|i| (i.name.as_str(), i.group)).collect();
+    assert_eq!(groups.len(), 3);
+    assert_eq!((groups[1].1, groups[2].0), (groups[2].1, "g/m"), "one mesh, placed twice: {groups:?}");
+    assert_eq!(scene.instances[2].transform.translation, DVec3::Y * 5.0);
+    let Geometry::Mesh(turned) = &scene.geometries[groups[0].1 as usize] else { panic!() };
+    assert_eq!(scene.materials[turned.material as usize].diffuse, Vec3::X);
+    assert_eq!(super::corners(turned)[0][2], Vec3::Y, "z is up in the file");
+}
+
+#[test]
+fn glowing_spheres_are_lights() {
+    let minray = "[render]\nshading = \"minray\"\nambient = 0.02\n[material.lamp]\nemission = [0.5, 0.4, 0.3]\n\
+        [[group.lamp.sphere]]\ncentre = [1, 0, 0]\nradius = 2\nmaterial = \"lamp\"\n\
+        [[instance]]\ngroup = \"lamp\"\ntransform = [{translate = [0, 1, 0]}, {scale = 3}]\n";
+    let scene = scene(&format!("{minray}{SPHERE}"));
+    let [Light::Point { position, color, radius, .. }] = scene.lights[..] else { panic!("{:?}", scene.lights) };
+    assert!((position - DVec3::new(3.0, 1.0, 0.0)).length() < 1e-12 && (radius - 6.0).abs() < 1e-9);
+    assert_eq!((color, scene.background), (Vec3::new(0.5, 0.4, 0.3), Some(Vec3::splat(0.02))));
+}
+
+#[test]
+fn faults_are_told_with_line_and_remedy() {
+    let deep: String = (0..100).map(|i| format!("[[group.g{i}.instance]]\ngroup = \"g{}\"\n", i + 1)).collect();
+    let many: String = (0..9)
+        .map(|i| format!("[[group.g{i}.instance]]\ngroup = \"g{}\"\n", i + 1).repeat(10))
+        .chain(["[[instance]]\ngroup = \"g0\"\n[[group.g9.sphere]]\ncentre = [0, 0, 0]\nradius = 1\n".to_owned()])
+        .collect();
+    for (text, line, words) in [
+        ("[render\n", 1, "not TOML"),
+        ("a = 1\n", 1, "the file has no key \"a\""),
+        ("[[spheer]]\nradius = 1\n", 1, "did you mean \"sphere\"?"),
+        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\ncolour = 1\n", 4, "[[sphere]] has no key \"colour\""),
+        ("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n", 1, "[[sphere]] lacks \"centre\""),
+        ("[[sphere]]\ncentre = [0, 0]\nradius = 1\n", 2, "a list of 2 where \"centre\" wants a list of 3 numbers"),
+        ("[[sphere]]\ncentre = [0, 0, nan]\nradius = 1\n", 2, "\"nan\" where \"centre\" wants a finite number"),
+        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = \"1\"\n", 3, "\"1\" where \"radius\" wants a finite number"),
+        ("[[sphere]]\ncentre = [0, 0, 0]\nradius = -1\n", 1, "the radius is -1"),
+        (
+            "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"rde\"\n[material.red]\n",
+            4,
+            "did you mean \"red\"?",
+        ),
+        ("[sphere]\nradius = 1\n", 1, "a table where \"sphere\" wants a list"),
+        ("[material.a]\ndiffuse = [1, -1, 0]\n", 2, "from 0 up"),
+        ("[material.a]\nior = 0\n", 2, "above 0"),
+        ("[material.a]\nmodel = \"phnog\"\n", 2, "did you mean \"phong\"?"),
+        ("[material.a]\ntexture = \"none.png\"\n", 2, "there is no file"),
+        ("[render]\nsize = [0, 1]\n", 2, "whole numbers from 1 to"),
+        ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
+        ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
+        ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
+        (
+            "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nradiance = 1\nhalf_edges = [[1, 0, 0], [2, 0, 0]]\n",
+            5,
+            "two vectors that are not parallel",
+        ),
+        (
+            "[[light]]\ntype = \"disk\"\nposition = [0, 0, 0]\ndirection = [0, 1, 0]\nradius = -1\n",
+            5,
+            "a length above 0",
+        ),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"orthographic\"\n", 1, "\"height\""),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\ndistortion = [1, 0, 0, 0, 0]\n",
+            5,
+            "perspective cameras alone",
+        ),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0, focus = 1 }\n", 4, "a length above 0"),
+        ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
+        (
+            "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",
+            3,
+            "\"1\" where \"triangles\" wants a whole number from 0 to 0",
+        ),
+        ("[[instance]]\ngroup = \"b\"\n", 2, "no [group.b]"),
+        (
+            "[[group.a.instance]]\ngroup = \"b\"\n[[group.b.instance]]\ngroup = \"a\"\n",
+            4,
+            "group \"a\" contains itself: a > b > a",
+        ),
+        (&deep, 1, "nested more than 64 deep"),
+        (&many, 1, "placements of groups"),
+        (
+            "[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {scale = 0}\n",
+            3,
+            "\"a\" has a transform that nothing undoes",
+        ),
+        ("[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {}\n", 4, "an empty step"),
+        (
+            "[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = [{scale = 2, translate = [0, 0, 0]}]\n",
+            4,
+            "a step does one thing",
+        ),
+        ("[group.a]\n[[instance]]\ngroup = \"a\"\ntransform = {rotat = [0, 0, 1, 3]}\n", 4, "did you mean \"rotate\"?"),
+    ] {
+        if text == deep {
+            let error = twincast::io::load(&files(text).path("a.toml"), &Default::default()).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+            continue;
+        }
+        refused(&files(text), "a.toml", &format!("line {line}"), words);
+    }
+    refused_bytes("a.toml", b"# \xff\n", "line 1", "no UTF-8");
+    refused_bytes("a.toml", "[render]\n", "", "nothing to render");
+    // What is wrong in an included file is told of that file.
+    let files = Files::one("a.toml", "[[file]]\npath = \"b.obj\"\n").and("b.obj", "f 1 2 3\n");
+    let error = twincast::io::load(&files.path("a.toml"), &Default::default()).unwrap_err().to_string();
+    assert!(error.contains("b.obj: line 1"), "{error}");
+}
