@@ -54,11 +54,10 @@ pub(super) struct Footprints {
 }
 
 impl Footprints {
-    /// `AXIS` is the bundle's.
     #[inline(always)]
-    pub fn new<S: Simd, const AXIS: usize>(corners: &[[[f32; LANES]; 3]; 3], bundle: &Bundle) -> Self {
+    pub fn new<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], bundle: &Bundle) -> Self {
         let splat = S::V8::splat;
-        let [p, q, along] = axes(AXIS);
+        let [p, q, along] = axes(bundle.axis);
         let forward = splat(bundle.forward);
         let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
         let (zero, one) = (splat(0.0), splat(1.0));

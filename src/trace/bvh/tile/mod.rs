@@ -15,6 +15,7 @@
 //!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one.
 
 mod found;
+mod octants;
 mod placed;
 mod walk;
 
@@ -28,14 +29,11 @@ use super::query::{Query, SOMETHING};
 use super::range::Range;
 use super::simd::{Group, Simd};
 use super::walk::Stack;
-use crate::math::Vec3;
 use crate::ray::Ray;
 use found::Found;
+use octants::{Octants, Part};
 use placed::{Tour, one_by_one};
 use walk::{Entry, Walk, Way};
-
-/// Fewer rays than this are better traced one by one.
-const FEWEST: usize = 6;
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
@@ -43,7 +41,7 @@ pub(super) struct Scratch {
     /// t of the closest hits of the last bundle.
     pub t: [f64; RAYS],
     /// Rays of one octant.
-    part: [Ray; RAYS],
+    part: Part,
 }
 
 /// Places on a stack.
@@ -64,12 +62,11 @@ struct One {
 
 impl Scratch {
     pub fn new() -> Self {
-        let ray = Ray::new(Vec3::ZERO, Vec3::X);
         let found = Found::new();
         let stack = [Entry::root(0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
         let one = One { upper: stack, stack, single: Stack::new(), bundle, local, range, found };
-        Self { one, t: [0.0; RAYS], part: [ray; RAYS] }
+        Self { one, t: [0.0; RAYS], part: Part::new() }
     }
 }
 
@@ -84,49 +81,43 @@ pub(super) fn trace<S: Simd, Q: Query>(
     answers: &mut [Q::Answer],
 ) -> u64 {
     let Scratch { one, t, part } = scratch;
-    if let (Ok(rays), Ok(answers)) = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers))
-    {
-        match one.bundle.fill::<S, Q>(rays, &mut one.range) {
-            Fit::Whole => {
-                let is_traced = one.trace::<S, Q>(bvh, rays, RAYS, answers, t);
-                return if is_traced { u64::MAX } else { 0 };
-            }
-            Fit::Parts => {}
-            Fit::None => return 0,
-        }
-    }
-    let mut octants = [0u64; 8];
-    for (i, ray) in rays.iter().enumerate() {
-        let d = ray.direction;
-        let octant = usize::from(d.x < 0.0) | usize::from(d.y < 0.0) << 1 | usize::from(d.z < 0.0) << 2;
-        octants[octant] |= u64::from(ray.is_valid()) << i;
-    }
+    let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
+    // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one loop, so
+    // that what is called here, of which most of the kernel consists, is compiled once.
+    let mut octants = if rays.len() == RAYS { None } else { Some(Octants::new(rays)) };
     let mut done = 0;
-    for members in octants {
-        if (members.count_ones() as usize) < FEWEST {
-            continue;
-        }
-        let (mut index, mut rest, mut count) = ([0u8; RAYS], members, 0);
-        while rest != 0 {
-            index[count] = rest.trailing_zeros() as u8;
-            part[count] = rays[usize::from(index[count])];
-            rest &= rest - 1;
-            count += 1;
-        }
-        // What fills the last group is traced, and forgotten.
-        let last = part[count - 1];
-        part[count..].fill(last);
-        let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
-        if one.bundle.fill::<S, Q>(part, &mut one.range) == Fit::Whole
-            && one.trace::<S, Q>(bvh, part, count, &mut part_answers, &mut part_t)
-        {
-            for (k, &i) in index[..count].iter().enumerate() {
-                (answers[usize::from(i)], t[usize::from(i)]) = (part_answers[k], part_t[k]);
+    loop {
+        let members = match &mut octants {
+            None => u64::MAX,
+            Some(octants) => match octants.next() {
+                Some(members) => members,
+                None => return done,
+            },
+        };
+        let whole = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers));
+        let (group, count, group_answers, group_t) = match (whole, &octants) {
+            ((Ok(rays), Ok(answers)), None) => (rays, RAYS, answers, &mut *t),
+            _ => {
+                part.gather(rays, members);
+                (&part.rays, part.count, &mut part_answers, &mut part_t)
             }
+        };
+        let fit = one.bundle.fill::<S, Q>(group, &mut one.range);
+        let is_traced = fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t);
+        if is_traced {
             done |= members;
         }
+        if octants.is_some() {
+            if is_traced {
+                part.scatter(&part_answers, answers);
+                part.scatter(&part_t, t);
+            }
+        } else if fit == Fit::Parts {
+            octants = Some(Octants::new(rays));
+        } else {
+            return done;
+        }
     }
-    done
 }
 
 impl One {
@@ -157,23 +148,8 @@ impl One {
                 continue;
             };
             let way = Way { bundle, slab, groups, most: 0.0 };
-            match bundle.axis {
-                0 => {
-                    let query = PhantomData::<Q>;
-                    let walk = Walk::<Q, 0> { bvh, place, tree, rays, bundle, found, groups, query };
-                    walk.run::<S>(stack, way, first);
-                }
-                1 => {
-                    let query = PhantomData::<Q>;
-                    let walk = Walk::<Q, 1> { bvh, place, tree, rays, bundle, found, groups, query };
-                    walk.run::<S>(stack, way, first);
-                }
-                _ => {
-                    let query = PhantomData::<Q>;
-                    let walk = Walk::<Q, 2> { bvh, place, tree, rays, bundle, found, groups, query };
-                    walk.run::<S>(stack, way, first);
-                }
-            }
+            let walk = Walk { bvh, place, tree, rays, bundle, found, groups, query: PhantomData::<Q> };
+            walk.run::<S>(stack, way, first);
             range.shorten::<S>(bundle, &found.sure, &found.limit);
         }
         if Q::ANY {

@@ -117,7 +117,7 @@ impl Way<'_> {
 }
 
 /// A bundle on its way through a tree of triangles.
-pub(super) struct Walk<'a, Q, const AXIS: usize> {
+pub(super) struct Walk<'a, Q> {
     pub bvh: &'a Bvh,
     /// Of the triangles.
     pub place: u32,
@@ -131,7 +131,7 @@ pub(super) struct Walk<'a, Q, const AXIS: usize> {
     pub query: PhantomData<Q>,
 }
 
-impl<Q, const AXIS: usize> Goal for Walk<'_, Q, AXIS> {
+impl<Q> Goal for Walk<'_, Q> {
     #[inline(always)]
     fn tree(&self) -> &Tree {
         self.tree.tree()
@@ -146,7 +146,7 @@ impl<Q, const AXIS: usize> Goal for Walk<'_, Q, AXIS> {
     }
 }
 
-impl<Q: Query, const AXIS: usize> Walk<'_, Q, AXIS> {
+impl<Q: Query> Walk<'_, Q> {
     #[inline(always)]
     pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, first: u8) {
         self.found.enter(self.bundle);
@@ -170,8 +170,8 @@ impl<Q: Query, const AXIS: usize> Walk<'_, Q, AXIS> {
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            let Some((mut lanes, edges)) = Edges::new::<S, AXIS>(block, self.bundle, most) else { continue };
-            let seen = Footprints::new::<S, AXIS>(&block.corners, self.bundle);
+            let Some((mut lanes, edges)) = Edges::new::<S>(block, self.bundle, most) else { continue };
+            let seen = Footprints::new::<S>(&block.corners, self.bundle);
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize % LANES;
                 lanes &= lanes - 1;
@@ -238,7 +238,7 @@ impl<Q: Query, const AXIS: usize> Walk<'_, Q, AXIS> {
     #[inline(always)]
     fn behind_starts<S: Simd>(&self, edges: &Edges, lane: usize, group: usize) -> u32 {
         let splat = S::Wide::splat;
-        let [p, q, along] = axes(AXIS);
+        let [p, q, along] = axes(self.bundle.axis);
         let direction = &self.bundle.direction;
         // The bundle's direction is the given one, turned round.
         let x = splat(edges.corner[0][lane]).add(S::Wide::at(&direction[p], group));
