@@ -51,7 +51,8 @@ impl Edges {
         let axes = axes(bundle.axis);
         let [p, q, along] = axes;
         let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
-        let (pa, pb, pc) = (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
+        let (pa, pb, pc) =
+            (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
         let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
         let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
         let n = cross(eb, ec);
