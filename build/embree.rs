@@ -98,7 +98,7 @@ fn generate_bindings(embree: &Found) {
         .allowlist_function("rtcGetDevice(Property|Error)")
         .allowlist_function("rtcSetDevice(Error|MemoryMonitor)Function")
         .allowlist_function("rtcSet(Scene(BuildQuality|Flags)|NewGeometryBuffer)")
-        .allowlist_function("rtcSetGeometry(InstancedScene|Transform|UserData|UserPrimitiveCount)")
+        .allowlist_function("rtcSetGeometry(InstancedScene|Transform|TimeStepCount|UserData|UserPrimitiveCount)")
         .allowlist_function("rtcSetGeometry(Bounds|Intersect|Occluded)Function")
         .allowlist_function("rtc(CommitGeometry|CommitScene|AttachGeometryByID)")
         .allowlist_function("rtc(Intersect|Occluded)(1|4|8|16)")

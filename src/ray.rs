@@ -4,7 +4,7 @@ use crate::math::Vec3;
 
 /// A half-line with a valid range. A hit counts for `tmin <= t <= tmax`.
 ///
-/// Eight f32 in the order of the fields, which is that of memory so that rays can be loaded as two vectors of four.
+/// In memory in the order of the fields, so that what a tree is asked for, the first eight f32, is loaded as two vectors of four.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -16,12 +16,14 @@ pub struct Ray {
     pub tmin: f32,
     /// Farthest valid t; may be infinite. A ray with `tmax < tmin` hits nothing.
     pub tmax: f32,
+    /// When it looks: from 0, where the shutter opens, to 1, where it closes. For scenes in which something moves.
+    pub time: f32,
 }
 
 impl Ray {
-    /// A ray over [0, infinity].
+    /// A ray over [0, infinity], at time 0.
     pub const fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, tmin: 0.0, tmax: f32::INFINITY }
+        Self { origin, direction, tmin: 0.0, tmax: f32::INFINITY, time: 0.0 }
     }
 
     /// Whether it can hit anything: finite origin and direction, a direction that is not zero (nor denormal on every

@@ -132,7 +132,7 @@ fn odd_transforms() {
         for group in 0..3 {
             let transform =
                 DAffine3 { matrix3: matrix, translation: DVec3::new(i as f64 - 2.0, f64::from(group), 0.3) };
-            scene.instances.push(Instance { name: format!("odd {i}"), group, transform });
+            scene.instances.push(Instance { name: format!("odd {i}"), group, transform, transform_end: None });
         }
     }
     let targets: Vec<Vec3> = (0..200).scan(Random::new(2), |random, _| Some(random.vec3() * 2.5)).collect();
@@ -202,7 +202,7 @@ fn groups_are_the_scenes_own() {
         })
         .collect();
     let groups = (0..5).map(|i| Group { name: String::new(), geometries: i..i + 1 }).collect();
-    let instance = |group| Instance { name: String::new(), group, transform: DAffine3::IDENTITY };
+    let instance = |group| Instance { name: String::new(), group, transform: DAffine3::IDENTITY, transform_end: None };
     let instances = (0..5).map(instance).collect();
     let scene =
         Scene { geometries: meshes, groups, instances, materials: vec![Material::default()], ..Scene::default() };

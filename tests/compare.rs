@@ -67,7 +67,7 @@ struct Pluecker<'a>(&'a World);
 impl Tracer for Pluecker<'_> {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        for ((instance, geometry, primitive), Primitive { body, .. }) in oracle::primitives(self.0) {
+        for ((instance, geometry, primitive), Primitive { body, .. }) in oracle::primitives(self.0, ray.time) {
             let Body::Triangle(corners) = body else { continue };
             let [v0, v1, v2] = corners.map(|p| p - ray.origin);
             let (e0, e1, e2) = (v2 - v0, v0 - v1, v1 - v2);
@@ -228,7 +228,7 @@ fn the_oracle_equals_f64_where_f64_is_sure() {
     for index in 0..400 {
         let Query::Closest(ray) = aim.ray(11, index) else { continue };
         let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        for (_, primitive) in oracle::primitives(&world) {
+        for (_, primitive) in oracle::primitives(&world, 0.0) {
             let Body::Triangle(corners) = primitive.body else { unreachable!("only a mesh") };
             // Cramer's rule: another formula than the oracle's.
             let [p, q, r] = corners.map(|p| p.as_dvec3());

@@ -315,7 +315,7 @@ fn an_instanced_mesh_is_hit_like_a_baked_one() {
     let mesh = Random(3).soup(200, 0.3);
     let scene = |groups: &[u32]| {
         let count = groups.iter().max().unwrap() + 1;
-        let instance = |(&group, transform)| Instance { name: String::new(), group, transform };
+        let instance = |(&group, transform)| Instance { name: String::new(), group, transform, transform_end: None };
         Scene {
             // A mesh before, so that ids are not all zero.
             geometries: std::iter::repeat_n(Geometry::Mesh(mesh.clone()), 2 * count as usize).collect(),

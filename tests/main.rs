@@ -12,6 +12,7 @@ mod image;
 mod io;
 mod layering;
 mod minray;
+mod motion;
 mod mutation;
 mod parity;
 mod queries;

@@ -96,7 +96,7 @@ pub fn instanced(seed: u64) -> Scene {
             glam::DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
             v(random.vec3()) * 3.0,
         );
-        instances.push(Instance { name: format!("node {i}"), group, transform });
+        instances.push(Instance { name: format!("node {i}"), group, transform, transform_end: None });
     }
     Scene {
         geometries,

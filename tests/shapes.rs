@@ -56,7 +56,8 @@ fn mixed(count: usize, size: f32, seed: u64) -> Scene {
     let mut placed = shapes(count / 3, size, seed + 2);
     placed.insert(0, plane(Vec3::NEG_Z * 2.0, Vec3::new(0.3, 0.2, 1.0)));
     let group = |geometries| Group { name: String::new(), geometries };
-    let mut instances = vec![Instance { name: "all".into(), group: 0, transform: DAffine3::IDENTITY }];
+    let mut instances =
+        vec![Instance { name: "all".into(), group: 0, transform: DAffine3::IDENTITY, transform_end: None }];
     for i in 0..4 {
         let v = |p: Vec3| p.as_dvec3();
         let transform = DAffine3::from_scale_rotation_translation(
@@ -64,7 +65,7 @@ fn mixed(count: usize, size: f32, seed: u64) -> Scene {
             glam::DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
             v(random.vec3()) * 2.0,
         );
-        instances.push(Instance { name: format!("node {i}"), group: 1, transform });
+        instances.push(Instance { name: format!("node {i}"), group: 1, transform, transform_end: None });
     }
     Scene {
         geometries: vec![
@@ -110,7 +111,7 @@ fn planes_are_met_however_they_are_placed() {
         Scene::from_geometries(vec![Geometry::Shapes { shapes: vec![floor], material: 0 }], vec![Material::default()]);
     let quarter = glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let wall = DAffine3::from_rotation_translation(quarter, DVec3::new(5.0, 0.0, 0.0));
-    scene.instances.push(Instance { name: "wall".into(), group: 0, transform: wall });
+    scene.instances.push(Instance { name: "wall".into(), group: 0, transform: wall, transform_end: None });
     let world = World::new(&scene).expect("sound");
     let bvh = Bvh::build(&world);
     let ray = Ray::new(Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, -0.1, 0.0));
@@ -142,7 +143,7 @@ fn brute_force_is_the_oracle() {
             None => exact.is_empty(),
         };
         // Two t within their bounds, or a rim.
-        let hit = found.and_then(|hit| Some((hit, oracle::primitive(&world, &hit)?)));
+        let hit = found.and_then(|hit| Some((hit, oracle::primitive(&world, &hit, ray.time)?)));
         let t = hit.and_then(|(hit, p): (_, Primitive)| Some((hit.t, oracle::meet(&ray, &p)?.t.to_f64())));
         if !is_one_of_them {
             ties += 1;

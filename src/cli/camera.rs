@@ -67,6 +67,10 @@ pub(crate) struct CameraArgs {
     /// Distortion of the lens after Brown and Conrady, as OpenCV has it
     #[arg(long, value_name = "K1,K2,K3,P1,P2", value_parser = parse_distortion, allow_hyphen_values = true)]
     distortion: Option<Distortion>,
+
+    /// When the shutter opens and closes, of the time from 0 to 1 in which things move (default: the file's, else 0,1)
+    #[arg(long, value_name = "OPEN,CLOSE", value_parser = parse_shutter)]
+    shutter: Option<[f32; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -95,6 +99,7 @@ impl CameraArgs {
             camera.lens = Some(ThinLens { radius, focus, blades: self.blades.unwrap_or(0) });
         }
         camera.distortion = self.distortion.or(camera.distortion);
+        camera.shutter = self.shutter.unwrap_or(camera.shutter);
         Ok((camera, source))
     }
 
@@ -181,12 +186,23 @@ pub(crate) fn camera_flags(camera: &Camera, bounds: &DAabb) -> String {
     if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
         flags += &format!(" --distortion {k1},{k2},{k3},{p1},{p2}");
     }
+    if camera.shutter != [0.0, 1.0] {
+        let [open, close] = camera.shutter;
+        flags += &format!(" --shutter {open},{close}");
+    }
     flags
 }
 
 fn list(v: DVec3) -> String {
     // Adding zero makes -0 print as 0.
     format!("{},{},{}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
+}
+
+/// When the shutter opens and closes.
+fn parse_shutter(text: &str) -> std::result::Result<[f32; 2], String> {
+    let numbers = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
+    let shutter = numbers.filter(|&[open, close]| 0.0 <= open && open <= close && close <= 1.0);
+    shutter.ok_or_else(|| "expected two times from 0 to 1, the earlier first, as in 0,0.5".to_owned())
 }
 
 /// Two finite numbers with a comma between.

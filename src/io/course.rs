@@ -251,7 +251,7 @@ impl Reader {
         let identity = DAffine3::IDENTITY;
         if !scene.geometries.is_empty() {
             scene.groups.push(Group { name: String::new(), geometries: 0..scene.geometries.len() as u32 });
-            scene.instances.push(Instance { name: String::new(), group: 0, transform: identity });
+            scene.instances.push(Instance { name: String::new(), group: 0, transform: identity, transform_end: None });
         }
         // One unit sphere for each material that needs it.
         let mut groups = HashMap::new();
@@ -263,7 +263,12 @@ impl Reader {
                 scene.groups.push(Group { name: "sphere".to_owned(), geometries: index..index + 1 });
                 scene.groups.len() as u32 - 1
             });
-            scene.instances.push(Instance { name: format!("sphere of line {line}"), group, transform });
+            scene.instances.push(Instance {
+                name: format!("sphere of line {line}"),
+                group,
+                transform,
+                transform_end: None,
+            });
         }
         scene
     }

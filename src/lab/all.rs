@@ -230,9 +230,10 @@ impl Row {
 
 /// A ray as Rust that makes it again, to the bit: Rust prints floats so that they are read back the same.
 fn exactly(ray: &Ray) -> String {
-    let Ray { origin: o, direction: d, tmin, tmax } = ray;
+    let Ray { origin: o, direction: d, tmin, tmax, time } = ray;
     let vector = |v: &crate::math::Vec3| format!("Vec3::new({:?}, {:?}, {:?})", v.x, v.y, v.z);
-    format!("Ray {{ origin: {}, direction: {}, tmin: {tmin:?}, tmax: {tmax:?} }}", vector(o), vector(d))
+    let (o, d) = (vector(o), vector(d));
+    format!("Ray {{ origin: {o}, direction: {d}, tmin: {tmin:?}, tmax: {tmax:?}, time: {time:?} }}")
 }
 
 impl Report {

@@ -28,7 +28,7 @@ pub struct Primitive<'a> {
     /// What it is, in its own coordinates.
     pub body: Body<'a>,
     /// From its own coordinates to the world's; None where they are the same.
-    pub to_world: Option<&'a Affine3>,
+    pub to_world: Option<Affine3>,
 }
 
 /// What a primitive is.
@@ -53,19 +53,20 @@ pub struct Meeting {
     pub at_range_end: bool,
 }
 
-/// The primitive that a hit names; None where there is none of that number.
-pub fn primitive<'a>(world: &'a World, hit: &Hit) -> Option<Primitive<'a>> {
+/// The primitive that a hit names, where it stands at a time; None where there is none of that number.
+pub fn primitive<'a>(world: &'a World, hit: &Hit, time: f32) -> Option<Primitive<'a>> {
     let (part, placement) = world.locate(hit);
     let body = body(part, hit.primitive as usize)?;
-    Some(Primitive { body, to_world: placement.map(|p| &p.to_world) })
+    Some(Primitive { body, to_world: placement.map(|p| p.at(time).to_world) })
 }
 
-/// Every primitive as placed, with its id.
-pub fn primitives(world: &World) -> impl Iterator<Item = (Id, Primitive<'_>)> {
+/// Every primitive as placed at a time, with its id.
+pub fn primitives(world: &World, time: f32) -> impl Iterator<Item = (Id, Primitive<'_>)> {
     let fixed = world.parts[world.fixed.clone()].iter().map(|part| (part, part.instance, None));
-    let placed = world.placements.iter().flat_map(|placement| {
+    let placed = world.placements.iter().flat_map(move |placement| {
+        let to_world = placement.at(time).to_world;
         let parts = &world.parts[world.objects[placement.object as usize].clone()];
-        parts.iter().map(move |part| (part, placement.instance, Some(&placement.to_world)))
+        parts.iter().map(move |part| (part, placement.instance, Some(to_world)))
     });
     fixed.chain(placed).flat_map(|(part, instance, to_world)| {
         (0..part.primitives.len()).filter_map(move |i| {
@@ -82,15 +83,15 @@ pub fn meet(ray: &Ray, primitive: &Primitive) -> Option<Meeting> {
         return None;
     }
     match primitive.body {
-        Body::Triangle(corners) => meet_triangle(ray, corners, primitive.to_world),
-        Body::Shape(shape) => meet_shape(ray, shape, primitive.to_world),
+        Body::Triangle(corners) => meet_triangle(ray, corners, primitive.to_world.as_ref()),
+        Body::Shape(shape) => meet_shape(ray, shape, primitive.to_world.as_ref()),
     }
 }
 
 /// The nearest hits of a ray among all primitives: one, none, or several at exactly the same t, by rising id.
 pub fn closest(world: &World, ray: &Ray) -> Vec<(Id, Meeting)> {
     let mut nearest: Vec<(Id, Meeting)> = Vec::new();
-    for (id, primitive) in primitives(world) {
+    for (id, primitive) in primitives(world, ray.time) {
         let Some(meeting) = meet(ray, &primitive).filter(|m| m.in_range) else { continue };
         match nearest.first().map(|(_, first)| meeting.t.cmp(&first.t)) {
             Some(std::cmp::Ordering::Greater) => continue,
@@ -250,7 +251,7 @@ mod tests {
         // Powers of two: the moved corners are f32.
         let m =
             Affine3 { matrix3: Mat3::from_diagonal(Vec3::new(2.0, 4.0, -1.0)), translation: Vec3::new(8.0, 0.0, 2.0) };
-        let placed = Primitive { body: Body::Triangle(UNIT), to_world: Some(&m) };
+        let placed = Primitive { body: Body::Triangle(UNIT), to_world: Some(m) };
         let moved = triangle(UNIT.map(|p| m.transform_point3(p)));
         for (x, y) in [(8.5, 0.5), (9.0, 2.0), (9.0, 2.1), (8.0, 0.0), (7.9, 1.0)] {
             let ray = Ray::new(Vec3::new(x, y, 3.5), Vec3::new(0.0, 0.0, -3.0));
@@ -274,7 +275,7 @@ mod tests {
         assert_eq!(meet(&Ray::new(Vec3::ZERO, Vec3::X), &ball).unwrap().t.to_f64(), 1.0);
 
         let m = Affine3 { matrix3: Mat3::from_diagonal(Vec3::new(2.0, 1.0, 1.0)), translation: Vec3::X };
-        let egg = Primitive { to_world: Some(&m), ..ball };
+        let egg = Primitive { to_world: Some(m), ..ball };
         assert_eq!(meet(&at(0.0), &egg).unwrap().t.to_f64(), 2.0);
         assert_eq!(meet(&Ray::new(Vec3::new(1.0, 4.0, 0.0), Vec3::NEG_Y), &egg).unwrap().t.to_f64(), 3.0);
     }

@@ -194,12 +194,13 @@ impl fmt::Display for Difference {
         }
         let bits = |x: f32| format!("f32::from_bits({:#010x})", x.to_bits());
         let vector = |v: Vec3| format!("Vec3::new({}, {}, {})", bits(v.x), bits(v.y), bits(v.z));
-        let Ray { origin, direction, tmin, tmax } = self.ray;
+        let Ray { origin, direction, tmin, tmax, time } = self.ray;
         writeln!(f, "Ray {{")?;
         writeln!(f, "    origin: {}, // {origin}", vector(origin))?;
         writeln!(f, "    direction: {}, // {direction}", vector(direction))?;
         writeln!(f, "    tmin: {}, // {tmin:?}", bits(tmin))?;
         writeln!(f, "    tmax: {}, // {tmax:?}", bits(tmax))?;
+        writeln!(f, "    time: {}, // {time:?}", bits(time))?;
         write!(f, "}}")
     }
 }

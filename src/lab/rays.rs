@@ -95,39 +95,40 @@ impl<'a> Aim<'a> {
     pub fn ray(&self, seed: u64, index: u64) -> Query {
         let mut random = Random::new(seed, index);
         let around = |random: &mut Random| self.centre + random.vector() * (1.5 * self.reach);
-        let between = |from: Vec3, to: Vec3| Ray::new(from, to - from);
+        let time = if self.world.moves() { random.unit() } else { 0.0 };
+        let between = |from: Vec3, to: Vec3| Ray { time, ..Ray::new(from, to - from) };
         let origin = around(&mut random);
         Query::Closest(match index % 8 {
-            0 => Ray::new(origin, random.direction()),
+            0 => Ray { time, ..Ray::new(origin, random.direction()) },
             1 => between(self.centre + random.direction() * (1000.0 * self.reach), origin),
-            2 => between(origin, self.corners(&mut random)[0]),
+            2 => between(origin, self.corners(&mut random, time)[0]),
             3 => {
-                let corners = self.corners(&mut random);
+                let corners = self.corners(&mut random, time);
                 between(origin, corners[0].midpoint(corners[1]))
             }
             4 => {
                 // Two coordinates of the corner, and a direction with zeros of both signs.
                 let axis = random.below(3) as usize;
-                let mut from = self.corners(&mut random)[0];
+                let mut from = self.corners(&mut random, time)[0];
                 let mut direction = Vec3::splat(if random.unit() < 0.5 { 0.0 } else { -0.0 });
                 direction[axis] = if random.unit() < 0.5 { 1.0 } else { -1.0 };
                 from[axis] = self.centre[axis] - direction[axis] * 2.0 * self.reach;
-                Ray::new(from, direction)
+                Ray { time, ..Ray::new(from, direction) }
             }
-            5 => Ray::new(self.inside(&mut random), random.direction()),
-            6 => between(origin, self.inside(&mut random)),
+            5 => Ray { time, ..Ray::new(self.inside(&mut random, time), random.direction()) },
+            6 => between(origin, self.inside(&mut random, time)),
             _ => {
-                let (from, to) = (self.inside(&mut random), self.inside(&mut random));
+                let (from, to) = (self.inside(&mut random, time), self.inside(&mut random, time));
                 return Query::Occluded(Ray { tmax: 1.0, ..between(from, to) });
             }
         })
     }
 
-    /// Points of a random primitive, in the world; a triangle's corners, the first of which is any of the three.
-    fn corners(&self, random: &mut Random) -> [Vec3; 3] {
+    /// Points of a random primitive at a time, in the world; a triangle's corners, the first of which is any of the three.
+    fn corners(&self, random: &mut Random, time: f32) -> [Vec3; 3] {
         // Untraceable corners are no targets; a few draws find others in any mesh that has them.
         for _ in 0..8 {
-            let primitive = self.primitive(random.below(self.count.max(1)));
+            let primitive = self.primitive(random.below(self.count.max(1)), time);
             let turn = random.below(3) as usize;
             let points = match primitive.body {
                 Body::Triangle(corners) => [corners[turn], corners[(turn + 1) % 3], corners[(turn + 2) % 3]],
@@ -145,14 +146,14 @@ impl<'a> Aim<'a> {
     }
 
     /// A point of a random primitive, up to rounding.
-    fn inside(&self, random: &mut Random) -> Vec3 {
-        let [a, b, c] = self.corners(random);
+    fn inside(&self, random: &mut Random, time: f32) -> Vec3 {
+        let [a, b, c] = self.corners(random, time);
         let (u, v) = (random.unit(), random.unit());
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         a + (b - a) * u + (c - a) * v
     }
 
-    fn primitive(&self, index: u64) -> Primitive<'a> {
+    fn primitive(&self, index: u64, time: f32) -> Primitive<'a> {
         let run = self.runs.partition_point(|&(.., first)| first <= index) - 1;
         let (part, placement, first) = self.runs[run];
         let body = match &self.world.parts[part].primitives {
@@ -161,7 +162,7 @@ impl<'a> Aim<'a> {
             }
             Primitives::Shapes(shapes) => Body::Shape(&shapes[(index - first) as usize]),
         };
-        Primitive { body, to_world: placement.map(|i| &self.world.placements[i].to_world) }
+        Primitive { body, to_world: placement.map(|i| self.world.placements[i].at(time).to_world) }
     }
 }
 

@@ -112,10 +112,10 @@ pub fn outcome(ray: &Ray, primitive: &Primitive, precision: Precision) -> Outcom
     if !ray.is_valid() {
         return Outcome::MISS;
     }
-    let Some(local) = LocalRay::new(ray, primitive.to_world, precision) else { return Outcome::ANYTHING };
+    let Some(local) = LocalRay::new(ray, primitive.to_world.as_ref(), precision) else { return Outcome::ANYTHING };
     match primitive.body {
         Body::Triangle(corners) if !corners.into_iter().all(is_traceable) => Outcome::MISS,
-        Body::Triangle(corners) => triangle(ray, corners, primitive.to_world, &local, precision),
+        Body::Triangle(corners) => triangle(ray, corners, primitive.to_world.as_ref(), &local, precision),
         Body::Shape(shape) => shapes::outcome(shape, &local.rounded(primitive.to_world.is_some())),
     }
 }
@@ -360,7 +360,7 @@ mod tests {
             let inside = (corners[0] + corners[1] + corners[2]) / 3.0;
             let target = if case % 2 == 0 { corners[0].midpoint(corners[1]) } else { inside };
             let ray = Ray::new(origin, m.transform_point3(target) - origin);
-            let primitive = Primitive { body: Body::Triangle(corners), to_world: Some(&m) };
+            let primitive = Primitive { body: Body::Triangle(corners), to_world: Some(m) };
             let allowed = outcome(&ray, &primitive, Precision::Single);
             let inverse = m.inverse();
             let local = Ray::new(inverse.transform_point3(ray.origin), inverse.transform_vector3(ray.direction));

@@ -45,6 +45,8 @@ pub struct Plan {
     pub attributes: Attributes,
     /// Where light comes from.
     pub lighting: Lighting,
+    /// Whether something moves, so that rays have times.
+    pub motion: bool,
     /// Whether ambient light is added.
     pub ambient: bool,
     /// How often rays may be mirrored or refracted; 0 where no material does either.
@@ -92,6 +94,7 @@ impl Plan {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
             lighting,
+            motion: world.moves(),
             ambient,
             depth,
             background: background.or(scene.background),
@@ -139,6 +142,7 @@ impl fmt::Display for Plan {
             (normals, "smooth normals"),
             (uvs, "textures"),
             (colors, "vertex colours"),
+            (self.motion, "motion"),
             (self.ambient, "ambient light"),
         ];
         for (_, name) in parts.iter().filter(|(on, _)| *on) {

@@ -99,6 +99,8 @@ pub struct Renderer<'a> {
     settings: Settings,
     plan: Plan,
     view: View,
+    /// When it opens and when it closes.
+    shutter: [f32; 2],
     sampler: Sampler,
     filter: FilterSampler,
     /// Of all shadow rays of a pixel to a light.
@@ -128,6 +130,11 @@ impl<'a> Renderer<'a> {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
         let view = View::new(&camera, world.centre, width, height)?;
+        let [open, close] = camera.shutter;
+        if !(0.0 <= open && open <= close && close <= 1.0) {
+            let message = format!("a shutter from {open} to {close}: things move from time 0 to 1, and it closes last");
+            return Err(Error::Usage(message));
+        }
         if settings.light_samples == 0 {
             return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
         }
@@ -136,6 +143,7 @@ impl<'a> Renderer<'a> {
             scene,
             world,
             view,
+            shutter: camera.shutter,
             sampler: Sampler::new(sampling, spp, seed),
             light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
             // A single sample is the pixel's middle, whatever the filter.
@@ -229,6 +237,14 @@ impl<'a> Renderer<'a> {
     }
 
     fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
-        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS))
+        let ray = self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS));
+        Ray { time: if self.plan.motion { self.time(pixel, sample) } else { 0.0 }, ..ray }
+    }
+
+    /// When a sample of a pixel is taken.
+    fn time(&self, pixel: &Pattern, sample: u32) -> f32 {
+        let [open, close] = self.shutter;
+        let share = self.sampler.pair(pixel, sample, Dimension::TIME).x as f32;
+        open + (close - open) * share
     }
 }

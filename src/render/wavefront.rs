@@ -155,6 +155,11 @@ impl Renderer<'_> {
         for (pixel, ray) in rest.iter().zip(&mut rays[groups * LANES..]) {
             *ray = self.ray(pixel, sample);
         }
+        if self.plan.motion {
+            for (pixel, ray) in patterns.iter().zip(&mut rays[..groups * LANES]) {
+                ray.time = self.time(pixel, sample);
+            }
+        }
         tracer.closest_batch(rays, hits, self.settings.batch);
     }
 

@@ -23,6 +23,8 @@ pub struct Camera {
     pub lens: Option<ThinLens>,
     /// How the lens bends straight lines; for [`Projection::Perspective`] alone.
     pub distortion: Option<Distortion>,
+    /// When it is open, of the time from 0 to 1 in which things move: from the first to the second.
+    pub shutter: [f32; 2],
 }
 
 /// Which ray belongs to a point of the picture.
@@ -143,6 +145,7 @@ impl Camera {
             shift: DVec2::ZERO,
             lens: None,
             distortion: None,
+            shutter: [0.0, 1.0],
         })
     }
 

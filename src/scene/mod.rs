@@ -112,7 +112,12 @@ impl Scene {
         Self {
             geometries,
             groups: vec![group],
-            instances: vec![Instance { name: String::new(), group: 0, transform: DAffine3::IDENTITY }],
+            instances: vec![Instance {
+                name: String::new(),
+                group: 0,
+                transform: DAffine3::IDENTITY,
+                transform_end: None,
+            }],
             materials,
             ..Self::default()
         }
@@ -132,11 +137,14 @@ impl Scene {
             .sum()
     }
 
-    /// Bounds of everything that can be hit, in scene coordinates.
+    /// Bounds of everything that can be hit, in scene coordinates, at all times.
     pub fn bounds(&self) -> DAabb {
         self.instances.iter().fold(DAabb::EMPTY, |all, instance| {
-            self.group_geometries(instance.group)
-                .fold(all, |all, (_, geometry)| all.union(geometry.bounds(&instance.transform)))
+            let geometries = self.group_geometries(instance.group);
+            geometries.fold(all, |all, (_, geometry)| {
+                let end = instance.transform_end.as_ref().map_or(DAabb::EMPTY, |end| geometry.bounds(end));
+                all.union(geometry.bounds(&instance.transform)).union(end)
+            })
         })
     }
 
@@ -144,6 +152,7 @@ impl Scene {
     pub fn transform(&mut self, transform: &DAffine3) {
         for instance in &mut self.instances {
             instance.transform = *transform * instance.transform;
+            instance.transform_end = instance.transform_end.map(|end| *transform * end);
         }
         for light in &mut self.lights {
             light.transform(transform);
@@ -168,7 +177,8 @@ impl Scene {
             let range = &self.groups[instance.group as usize].geometries;
             let geometries = &mut self.geometries[range.start as usize..range.end as usize];
             let only_meshes = geometries.iter().all(|geometry| matches!(geometry, Geometry::Mesh(_)));
-            if !(turns && only_meshes && instance.transform.translation == DVec3::ZERO) {
+            let is_still = instance.transform_end.is_none();
+            if !(turns && only_meshes && is_still && instance.transform.translation == DVec3::ZERO) {
                 continue;
             }
             for geometry in geometries {

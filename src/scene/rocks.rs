@@ -19,7 +19,12 @@ const SPACING: f64 = 2.2;
 /// from multiples of irrational numbers: spread as evenly, and the same everywhere.
 pub fn rocks(n: u32) -> Scene {
     let rock = rock();
-    let instances = (0..n).map(|i| Instance { name: format!("rock {i}"), group: 0, transform: place(&rock, i) });
+    let instances = (0..n).map(|i| Instance {
+        name: format!("rock {i}"),
+        group: 0,
+        transform: place(&rock, i),
+        transform_end: None,
+    });
     let instances = instances.collect();
     let group = Group { name: "rock".to_owned(), geometries: 0..1 };
     Scene {

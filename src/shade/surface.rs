@@ -56,23 +56,31 @@ pub struct SurfacePoint {
     pub color: Vec4,
     /// Index into [`Scene::materials`].
     pub material: u32,
+    /// When it was seen, which is when rays that leave it look: see [`Ray::time`].
+    pub time: f32,
 }
 
 impl SurfacePoint {
     /// The point that `hit` names on `ray`.
     pub fn new(scene: &Scene, world: &World, ray: &Ray, hit: &Hit, attributes: Attributes) -> Self {
         let (part, placement) = world.locate(hit);
+        let placement = placement.map(|placement| placement.at(ray.time));
+        let placement = placement.as_deref();
         let geometry = &scene.geometries[hit.geometry as usize];
-        let transform = &scene.instances[hit.instance as usize].transform;
+        let instance = &scene.instances[hit.instance as usize];
+        let linear = match placement {
+            Some(placement) if instance.transform_end.is_some() => placement.to_world.as_daffine3().matrix3,
+            _ => instance.transform.matrix3,
+        };
         let mut point = match &part.primitives {
             Primitives::Triangles { positions, triangles } => {
                 let corners = triangles[hit.primitive as usize].map(|i| positions[i as usize].as_dvec3());
                 let mut point = on_triangle(ray, placement, corners);
-                if transform.matrix3.determinant() < 0.0 {
+                if linear.determinant() < 0.0 {
                     point.front = !point.front;
                 }
                 if let Geometry::Mesh(mesh) = geometry {
-                    point.interpolate(mesh, hit.primitive, &transform.matrix3, attributes);
+                    point.interpolate(mesh, hit.primitive, &linear, attributes);
                 }
                 point
             }
@@ -98,6 +106,7 @@ impl SurfacePoint {
             uv: Vec2::ZERO,
             color: Vec4::ONE,
             material: 0,
+            time: ray.time,
         }
     }
 
@@ -129,14 +138,14 @@ impl SurfacePoint {
     /// Binder 2019, *A fast and robust method for avoiding self-intersection*). A fixed epsilon would be too small for
     /// large scenes and would lose the shadows of small ones.
     pub fn spawn(&self, direction: Vec3, tmax: f32) -> Ray {
-        Ray { origin: self.start(direction.as_dvec3()), direction, tmin: 0.0, tmax }
+        Ray { origin: self.start(direction.as_dvec3()), direction, tmin: 0.0, tmax, time: self.time }
     }
 
     /// A ray that leaves the surface and ends just short of `target` (world coordinates), at t = 1.
     pub fn spawn_to(&self, target: DVec3) -> Ray {
         let origin = self.start(target - self.position);
         let direction = (target - origin.as_dvec3()).as_vec3();
-        Ray { origin, direction, tmin: 0.0, tmax: 1.0 - gamma(TEST_ROUNDINGS) }
+        Ray { origin, direction, tmin: 0.0, tmax: 1.0 - gamma(TEST_ROUNDINGS), time: self.time }
     }
 
     fn start(&self, direction: DVec3) -> Vec3 {

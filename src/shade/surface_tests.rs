@@ -210,7 +210,7 @@ fn placed_shapes_have_their_exact_point_and_either_root() {
         Scene::from_geometries(vec![Geometry::Shapes { shapes: vec![sphere], material: 0 }], vec![Material::default()]);
     let transform = DAffine3::from_scale(DVec3::new(2.0, 1.0, 1.0));
     scene.groups = vec![Group { name: String::new(), geometries: 0..1 }];
-    scene.instances = vec![Instance { name: String::new(), group: 0, transform }; 2];
+    scene.instances = vec![Instance { name: String::new(), group: 0, transform, transform_end: None }; 2];
     let world = World::new(&scene).unwrap();
     assert_eq!(world.placements[0].to_world, Affine3::from_scale(Vec3::new(2.0, 1.0, 1.0)));
     // x = 2 + sqrt(2) is the object's 1 + 1/sqrt(2): the ellipsoid's normal there is (1/2, 1) normalised.

@@ -50,6 +50,7 @@ mod tests {
             uv: Vec2::ZERO,
             color: Vec4::ONE,
             material: 0,
+            time: 0.0,
         }
     }
 

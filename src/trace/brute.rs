@@ -17,8 +17,8 @@ use crate::shape::triangle::Placed;
 pub struct Brute {
     world: World,
     parts: Vec<Prepared>,
-    /// Of each placement, for each part of its object: the triangles where they stand.
-    placed: Vec<Vec<Vec<Lanes>>>,
+    /// Of each placement, for each part of its object: the triangles where they stand; nothing of what moves.
+    placed: Vec<Vec<Option<Vec<Lanes>>>>,
 }
 
 /// A part's primitives, laid out for a linear scan.
@@ -41,7 +41,8 @@ impl Brute {
         let parts: Vec<Prepared> = world.parts.iter().map(Prepared::new).collect();
         let placed = world.placements.iter().map(|placement| {
             let object = &parts[world.objects[placement.object as usize].clone()];
-            object.iter().map(|part| part.placed(&placement.to_world)).collect()
+            let is_still = placement.motion.is_none();
+            object.iter().map(|part| is_still.then(|| part.placed(&placement.to_world))).collect()
         });
         Self { world: world.clone(), placed: placed.collect(), parts }
     }
@@ -54,7 +55,7 @@ impl Brute {
             }
             Prepared::Shapes(shapes) => size_of_val(&shapes[..]),
         };
-        let placed = self.placed.iter().flatten().map(|lanes| size_of_val(&lanes[..]));
+        let placed = self.placed.iter().flatten().flatten().map(|lanes| size_of_val(&lanes[..]));
         self.parts.iter().map(part).sum::<usize>() + placed.sum::<usize>()
     }
 
@@ -79,15 +80,20 @@ impl Brute {
             }
         }
         for (placement, placed) in self.world.placements.iter().zip(&self.placed) {
+            let placement = placement.at(ray.time);
             let object_ray = placement.object_ray(ray);
             for (i, lanes) in self.world.objects[placement.object as usize].clone().zip(placed) {
                 let part = &self.world.parts[i];
                 match &self.parts[i] {
                     Prepared::Triangles { corners, primitives, .. } => {
-                        each_candidate(lanes, corners.len(), ray, |k| {
+                        let offer = |k: usize| {
                             let placed = Placed { corners: corners[k], to_world: &placement.to_world };
                             offer_triangle(&mut nearest, ray, &placed, part.id(placement.instance, primitives[k]));
-                        });
+                        };
+                        match lanes {
+                            Some(lanes) => each_candidate(lanes, corners.len(), ray, offer),
+                            None => (0..corners.len()).for_each(offer),
+                        }
                     }
                     Prepared::Shapes(shapes) => {
                         offer_shapes(&mut nearest, &object_ray, shapes, part, placement.instance);

@@ -11,10 +11,12 @@ pub mod bvh;
 pub mod embree;
 mod leaf;
 mod limits;
+mod motion;
 mod nearest;
 mod unbounded;
 mod world;
 
+pub use motion::Motion;
 pub use world::{Part, Placement, Primitives, World};
 
 use crate::ray::{Hit, Ray};

@@ -14,8 +14,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::limits;
+use super::motion::Motion;
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, gamma64, is_traceable};
+use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Instance, Mesh, Scene, choose_origin};
 use crate::shape::Shape;
@@ -68,10 +69,12 @@ pub struct Placement {
     pub instance: u32,
     /// Index into [`World::objects`].
     pub object: u32,
-    /// From the object's coordinates to the world's; invertible.
+    /// From the object's coordinates to the world's; invertible. Of what moves, at time 0.
     pub to_world: Affine3,
     /// Its inverse in f64.
     pub to_object: DAffine3,
+    /// Where it moves to; none for what stands still. [`Placement::at`] tells where it is.
+    pub motion: Option<Box<Motion>>,
 }
 
 /// Where the parts of a scene instance are.
@@ -106,8 +109,11 @@ impl World {
         let is_baked = |instance: &Instance| {
             let is_mesh = |(_, geometry): (u32, &Geometry)| matches!(geometry, Geometry::Mesh(_));
             let only_meshes = scene.group_geometries(instance.group).all(is_mesh);
+            let is_still = instance.transform_end.is_none();
             // A scaled sphere is no sphere, so shapes are baked only where they merely move.
-            uses[instance.group as usize] == 1 && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
+            is_still
+                && uses[instance.group as usize] == 1
+                && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
         };
         let (baked, placed): (Vec<_>, Vec<_>) =
             scene.instances.iter().enumerate().partition(|(_, instance)| is_baked(instance));
@@ -132,15 +138,23 @@ impl World {
                 world.objects.push(lookup.first_part..world.parts.len());
                 (world.objects.len() as u32 - 1, lookup, origin)
             });
-            let exact = to_world * instance.transform * DAffine3::from_translation(origin);
-            let rounded = exact.as_affine3();
+            let rounded =
+                |transform: &DAffine3| (to_world * *transform * DAffine3::from_translation(origin)).as_affine3();
+            let start = rounded(&instance.transform);
             // The inverse of what is traced, not of what was asked for: the two differ by f32 rounding.
-            let to_object = rounded.as_daffine3().inverse();
+            let to_object = start.as_daffine3().inverse();
             if !to_object.is_finite() {
                 return Err(singular(i, instance));
             }
             world.lookup[i] = Lookup { placement: Some(world.placements.len() as u32), ..lookup };
-            world.placements.push(Placement { instance: i as u32, object, to_world: rounded, to_object });
+            let motion = match &instance.transform_end {
+                None => None,
+                Some(end) => {
+                    let motion = Motion::new(&start, rounded(end));
+                    Some(Box::new(motion.map_err(|time| singular_on_the_way(i, instance, time))?))
+                }
+            };
+            world.placements.push(Placement { instance: i as u32, object, to_world: start, to_object, motion });
         }
         for object in &world.objects {
             limits::check(&world.parts[object.clone()], "an object that is placed several times")?;
@@ -155,6 +169,11 @@ impl World {
             let parts = &self.parts[self.objects[placement.object as usize].clone()];
             all.union(placement.bounds(parts.iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union)))
         })
+    }
+
+    /// Whether something moves.
+    pub fn moves(&self) -> bool {
+        self.placements.iter().any(|placement| placement.motion.is_some())
     }
 
     /// Primitives as placed: those of an object that is placed twice count twice.
@@ -229,27 +248,6 @@ impl Placement {
             ..*ray
         }
     }
-
-    /// A box around the object whose own box is `object`, in world coordinates, rounded outwards.
-    pub fn bounds(&self, object: Aabb) -> Aabb {
-        if object.is_empty() {
-            return Aabb::EMPTY;
-        }
-        let to_world = self.to_world.as_daffine3();
-        let (centre, half) =
-            (object.min.as_dvec3() * 0.5 + object.max.as_dvec3() * 0.5, object.size().as_dvec3() * 0.5);
-        let middle = to_world.transform_point3(centre);
-        let reach = to_world.matrix3.abs() * half;
-        // f64 rounding of the sums, far below one step of f32.
-        let slack = (to_world.matrix3.abs() * (centre.abs() + half) + to_world.translation.abs()) * gamma64(16);
-        let down = |x: f64| (x as f32).next_down();
-        let up = |x: f64| (x as f32).next_up();
-        let (low, high) = (middle - reach - slack, middle + reach + slack);
-        Aabb {
-            min: Vec3::new(down(low.x), down(low.y), down(low.z)),
-            max: Vec3::new(up(high.x), up(high.y), up(high.z)),
-        }
-    }
 }
 
 /// The mesh's positions under `transform`, rounded once; shared where nothing moves.
@@ -291,7 +289,17 @@ fn group_origin(scene: &Scene, group: u32) -> DVec3 {
 fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     let determinant = instance.transform.matrix3.determinant();
     let invertible = determinant != 0.0 && instance.transform.inverse().is_finite();
-    if invertible && instance.transform.is_finite() { Ok(()) } else { Err(singular(index, instance)) }
+    let ends = instance.transform_end.is_none_or(|end| end.is_finite());
+    if invertible && instance.transform.is_finite() && ends { Ok(()) } else { Err(singular(index, instance)) }
+}
+
+fn singular_on_the_way(index: usize, instance: &Instance, time: f64) -> Error {
+    let name = &instance.name;
+    let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way";
+    Error::Backend {
+        backend: "scene",
+        message: format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"),
+    }
 }
 
 fn singular(index: usize, instance: &Instance) -> Error {

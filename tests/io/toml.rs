@@ -158,7 +158,7 @@ fn every_primitive_arrives() {
 fn groups_in_groups_are_unrolled() {
     let scene = scene(&examples()[6]);
     let names: Vec<_> = scene.instances.iter().map(|instance| instance.name.as_str()).collect();
-    assert_eq!(names, ["forest/left", "forest/right", "twin/left", "twin/right"]);
+    assert_eq!(names, ["forest/left", "forest/right", "twin/left", "twin/right", "blown over"]);
     assert!(scene.instances.iter().all(|i| i.group == scene.instances[0].group) && scene.groups.len() == 1);
     // The tree's top, (0, 3, 0): scaled to (0, 4.5, 0), turned about y, moved; then halved and moved back by 6.
     let top = |i: usize| scene.instances[i].transform.transform_point3(DVec3::new(0.0, 3.0, 0.0));
@@ -167,6 +167,8 @@ fn groups_in_groups_are_unrolled() {
     {
         assert!((top(i) - DVec3::from(expected)).length() < 1e-12, "{i}: {}", top(i));
     }
+    let ends: Vec<bool> = scene.instances.iter().map(|instance| instance.transform_end.is_some()).collect();
+    assert_eq!(ends, [false, false, false, false, true]);
     // Turned by 30 degrees about y: x goes to (cos, 0, -sin).
     let x = scene.instances[1].transform.matrix3.x_axis;
     assert!((x - DVec3::new(0.75f64.sqrt(), 0.0, -0.5)).length() < 1e-12, "{x}");

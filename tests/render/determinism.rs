@@ -19,7 +19,7 @@ fn busy_scene(place: DVec3) -> Scene {
     scene.groups[0].geometries = 0..1;
     scene.groups.push(twincast::scene::Group { name: String::new(), geometries: 1..2 });
     let below = DAffine3::from_translation(DVec3::Y * -1.5);
-    scene.instances.push(Instance { name: String::new(), group: 1, transform: below });
+    scene.instances.push(Instance { name: String::new(), group: 1, transform: below, transform_end: None });
     scene.lights = vec![
         Light::Directional { direction: DVec3::new(-1.0, -2.0, -1.0).normalize(), color: Vec3::splat(0.7) },
         Light::Point {
@@ -42,7 +42,10 @@ fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
 
 #[test]
 fn threads_tile_orders_and_packets_do_not_show() {
-    let scene = busy_scene(DVec3::ZERO);
+    let mut scene = busy_scene(DVec3::ZERO);
+    let beside = DAffine3::from_translation(DVec3::new(-2.0, 1.0, 0.5));
+    let moved = DAffine3::from_translation(DVec3::new(-1.5, 1.5, 0.0)) * DAffine3::from_rotation_y(0.5);
+    scene.instances.push(Instance { name: String::new(), group: 1, transform: beside, transform_end: Some(moved) });
     let world = World::new(&scene).unwrap();
     let plain = Settings { tile_order: TileOrder::Scanline, seed: 5, ..settings(70, 45, 3) };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -105,7 +108,7 @@ fn instances_look_like_what_they_are_instances_of() {
     let one = busy_scene(DVec3::ZERO);
     let mut two = one.clone();
     let away = DAffine3::from_translation(DVec3::Y * -1000.0);
-    two.instances.push(Instance { name: String::new(), group: 0, transform: away });
+    two.instances.push(Instance { name: String::new(), group: 0, transform: away, transform_end: None });
     let picture = |scene: &Scene, placements| {
         let world = World::new(scene).unwrap();
         assert_eq!(world.placements.len(), placements);

@@ -41,7 +41,7 @@ impl Toy<'_> {
 }
 
 fn meet(ray: &Ray, part: &Part, placement: Option<&Placement>, primitive: usize) -> Option<f64> {
-    let to_object = placement.map_or(DAffine3::IDENTITY, |p| p.to_object);
+    let to_object = placement.map_or(DAffine3::IDENTITY, |p| p.at(ray.time).to_object);
     let origin = to_object.transform_point3(ray.origin.as_dvec3());
     let direction = to_object.transform_vector3(ray.direction.as_dvec3());
     match &part.primitives {

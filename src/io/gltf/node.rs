@@ -48,7 +48,7 @@ pub(super) fn place(
             document.check_index(&format!("{pointer}/mesh"), mesh, groups.len(), "mesh")?;
             if let Some(group) = groups[mesh] {
                 if is_invertible(&transform) {
-                    scene.instances.push(Instance { name: node.name.clone(), group, transform });
+                    scene.instances.push(Instance { name: node.name.clone(), group, transform, transform_end: None });
                 } else {
                     let message = format!("node {:?} is scaled by zero, and left out", node.name);
                     warnings.push(document.warning(&pointer, message));
@@ -142,7 +142,16 @@ fn make_camera(
     let name = if node.name.is_empty() { source.name.clone() } else { node.name.clone() };
     let frame = DMat3::from_cols(right, back.cross(right), back);
     let eye = transform.translation;
-    Ok(Some(Camera { name, eye, frame, projection, shift: DVec2::ZERO, lens: None, distortion: None }))
+    Ok(Some(Camera {
+        name,
+        eye,
+        frame,
+        projection,
+        shift: DVec2::ZERO,
+        lens: None,
+        distortion: None,
+        shutter: [0.0, 1.0],
+    }))
 }
 
 /// The lights of `KHR_lights_punctual`, at the origin, along -z.

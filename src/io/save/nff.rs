@@ -24,6 +24,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             }
         }
     }
+    if scene.instances.iter().any(|instance| instance.transform_end.is_some()) {
+        return elsewhere("motion".to_owned());
+    }
     let is_grey = |color: Vec3| color.x == color.y && color.y == color.z;
     for material in &scene.materials {
         let Material { ambient, specular, reflection, transmission, emission, .. } = *material;

@@ -35,7 +35,8 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     let mut uses = vec![0; scene.groups.len()];
     for instance in &scene.instances {
         // One that moves its group counts as several.
-        uses[instance.group as usize] += if instance.transform == DAffine3::IDENTITY { 1 } else { 2 };
+        let stays = instance.transform == DAffine3::IDENTITY && instance.transform_end.is_none();
+        uses[instance.group as usize] += if stays { 1 } else { 2 };
     }
     let tops: Vec<bool> = uses.into_iter().map(|uses| uses == 1).collect();
     for (group, &top) in (0..).zip(&tops) {
@@ -53,15 +54,23 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         }
     }
     for instance in scene.instances.iter().filter(|instance| !tops[instance.group as usize]) {
-        let DAffine3 { matrix3, translation } = instance.transform;
-        let rows = [0, 1, 2].map(|i| {
-            let row = matrix3.row(i);
-            format!("[{}, {}, {}, {}]", row.x, row.y, row.z, translation[i])
-        });
         writeln!(out, "[[instance]]\ngroup = \"g{}\"\nname = {}", instance.group, quoted(&instance.name))?;
-        writeln!(out, "transform = {{ matrix = [{}] }}\n", rows.join(", "))?;
+        writeln!(out, "transform = {}", matrix(&instance.transform))?;
+        if let Some(end) = &instance.transform_end {
+            writeln!(out, "transform_end = {}", matrix(end))?;
+        }
+        writeln!(out)?;
     }
     Ok(())
+}
+
+/// A transform as one step, by rows.
+fn matrix(transform: &DAffine3) -> String {
+    let rows = [0, 1, 2].map(|i| {
+        let row = transform.matrix3.row(i);
+        format!("[{}, {}, {}, {}]", row.x, row.y, row.z, transform.translation[i])
+    });
+    format!("{{ matrix = [{}] }}", rows.join(", "))
 }
 
 /// A text in quotes, as TOML has them.
@@ -127,6 +136,10 @@ fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
     }
     if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
         writeln!(out, "distortion = [{k1}, {k2}, {k3}, {p1}, {p2}]")?;
+    }
+    if camera.shutter != [0.0, 1.0] {
+        let [open, close] = camera.shutter;
+        writeln!(out, "shutter = [{open}, {close}]")?;
     }
     if camera.shift != DVec2::ZERO {
         writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;

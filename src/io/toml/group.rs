@@ -24,10 +24,38 @@ pub(super) struct Body {
 /// What is placed in a body.
 pub(super) struct Child {
     pub(super) name: String,
-    pub(super) transform: DAffine3,
+    pub(super) place: Place,
     pub(super) target: Target,
     /// Where it stands in the text.
     pub(super) at: usize,
+}
+
+/// Where something stands, and where it moves to.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    start: DAffine3,
+    end: Option<DAffine3>,
+}
+
+impl Place {
+    const HERE: Self = Self { start: DAffine3::IDENTITY, end: None };
+
+    /// The keys `transform` and `transform_end`.
+    pub(super) fn read(table: &mut Table<'_>) -> Read<Self> {
+        let start = table.optional("transform", transform)?.unwrap_or(DAffine3::IDENTITY);
+        Ok(Self { start, end: table.optional("transform_end", transform)? })
+    }
+
+    /// Of something within what stands here.
+    fn of(&self, inner: &Self) -> Self {
+        let end_of = |place: &Self| place.end.unwrap_or(place.start);
+        let moves = self.end.is_some() || inner.end.is_some();
+        Self { start: self.start * inner.start, end: moves.then(|| end_of(self) * end_of(inner)) }
+    }
+
+    fn instance(&self, name: String, group: u32) -> Instance {
+        Instance { name, group, transform: self.start, transform_end: self.end }
+    }
 }
 
 pub(super) enum Target {
@@ -67,7 +95,7 @@ impl Groups<'_> {
             let message = format!("{count} placements of groups, those in groups counted; at most {MOST} are unrolled");
             return Err(Fault { at: 0, message });
         }
-        self.place(&self.top, "", &DAffine3::IDENTITY, scene)
+        self.place(&self.top, "", &Place::HERE, scene)
     }
 
     /// What a body comes to. `path` names the groups that are being looked at.
@@ -117,22 +145,21 @@ impl Groups<'_> {
         })
     }
 
-    fn place(&self, body: &Body, path: &str, transform: &DAffine3, scene: &mut Scene) -> Read<()> {
+    fn place(&self, body: &Body, path: &str, place: &Place, scene: &mut Scene) -> Read<()> {
         if let Some(group) = body.own {
-            scene.instances.push(Instance { name: path.to_owned(), group, transform: *transform });
+            scene.instances.push(place.instance(path.to_owned(), group));
         }
         for child in &body.children {
-            let (name, transform) = (joined(path, &child.name), *transform * child.transform);
-            if !is_invertible(&transform) {
+            let (name, place) = (joined(path, &child.name), place.of(&child.place));
+            if !is_invertible(&place.start) || place.end.is_some_and(|end| !is_invertible(&end)) {
                 let message = format!("{name:?} has a transform that nothing undoes; no scale may be 0");
                 return Err(Fault { at: child.at, message });
             }
             match &child.target {
-                Target::Group(group) => self.place(self.find(group, child.at)?.1, &name, &transform, scene)?,
-                Target::File(placed) => scene.instances.extend(placed.iter().map(|inner| Instance {
-                    name: joined(&name, &inner.name),
-                    group: inner.group,
-                    transform: transform * inner.transform,
+                Target::Group(group) => self.place(self.find(group, child.at)?.1, &name, &place, scene)?,
+                Target::File(placed) => scene.instances.extend(placed.iter().map(|inner| {
+                    let within = Place { start: inner.transform, end: None };
+                    place.of(&within).instance(joined(&name, &inner.name), inner.group)
                 })),
             }
         }

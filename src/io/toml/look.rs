@@ -215,6 +215,9 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
         })
         .transpose()?;
     camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
+    if let Some(shutter) = table.optional("shutter", |value| value.numbers())? {
+        camera.shutter = shutter.map(|time| time as f32);
+    }
     camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
     table.finish()?;
     Ok(camera)

@@ -16,14 +16,14 @@ use std::path::Path;
 
 use ::toml::de::DeTable;
 
-use self::group::{Body, Child, Groups, Target};
+use self::group::{Body, Child, Groups, Place, Target};
 use self::include::{Include, Includes};
 use self::look::{Render, Shading};
 use self::table::{Fault, Read, Table, Value};
 use super::suggest::suggestion;
 use super::{light_or_darkness, texture};
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, Vec3};
+use crate::math::Vec3;
 use crate::memory::Mapped;
 use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture};
 use crate::shape::Shape;
@@ -152,8 +152,8 @@ impl Reader<'_> {
             let value = instance.need("group")?;
             let group = value.text()?;
             let name = instance.optional("name", Value::text)?.unwrap_or(group).to_owned();
-            let transform = instance.optional("transform", group::transform)?.unwrap_or(DAffine3::IDENTITY);
-            body.children.push(Child { name, transform, target: Target::Group(group.to_owned()), at: value.at });
+            let place = Place::read(&mut instance)?;
+            body.children.push(Child { name, place, target: Target::Group(group.to_owned()), at: value.at });
             instance.finish()?;
         }
         if !geometries.is_empty() {
@@ -171,9 +171,9 @@ impl Reader<'_> {
         let include = Include::read(table, self.folder, material)?;
         let at = table.need("path")?.at;
         let name = table.optional("name", Value::text)?.unwrap_or_default().to_owned();
-        let transform = table.optional("transform", group::transform)?.unwrap_or(DAffine3::IDENTITY);
+        let place = Place::read(table)?;
         let placed = self.includes.add(include, &mut self.scene, self.warnings).map_err(Stop::Elsewhere)?;
-        Ok(Child { name, transform, target: Target::File(placed), at })
+        Ok(Child { name, place, target: Target::File(placed), at })
     }
 
     /// The material that a primitive's table names, or the plain one.

@@ -123,5 +123,5 @@ fn add_mesh(scene: &mut Scene, mesh: Mesh) {
     let name = String::new();
     scene.groups.push(Group { name: name.clone(), geometries: geometry..geometry + 1 });
     let group = scene.groups.len() as u32 - 1;
-    scene.instances.push(Instance { name, group, transform: DAffine3::IDENTITY });
+    scene.instances.push(Instance { name, group, transform: DAffine3::IDENTITY, transform_end: None });
 }

@@ -67,6 +67,8 @@ impl Dimension {
     pub(super) const FILM: Self = Self(0);
     /// The point on the lens.
     pub(super) const LENS: Self = Self(1);
+    /// The time while the shutter is open.
+    pub(super) const TIME: Self = Self(u32::MAX >> 1);
 
     /// The point on a light, as asked by the ray of a pixel's tree of rays that has the number `branch`.
     pub(super) const fn light(light: u32, branch: u32) -> Self {

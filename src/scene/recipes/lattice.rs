@@ -17,7 +17,7 @@ pub(super) fn make(n: u32) -> Scene {
         let at = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * SPACING;
         let matrix = turn(index) * DMat3::from_diagonal(DVec3::splat(0.7 + 0.5 * noise(index, 3)));
         let transform = DAffine3::from_mat3_translation(matrix, at);
-        instances.push(Instance { name: format!("teapot {x} {y} {z}"), group: 0, transform });
+        instances.push(Instance { name: format!("teapot {x} {y} {z}"), group: 0, transform, transform_end: None });
     }
     let mut scene = Scene {
         geometries: vec![Geometry::Mesh(teapot::mesh())],

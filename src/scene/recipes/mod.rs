@@ -194,7 +194,7 @@ fn add_floor(scene: &mut Scene, subject: &DAabb, material: Material) {
     scene.groups.push(super::Group { name: "floor".to_owned(), geometries: first..first + 1 });
     let group = scene.groups.len() as u32 - 1;
     let transform = crate::math::DAffine3::IDENTITY;
-    scene.instances.push(super::Instance { name: "floor".to_owned(), group, transform });
+    scene.instances.push(super::Instance { name: "floor".to_owned(), group, transform, transform_end: None });
 }
 
 /// A number in [0, 1) for two whole ones, by the finaliser of SplitMix64 (Steele, Lea, Flood 2014, *Fast splittable

@@ -14,11 +14,14 @@
 //! |M| times what it strays in the object, with |o'| at most |B| (|o| + |T|). The largest of that over all placements is
 //! linear in |o|: a matrix and a vector, found when the scene is built.
 
+use std::borrow::Cow;
+
 use super::items::reach;
 use super::ray::IndexRay;
 use crate::math::{Aabb, DMat3, DVec3, UNIT_ROUNDOFF, gamma64};
 use crate::ray::Ray;
 use crate::trace::Placement;
+use crate::trace::motion::Extremes;
 
 /// How much of the coordinates a hit of a shape may lie beside where the ray is: see above.
 const SHAPE_ERROR: f64 = 4.0 * UNIT_ROUNDOFF as f64;
@@ -29,6 +32,7 @@ pub(super) fn stray_of_shapes(ray: &Ray, reach: DVec3) -> DVec3 {
 }
 
 /// A placement, and how good its inverse is.
+#[derive(Clone)]
 pub(super) struct Placed {
     pub placement: Placement,
     /// The largest row sum of |B M - 1|, doubled, rounding and all; huge where the inverse is worth nothing.
@@ -44,6 +48,14 @@ impl Placed {
         let residual = 2.0 * rows.max_element();
         // The bound holds for |R| up to a half. Beyond, everything is let pass.
         Self { placement: placement.clone(), residual: if residual <= 1.0 { residual } else { 1e30 } }
+    }
+
+    /// Where it stands at a time.
+    pub fn at(&self, time: f32) -> Cow<'_, Self> {
+        match self.placement.motion {
+            None => Cow::Borrowed(self),
+            Some(_) => Cow::Owned(Self::new(&self.placement.at(time))),
+        }
     }
 
     /// The ray in the object's coordinates, made ready for its index.
@@ -83,14 +95,13 @@ impl Spread {
 
     /// With another object, which holds shapes within `bounds`.
     pub fn include(self, placed: &Placed, bounds: &Aabb) -> Self {
-        let Placed { placement, residual } = placed;
-        let to_world = placement.to_world.as_daffine3();
-        let (forward, inverse) = (to_world.matrix3.abs(), placement.to_object.matrix3.abs());
+        let Extremes { forward, inverse, translation, residual } = placed.placement.extremes();
+        let residual = if residual <= 1.0 { residual.max(placed.residual) } else { 1e30 };
         let ones = DMat3::from_cols(DVec3::ONE, DVec3::ONE, DVec3::ONE);
         // From the size of coordinates in the object to the error in the world.
         let error = forward * (DMat3::IDENTITY * (4.0 * SHAPE_ERROR) + ones * (2.0 * residual));
         let matrix = error * inverse;
-        let constant = matrix * to_world.translation.abs() + error * reach(bounds);
+        let constant = matrix * translation + error * reach(bounds);
         let column = |i: usize| self.of_origin.col(i).max(matrix.col(i));
         Self { of_origin: DMat3::from_cols(column(0), column(1), column(2)), constant: self.constant.max(constant) }
     }

@@ -135,11 +135,17 @@ impl Kernel for Gather<'_> {
         let (mut upper, mut level) = (Stack::new(), Stack::new());
         bvh.fixed.gather::<S>(ray, None, &mut level, gathered);
         bvh.unbounded.gather(ray, &mut gathered.shapes);
+        let limit = limit(ray);
+        if !bvh.moving.is_empty() {
+            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, &mut upper, |object, place| {
+                object.gather::<S>(ray, Some(place), &mut level, gathered);
+                Visit::Until(limit)
+            });
+        }
         if bvh.placements.is_empty() {
             return;
         }
         let slab = SlabRay::new(ray, bvh.placements.reach(), Blur::NONE);
-        let limit = limit(ray);
         walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |leaf| {
             for place in leaf.blocks().map(|number| bvh.placements.at(number)) {
                 let object = &bvh.objects[place.placement.object as usize];

@@ -82,6 +82,30 @@ impl Bvh {
         );
     }
 
+    /// Everything that moves, for one ray.
+    #[inline(always)]
+    fn enter_moving<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+        if self.moving.is_empty() || Q::ANY && nearest.hit().is_some() {
+            return;
+        }
+        let Stacks { upper, level: lower } = stacks;
+        self.moving.walk::<S, Q>(
+            &self.objects,
+            ray,
+            nearest.limit(),
+            upper,
+            #[inline(always)]
+            |level, place| {
+                level.trace_triangles::<S, Q>(ray, place, lower, nearest);
+                let object_ray = place.placement.object_ray(ray);
+                if object_ray.is_valid() {
+                    level.trace_shapes::<S, Q>(&object_ray, Some(place.through()), lower, nearest);
+                }
+                Visit::after::<Q>(nearest)
+            },
+        );
+    }
+
     /// Many rays among triangles, in flight together; hits are computed several at a time. Also tells t in f64, for the last 64 of
     /// them: that of ray i in the place of `first` + i.
     #[inline(always)]
@@ -130,9 +154,10 @@ impl Bvh {
         !self.fixed.triangles.tree().is_empty() || self.placements.has_triangles()
     }
 
-    /// Whether there is nothing else.
+    /// Whether there is nothing else, and all of it stands still.
     fn has_only_triangles(&self) -> bool {
-        self.fixed.shapes.tree().is_empty() && !self.placements.has_shapes() && self.unbounded.is_empty()
+        let has_shapes = !self.fixed.shapes.tree().is_empty() || self.placements.has_shapes();
+        !has_shapes && self.moving.is_empty() && self.unbounded.is_empty()
     }
 
     /// Many rays: in bundles of 64 where they are bundles, else in flight.
@@ -165,7 +190,7 @@ impl Bvh {
         }
     }
 
-    /// What there is besides triangles of the world, for rays that have `answers`, with t in f64, among these.
+    /// What there is besides triangles that stand still, for rays that have `answers`, with t in f64, among these.
     #[inline(always)]
     fn trace_others<S: Simd, Q: Query>(
         &self,
@@ -180,6 +205,7 @@ impl Bvh {
                 self.unbounded.offer(ray, &mut nearest);
                 self.fixed.trace_shapes::<S, Q>(ray, None, &mut stacks.level, &mut nearest);
                 self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
+                self.enter_moving::<S, Q>(ray, stacks, &mut nearest);
                 *answer = Q::answer(nearest.hit());
             }
         }

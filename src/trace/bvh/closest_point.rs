@@ -62,11 +62,12 @@ impl Bvh {
 }
 
 /// Which tree a box is of.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Level {
     Fixed,
     Placements,
-    /// Of an object, by the index of its placement.
+    Moving,
+    /// Of an object, by the index of its placement; those that move come after those that do not.
     Placed(u32),
 }
 
@@ -114,7 +115,8 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(bvh: &'a Bvh, point: Vec3, max_distance: f32) -> Self {
-        let bounds = bvh.fixed.triangles.tree().bounds().union(bvh.placements.tree().bounds());
+        let placed = bvh.placements.tree().bounds().union(bvh.moving.tree().bounds());
+        let bounds = bvh.fixed.triangles.tree().bounds().union(placed);
         let reach = bounds.min.abs().max(bounds.max.abs()).as_dvec3() + point.as_dvec3().abs();
         let slack = if bounds.is_empty() { 0.0 } else { reach.element_sum() * gamma64(32) };
         let point = point.as_dvec3();
@@ -133,6 +135,7 @@ impl<'a> Search<'a> {
     fn run(&mut self) {
         self.push_root(Level::Fixed);
         self.push_root(Level::Placements);
+        self.push_root(Level::Moving);
         while let Some(waiting) = self.queue.pop() {
             if waiting.near > self.limit {
                 return;
@@ -142,6 +145,10 @@ impl<'a> Search<'a> {
                 Waiting { level: Level::Placements, child, .. } => {
                     child.blocks().for_each(|index| self.push_root(Level::Placed(index)));
                 }
+                Waiting { level: Level::Moving, child, .. } => {
+                    let first = self.bvh.placements.len();
+                    child.blocks().for_each(|index| self.push_root(Level::Placed(first + index)));
+                }
                 Waiting { level, child, .. } => self.offer_leaf(level, child),
             }
         }
@@ -149,19 +156,23 @@ impl<'a> Search<'a> {
 
     /// The placement with this index among the leaves of the upper tree.
     fn placement(&self, index: u32) -> &'a Placement {
-        &self.bvh.placements.at(index).placement
+        match index.checked_sub(self.bvh.placements.len()) {
+            None => &self.bvh.placements.at(index).placement,
+            Some(moving) => self.bvh.moving.at(moving),
+        }
     }
 
     fn triangles(&self, level: Level) -> Option<&'a TriangleTree> {
         match level {
             Level::Fixed => Some(&self.bvh.fixed.triangles),
-            Level::Placements => None,
+            Level::Placements | Level::Moving => None,
             Level::Placed(index) => Some(&self.bvh.objects[self.placement(index).object as usize].triangles),
         }
     }
 
     fn tree(&self, level: Level) -> &'a Tree {
-        self.triangles(level).map_or(self.bvh.placements.tree(), TriangleTree::tree)
+        let upper = if level == Level::Moving { self.bvh.moving.tree() } else { self.bvh.placements.tree() };
+        self.triangles(level).map_or(upper, TriangleTree::tree)
     }
 
     fn push_root(&mut self, level: Level) {
@@ -181,7 +192,7 @@ impl<'a> Search<'a> {
     fn push(&mut self, level: Level, bounds: Aabb, child: Child) {
         let bounds = match level {
             Level::Placed(placement) => self.placement(placement).bounds(bounds),
-            Level::Fixed | Level::Placements => bounds,
+            Level::Fixed | Level::Placements | Level::Moving => bounds,
         };
         let outside = (bounds.min.as_dvec3() - self.point).max(self.point - bounds.max.as_dvec3()).max(DVec3::ZERO);
         let near = outside.length_squared();
@@ -203,7 +214,7 @@ impl<'a> Search<'a> {
                         let placement = self.placement(index);
                         (Placed { corners, to_world: &placement.to_world }.rounded(), placement.instance)
                     }
-                    Level::Fixed | Level::Placements => (corners.rounded(), part.instance),
+                    Level::Fixed | Level::Placements | Level::Moving => (corners.rounded(), part.instance),
                 };
                 self.offer(closest_point(self.point, corners), (block.primitive[lane], part.geometry, instance));
             }

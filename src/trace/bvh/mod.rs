@@ -15,6 +15,7 @@
 //! | `walk` | one ray by itself, from the root to the leaves |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
@@ -47,6 +48,7 @@ mod isa;
 mod leaves;
 mod level;
 mod meshes;
+mod moving;
 mod node;
 mod noted;
 mod place;
@@ -76,6 +78,7 @@ use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
 use level::Level;
+use moving::MovingTree;
 use placements::PlacementTree;
 use query::{Closest, Occluded};
 use triangles::TriangleTree;
@@ -85,6 +88,7 @@ pub struct Bvh {
     fixed: Level,
     objects: Vec<Level>,
     placements: PlacementTree,
+    moving: MovingTree,
     unbounded: Unbounded,
     preset: Preset,
     isa: Isa,
@@ -131,13 +135,17 @@ impl Bvh {
         let fixed = levels.next().expect("the fixed parts are a level");
         let objects: Vec<Level> = levels.collect();
         let placements = PlacementTree::build(&world.placements, &objects, options);
-        Self { fixed, objects, placements, unbounded: Unbounded::new(world), preset, isa }
+        let moving = MovingTree::build(&world.placements, &objects, options);
+        Self { fixed, objects, placements, moving, unbounded: Unbounded::new(world), preset, isa }
     }
 
     /// Memory the trees hold, in bytes.
     pub fn bytes(&self) -> usize {
         let level = |level: &Level| level.triangles.bytes() + level.shapes.bytes();
-        level(&self.fixed) + self.objects.iter().map(level).sum::<usize>() + self.placements.bytes()
+        level(&self.fixed)
+            + self.objects.iter().map(level).sum::<usize>()
+            + self.placements.bytes()
+            + self.moving.bytes()
     }
 
     /// The surface area heuristic's estimate of what a ray costs that meets the scene's box, in tests of a block of
@@ -156,8 +164,13 @@ impl Bvh {
             let costs = items.map(|item| objects[self.placements.at(item).placement.object as usize]);
             costs.sum()
         });
-        let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));
-        if whole > 0.0 { (of(&self.fixed) + placed) / whole } else { 0.0 }
+        let moving = self.moving.tree().cost(|items| {
+            let costs = items.map(|item| objects[self.moving.at(item).object as usize]);
+            costs.sum()
+        });
+        let placed_bounds = self.placements.tree().bounds().union(self.moving.tree().bounds());
+        let whole = area(self.fixed.bounds().union(placed_bounds));
+        if whole > 0.0 { (of(&self.fixed) + placed + moving) / whole } else { 0.0 }
     }
 
     /// What it was built for.

@@ -209,7 +209,7 @@ mod tests {
             matrix.x_axis = rotation.x_axis + rotation.y_axis * shear;
             let to_world = Affine3 { matrix3: matrix, translation: random.vec3() * away };
             let to_object = to_world.as_daffine3().inverse();
-            let place = Place::new(Placement { instance: 0, object: 0, to_world, to_object }, Vec3::ONE);
+            let place = Place::new(Placement { instance: 0, object: 0, to_world, to_object, motion: None }, Vec3::ONE);
             let ray = Ray::new(random.vec3() * away.max(3.0), random.vec3());
             let (local, blur) = place.local::<Portable>(&ray);
             if blur == Blur::UNKNOWN {
@@ -238,7 +238,8 @@ mod tests {
     fn a_transform_that_f64_loses_leaves_everything_open() {
         let matrix = Mat3::from_cols(Vec3::X, Vec3::new(1.0, f32::EPSILON, 0.0) * 1e30, Vec3::Z * 1e-30);
         let to_world = Affine3 { matrix3: matrix, translation: Vec3::ZERO };
-        let placement = Placement { instance: 0, object: 0, to_world, to_object: to_world.as_daffine3().inverse() };
+        let to_object = to_world.as_daffine3().inverse();
+        let placement = Placement { instance: 0, object: 0, to_world, to_object, motion: None };
         let place = Place::new(placement, Vec3::ONE);
         let (_, blur) = place.local::<Portable>(&Ray::new(Vec3::ONE, Vec3::new(1.0, 1.0, 1e30)));
         assert_eq!(blur, Blur::UNKNOWN);

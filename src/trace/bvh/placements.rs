@@ -1,4 +1,4 @@
-//! The upper level: a tree over placed objects.
+//! The upper level: a tree over placed objects that stand still.
 
 use super::build::{self, Record};
 use super::level::Level;
@@ -8,7 +8,7 @@ use super::preset::Options;
 use crate::math::{Aabb, Vec3};
 use crate::trace::Placement;
 
-/// All placements, in the order of the tree's leaves.
+/// All that stand still, in the order of the tree's leaves.
 pub(super) struct PlacementTree {
     tree: Tree,
     places: Vec<Place>,
@@ -16,26 +16,38 @@ pub(super) struct PlacementTree {
     has_shapes: bool,
 }
 
+/// A tree over those placements that `is_wanted`, and which each of them is, in the order of its leaves: one a leaf, for to enter an
+/// object costs many times what the test of its box does.
+pub(super) fn tree_over(
+    placements: &[Placement],
+    is_wanted: impl Fn(&Placement) -> bool,
+    objects: &[Level],
+    options: &Options<'_>,
+) -> (Tree, Vec<usize>) {
+    let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
+    let item = |(i, placement): (usize, &Placement)| {
+        let bounds = placement.bounds(bounds[placement.object as usize]);
+        (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
+    };
+    let wanted = placements.iter().enumerate().filter(|(_, placement)| is_wanted(placement));
+    let mut items: Vec<Record> = wanted.filter_map(item).collect();
+    let tree = build::build(&mut items, 1, 1, options);
+    (tree, items.iter().map(|item| item.primitive() as usize).collect())
+}
+
 /// The place of what is not placed: the fixed triangles. No placement has this number, since a leaf could not name it.
 pub(super) const FIXED: u32 = u32::MAX;
 
 impl PlacementTree {
-    /// `objects` are what is placed.
+    /// Takes those that stand still. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
-        let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let item = |(i, placement): (usize, &Placement)| {
-            let bounds = placement.bounds(bounds[placement.object as usize]);
-            (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
-        };
-        let mut items: Vec<Record> = placements.iter().enumerate().filter_map(item).collect();
-        // A leaf for each: to enter an object costs many times what the test of its box does.
-        let tree = build::build(&mut items, 1, 1, options);
-        let place = |item: &Record| {
-            let placement = placements[item.primitive() as usize].clone();
+        let (tree, order) = tree_over(placements, |placement| placement.motion.is_none(), objects, options);
+        let place = |i: usize| {
+            let placement = placements[i].clone();
             let reach = objects[placement.object as usize].triangles.tree().reach();
             Place::new(placement, reach)
         };
-        let places: Vec<Place> = items.iter().map(place).collect();
+        let places: Vec<Place> = order.into_iter().map(place).collect();
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());
@@ -45,6 +57,11 @@ impl PlacementTree {
     /// Whether nothing is placed.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
+    }
+
+    /// How many they are.
+    pub fn len(&self) -> u32 {
+        self.places.len() as u32
     }
 
     /// Whether some object that is placed has triangles.

@@ -7,6 +7,7 @@
 
 use super::Bvh;
 use super::level::Level;
+use super::moving::MovingTree;
 use super::placements::PlacementTree;
 use super::preset::Options;
 use super::shapes::ShapeTree;
@@ -31,6 +32,7 @@ impl Bvh {
             level.refit(&world.parts[parts.clone()], &options)?;
         }
         self.placements = PlacementTree::build(&world.placements, &self.objects, &options);
+        self.moving = MovingTree::build(&world.placements, &self.objects, &options);
         self.unbounded = Unbounded::new(world);
         Ok(())
     }

@@ -257,6 +257,6 @@ pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8
 }
 
 #[inline(always)]
-fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax }: &Ray) -> S::V8 {
+fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax, .. }: &Ray) -> S::V8 {
     S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

@@ -12,6 +12,8 @@ pub(super) struct Lanes {
     pub direction: [Vec4; 3],
     pub tmin: Vec4,
     pub tmax: Vec4,
+    /// From 0 to 1, as Embree demands.
+    pub time: Vec4,
 }
 
 impl Lanes {
@@ -28,6 +30,8 @@ impl Lanes {
             direction: [starts.w_axis, ends.x_axis, ends.y_axis],
             tmin: ends.z_axis,
             tmax: ends.w_axis,
+            // In this order NaN becomes 0.
+            time: Vec4::from_array(rays.each_ref().map(|r| r.time)).max(Vec4::ZERO).min(Vec4::ONE),
         }
     }
 

@@ -129,7 +129,8 @@ impl Embree {
         let fixed = &world.parts[world.fixed.clone()];
         let mut builder = build(fixed)?;
         for (i, placement) in world.placements.iter().enumerate() {
-            builder.add_instance(id(fixed.len() + i)?, &objects[placement.object as usize], &placement.to_world)?;
+            let (object, end) = (&objects[placement.object as usize], placement.motion.as_ref().map(|m| &m.end));
+            builder.add_instance(id(fixed.len() + i)?, object, &placement.to_world, end)?;
         }
         let part_ids = |part: &Part| PartIds { geometry: part.geometry, instance: part.instance };
         let placements = world.placements.iter().map(|placement| PlacementIds {

@@ -25,6 +25,7 @@ pub(super) mod ray_row {
     pub const ORIGIN: usize = 0;
     pub const TNEAR: usize = 3;
     pub const DIRECTION: usize = 4;
+    pub const TIME: usize = 7;
     pub const TFAR: usize = 8;
     pub const MASK: usize = 9;
     pub const COUNT: usize = 12;
@@ -135,6 +136,7 @@ impl<const G: usize> Rays<G> {
             self.0[ray_row::DIRECTION + axis][group] = lanes.direction[axis];
         }
         self.0[ray_row::TNEAR][group] = lanes.tmin;
+        self.0[ray_row::TIME][group] = lanes.time;
         self.0[ray_row::TFAR][group] = lanes.tmax;
     }
 

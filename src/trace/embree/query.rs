@@ -211,6 +211,8 @@ fn each_hit(
             direction: vector(ray_row::DIRECTION),
             tmin: get(ray_row::TNEAR),
             tmax: get(ray_row::TFAR),
+            // A shape stands still in its own coordinates.
+            time: 0.0,
         };
         let hit = guard(list, None, || Shape::intersect(&list.shapes[primitive as usize], &ray));
         // Version 4 reads the answer from the mask, version 3 goes on using it as the mask of its own.

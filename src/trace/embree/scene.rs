@@ -104,16 +104,26 @@ impl SceneBuilder {
         self.attach(&geometry, id)
     }
 
-    /// Adds `object`, placed by `to_world`, as geometry `id`.
-    pub(super) fn add_instance(&mut self, id: u32, object: &Arc<Scene>, to_world: &Affine3) -> Result<()> {
+    /// Adds `object`, placed by `to_world`, as geometry `id`; it may move to `end`.
+    pub(super) fn add_instance(
+        &mut self,
+        id: u32,
+        object: &Arc<Scene>,
+        to_world: &Affine3,
+        end: Option<&Affine3>,
+    ) -> Result<()> {
         let geometry = self.geometry(sys::RTC_GEOMETRY_TYPE_INSTANCE)?;
-        let columns = to_world.to_cols_array();
+        let columns = |transform: &Affine3| transform.to_cols_array();
         // SAFETY: geometry and object are alive; Embree reads the 12 floats of this format during the call, and the
         // object is kept with this scene.
         unsafe {
             sys::rtcSetGeometryInstancedScene(geometry.0, object.raw());
             let format = sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
-            sys::rtcSetGeometryTransform(geometry.0, 0, format, columns.as_ptr().cast());
+            if let Some(end) = end {
+                sys::rtcSetGeometryTimeStepCount(geometry.0, 2);
+                sys::rtcSetGeometryTransform(geometry.0, 1, format, columns(end).as_ptr().cast());
+            }
+            sys::rtcSetGeometryTransform(geometry.0, 0, format, columns(to_world).as_ptr().cast());
         }
         self.attach(&geometry, id)?;
         // One reference an object is enough, and placements come in runs of one object.

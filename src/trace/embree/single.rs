@@ -42,9 +42,9 @@ impl SingleRay {
     /// Takes a valid ray.
     #[inline(always)]
     pub fn load(&mut self, ray: &Ray) {
-        let time = 0.0;
         self.0[0] = ray.origin.extend(ray.tmin);
-        self.0[1] = ray.direction.extend(time);
+        // From 0 to 1, as Embree demands; in this order NaN becomes 0.
+        self.0[1] = ray.direction.extend(ray.time.max(0.0).min(1.0));
         self.0[2] = Vec4::new(ray.tmax, ALL_BITS, 0.0, 0.0);
     }
 

@@ -1,0 +1,80 @@
+//! Objects that move: a tree of their own, over the boxes of all they pass through.
+//!
+//! A ray comes here by itself, after everything that stands still, and each object that it enters is put where it stands at that time. So
+//! bundles and flights, in which rays of many times would have to part, know of no time, and scenes without motion pay nothing for it. Boxes that move
+//! with the time of the ray (Embree's way, and that of Grünschloss, Stich, Nawaz, Keller 2011, *MSBVH*) would be entered less
+//! often by rays among things that fly far; that would need a second kind of node.
+
+use super::level::Level;
+use super::node::Tree;
+use super::place::{Blur, Place};
+use super::placements::tree_over;
+use super::preset::Options;
+use super::query::Query;
+use super::simd::Simd;
+use super::slab::SlabRay;
+use super::walk::{self, Stack, Visit};
+use crate::ray::Ray;
+use crate::trace::Placement;
+
+/// Everything that moves.
+pub(super) struct MovingTree {
+    tree: Tree,
+    /// In the order of the tree's leaves.
+    placements: Vec<Placement>,
+}
+
+impl MovingTree {
+    /// Takes those that move. `objects` are what is placed.
+    pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
+        let (tree, order) = tree_over(placements, |placement| placement.motion.is_some(), objects, options);
+        Self { tree, placements: order.into_iter().map(|i| placements[i].clone()).collect() }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.placements.is_empty()
+    }
+
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// The placement with that number, at time 0.
+    pub fn at(&self, number: u32) -> &Placement {
+        &self.placements[number as usize]
+    }
+
+    /// Calls `enter` with every object that the ray may meet, where it stands at that time; it gives how far the ray still looks.
+    #[inline(always)]
+    pub fn walk<S: Simd, Q: Query>(
+        &self,
+        objects: &[Level],
+        ray: &Ray,
+        limit: f32,
+        stack: &mut Stack,
+        mut enter: impl FnMut(&Level, &Place) -> Visit,
+    ) {
+        let slab = SlabRay::new(ray, self.tree.reach(), Blur::NONE);
+        walk::single::<S, Q>(
+            stack,
+            &self.tree,
+            &slab,
+            limit,
+            #[inline(always)]
+            |leaf| {
+                let mut visit = Visit::Until(limit);
+                for placement in leaf.blocks().map(|number| self.at(number)) {
+                    let level = &objects[placement.object as usize];
+                    let place = Place::new(placement.at(ray.time).into_owned(), level.triangles.tree().reach());
+                    visit = enter(level, &place);
+                }
+                visit
+            },
+        );
+    }
+
+    /// Memory it holds, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes() + size_of_val(&self.placements[..])
+    }
+}
