@@ -26,6 +26,12 @@ impl Ray {
         Self { origin, direction, tmin: 0.0, tmax: f32::INFINITY, time: 0.0 }
     }
 
+    /// Its time as tracers take it: before 0, and NaN, is 0, after 1 is 1.
+    #[inline]
+    pub(crate) fn moment(&self) -> f32 {
+        if self.time > 0.0 { self.time.min(1.0) } else { 0.0 }
+    }
+
     /// Whether it can hit anything: finite origin and direction, a direction that is not zero (nor denormal on every
     /// axis, where too few bits are left to tell it from others), a range that is not empty. Every tracer answers a
     /// miss for any other ray.

@@ -80,6 +80,12 @@ fn at_each_time_things_are_where_they_should_be() {
             elsewhere += usize::from(at_start.closest(&ray) != hit);
         }
     }
+    for (odd, time) in [(f32::NAN, 0.0), (-1.0, 0.0), (7.0, 1.0)] {
+        for ray in rays(200, time, 99) {
+            let odd = Ray { time: odd, ..ray };
+            assert_eq!((brute.closest(&odd), bvh.closest(&odd)), (brute.closest(&ray), bvh.closest(&ray)), "{odd:?}");
+        }
+    }
     assert!(hits > 2000 && elsewhere > 1000, "{hits} hits, {elsewhere} of them by motion");
 }
 

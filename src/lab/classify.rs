@@ -134,7 +134,7 @@ pub fn classify_occluded(
 /// Whether the ray passes within f32 rounding of an edge, a silhouette or an end of its range at the primitive that
 /// `hit` names.
 pub fn is_boundary(world: &World, ray: &Ray, hit: &Hit) -> bool {
-    oracle::primitive(world, hit, ray.time).is_some_and(|primitive| {
+    oracle::primitive(world, hit, ray.moment()).is_some_and(|primitive| {
         let outcome = outcome(ray, &primitive, Precision::Single);
         outcome.may_hit(ray) && outcome.may_miss(ray)
     })
@@ -142,13 +142,13 @@ pub fn is_boundary(world: &World, ray: &Ray, hit: &Hit) -> bool {
 
 /// Whether the ray starts on the primitive that `hit` names, up to f32 rounding: its t is then nothing but rounding.
 pub fn starts_on(world: &World, ray: &Ray, hit: &Hit) -> bool {
-    oracle::primitive(world, hit, ray.time)
+    oracle::primitive(world, hit, ray.moment())
         .is_some_and(|primitive| outcome(ray, &primitive, Precision::Single).span(ray).0 <= 0.0)
 }
 
 /// Whether the t of a native hit is within its bound.
 fn t_fits(world: &World, ray: &Ray, hit: &Hit) -> bool {
-    oracle::primitive(world, hit, ray.time).is_some_and(|primitive| {
+    oracle::primitive(world, hit, ray.moment()).is_some_and(|primitive| {
         let (low, high) = outcome(ray, &primitive, Precision::Double).span(ray);
         (low..=high).contains(&f64::from(hit.t))
     })
@@ -173,7 +173,8 @@ impl Involved {
         for hit in hits {
             if all.iter().all(|c| c.id != hit.id()) {
                 all.extend(
-                    oracle::primitive(world, &hit, ray.time).map(|primitive| Candidate::new(ray, hit.id(), &primitive)),
+                    oracle::primitive(world, &hit, ray.moment())
+                        .map(|primitive| Candidate::new(ray, hit.id(), &primitive)),
                 );
             }
         }
@@ -183,7 +184,7 @@ impl Involved {
     /// Every primitive of the world that some engine might find hit.
     fn all(world: &World, ray: &Ray) -> Self {
         let possible =
-            oracle::primitives(world, ray.time).filter(|(_, p)| outcome(ray, p, Precision::Single).may_hit(ray));
+            oracle::primitives(world, ray.moment()).filter(|(_, p)| outcome(ray, p, Precision::Single).may_hit(ray));
         Self(possible.map(|(id, primitive)| Candidate::new(ray, id, &primitive)).collect())
     }
 

@@ -91,7 +91,7 @@ pub fn meet(ray: &Ray, primitive: &Primitive) -> Option<Meeting> {
 /// The nearest hits of a ray among all primitives: one, none, or several at exactly the same t, by rising id.
 pub fn closest(world: &World, ray: &Ray) -> Vec<(Id, Meeting)> {
     let mut nearest: Vec<(Id, Meeting)> = Vec::new();
-    for (id, primitive) in primitives(world, ray.time) {
+    for (id, primitive) in primitives(world, ray.moment()) {
         let Some(meeting) = meet(ray, &primitive).filter(|m| m.in_range) else { continue };
         match nearest.first().map(|(_, first)| meeting.t.cmp(&first.t)) {
             Some(std::cmp::Ordering::Greater) => continue,

@@ -64,7 +64,7 @@ impl SurfacePoint {
     /// The point that `hit` names on `ray`.
     pub fn new(scene: &Scene, world: &World, ray: &Ray, hit: &Hit, attributes: Attributes) -> Self {
         let (part, placement) = world.locate(hit);
-        let placement = placement.map(|placement| placement.at(ray.time));
+        let placement = placement.map(|placement| placement.at(ray.moment()));
         let placement = placement.as_deref();
         let geometry = &scene.geometries[hit.geometry as usize];
         let instance = &scene.instances[hit.instance as usize];

@@ -80,7 +80,7 @@ impl Brute {
             }
         }
         for (placement, placed) in self.world.placements.iter().zip(&self.placed) {
-            let placement = placement.at(ray.time);
+            let placement = placement.at(ray.moment());
             let object_ray = placement.object_ray(ray);
             for (i, lanes) in self.world.objects[placement.object as usize].clone().zip(placed) {
                 let part = &self.world.parts[i];

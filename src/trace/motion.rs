@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 
 use super::Placement;
+use crate::error::Error;
 use crate::math::{Aabb, Affine3, DAffine3, DMat3, DVec3, UNIT_ROUNDOFF, Vec3, gamma64};
 
 /// Where an object moves to.
@@ -55,6 +56,15 @@ impl Motion {
         let half = (*a + *b) * 0.5;
         self.include(a, &half, [from, middle], floor)?;
         self.include(&half, b, [middle, to], floor)
+    }
+}
+
+/// Says of an instance that [`Motion::new`] gave a time.
+pub(super) fn singular_on_the_way(index: usize, name: &str, time: f64) -> Error {
+    let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way";
+    Error::Backend {
+        backend: "scene",
+        message: format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"),
     }
 }
 
@@ -109,7 +119,7 @@ impl Placement {
         }
     }
 
-    /// The object where it stands at a time from 0 to 1; times beyond are those. Where rounding leaves a transform that nothing undoes,
+    /// The object where it stands at a time from 0 to 1. Where rounding leaves a transform that nothing undoes,
     /// `to_object` is not finite, and no ray of that time meets the object.
     #[inline]
     pub fn at(&self, time: f32) -> Cow<'_, Self> {
@@ -120,8 +130,7 @@ impl Placement {
     }
 
     fn moved(&self, motion: &Motion, time: f32) -> Self {
-        // In this order NaN becomes 0.
-        let s = f64::from(time.max(0.0).min(1.0));
+        let s = f64::from(time);
         // Monotone up to f64's rounding, which the rounding to f32 undoes: never beyond either end.
         let between = |a: Vec3, b: Vec3| (a.as_dvec3() * (1.0 - s) + b.as_dvec3() * s).as_vec3();
         let (a, b) = (&self.to_world, &motion.end);
@@ -207,8 +216,7 @@ mod tests {
             let motion = moving.motion.as_ref().expect("it moves");
             let bounds = moving.bounds(object);
             assert_eq!(moving.at(0.0).to_world, moving.to_world);
-            assert_eq!((moving.at(1.0).to_world, moving.at(7.0).to_world), (end, end));
-            assert_eq!(moving.at(f32::NAN).to_world, moving.to_world);
+            assert_eq!(moving.at(1.0).to_world, end);
             for step in 0..=1000 {
                 let now = moving.at(step as f32 / 1000.0);
                 let residual = (now.to_object.matrix3 * now.to_world.as_daffine3().matrix3 - DMat3::IDENTITY).abs();

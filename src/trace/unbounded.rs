@@ -49,7 +49,7 @@ impl Unbounded {
     /// Offers what the ray, in the world, hits.
     pub fn offer(&self, ray: &Ray, nearest: &mut Nearest) {
         for entry in &self.0 {
-            let local = entry.placement.as_ref().map_or(*ray, |placement| placement.at(ray.time).object_ray(ray));
+            let local = entry.placement.as_ref().map_or(*ray, |placement| placement.at(ray.moment()).object_ray(ray));
             offer_shape(nearest, &local, &entry.shape, entry.id);
         }
     }
@@ -57,7 +57,7 @@ impl Unbounded {
     /// Adds everything that the ray, in the world, hits, with t in f64.
     pub fn gather(&self, ray: &Ray, hits: &mut Vec<(f64, Hit)>) {
         for entry in &self.0 {
-            let local = entry.placement.as_ref().map_or(*ray, |placement| placement.at(ray.time).object_ray(ray));
+            let local = entry.placement.as_ref().map_or(*ray, |placement| placement.at(ray.moment()).object_ray(ray));
             hits.extend(entry.shape.intersect_all(&local).map(|hit| (hit.t, entry.id.of_shape(&hit))));
         }
     }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::limits;
-use super::motion::Motion;
+use super::motion::{Motion, singular_on_the_way};
 use crate::error::{Error, Result};
 use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
@@ -151,7 +151,7 @@ impl World {
                 None => None,
                 Some(end) => {
                     let motion = Motion::new(&start, rounded(end));
-                    Some(Box::new(motion.map_err(|time| singular_on_the_way(i, instance, time))?))
+                    Some(Box::new(motion.map_err(|time| singular_on_the_way(i, &instance.name, time))?))
                 }
             };
             world.placements.push(Placement { instance: i as u32, object, to_world: start, to_object, motion });
@@ -291,15 +291,6 @@ fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     let invertible = determinant != 0.0 && instance.transform.inverse().is_finite();
     let ends = instance.transform_end.is_none_or(|end| end.is_finite());
     if invertible && instance.transform.is_finite() && ends { Ok(()) } else { Err(singular(index, instance)) }
-}
-
-fn singular_on_the_way(index: usize, instance: &Instance, time: f64) -> Error {
-    let name = &instance.name;
-    let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way";
-    Error::Backend {
-        backend: "scene",
-        message: format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"),
-    }
 }
 
 fn singular(index: usize, instance: &Instance) -> Error {

@@ -176,7 +176,7 @@ impl<I: Index> Accelerated<I> {
         let index_ray = IndexRay::of_world(ray, reach(&self.placed_bounds), self.spread.of(ray));
         self.placements.visit(&index_ray, limit(&nearest), &mut |placed| {
             let found = |item| place = Some(Place { placed: Some(placed), item });
-            let placed = self.placed[placed as usize].at(ray.time);
+            let placed = self.placed[placed as usize].at(ray.moment());
             let object = &self.objects[placed.placement.object as usize];
             object.trace_placed(ray, &placed, any, &mut nearest, found);
             if is_done(&nearest) { f64::NEG_INFINITY } else { limit(&nearest) }
@@ -190,7 +190,7 @@ impl<I: Index> Accelerated<I> {
         match place.placed {
             None => self.fixed.items.offer(place.item, ray, ray, None, &mut nearest),
             Some(placed) => {
-                let placement = self.placed[placed as usize].placement.at(ray.time);
+                let placement = self.placed[placed as usize].placement.at(ray.moment());
                 let through = Through { instance: placement.instance, to_world: &placement.to_world };
                 let items = &self.objects[placement.object as usize].items;
                 items.offer(place.item, ray, &placement.object_ray(ray), Some(through), &mut nearest);

@@ -65,7 +65,7 @@ impl MovingTree {
                 let mut visit = Visit::Until(limit);
                 for placement in leaf.blocks().map(|number| self.at(number)) {
                     let level = &objects[placement.object as usize];
-                    let place = Place::new(placement.at(ray.time).into_owned(), level.triangles.tree().reach());
+                    let place = Place::new(placement.at(ray.moment()).into_owned(), level.triangles.tree().reach());
                     visit = enter(level, &place);
                 }
                 visit

@@ -30,8 +30,7 @@ impl Lanes {
             direction: [starts.w_axis, ends.x_axis, ends.y_axis],
             tmin: ends.z_axis,
             tmax: ends.w_axis,
-            // In this order NaN becomes 0.
-            time: Vec4::from_array(rays.each_ref().map(|r| r.time)).max(Vec4::ZERO).min(Vec4::ONE),
+            time: Vec4::from_array(rays.each_ref().map(Ray::moment)),
         }
     }
 

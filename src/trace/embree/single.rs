@@ -43,8 +43,7 @@ impl SingleRay {
     #[inline(always)]
     pub fn load(&mut self, ray: &Ray) {
         self.0[0] = ray.origin.extend(ray.tmin);
-        // From 0 to 1, as Embree demands; in this order NaN becomes 0.
-        self.0[1] = ray.direction.extend(ray.time.max(0.0).min(1.0));
+        self.0[1] = ray.direction.extend(ray.moment());
         self.0[2] = Vec4::new(ray.tmax, ALL_BITS, 0.0, 0.0);
     }
 
