@@ -1,0 +1,138 @@
+//! What the program says and draws of accelerators: flags, refusals, tables, charts.
+
+use std::process::{Command, Output};
+
+use twincast::lab::{Entrant, bench};
+use twincast::trace::accel::Accel;
+
+fn twincast(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the program runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn pyramid(folder: &tempfile::TempDir) -> String {
+    let path = folder.path().join("scene.obj");
+    let scene = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 1.5 0\nf 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
+    std::fs::write(&path, scene).expect("a file");
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+fn every_accelerator_renders_the_same_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = pyramid(&folder);
+    let render = |name: &str, more: &[&str]| {
+        let path = folder.path().join(name);
+        let args = ["render", &scene, "-o", path.to_str().expect("UTF-8"), "--size", "60x40"];
+        let output = twincast(&[&args[..], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let picture = twincast::image::read(&path).expect("a picture");
+        (picture, text(&output.stdout))
+    };
+    let (expected, _) = render("bvh.exr", &[]);
+    for accel in Accel::ALL {
+        let name = accel.name();
+        let (picture, summary) = render(&format!("{name}.exr"), &["--accel", name]);
+        assert!(picture == expected, "{name}");
+        assert!(accel == Accel::Bvh || summary.contains(&format!("native ({name})")), "{summary}");
+    }
+    let (picture, summary) = render("grid.exr", &["--accel", "grid", "--grid", "7"]);
+    assert!(picture == expected && summary.contains("a grid of 7 x 5 x 7 cells"), "{summary}");
+}
+
+#[test]
+fn what_does_not_go_together_ends_with_2() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("kept");
+    let kept = kept.to_str().expect("UTF-8");
+    for (more, words) in [
+        (&["--accel", "kd-tree", "--cache", kept][..], "--cache"),
+        (&["--accel", "grid", "--build", "high"], "--build"),
+        (&["--accel", "grid", "--max-memory", "1G"], "--max-memory"),
+        (&["--grid", "5"], "--accel grid"),
+        (&["--accel", "octree", "--grid", "5"], "--accel grid"),
+        (&["--accel", "grid", "--grid", "0"], "1 to 2048"),
+        (&["--accel", "grid", "--grid", "1x2"], "XxYxZ"),
+        (&["--accel", "quadtree"], "kd-tree"),
+    ] {
+        let output = twincast(&[&["render", "x.glb", "-o", "x.png"][..], more].concat());
+        let message = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && message.contains(words), "{more:?}: {message}");
+    }
+    if cfg!(feature = "embree") {
+        for backend in ["embree", "both"] {
+            let output = twincast(&["render", "x.glb", "-o", "x.png", "--accel", "grid", "--backend", backend]);
+            let message = text(&output.stderr);
+            assert!(output.status.code() == Some(2) && message.contains("--accel grid"), "{message}");
+        }
+    }
+    for args in [
+        &["compare", "x.glb", "--all", "--accel", "grid"][..],
+        &["compare", "x.glb", "--seconds", "3"],
+        &["bench", "--max", "100"],
+        &["bench", "--scaling", "--modes", "fast"],
+        &["bench", "--scaling", "--max", "5"],
+    ] {
+        assert_eq!(twincast(args).status.code(), Some(2), "{args:?}");
+    }
+}
+
+#[test]
+fn compare_all_prints_a_table_or_one_document() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = pyramid(&folder);
+    let args = ["compare", &scene, "--all", "--size", "40x30", "--random", "1000"];
+    let output = twincast(&args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    assert!(Accel::ALL.iter().all(|accel| table.contains(accel.name())), "{table}");
+    let output = twincast(&[&args[..], &["--json"]].concat());
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+    assert_eq!(document["rays"], 40 * 30 + 1000);
+    assert_eq!(document["rows"].as_array().map(Vec::len), Some(Entrant::all().len()));
+    assert_eq!(document["rows"][0]["name"], "brute");
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn an_accelerator_is_compared_with_embree() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = pyramid(&folder);
+    let output = twincast(&["compare", &scene, "--accel", "octree", "--size", "40x30", "--random", "1000"]);
+    let table = text(&output.stdout);
+    assert!(output.status.success() && table.contains("native_wrong                   0"), "{table}");
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn accelerators_are_measured_beside_the_engines() {
+    let args =
+        ["bench", "terrain20", "--modes", "default", "--rays", "primary,shadow", "--size", "64", "--repeat", "1"];
+    let output = twincast(&[&args[..], &["--accel", "grid,kd-tree", "--grid", "9"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    assert!(table.contains("native grid") && table.contains("native kd-tree"), "{table}");
+    let output = twincast(&[&args[..], &["--accel", "octree", "--grid", "9"]].concat());
+    assert_eq!(output.status.code(), Some(2), "a resolution without a grid");
+}
+
+#[test]
+fn scaling_prints_a_table_or_one_document_and_draws() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let chart = folder.path().join("scaling.svg");
+    let args = ["bench", "--scaling", "--max", "100", "--threads", "1"];
+    let output = twincast(&[&args[..], &["--json", "--chart", chart.to_str().expect("UTF-8")]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+    let points = document["points"].as_array().expect("points");
+    assert_eq!(points.len(), 2 * 3 * Entrant::all().len(), "families, numbers, accelerators");
+    assert!(points.iter().all(|p| p["microseconds_a_ray"].as_f64().is_some_and(|t| t > 0.0)), "{document}");
+    assert_eq!(document["grids"].as_array().map(Vec::len), Some(10));
+    let drawn = std::fs::read_to_string(&chart).expect("a chart");
+    assert!(drawn.contains("terrain: microseconds a ray") && drawn.contains(">kd-tree<"), "{drawn}");
+    let report = bench::ScalingReport::default();
+    assert!(bench::scaling_chart(&report, &[]).contains("</svg>"), "an empty report is drawn, too");
+}
