@@ -1,15 +1,19 @@
 //! `twincast compare`: both engines on the rays of a picture and on difficult ones, every difference judged.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use super::accel::AccelArgs;
 use super::cache::CacheArgs;
 use super::camera::CameraArgs;
 use super::common::{SceneArgs, Size};
 use super::engine::BackendArg;
-use crate::error::Result;
+use super::{interrupt, say, warn};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Scene};
 
 /// Compare native with Embree on every ray of a picture and on difficult rays
 ///
@@ -71,6 +75,26 @@ pub(super) struct CompareArgs {
     diff: Option<PathBuf>,
 }
 
+impl CompareArgs {
+    /// The scene, and from where it is seen.
+    fn view(&self) -> Result<(Scene, Camera)> {
+        let (scene, warnings) = self.scene.load()?;
+        warn(&warnings);
+        interrupt::check()?;
+        let (camera, _) = self.camera.choose(&scene, f64::from(self.size.width) / f64::from(self.size.height))?;
+        Ok((scene, camera))
+    }
+
+    /// Says what came of it, as was asked for.
+    fn print(&self, report: &(impl Serialize + Display)) -> Result<()> {
+        if self.json {
+            let document = serde_json::to_string(report);
+            return say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?);
+        }
+        say(report.to_string().trim_end())
+    }
+}
+
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
     if args.all {
         return compare_all(args);
@@ -86,8 +110,7 @@ fn compare(_: &CompareArgs) -> Result<()> {
 
 #[cfg(feature = "embree")]
 fn compare(args: &CompareArgs) -> Result<()> {
-    use super::{cache, interrupt, outputs, progress, say, warn};
-    use crate::error::Error;
+    use super::{cache, outputs, progress};
     use crate::image::Metadata;
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
@@ -103,12 +126,8 @@ fn compare(args: &CompareArgs) -> Result<()> {
     outputs::check(diff, None, [&args.scene.scene])?;
     let cache = args.cache.open(BackendArg::Both)?;
     let cancel = interrupt::install()?;
-    let (scene, warnings) = args.scene.load()?;
-    warn(&warnings);
-    interrupt::check()?;
-
+    let (scene, camera) = args.view()?;
     let Size { width, height } = args.size;
-    let (camera, _) = args.camera.choose(&scene, f64::from(width) / f64::from(height))?;
     let world = World::new(&scene)?;
     let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
@@ -141,19 +160,13 @@ fn compare(args: &CompareArgs) -> Result<()> {
         outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default())?;
     }
     let report = &comparison.report;
-    if args.json {
-        let document = serde_json::to_string(report);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
-    } else {
-        say(report.to_string().trim_end())?;
-    }
+    args.print(report)?;
     report.check()
 }
 
 /// Every accelerator against brute force.
 fn compare_all(args: &CompareArgs) -> Result<()> {
-    use super::{interrupt, progress, say, warn};
-    use crate::error::Error;
+    use super::progress;
     use crate::lab::{Entrant, all};
     use crate::render::{Control, Renderer, Settings};
     use crate::trace::World;
@@ -161,12 +174,8 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
 
     let options = args.accel.options.choose(&Accel::ALL)?;
     let cancel = interrupt::install()?;
-    let (scene, warnings) = args.scene.load()?;
-    warn(&warnings);
-    interrupt::check()?;
-
+    let (scene, camera) = args.view()?;
     let Size { width, height } = args.size;
-    let (camera, _) = args.camera.choose(&scene, f64::from(width) / f64::from(height))?;
     let world = World::new(&scene)?;
     let settings = Settings { width, height, spp: 1, seed: args.seed, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
@@ -183,11 +192,6 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
     let report = setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)) });
     bar.finish_and_clear();
     let report = report?;
-    if args.json {
-        let document = serde_json::to_string(&report);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)?;
-    } else {
-        say(report.to_string().trim_end())?;
-    }
+    args.print(&report)?;
     report.check()
 }

@@ -36,9 +36,11 @@ const FAINT: f32 = 1e-4;
 /// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
 pub(super) struct Buffers {
-    /// In the order of [`Tile::pixels`], as `sums` and `radiance`.
+    /// In the order of [`Tile::pixels`], as `sums`, `weights` and `radiance`.
     patterns: Vec<Pattern>,
     sums: Vec<Vec4>,
+    /// Of each pixel's samples so far, added up.
+    weights: Vec<f32>,
     radiance: Vec<Vec4>,
     /// The rays of each depth, those of a pixel side by side; the camera's first.
     waves: Vec<Wave>,
@@ -90,31 +92,26 @@ impl Renderer<'_> {
         self.begin(tile, buffers);
         buffers.sums.clear();
         buffers.sums.resize(tile.len(), Vec4::ZERO);
+        buffers.weights.clear();
+        buffers.weights.resize(tile.len(), 0.0);
         for sample in 0..self.settings.spp {
             self.camera_hits(tracer, sample, buffers);
             buffers.radiance.clear();
             buffers.radiance.resize(tile.len(), Vec4::ZERO);
             self.radiance(tracer, Stage { sample, depth: 0 }, 0, buffers);
-            let Buffers { patterns, sums, radiance, .. } = &mut *buffers;
-            for ((sum, radiance), pixel) in sums.iter_mut().zip(radiance).zip(patterns) {
-                let negative = self.filter.has_negative() && self.place(pixel, sample).1 < 0.0;
-                *sum += if negative { -*radiance } else { *radiance };
+            let Buffers { patterns, sums, weights, radiance, .. } = &mut *buffers;
+            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(radiance).zip(patterns) {
+                let weight = if self.filter.has_negative() { self.place(pixel, sample).1 } else { 1.0 };
+                *sum += *radiance * weight;
+                *total += weight;
             }
         }
-        for (sum, pixel) in buffers.sums.iter_mut().zip(&buffers.patterns) {
-            // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples.
-            *sum /= self.total_weight(pixel);
+        for (sum, total) in buffers.sums.iter_mut().zip(&buffers.weights) {
+            // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples. By 1 where the
+            // weights cancel out.
+            *sum /= total.max(1.0);
         }
         &buffers.sums
-    }
-
-    /// The sum of a pixel's sample weights; 1 where they cancel out.
-    fn total_weight(&self, pixel: &Pattern) -> f32 {
-        let spp = self.settings.spp;
-        if !self.filter.has_negative() {
-            return spp as f32;
-        }
-        (0..spp).map(|sample| self.place(pixel, sample).1).sum::<f32>().max(1.0)
     }
 
     /// How many camera rays of a tile hit something.

@@ -10,7 +10,7 @@ use super::axis::Frustum;
 use super::line::{Line, Roots};
 use super::quadric::Quadric;
 use crate::math::number::{Formula, Number, cross, dot, minus, plus, times, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 
 /// A cone, or a part of one.
@@ -45,13 +45,10 @@ impl Cone {
         InvalidShape::unless_radius(larger)
     }
 
-    fn frustum(&self) -> Frustum {
+    /// What it has in common with other surfaces around an axis.
+    pub(super) fn frustum(&self) -> Frustum {
         let radii = [self.base_radius, self.apex_radius];
         Frustum { ends: [self.base, self.apex], radii, capped: self.capped }
-    }
-
-    pub(super) fn bounds(&self) -> Aabb {
-        self.frustum().bounds()
     }
 
     pub(super) fn translated(&self, offset: DVec3) -> Self {
@@ -70,11 +67,6 @@ impl Cone {
             line,
         };
         frustum.roots(&line, seen.solve(), Widening(&seen).signs()[0] > 0)
-    }
-
-    /// The unit normal and the parameters.
-    pub(super) fn at(&self, point: DVec3) -> (DVec3, Vec2) {
-        self.frustum().at(point)
     }
 }
 

@@ -9,7 +9,7 @@ use super::axis::Frustum;
 use super::line::{Line, Roots};
 use super::quadric::Quadric;
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 
 /// A cylinder.
@@ -40,12 +40,9 @@ impl Cylinder {
         InvalidShape::unless_radius(self.radius)
     }
 
-    fn frustum(&self) -> Frustum {
+    /// What it has in common with other surfaces around an axis.
+    pub(super) fn frustum(&self) -> Frustum {
         Frustum { ends: [self.base, self.apex], radii: [self.radius; 2], capped: self.capped }
-    }
-
-    pub(super) fn bounds(&self) -> Aabb {
-        self.frustum().bounds()
     }
 
     pub(super) fn translated(&self, offset: DVec3) -> Self {
@@ -60,11 +57,6 @@ impl Cylinder {
         let seen =
             Seen { base: line.place(self.base), apex: line.place(self.apex), radius: line.length(self.radius), line };
         frustum.roots(&line, seen.solve(), false)
-    }
-
-    /// The unit normal and the parameters.
-    pub(super) fn at(&self, point: DVec3) -> (DVec3, Vec2) {
-        self.frustum().at(point)
     }
 }
 

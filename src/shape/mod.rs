@@ -182,8 +182,8 @@ impl Shape {
             Self::Plane(_) => Aabb::EMPTY,
             Self::Disk(disk) => disk.bounds(),
             Self::Cuboid(cuboid) => cuboid.bounds(),
-            Self::Cylinder(cylinder) => cylinder.bounds(),
-            Self::Cone(cone) => cone.bounds(),
+            Self::Cylinder(cylinder) => cylinder.frustum().bounds(),
+            Self::Cone(cone) => cone.frustum().bounds(),
             Self::Ellipsoid(ellipsoid) => ellipsoid.bounds(),
             Self::Polygon(polygon) => polygon.bounds(),
         }
@@ -230,8 +230,8 @@ impl Shape {
             Self::Plane(plane) => plane.normal(),
             Self::Disk(disk) => disk.normal(),
             Self::Cuboid(cuboid) => cuboid.normal(point),
-            Self::Cylinder(cylinder) => cylinder.at(point).0,
-            Self::Cone(cone) => cone.at(point).0,
+            Self::Cylinder(cylinder) => cylinder.frustum().at(point).0,
+            Self::Cone(cone) => cone.frustum().at(point).0,
             Self::Ellipsoid(ellipsoid) => ellipsoid.normal(point),
             Self::Polygon(polygon) => polygon.normal(),
         }
@@ -244,8 +244,8 @@ impl Shape {
             Self::Plane(plane) => plane.uv(point),
             Self::Disk(disk) => disk.uv(point),
             Self::Cuboid(cuboid) => cuboid.uv(point),
-            Self::Cylinder(cylinder) => cylinder.at(point).1,
-            Self::Cone(cone) => cone.at(point).1,
+            Self::Cylinder(cylinder) => cylinder.frustum().at(point).1,
+            Self::Cone(cone) => cone.frustum().at(point).1,
             Self::Ellipsoid(ellipsoid) => ellipsoid.uv(point),
             Self::Polygon(polygon) => polygon.uv(point),
         }

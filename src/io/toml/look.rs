@@ -120,21 +120,18 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
         ("sphere", Kind::Sphere),
     ];
     let kind = table.need("type")?.choice(&kinds)?;
-    if matches!(kind, Kind::Rectangle | Kind::Disk | Kind::Sphere) {
-        let light = Light::Area { shape: area(kind, &mut table)?, radiance: table.need("radiance")?.color()? };
-        table.finish()?;
-        return Ok(light);
-    }
-    let color = table.optional("color", |value| value.color())?.unwrap_or(Vec3::ONE);
     let light = match kind {
-        Kind::Rectangle | Kind::Disk | Kind::Sphere => unreachable!("returned above"),
-        Kind::Directional => Light::Directional { direction: table.need("direction")?.direction()?, color },
+        Kind::Directional => {
+            Light::Directional { direction: table.need("direction")?.direction()?, color: color(&mut table)? }
+        }
         Kind::Point => {
+            let color = color(&mut table)?;
             let (position, attenuation, range) = place(&mut table)?;
             let radius = table.optional("radius", |value| value.share())?.unwrap_or(0.0).into();
             Light::Point { position, color, attenuation, range, radius }
         }
         Kind::Spot => {
+            let color = color(&mut table)?;
             let (position, attenuation, range) = place(&mut table)?;
             let direction = table.need("direction")?.direction()?;
             let outer = table.need("outer_angle")?;
@@ -148,29 +145,37 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
             let (inner_angle, outer_angle) = (inner_angle.to_radians(), outer_angle.to_radians());
             Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle }
         }
+        Kind::Rectangle => {
+            let centre = table.need("position")?.vector()?;
+            let value = table.need("half_edges")?;
+            let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
+            let half_edges = match edges[..] {
+                [a, b] if a.cross(b).length() > 0.0 => [a, b],
+                _ => return Err(value.unlike("two vectors that are not parallel")),
+            };
+            area(AreaShape::Rectangle { centre, half_edges }, &mut table)?
+        }
+        Kind::Disk => {
+            let (centre, normal) = (table.need("position")?.vector()?, table.need("direction")?.direction()?);
+            area(AreaShape::Disk { centre, normal, radius: length(table.need("radius")?)? }, &mut table)?
+        }
+        Kind::Sphere => {
+            let centre = table.need("position")?.vector()?;
+            area(AreaShape::Sphere { centre, radius: length(table.need("radius")?)? }, &mut table)?
+        }
     };
     table.finish()?;
     Ok(light)
 }
 
-/// The surface of a light.
-fn area(kind: Kind, table: &mut Table<'_>) -> Read<AreaShape> {
-    let centre = table.need("position")?.vector()?;
-    Ok(match kind {
-        Kind::Rectangle => {
-            let value = table.need("half_edges")?;
-            let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
-            match edges[..] {
-                [a, b] if a.cross(b).length() > 0.0 => AreaShape::Rectangle { centre, half_edges: [a, b] },
-                _ => return Err(value.unlike("two vectors that are not parallel")),
-            }
-        }
-        Kind::Disk => {
-            let normal = table.need("direction")?.direction()?;
-            AreaShape::Disk { centre, normal, radius: length(table.need("radius")?)? }
-        }
-        _ => AreaShape::Sphere { centre, radius: length(table.need("radius")?)? },
-    })
+/// What a light without a surface shows.
+fn color(table: &mut Table<'_>) -> Read<Vec3> {
+    Ok(table.optional("color", |value| value.color())?.unwrap_or(Vec3::ONE))
+}
+
+/// A light with a surface.
+fn area(shape: AreaShape, table: &mut Table<'_>) -> Read<Light> {
+    Ok(Light::Area { shape, radiance: table.need("radiance")?.color()? })
 }
 
 /// Position, attenuation and range of a light.
