@@ -173,7 +173,8 @@ fn hold(kinds: &[Kind]) {
             }
             assert_parity_of(&matrix.world, &brute, &rays);
         }
-        println!("{kind:?} hits {hits} decided {decided} of {}", RAYS * Class::ALL.len());
+        let all = RAYS * Class::ALL.len();
+        assert!(hits > all / 3 && decided > all / 3, "{kind:?}: {hits} hits, {decided} decided, of {all}");
     }
 }
 

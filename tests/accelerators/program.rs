@@ -52,8 +52,8 @@ fn what_does_not_go_together_ends_with_2() {
         (&["--accel", "kd-tree", "--cache", kept][..], "--cache"),
         (&["--accel", "grid", "--build", "high"], "--build"),
         (&["--accel", "grid", "--max-memory", "1G"], "--max-memory"),
-        (&["--grid", "5"], "--accel grid"),
         (&["--accel", "octree", "--grid", "5"], "--accel grid"),
+        (&["--accel", "brute", "--triangle-method", "woop"], "--accel binary-bvh"),
         (&["--accel", "grid", "--grid", "0"], "1 to 2048"),
         (&["--accel", "grid", "--grid", "1x2"], "XxYxZ"),
         (&["--accel", "quadtree"], "kd-tree"),
@@ -63,11 +63,9 @@ fn what_does_not_go_together_ends_with_2() {
         assert!(output.status.code() == Some(2) && message.contains(words), "{more:?}: {message}");
     }
     if cfg!(feature = "embree") {
-        for backend in ["embree", "both"] {
-            let output = twincast(&["render", "x.glb", "-o", "x.png", "--accel", "grid", "--backend", backend]);
-            let message = text(&output.stderr);
-            assert!(output.status.code() == Some(2) && message.contains("--accel grid"), "{message}");
-        }
+        let output = twincast(&["render", "x.glb", "-o", "x.png", "--accel", "grid", "--backend", "embree"]);
+        let message = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && message.contains("--accel grid"), "{message}");
     }
     for args in [
         &["compare", "x.glb", "--all", "--accel", "grid"][..],
@@ -135,4 +133,68 @@ fn scaling_prints_a_table_or_one_document_and_draws() {
     assert!(drawn.contains("terrain: microseconds a ray") && drawn.contains(">kd-tree<"), "{drawn}");
     let report = bench::ScalingReport::default();
     assert!(bench::scaling_chart(&report, &[]).contains("</svg>"), "an empty report is drawn, too");
+}
+
+/// A sphere, and what its file asks for.
+fn asking(folder: &tempfile::TempDir, keys: &str) -> String {
+    let path = folder.path().join("asking.toml");
+    std::fs::write(&path, format!("[render]\n{keys}\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n")).expect("a file");
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+fn scenes_choose_their_accelerator_and_flags_win() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = folder.path().join("a.png");
+    let picture = picture.to_str().expect("UTF-8");
+    let render = |keys: &str, more: &[&str]| {
+        let scene = asking(&folder, keys);
+        let output = twincast(&[&["render", &scene, "-o", picture, "--size", "20x20"], more].concat());
+        (output.status.code(), text(&output.stdout) + &text(&output.stderr))
+    };
+    let grid = "accel = \"grid\"\ngrid = 5";
+    let methods = "accel = \"kd-tree\"\nsphere_method = \"geometric\"";
+    for (keys, more, code, words) in [
+        ("accel = \"octree\"", &[][..], 0, "native (octree)"),
+        ("accel = \"octree\"", &["--accel", "kd-tree"], 0, "native (kd-tree)"),
+        ("accel = \"octree\"", &["--accel", "bvh"], 0, "native (BVH)"),
+        (grid, &[], 0, "5 x 5 x 5 cells"),
+        (grid, &["--grid", "3"], 0, "3 x 3 x 3 cells"),
+        (grid, &["--accel", "bsp"], 0, "native (bsp)"),
+        ("", &["--grid", "3"], 2, "--accel grid"),
+        (methods, &[], 0, "native (kd-tree)"),
+        (methods, &["--accel", "bvh"], 2, "sphere_method = \"geometric\""),
+        (methods, &["--accel", "bvh", "--sphere-method", "exact"], 0, "native (BVH)"),
+        ("accel = \"bsp\"", &["--max-memory", "1G"], 2, "write --accel bvh"),
+    ] {
+        let (found, said) = render(keys, more);
+        assert!(found == Some(code) && said.contains(words), "{keys} {more:?}: {found:?} {said}");
+    }
+    if cfg!(feature = "embree") {
+        assert!(render("accel = \"octree\"", &["--backend", "embree"]).1.contains("embree"));
+        let (code, said) = render(methods, &["--backend", "embree"]);
+        assert!(code == Some(2) && said.contains("--backend native"), "{said}");
+        // Embree beside the scene's accelerator, and beside the flag's.
+        let (code, said) = render("accel = \"octree\"", &["--backend", "both"]);
+        assert!(code == Some(0) && said.contains("native (octree)") && said.contains("pixels of native"), "{said}");
+        let (code, said) = render("", &["--backend", "both", "--accel", "bsp"]);
+        assert!(code == Some(0) && said.contains("native (bsp)"), "{said}");
+        let output = twincast(&["compare", &asking(&folder, grid), "--size", "20x20", "--random", "500"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+}
+
+/// A limit on memory ends the series before it is passed, and says so.
+#[test]
+fn scaling_ends_where_memory_would() {
+    if cfg!(not(target_os = "linux")) {
+        return;
+    }
+    let args = ["bench", "--scaling", "--max", "300000", "--threads", "1", "--max-memory", "1M", "--json"];
+    let output = twincast(&args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+    assert_eq!(document["points"].as_array().map(Vec::len), Some(0), "{document}");
+    let stopped = document["stopped"].to_string();
+    assert!(stopped.contains("terrain ends at 0: 10 triangles may take") && stopped.contains("0.0 allowed"), "{stopped}");
 }

@@ -24,23 +24,6 @@ pub enum Kind {
     ConcavePolygon,
 }
 
-impl Kind {
-    pub const ALL: [Self; 12] = [
-        Self::Triangle,
-        Self::Sphere,
-        Self::Plane,
-        Self::Disk,
-        Self::Box,
-        Self::Cylinder,
-        Self::OpenCylinder,
-        Self::Cone,
-        Self::OpenCone,
-        Self::Ellipsoid,
-        Self::ConvexPolygon,
-        Self::ConcavePolygon,
-    ];
-}
-
 /// What a primitive is.
 #[derive(Clone, Debug)]
 pub enum Body {
@@ -126,7 +109,8 @@ impl Subject {
         let length = |random: &mut Random| (2 + random.below(5)) as f32 / 8.0;
         let (r, h) = (length(random), length(random));
         let [x, y, z] = frame(random);
-        let flat = |points: &[(f32, f32)]| points.iter().map(|&(a, b)| middle + (x * a + y * b) * r).collect::<Vec<_>>();
+        let flat =
+            |points: &[(f32, f32)]| points.iter().map(|&(a, b)| middle + (x * a + y * b) * r).collect::<Vec<_>>();
         let tip = middle + z * h;
         let rim = vec![middle + x * r, middle - y * r, middle - x * r];
         match kind {
@@ -156,7 +140,8 @@ impl Subject {
                 let (low, high) = (middle - Vec3::new(r, h, r), middle + Vec3::new(h, r, h));
                 let body = Body::Shape(Shape::Cuboid(Cuboid::new(low, high).expect("a box")));
                 let corners = vec![low, low.with_x(high.x), high.with_z(low.z), high];
-                let tangents = vec![(low, Vec3::X), (high, Vec3::NEG_Z), (low, Vec3::new(0.0, 1.0, 2.0)), (high, x + y)];
+                let tangents =
+                    vec![(low, Vec3::X), (high, Vec3::NEG_Z), (low, Vec3::new(0.0, 1.0, 2.0)), (high, x + y)];
                 Self { body, corners, tangents, middle }
             }
             Kind::Cylinder | Kind::OpenCylinder => {
@@ -181,9 +166,10 @@ impl Subject {
                 let tangents = vec![(corners[0], y), (corners[1], z), (corners[2], x)];
                 Self { body, corners, tangents, middle }
             }
-            Kind::ConvexPolygon => {
-                Self::polygon(middle, flat(&[(2.0, 0.0), (1.0, 1.5), (-1.0, 1.5), (-2.0, 0.0), (-1.0, -1.5), (1.0, -1.5)]))
-            }
+            Kind::ConvexPolygon => Self::polygon(
+                middle,
+                flat(&[(2.0, 0.0), (1.0, 1.5), (-1.0, 1.5), (-2.0, 0.0), (-1.0, -1.5), (1.0, -1.5)]),
+            ),
             Kind::ConcavePolygon => {
                 // A comb, of which several corners are in a row.
                 let comb = [(-1.0, -2.0), (2.0, -2.0), (2.0, -1.0), (1.0, -1.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0)];
@@ -216,7 +202,8 @@ impl Subject {
         let near = self.middle + random.vec3();
         let i = random.below(self.corners.len());
         let corner = self.corners[i];
-        let on_edge = corner.lerp(self.corners[(i + 1) % self.corners.len()], [0.5, 0.25, random.unit()][random.below(3)]);
+        let on_edge =
+            corner.lerp(self.corners[(i + 1) % self.corners.len()], [0.5, 0.25, random.unit()][random.below(3)]);
         let between = |from: Vec3, to: Vec3| Ray::new(from, to - from);
         // Powers of two round nothing.
         let [step, pace] = [(); 2].map(|()| 2f32.powi(random.below(7) as i32 - 3));

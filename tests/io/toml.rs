@@ -1,8 +1,10 @@
 //! Twincast's own scene format.
 
-use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{AreaShape, Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
-use twincast::{Shape, World};
+use twincast::math::{DVec2, DVec3, UVec3, Vec3};
+use twincast::scene::{
+    Accel, AreaShape, Distortion, Fov, Geometry, Light, Projection, Resolution, Scene, Search, Specular, ThinLens,
+};
+use twincast::{Shape, SphereMethod, TriangleMethod, World};
 
 use super::{Files, obj, refused, refused_bytes};
 
@@ -87,6 +89,13 @@ fn what_the_file_asks_of_a_render() {
     let request = &scene.request;
     assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
     assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
+    let search = Search {
+        accel: Some(Accel::Grid),
+        grid: Some(Resolution::Axes(UVec3::new(20, 10, 20))),
+        triangle_method: Some(TriangleMethod::Woop),
+        sphere_method: Some(SphereMethod::Accurate),
+    };
+    assert_eq!(request.search, search);
     assert_eq!((scene.background, scene.ambient), (Some(Vec3::new(0.1, 0.2, 0.4)), Vec3::splat(0.1)));
     let camera = &scene.cameras[0];
     assert_eq!(

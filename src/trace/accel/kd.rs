@@ -178,11 +178,12 @@ impl<'a> Part<'a> {
     fn build(self) -> Branch {
         let count = self.items.len() as f32;
         let split = if self.depth > 0 && self.items.len() > 1 { self.best_split() } else { None };
-        let Some(Split { axis, plane, .. }) = split.filter(|split| split.cost < count) else {
+        let Some(split) = split.filter(|split| split.cost < count) else {
             return Branch::Leaf(self.items);
         };
+        let Split { axis, plane, .. } = split;
         let many = self.items.len() >= MANY;
-        let [below, above] = match self.cut(axis, plane) {
+        let [below, above] = match self.cut(split) {
             Ok(parts) => parts,
             Err(whole) => return Branch::Leaf(whole.items),
         };
@@ -192,8 +193,8 @@ impl<'a> Part<'a> {
     }
 
     /// The parts below and above a plane, what lies within it above; or the whole, where there is no room for both.
-    fn cut(self, axis: usize, plane: f32) -> Result<[Self; 2], Self> {
-        let (mut below, mut above) = (Vec::new(), Vec::new());
+    fn cut(self, Split { axis, plane, counts, .. }: Split) -> Result<[Self; 2], Self> {
+        let [mut below, mut above] = counts.map(Vec::with_capacity);
         for &item in &self.items {
             let Aabb { min, max } = self.boxes[item as usize];
             let is_below = min[axis] < plane;
@@ -216,61 +217,69 @@ impl<'a> Part<'a> {
     }
 
     /// The sides of an item's box, as far as it is in the cell.
-    fn extent(&self, item: u32, axis: usize) -> (f32, f32) {
+    fn extent(&self, item: u32) -> [[f32; 3]; 2] {
         let Aabb { min, max } = self.boxes[item as usize];
-        (min[axis].max(self.bounds.min[axis]), max[axis].min(self.bounds.max[axis]))
+        [min.max(self.bounds.min).to_array(), max.min(self.bounds.max).to_array()]
     }
 
     fn best_split(&self) -> Option<Split> {
-        let of_axis = |axis| if self.items.len() <= FEW { self.sweep(axis) } else { self.bins(axis) };
-        (0..3).filter_map(of_axis).min_by(|a, b| a.cost.total_cmp(&b.cost))
+        let splits = if self.items.len() <= FEW { self.sweep() } else { self.bins() };
+        splits.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
-    /// Every side of a box, in order.
-    fn sweep(&self, axis: usize) -> Option<Split> {
-        let mut begins = [0.0; FEW];
-        let mut ends = [0.0; FEW];
+    /// The best on each axis among the sides of all boxes.
+    fn sweep(&self) -> [Option<Split>; 3] {
+        let (mut begins, mut ends) = ([[0.0; FEW]; 3], [[0.0; FEW]; 3]);
         for (i, &item) in self.items.iter().enumerate() {
-            (begins[i], ends[i]) = self.extent(item, axis);
+            let [low, high] = self.extent(item);
+            for axis in 0..3 {
+                (begins[axis][i], ends[axis][i]) = (low[axis], high[axis]);
+            }
         }
         let count = self.items.len();
-        let (begins, ends) = (&mut begins[..count], &mut ends[..count]);
-        begins.sort_unstable_by(f32::total_cmp);
-        ends.sort_unstable_by(f32::total_cmp);
-        let chooser = Chooser::new(&self.bounds, axis);
-        let counts = |plane: f32| {
-            let below = begins.partition_point(|&begin| begin < plane);
-            (below, count - ends.partition_point(|&end| end <= plane))
-        };
-        let planes = begins.iter().chain(ends.iter());
-        planes.filter_map(|&plane| chooser.split(plane, counts(plane))).min_by(|a, b| a.cost.total_cmp(&b.cost))
+        std::array::from_fn(|axis| {
+            let (begins, ends) = (&mut begins[axis][..count], &mut ends[axis][..count]);
+            begins.sort_unstable_by(f32::total_cmp);
+            ends.sort_unstable_by(f32::total_cmp);
+            let mut best = Best::new(&self.bounds, axis);
+            let (mut begun, mut ended) = (0, 0);
+            // No box ends before it begins, so there is an end as long as there is anything.
+            while let Some(&end) = ends.get(ended) {
+                let plane = begins.get(begun).map_or(end, |begin| begin.min(end));
+                let below = begun;
+                begun += begins[begun..].iter().take_while(|&&begin| begin <= plane).count();
+                ended += ends[ended..].iter().take_while(|&&end| end <= plane).count();
+                best.offer(plane, [below, count - ended]);
+            }
+            best.split
+        })
     }
 
-    /// Planes at equal distances.
-    fn bins(&self, axis: usize) -> Option<Split> {
-        let (start, end) = (self.bounds.min[axis], self.bounds.max[axis]);
-        let plane = |bin: usize| start + (end - start) * (bin as f32 / BINS as f32);
-        let scale = BINS as f32 / (end - start);
-        if !scale.is_finite() {
-            return None;
-        }
-        let bin = |x: f32| (((x - start) * scale) as usize).min(BINS - 1);
-        let (mut begins, mut ends) = ([0; BINS], [0; BINS]);
+    /// The best on each axis among planes at equal distances.
+    fn bins(&self) -> [Option<Split>; 3] {
+        let (start, end) = (self.bounds.min.to_array(), self.bounds.max.to_array());
+        let scale: [f32; 3] = std::array::from_fn(|axis| BINS as f32 / (end[axis] - start[axis]));
+        let bin = |x: f32, axis: usize| (((x - start[axis]) * scale[axis]) as usize).min(BINS - 1);
+        let (mut begins, mut ends) = ([[0; BINS]; 3], [[0; BINS]; 3]);
         for &item in &self.items {
-            let (from, to) = self.extent(item, axis);
-            begins[bin(from)] += 1;
-            ends[bin(to)] += 1;
+            let [low, high] = self.extent(item);
+            for axis in 0..3 {
+                begins[axis][bin(low[axis], axis)] += 1;
+                ends[axis][bin(high[axis], axis)] += 1;
+            }
         }
-        let chooser = Chooser::new(&self.bounds, axis);
-        let (mut below, mut passed) = (0, 0);
-        let mut best: Option<Split> = None;
-        for bin in 1..BINS {
-            below += begins[bin - 1];
-            passed += ends[bin - 1];
-            let split = chooser.split(plane(bin), (below, self.items.len() - passed));
-            best = best.into_iter().chain(split).min_by(|a, b| a.cost.total_cmp(&b.cost));
-        }
-        best
+        std::array::from_fn(|axis| {
+            let mut best = Best::new(&self.bounds, axis);
+            let (mut below, mut passed) = (0, 0);
+            for bin in 1..BINS {
+                below += begins[axis][bin - 1];
+                passed += ends[axis][bin - 1];
+                let plane = start[axis] + (end[axis] - start[axis]) * (bin as f32 / BINS as f32);
+                best.offer(plane, [below, self.items.len() - passed]);
+            }
+            // A flat cell has no bins along the axis.
+            best.split.filter(|_| scale[axis].is_finite())
+        })
     }
 }
 
@@ -280,35 +289,43 @@ struct Split {
     plane: f32,
     /// In tests of an item.
     cost: f32,
+    /// Items below and above; in bins, as far as these tell them apart.
+    counts: [usize; 2],
 }
 
-/// The surface area heuristic along an axis of a cell.
-struct Chooser {
+/// The plane across an axis of a cell that the surface area heuristic likes best.
+struct Best {
     axis: usize,
     start: f32,
     end: f32,
     /// Of the sides across the axis, and of a slice of length 1 along it, over the whole.
     across: f32,
     along: f32,
+    split: Option<Split>,
 }
 
-impl Chooser {
+impl Best {
     fn new(bounds: &Aabb, axis: usize) -> Self {
         let size = bounds.size();
         let (a, b) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
         let whole = bounds.half_area().max(f32::MIN_POSITIVE);
         let (start, end) = (bounds.min[axis], bounds.max[axis]);
-        Self { axis, start, end, across: a * b / whole, along: (a + b) / whole }
+        Self { axis, start, end, across: a * b / whole, along: (a + b) / whole, split: None }
     }
 
-    /// None for a plane that does not divide the cell.
-    fn split(&self, plane: f32, (below, above): (usize, usize)) -> Option<Split> {
+    /// A plane and the items below and above; one that does not divide the cell is none.
+    #[inline]
+    fn offer(&mut self, plane: f32, counts: [usize; 2]) {
         if !(self.start < plane && plane < self.end) {
-            return None;
+            return;
         }
         let share = |length: f32| self.across + self.along * length;
+        let [below, above] = counts;
         let items = share(plane - self.start) * below as f32 + share(self.end - plane) * above as f32;
         let bonus = if below == 0 || above == 0 { EMPTY_BONUS } else { 1.0 };
-        Some(Split { axis: self.axis, plane, cost: bonus * (NODE_COST + items) })
+        let cost = bonus * (NODE_COST + items);
+        if self.split.is_none_or(|best| cost < best.cost) {
+            self.split = Some(Split { axis: self.axis, plane, cost, counts });
+        }
     }
 }

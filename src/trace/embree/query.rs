@@ -10,7 +10,7 @@ use super::single::{SingleRay, SingleRayHit};
 use super::sys;
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
-use crate::shape::{Shape, ShapeHit};
+use crate::shape::Shape;
 
 /// How queries are made: the context of Embree 3. What its inline functions would initialise is written out, for
 /// bindgen passes over those.
@@ -157,7 +157,7 @@ pub(super) unsafe extern "C" fn on_intersect(args: *const sys::RTCIntersectFunct
     // SAFETY: Embree always passes a context.
     let instance = unsafe { (*args.context).instID[0] };
     let (rays, hits) = words.split_at_mut(ray_row::COUNT * width);
-    each_hit(list, args.primID, rays, active, |lane, hit, rays| {
+    each_hit(list, args.primID, rays, active, Shape::hit_at, |lane, hit, rays| {
         rays[ray_row::TFAR * width + lane] = (hit.t as f32).to_bits();
         let mut set = |row: usize, bits: u32| hits[row * width + lane] = bits;
         // Nobody asks for the normal; zeros, because Embree's filters and debuggers may look at it.
@@ -186,18 +186,26 @@ pub(super) unsafe extern "C" fn on_occluded(args: *const sys::RTCOccludedFunctio
             std::slice::from_raw_parts_mut(args.valid, width),
         )
     };
-    each_hit(list, args.primID, rays, active, |lane, _, rays| {
-        rays[ray_row::TFAR * width + lane] = f32::NEG_INFINITY.to_bits();
-    });
+    each_hit(
+        list,
+        args.primID,
+        rays,
+        active,
+        |_, _, _| (),
+        |lane, (), rays| {
+            rays[ray_row::TFAR * width + lane] = f32::NEG_INFINITY.to_bits();
+        },
+    );
 }
 
-/// Calls `found` with the lane, the hit and the rays for each active ray that hits the shape.
-fn each_hit(
+/// Calls `found` with the lane, what `hit_at` makes of the shape, the ray and t, and the rays for each active ray that hits the shape.
+fn each_hit<T>(
     list: &ShapeList,
     primitive: u32,
     rays: &mut [u32],
     active: &mut [i32],
-    mut found: impl FnMut(usize, ShapeHit, &mut [u32]),
+    hit_at: impl Fn(&Shape, &Ray, f64) -> T,
+    mut found: impl FnMut(usize, T, &mut [u32]),
 ) {
     let width = active.len();
     for (lane, active) in active.iter_mut().enumerate() {
@@ -212,7 +220,10 @@ fn each_hit(
             tmin: get(ray_row::TNEAR),
             tmax: get(ray_row::TFAR),
         };
-        let hit = guard(list, None, || Shape::intersect(&list.shapes[primitive as usize], &ray));
+        let hit = guard(list, None, || {
+            let shape = &list.shapes[primitive as usize];
+            shape.crossings(&ray).next().map(|t| hit_at(shape, &ray, t))
+        });
         // Version 4 reads the answer from the mask, version 3 goes on using it as the mask of its own.
         if cfg!(embree4) {
             *active = if hit.is_some() { -1 } else { 0 };
