@@ -196,5 +196,8 @@ fn scaling_ends_where_memory_would() {
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
     assert_eq!(document["points"].as_array().map(Vec::len), Some(0), "{document}");
     let stopped = document["stopped"].to_string();
-    assert!(stopped.contains("terrain ends at 0: 10 triangles may take") && stopped.contains("0.0 allowed"), "{stopped}");
+    assert!(
+        stopped.contains("terrain ends at 0: 10 triangles may take") && stopped.contains("0.0 allowed"),
+        "{stopped}"
+    );
 }

@@ -237,6 +237,12 @@ fn faults_are_told_with_line_and_remedy() {
         ("[material.a]\ntexture = \"none.png\"\n", 2, "there is no file"),
         ("[render]\nsize = [0, 1]\n", 2, "whole numbers from 1 to"),
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
+        ("[render]\naccel = \"octre\"\n", 2, "did you mean \"octree\"?"),
+        ("[render]\ngrid = 5\n", 2, "write that, too"),
+        ("[render]\naccel = \"grid\"\ngrid = [1, 2]\n", 3, "one number of cells or three"),
+        ("[render]\naccel = \"grid\"\ngrid = 0\n", 3, "a whole number from 1 to 2048"),
+        ("[render]\ntriangle_method = \"woop\"\n", 2, "write accel = \"binary-bvh\" or another"),
+        ("[render]\naccel = \"bvh\"\nsphere_method = \"geometric\"\n", 3, "bvh and brute are exact"),
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
         (

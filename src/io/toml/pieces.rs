@@ -61,29 +61,19 @@ impl Cut {
 /// Each `[[instance]]` at the top, up to the next header that is not part of it.
 fn placements(text: &[u8]) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
-    let mut is_open = false;
-    let mut end_at = |found: &mut Vec<Range<usize>>, is_open: bool, at: usize| {
-        if let (Some(last), true) = (found.last_mut(), is_open) {
-            last.end = at;
-        }
-    };
+    let mut start = None;
     for header in headers(text) {
         let line = text[header..].split(|&c| c == b'\n').next().unwrap_or_default();
-        match kind(line) {
-            Header::Placement => {
-                end_at(&mut found, is_open, header);
-                found.push(header..header);
-                is_open = true;
-            }
+        let next = match kind(line) {
             // A table within the one that is open, of which its reader thinks what it will.
-            Header::Within if is_open => {}
-            Header::Within | Header::Other => {
-                end_at(&mut found, is_open, header);
-                is_open = false;
-            }
-        }
+            Header::Within => continue,
+            Header::Placement => Some(header),
+            Header::Other => None,
+        };
+        found.extend(start.map(|start| start..header));
+        start = next;
     }
-    end_at(&mut found, is_open, text.len());
+    found.extend(start.map(|start| start..text.len()));
     found
 }
 
@@ -174,7 +164,8 @@ mod tests {
 
     #[test]
     fn placements_are_cut_and_the_rest_stays_in_its_place() {
-        let (rest, pieces) = cut("a = 1\n[[instance]]\nx = 1\n[[ instance ]] # one\nx = 2\n[b]\nc = 2\n[[instance]]\nx = 3");
+        let (rest, pieces) =
+            cut("a = 1\n[[instance]]\nx = 1\n[[ instance ]] # one\nx = 2\n[b]\nc = 2\n[[instance]]\nx = 3");
         assert_eq!(pieces, ["[[instance]]\nx = 1\n[[ instance ]] # one\nx = 2\n", "[[instance]]\nx = 3"]);
         assert_eq!(rest.split_whitespace().collect::<Vec<_>>().join(" "), "a = 1 [b] c = 2");
         let three = "[[instance]]\n".repeat(3);

@@ -57,6 +57,21 @@ pub(super) fn outcome(shape: &Shape, ray: &LocalRay) -> Outcome {
     }
 }
 
+/// Whether the ray passes so close by the side of the shape's box that f32 may find it outside.
+///
+/// A slab's t is off by a few roundings of the way there, which is that of the ray's origin and the box together. What is
+/// flat along an axis stays so: both of its t are the same number.
+pub(super) fn may_pass_box(shape: &Shape, ray: &LocalRay) -> bool {
+    let Aabb { min, max } = shape.bounds();
+    if min.cmpgt(max).any() {
+        return false;
+    }
+    let reach = ray.origin.abs().max(min.abs().as_dvec3()).max(max.abs().as_dvec3()).max_element();
+    let error = (f64::from(gamma(Precision::Single.operations())) * reach + ray.origin_error.max_element()) as f32;
+    let inside = Vec3::select((max - min).cmpgt(Vec3::splat(4.0 * error)), Vec3::splat(error), Vec3::ZERO);
+    crossings_of(ray.origin, ray.direction, &Shape::Cuboid(Cuboid { min: min + inside, max: max - inside })).is_empty()
+}
+
 /// How far the ray may be off where it is within `size` of `centre`.
 fn blur(ray: &LocalRay, centre: DVec3, size: f64) -> f64 {
     let farthest = ((ray.origin - centre).length() + size) / ray.direction.length();

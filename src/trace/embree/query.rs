@@ -120,6 +120,9 @@ packet_query!(1, rtcIntersect4, rtcOccluded4);
 packet_query!(2, rtcIntersect8, rtcOccluded8);
 packet_query!(4, rtcIntersect16, rtcOccluded16);
 
+/// By how much of a coordinate bounds are made larger: four steps of f32.
+const BOUNDS_PAD: f32 = 4.0 * f32::EPSILON;
+
 /// `RTCBoundsFunction`: the bounds of one shape; empty ones make Embree leave it out.
 ///
 /// # Safety
@@ -131,7 +134,12 @@ pub(super) unsafe extern "C" fn on_bounds(args: *const sys::RTCBoundsFunctionArg
     let (args, bounds) = unsafe { (&*args, &mut *(*args).bounds_o) };
     // SAFETY: the user data is a ShapeList, kept by the scene that Embree is building.
     let list = unsafe { shape_list(args.geometryUserPtr) };
-    let Aabb { min, max } = guard(list, Aabb::EMPTY, || list.shapes[args.primID as usize].bounds());
+    let Aabb { mut min, mut max } = guard(list, Aabb::EMPTY, || list.shapes[args.primID as usize].bounds());
+    if min.cmple(max).all() {
+        // A ray along the very side of a box is outside for Embree, and the side of a box may be a shape's.
+        let pad = (min.abs().max(max.abs()) * BOUNDS_PAD).max(Vec3::splat(f32::MIN_POSITIVE));
+        (min, max) = (min - pad, max + pad);
+    }
     [bounds.lower_x, bounds.lower_y, bounds.lower_z] = min.to_array();
     [bounds.upper_x, bounds.upper_y, bounds.upper_z] = max.to_array();
 }

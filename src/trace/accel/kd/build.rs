@@ -1,20 +1,17 @@
-//! A kd-tree: a BSP tree of planes across the axes (Wald, Havran 2006, *On building fast kd-trees for ray tracing, and on doing that in O(N
-//! log N)*).
+//! Where the planes of a kd-tree are.
 //!
-//! Each plane is where the surface area heuristic expects rays to cost least: cells that are empty, or large with little in them, are
-//! cut off early. An item lies in every cell that its box, cut off at the cell, reaches. Large cells choose among 32 planes an axis, counted in bins (Hunt, Mark, Stoll
-//! 2006, *Fast kd-tree construction with an adaptive error-bounded heuristic*; Shevtsov, Soupikov, Kapustin 2007), small ones among the sides of all boxes. Sorting the
-//! sides once and keeping them sorted, as Wald and Havran do, finds slightly better planes and takes three times as long to build and to read.
-//!
-//! A ray carries its range of t from cell to cell and visits the near child first; a far child that begins behind the
-//! nearest hit is left out.
+//! Each is where the surface area heuristic expects rays to cost least: cells that are empty, or large with little in them, are cut off
+//! early. Large cells choose among 32 planes an axis, counted in bins (Hunt, Mark, Stoll 2006, *Fast kd-tree construction with an adaptive
+//! error-bounded heuristic*; Shevtsov, Soupikov, Kapustin 2007, *Highly parallel fast kd-tree construction for interactive ray tracing of dynamic
+//! scenes*), small ones among the sides of all boxes: O(n log n) in all. Sorting the sides once and keeping them sorted, as Wald and Havran do,
+//! finds slightly better planes and takes three times as long to build and to read.
 
 use rayon::join;
 
-use super::items::Input;
-use super::ray::IndexRay;
-use super::{Cell, Index, Options, share};
-use crate::math::{Aabb, DVec3, Vec3};
+use super::super::items::Input;
+use super::super::share;
+use super::{LEAF, Node, STACK, Tree};
+use crate::math::Aabb;
 
 /// What going through a node costs, in tests of an item.
 const NODE_COST: f32 = 0.15;
@@ -28,31 +25,10 @@ const FEW: usize = 32;
 const MANY: usize = 1 << 12;
 /// References for each item that cutting may add in all; every cell has its share.
 const MOST_REFERENCES: usize = 12;
-/// Levels of planes at most, whatever the depth by number of items.
-const STACK: usize = 80;
-
-/// The index.
-pub(super) struct KdTree {
-    bounds: Aabb,
-    /// The root first; a node's lower child follows it.
-    nodes: Vec<Node>,
-    items: Vec<u32>,
-}
-
-/// 8 bytes.
-#[derive(Clone, Copy)]
-struct Node {
-    /// The plane's coordinate; of a leaf, the bits of its first item's number.
-    plane: f32,
-    /// Below, in two bits, the axis, or [`LEAF`]. Above, the upper child; of a leaf, how many items it has.
-    link: u32,
-}
-
-const LEAF: u32 = 3;
-
-/// A tree that is being built.
+/// A tree of which the upper part is built by all threads. What is below is finished at once: two allocations for each of millions of
+/// leaves would take as long as choosing the planes.
 enum Branch {
-    Leaf(Vec<u32>),
+    Whole(Tree),
     Plane { axis: usize, plane: f32, children: Box<[Branch; 2]> },
 }
 
@@ -67,129 +43,88 @@ struct Part<'a> {
     room: usize,
 }
 
-impl Index for KdTree {
-    const REPEATS: bool = true;
-
-    fn build(input: &Input<'_>, _: &Options) -> Self {
-        let bounds = input.bounds();
-        let items = input.all();
-        let room = MOST_REFERENCES * items.len();
-        // As deep as Havran 2000 found to pay, plus some for uneven scenes.
-        let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
-        let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32), room };
-        let mut tree = Self { bounds, nodes: Vec::new(), items: Vec::new() };
-        tree.place(whole.build());
-        tree
-    }
-
-    fn visit(&self, ray: &IndexRay, mut limit: f64, each: &mut impl FnMut(u32) -> f64) {
-        if self.bounds.is_empty() {
-            return;
-        }
-        let mut range = ray.within_box(&self.bounds, limit);
-        if range.is_empty() {
-            return;
-        }
-        let (mut stack, mut waiting) = ([(0, range); STACK], 0);
-        let mut at = 0;
-        loop {
-            let node = self.nodes[at as usize];
-            let axis = node.link & 3;
-            if axis != LEAF {
-                let (near, far) = ray.split(axis as usize, node.plane.into(), range);
-                let (below, above) = (at + 1, node.link >> 2);
-                let (first, second) = if ray.backwards[axis as usize] { (above, below) } else { (below, above) };
-                if near.is_empty() {
-                    (at, range) = (second, far);
-                } else {
-                    if !far.is_empty() {
-                        stack[waiting] = (second, far);
-                        waiting += 1;
-                    }
-                    (at, range) = (first, near);
-                }
-                if !range.is_empty() {
-                    continue;
-                }
-            } else {
-                for &item in &self.items[node.plane.to_bits() as usize..][..(node.link >> 2) as usize] {
-                    limit = each(item);
-                }
-            }
-            loop {
-                if waiting == 0 {
-                    return;
-                }
-                waiting -= 1;
-                (at, range) = stack[waiting];
-                if range.from <= limit {
-                    range = range.until(limit);
-                    break;
-                }
-            }
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.items[..])
-    }
-
-    fn locate(&self, point: Vec3) -> Option<Cell> {
-        let mut cell = Cell::within(&self.bounds, point)?;
-        let mut at = 0;
-        loop {
-            let node = self.nodes[at];
-            let axis = (node.link & 3) as usize;
-            if axis == LEAF as usize {
-                cell.number = at as u32;
-                cell.items.extend(&self.items[node.plane.to_bits() as usize..][..(node.link >> 2) as usize]);
-                return Some(cell);
-            }
-            let (normal, plane) = (DVec3::AXES[axis], f64::from(node.plane));
-            let is_above = point[axis] >= node.plane;
-            at = if is_above { (node.link >> 2) as usize } else { at + 1 };
-            cell.sides.push(if is_above { (-normal, -plane) } else { (normal, plane) });
-        }
-    }
+/// The tree over all items, whose boxes are within `bounds`.
+pub(super) fn tree(input: &Input<'_>, bounds: Aabb) -> Tree {
+    let items = input.all();
+    let room = MOST_REFERENCES * items.len();
+    // As deep as Havran 2000 found to pay, plus some for uneven scenes.
+    let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
+    let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32), room };
+    let mut tree = Tree::default();
+    tree.place(whole.build());
+    tree
 }
 
-impl KdTree {
-    /// Appends a branch, depth first.
+impl Tree {
+    fn add_leaf(&mut self, items: &[u32]) {
+        let first = f32::from_bits(self.items.len() as u32);
+        self.nodes.push(Node { plane: first, link: (items.len() as u32) << 2 | LEAF });
+        self.items.extend(items);
+    }
+
+    /// Adds a node and, by two calls of `add`, its children.
+    fn add_plane<T>(&mut self, axis: usize, plane: f32, [below, above]: [T; 2], add: impl Fn(&mut Self, T)) {
+        let at = self.nodes.len();
+        self.nodes.push(Node { plane, link: 0 });
+        add(self, below);
+        self.nodes[at].link = (self.nodes.len() as u32) << 2 | axis as u32;
+        add(self, above);
+    }
+
+    /// Adds a branch, depth first.
     fn place(&mut self, branch: Branch) {
         match branch {
-            Branch::Leaf(items) => {
-                let first = f32::from_bits(self.items.len() as u32);
-                self.nodes.push(Node { plane: first, link: (items.len() as u32) << 2 | LEAF });
-                self.items.extend(items);
+            Branch::Whole(tree) if self.nodes.is_empty() => *self = tree,
+            Branch::Whole(tree) => {
+                let (nodes, items) = (self.nodes.len() as u32, self.items.len() as u32);
+                self.items.extend(tree.items);
+                self.nodes.extend(tree.nodes.into_iter().map(|Node { plane, link }| match link & 3 {
+                    LEAF => Node { plane: f32::from_bits(plane.to_bits() + items), link },
+                    _ => Node { plane, link: link + (nodes << 2) },
+                }));
             }
-            Branch::Plane { axis, plane, children } => {
-                let at = self.nodes.len();
-                self.nodes.push(Node { plane, link: 0 });
-                let [below, above] = *children;
-                self.place(below);
-                self.nodes[at].link = (self.nodes.len() as u32) << 2 | axis as u32;
-                self.place(above);
-            }
+            Branch::Plane { axis, plane, children } => self.add_plane(axis, plane, *children, Self::place),
         }
     }
 }
 
 impl<'a> Part<'a> {
     fn build(self) -> Branch {
+        if self.items.len() >= MANY {
+            return match self.divide() {
+                Ok((Split { axis, plane, .. }, [below, above])) => {
+                    let children = join(|| below.build(), || above.build()).into();
+                    Branch::Plane { axis, plane, children: Box::new(children) }
+                }
+                Err(whole) => {
+                    let mut tree = Tree::default();
+                    tree.add_leaf(&whole.items);
+                    Branch::Whole(tree)
+                }
+            };
+        }
+        let mut tree = Tree::default();
+        self.build_into(&mut tree);
+        Branch::Whole(tree)
+    }
+
+    fn build_into(self, tree: &mut Tree) {
+        match self.divide() {
+            Ok((Split { axis, plane, .. }, parts)) => {
+                tree.add_plane(axis, plane, parts, |tree, part| part.build_into(tree));
+            }
+            Err(whole) => tree.add_leaf(&whole.items),
+        }
+    }
+
+    /// Cut in two, or the whole where that does not pay.
+    fn divide(self) -> Result<(Split, [Self; 2]), Self> {
         let count = self.items.len() as f32;
         let split = if self.depth > 0 && self.items.len() > 1 { self.best_split() } else { None };
-        let Some(split) = split.filter(|split| split.cost < count) else {
-            return Branch::Leaf(self.items);
-        };
-        let Split { axis, plane, .. } = split;
-        let many = self.items.len() >= MANY;
-        let [below, above] = match self.cut(split) {
-            Ok(parts) => parts,
-            Err(whole) => return Branch::Leaf(whole.items),
-        };
-        let children =
-            if many { join(|| below.build(), || above.build()).into() } else { [below.build(), above.build()] };
-        Branch::Plane { axis, plane, children: Box::new(children) }
+        match split.filter(|split| split.cost < count) {
+            Some(split) => self.cut(split).map(|parts| (split, parts)),
+            None => Err(self),
+        }
     }
 
     /// The parts below and above a plane, what lies within it above; or the whole, where there is no room for both.
@@ -247,8 +182,12 @@ impl<'a> Part<'a> {
             while let Some(&end) = ends.get(ended) {
                 let plane = begins.get(begun).map_or(end, |begin| begin.min(end));
                 let below = begun;
-                begun += begins[begun..].iter().take_while(|&&begin| begin <= plane).count();
-                ended += ends[ended..].iter().take_while(|&&end| end <= plane).count();
+                while begins.get(begun).is_some_and(|&begin| begin <= plane) {
+                    begun += 1;
+                }
+                while ends.get(ended).is_some_and(|&end| end <= plane) {
+                    ended += 1;
+                }
                 best.offer(plane, [below, count - ended]);
             }
             best.split
