@@ -201,3 +201,22 @@ fn scaling_ends_where_memory_would() {
         "{stopped}"
     );
 }
+
+/// A sphere above a mirror: how many rays are compared tells how often they were sent on.
+#[cfg(feature = "embree")]
+#[test]
+fn rays_are_followed_as_often_as_the_scene_asks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rays = |depth: u32| {
+        let path = folder.path().join("mirrors.toml");
+        let mirrors = "[material.m]\nreflection = 1\n[[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n\
+            [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
+        std::fs::write(&path, format!("[render]\nmax_depth = {depth}\n{mirrors}")).expect("a file");
+        let path = path.to_str().expect("UTF-8");
+        let output = twincast(&["compare", path, "--size", "20x20", "--random", "0", "--json"]);
+        let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+        document["rays"].as_u64().expect("a number")
+    };
+    let counts = [rays(0), rays(1), rays(4)];
+    assert!(counts[0] == 400 && counts[0] < counts[1] && counts[1] < counts[2], "{counts:?}");
+}

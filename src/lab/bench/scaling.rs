@@ -81,7 +81,8 @@ pub struct Point {
     pub microseconds_a_ray: f64,
     /// Memory for each triangle.
     pub bytes_a_primitive: f64,
-    /// The same while it was built, at most; none where the system does not tell.
+    /// By how much more the process held while it was built, at most; less than was used where freed memory was used again. None
+    /// where the system does not tell.
     pub bytes_a_primitive_building: Option<f64>,
     /// What there is to say about how it was built.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -163,3 +163,32 @@ fn quadric(sphere: &Sphere, ray: &LocalRay) -> Outcome {
     };
     Outcome { may_meet: true, may_pass: !(discriminant > bound), roots: [root(-1.0), root(1.0)] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Body, Precision, Primitive, outcome};
+    use super::*;
+    use crate::ray::Ray;
+    use crate::shape::Disk;
+
+    #[test]
+    fn along_the_side_of_a_box_f32_alone_may_pass() {
+        let cuboid = Shape::Cuboid(Cuboid::new(Vec3::ZERO, Vec3::ONE).unwrap());
+        let disk = Shape::Disk(Disk::new(Vec3::splat(0.5), Vec3::Z, 0.5).unwrap());
+        let may_pass = |shape: &Shape, x: f32, precision: Precision| {
+            let ray = Ray::new(Vec3::new(x, 0.5, 3.0), Vec3::NEG_Z);
+            let answer = outcome(&ray, &Primitive { body: Body::Shape(shape), to_world: None }, precision);
+            assert!(answer.may_meet, "{shape:?} {x}");
+            answer.may_pass
+        };
+        for shape in [&cuboid, &disk] {
+            for x in [0.0, 1.0] {
+                assert!(may_pass(shape, x, Precision::Single) && !may_pass(shape, x, Precision::Double));
+            }
+            assert!(
+                !may_pass(shape, 0.4, Precision::Single),
+                "the disk's box is flat, and nothing passes through that"
+            );
+        }
+    }
+}
