@@ -84,6 +84,53 @@ fn instances_and_spheres() {
     assert!(hits > 200, "{hits} hits");
 }
 
+/// Transforms of every kind: objects that are tiny, huge, flattened, sheared, mirrored, or far away for their size. Rays alone and in
+/// bundles; some bundles cross octants in the object's coordinates and not in the world's.
+#[test]
+fn extreme_placements() {
+    use twincast::math::{DAffine3, DMat3, DVec3};
+    let mut hits = 0;
+    for (case, scale) in [1.0, 1e-12, 1e9].into_iter().enumerate() {
+        let mut random = Random::new(case as u64 + 40);
+        let mut scene = scenes::of_mesh(scenes::bumpy_sphere(12, 0.3, case as u64));
+        let first = scene.instances.pop().expect("one instance");
+        let mut targets = Vec::new();
+        for i in 0..10 {
+            let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
+            let shape = match i {
+                0 | 1 => DVec3::ONE,
+                2 => DVec3::new(1.0, 1e-4, 1.0),
+                3 => DVec3::new(1e-6, 1.0, 1e3),
+                4 => DVec3::new(-1.0, 1.0, 0.5),
+                5 => DVec3::splat(1e-5),
+                6 => DVec3::splat(1e4),
+                _ => DVec3::ONE + random.vec3().as_dvec3() * 0.5,
+            };
+            let mut matrix = turn * DMat3::from_diagonal(shape * scale);
+            if i == 7 {
+                matrix.x_axis += matrix.y_axis * 1e5;
+            }
+            let translation = random.vec3().as_dvec3() * scale * if i == 8 { 1e5 } else { 5.0 };
+            let transform = DAffine3 { matrix3: matrix, translation };
+            scene.instances.push(twincast::scene::Instance { transform, ..first.clone() });
+            targets.extend((0..20).map(|_| transform.transform_point3(random.vec3().as_dvec3()).as_vec3()));
+        }
+        let unit = scale as f32;
+        let mut rays = Vec::new();
+        for view in 0..12 {
+            let eye = random.vec3() * unit * [3.0, 30.0, 0.1][view % 3];
+            let target = targets[random.below(targets.len())];
+            let spread = (target - eye).length() * [0.002, 0.05, 0.3][view / 3 % 3];
+            rays.extend((0..64).map(|_| Ray::new(eye, target + random.vec3() * spread - eye)));
+        }
+        let to = rays[0].origin + Vec3::ONE * unit * 9.0;
+        let end = |&target: &Vec3| Ray { tmax: 0.999, ..Ray::new(target * 1.01, to - target * 1.01) };
+        rays.extend(targets.iter().map(end));
+        hits += assert_parity(&scene, &rays);
+    }
+    assert!(hits > 500, "{hits} hits");
+}
+
 /// Directions so short that 1/d overflows on an axis, in trees whose nodes are mostly empty.
 #[test]
 fn short_directions() {

@@ -150,7 +150,7 @@ impl Difference {
 
 /// Relative errors: 9 in a corner (8 of its own, 1 of the subtraction), as many in an edge; 2 in the cross product, 3 in
 /// the dot product; and the bound's own rounding.
-const ROUNDING: f64 = gamma64(32);
+pub(crate) const ROUNDING: f64 = gamma64(32);
 
 /// A triangle as seen from the origin of a ray, in f64.
 struct Seen {
@@ -190,7 +190,7 @@ impl Seen {
 }
 
 /// The relative error of t that is let pass: 2^-27, an eighth of an f32 step.
-const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
+pub(crate) const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
 
 /// The same by exact arithmetic; t is unbounded.
 #[cold]

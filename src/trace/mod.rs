@@ -10,6 +10,7 @@ pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
 mod leaf;
+mod limits;
 mod nearest;
 mod unbounded;
 mod world;

@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::limits;
 use crate::error::{Error, Result};
 use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, gamma64, is_traceable};
 use crate::ray::{Hit, Ray};
@@ -94,7 +95,8 @@ impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
-    /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name.
+    /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name; and for more
+    /// primitives in one place than tracers can name.
     pub fn new(scene: &Scene) -> Result<Self> {
         let mut uses = vec![0usize; scene.groups.len()];
         for (i, instance) in scene.instances.iter().enumerate() {
@@ -119,6 +121,7 @@ impl World {
             world.lookup[i] = world.add_group(scene, instance.group, i as u32, &transform);
         }
         world.fixed = 0..world.parts.len();
+        limits::check(&world.parts, "the scene, without what is placed several times,")?;
 
         let mut added: Vec<Option<(u32, Lookup, DVec3)>> = vec![None; scene.groups.len()];
         for (i, instance) in placed {
@@ -138,6 +141,9 @@ impl World {
             }
             world.lookup[i] = Lookup { placement: Some(world.placements.len() as u32), ..lookup };
             world.placements.push(Placement { instance: i as u32, object, to_world: rounded, to_object });
+        }
+        for object in &world.objects {
+            limits::check(&world.parts[object.clone()], "an object that is placed several times")?;
         }
         Ok(world)
     }

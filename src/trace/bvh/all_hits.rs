@@ -10,8 +10,9 @@ use super::Bvh;
 use super::block::LANES;
 use super::filter::Filter;
 use super::isa::{self, Kernel};
-use super::level::{Level, PLACED, Through};
+use super::level::{Level, Through};
 use super::node::Child;
+use super::place::{Blur, Place};
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -132,21 +133,17 @@ impl Kernel for Gather<'_> {
     fn run<S: Simd>(self) {
         let Self { bvh, ray, gathered } = self;
         let (mut upper, mut level) = (Stack::new(), Stack::new());
-        bvh.fixed.gather::<S>(ray, ray, None, &mut level, gathered);
+        bvh.fixed.gather::<S>(ray, None, &mut level, gathered);
         bvh.unbounded.gather(ray, &mut gathered.shapes);
         if bvh.placements.is_empty() {
             return;
         }
-        let slab = SlabRay::new(ray, bvh.placements.reach(), 1.0);
+        let slab = SlabRay::new(ray, bvh.placements.reach(), Blur::NONE);
         let limit = limit(ray);
         walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |leaf| {
-            for placement in bvh.placements.leaf(leaf.blocks()) {
-                let local = placement.object_ray(ray);
-                if local.is_valid() {
-                    let through = Through { instance: placement.instance, to_world: &placement.to_world };
-                    let object = &bvh.objects[placement.object as usize];
-                    object.gather::<S>(ray, &local, Some(through), &mut level, gathered);
-                }
+            for place in leaf.blocks().map(|number| bvh.placements.at(number)) {
+                let object = &bvh.objects[place.placement.object as usize];
+                object.gather::<S>(ray, Some(place), &mut level, gathered);
             }
             Visit::Until(limit)
         });
@@ -159,30 +156,26 @@ fn limit(ray: &Ray) -> f32 {
 }
 
 impl Level {
-    /// What `ray`, in the world, hits in this level; `local` is the same ray in this level's coordinates, rounded.
+    /// What `ray`, in the world, hits in this level, which may be placed.
     #[inline(always)]
-    fn gather<S: Simd>(
-        &self,
-        ray: &Ray,
-        local: &Ray,
-        through: Option<Through<'_>>,
-        stack: &mut Stack,
-        gathered: &mut Gathered,
-    ) {
-        let blur = if through.is_some() { PLACED } else { 1.0 };
+    fn gather<S: Simd>(&self, ray: &Ray, place: Option<&Place>, stack: &mut Stack, gathered: &mut Gathered) {
+        let through = place.map(Place::through);
         let limit = limit(ray);
         if !self.triangles.tree().is_empty() {
-            let slab = SlabRay::new(local, self.triangles.tree().reach(), blur);
-            let filter = Filter::new(local, blur);
+            let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
+            let slab = SlabRay::new(&local, self.triangles.tree().reach(), blur);
+            let filter = Filter::new(&local, blur);
             walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |leaf| {
                 self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
                 Visit::Until(limit)
             });
         }
-        if !self.shapes.tree().is_empty() {
-            let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
+        // The rounding of the ray is part of what shapes are asked.
+        let local = place.map_or(*ray, |place| place.placement.object_ray(ray));
+        if !self.shapes.tree().is_empty() && local.is_valid() {
+            let slab = SlabRay::new(&local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |leaf| {
-                self.shapes.gather_leaf(leaf, local, through, &mut gathered.shapes);
+                self.shapes.gather_leaf(leaf, &local, through, &mut gathered.shapes);
                 Visit::Until(limit)
             });
         }
@@ -202,7 +195,7 @@ impl TriangleTree {
         for index in leaf.blocks() {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
-            let mut open = filter.candidates::<S>(block, limit(ray)).lanes;
+            let mut open = filter.candidates::<S, true>(block, limit(ray)).lanes;
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;
                 open &= open - 1;

@@ -1,17 +1,19 @@
-//! Many rays: in bundles where they are bundles, else one by one, made ready and computed several at a time.
+//! Many rays: among triangles in bundles where they are bundles, else in flight, and hits computed several at a time; then one by
+//! one among everything else, of which there is little.
 
 use std::cell::Cell;
 
 use super::flight::{self, Flight};
-use super::found::NONE;
-use super::level::Through;
-use super::quad::widen;
+use super::found::{Found, NONE};
+use super::noted::Rays;
+use super::place::Blur;
+use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::walk::{self, Stack, Visit};
 use super::{Bvh, bundle, isa, tile};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
 
@@ -53,13 +55,13 @@ impl Bvh {
         WORKSPACE.set(Some(workspace));
     }
 
-    /// Placed objects for one ray.
+    /// Shapes of placed objects, for one ray.
     #[inline(always)]
     fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
-        if self.placements.is_empty() || Q::ANY && nearest.hit().is_some() {
+        if !self.placements.has_shapes() || Q::ANY && nearest.hit().is_some() {
             return;
         }
-        let slab = SlabRay::new(ray, self.placements.reach(), 1.0);
+        let slab = SlabRay::new(ray, self.placements.reach(), Blur::NONE);
         let Stacks { upper, level: lower } = stacks;
         walk::single::<S, Q>(
             upper,
@@ -68,12 +70,11 @@ impl Bvh {
             nearest.limit(),
             #[inline(always)]
             |leaf| {
-                for placement in self.placements.leaf(leaf.blocks()) {
-                    let object_ray = placement.object_ray(ray);
+                for place in leaf.blocks().map(|number| self.placements.at(number)) {
+                    let object_ray = place.placement.object_ray(ray);
                     if object_ray.is_valid() {
-                        let through = Through { instance: placement.instance, to_world: &placement.to_world };
-                        let level = &self.objects[placement.object as usize];
-                        level.trace_placed::<S, Q>(ray, &object_ray, through, lower, nearest);
+                        let level = &self.objects[place.placement.object as usize];
+                        level.trace_shapes::<S, Q>(&object_ray, Some(place.through()), lower, nearest);
                     }
                 }
                 Visit::after::<Q>(nearest)
@@ -81,8 +82,8 @@ impl Bvh {
         );
     }
 
-    /// Many rays among the triangles of the world, in flight together; hits are computed several at a time. Also tells t
-    /// in f64, for the last 64 of them: that of ray i in the place of `first` + i.
+    /// Many rays among triangles, in flight together; hits are computed several at a time. Also tells t in f64, for the last 64 of
+    /// them: that of ray i in the place of `first` + i.
     #[inline(always)]
     fn fly<S: Simd, Q: Query>(
         &self,
@@ -92,76 +93,46 @@ impl Bvh {
         answers: &mut [Q::Answer],
         t: &mut [f64; bundle::RAYS],
     ) {
-        let triangles = &self.fixed.triangles;
         answers.fill(Q::MISS);
-        if triangles.tree().is_empty() {
+        if !self.has_triangles() {
             return;
         }
-        // Rays, and the triangles that they hit for sure.
-        let (mut pending, mut ids, mut count) = ([0; 4], [NONE; 4], 0);
+        let mut answer = Answers::<Q> { bvh: self, rays, answers, first, t };
+        let (mut fixed, mut placed) = (Pending::NONE, Pending::NONE);
         flight::trace::<S, Q>(
             flight,
-            triangles,
+            self,
             rays,
             #[inline(always)]
             |i, found| {
                 if found.is_noted() && Q::ANY {
-                    answers[i] = Q::answer(Some(SOMETHING));
+                    answer.answers[i] = Q::answer(Some(SOMETHING));
                 } else if found.is_noted() {
-                    (pending[count % 4], ids[count % 4]) = (i, found.noted);
-                    count += 1;
-                    if count == 4 {
-                        count = 0;
-                        self.compute_noted::<S, Q>(&pending, &ids, first, rays, answers, t);
+                    let pending = if found.place == FIXED { &mut fixed } else { &mut placed };
+                    if pending.push(i, found) {
+                        answer.compute::<S>(pending);
                     }
                 } else if found.is_hit() {
-                    let nearest = found.nearest(triangles, &rays[i]);
-                    (answers[i], t[(first + i) % bundle::RAYS]) = (Q::answer(nearest.hit()), nearest.t());
+                    let nearest = found.nearest(self, &rays[i]);
+                    answer.take(i, nearest.t(), nearest.hit());
                 }
             },
         );
-        if count > 0 {
-            // The others are computed twice, or again.
-            for i in count..4 {
-                (pending[i], ids[i]) = (pending[0], ids[0]);
+        for pending in [&mut fixed, &mut placed] {
+            if pending.count > 0 {
+                pending.fill_up();
+                answer.compute::<S>(pending);
             }
-            self.compute_noted::<S, Q>(&pending, &ids, first, rays, answers, t);
         }
     }
 
-    /// The hits of four rays, by number, with the triangles that are noted.
-    #[inline(always)]
-    fn compute_noted<S: Simd, Q: Query>(
-        &self,
-        pending: &[usize; 4],
-        ids: &[u32; 4],
-        first: usize,
-        rays: &[Ray],
-        answers: &mut [Q::Answer],
-        t: &mut [f64; bundle::RAYS],
-    ) {
-        let [a, b, c, d] = pending.map(|i| &rays[i]);
-        let (oa, ob, oc, od) = (a.origin, b.origin, c.origin, d.origin);
-        let origin = [
-            widen::<S>(&[oa.x, ob.x, oc.x, od.x]),
-            widen::<S>(&[oa.y, ob.y, oc.y, od.y]),
-            widen::<S>(&[oa.z, ob.z, oc.z, od.z]),
-        ];
-        let (da, db, dc, dd) = (a.direction, b.direction, c.direction, d.direction);
-        let direction = [
-            widen::<S>(&[da.x, db.x, dc.x, dd.x]),
-            widen::<S>(&[da.y, db.y, dc.y, dd.y]),
-            widen::<S>(&[da.z, db.z, dc.z, dd.z]),
-        ];
-        let (exact, hits) = self.fixed.triangles.hits::<S>(origin, direction, *ids);
-        for ((&i, hit), exact) in pending.iter().zip(hits).zip(exact) {
-            (answers[i], t[(first + i) % bundle::RAYS]) = (Q::answer(Some(hit)), exact);
-        }
+    fn has_triangles(&self) -> bool {
+        !self.fixed.triangles.tree().is_empty() || self.placements.has_triangles()
     }
 
-    /// Whether there are neither shapes nor placed objects.
+    /// Whether there is nothing else.
     fn has_only_triangles(&self) -> bool {
-        self.fixed.shapes.tree().is_empty() && self.placements.is_empty() && self.unbounded.is_empty()
+        self.fixed.shapes.tree().is_empty() && !self.placements.has_shapes() && self.unbounded.is_empty()
     }
 
     /// Many rays: in bundles of 64 where they are bundles, else in flight.
@@ -174,12 +145,11 @@ impl Bvh {
         coherent: bool,
     ) {
         let Workspace { stacks, flight, tile } = workspace;
-        let triangles = &self.fixed.triangles;
         let is_all = self.has_only_triangles();
-        let in_bundles = coherent && !triangles.tree().is_empty();
+        let in_bundles = coherent && self.has_triangles();
         let chunk = if in_bundles || !is_all { bundle::RAYS } else { rays.len().max(1) };
         for (rays, answers) in rays.chunks(chunk).zip(answers.chunks_mut(chunk)) {
-            let traced = if in_bundles { tile::trace::<S, Q>(tile, triangles, rays, answers) } else { 0 };
+            let traced = if in_bundles { tile::trace::<S, Q>(tile, self, rays, answers) } else { 0 };
             // The others, in runs: all of them, where there are no bundles.
             let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - rays.len()) } else { 1 };
             while open != 0 {
@@ -208,10 +178,72 @@ impl Bvh {
             let mut nearest = Nearest::new(ray);
             if Q::resume(&mut nearest, t, *answer) {
                 self.unbounded.offer(ray, &mut nearest);
-                self.fixed.trace_shapes::<S, Q>(ray, None, 1.0, &mut stacks.level, &mut nearest);
+                self.fixed.trace_shapes::<S, Q>(ray, None, &mut stacks.level, &mut nearest);
                 self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
                 *answer = Q::answer(nearest.hit());
             }
+        }
+    }
+}
+
+/// Four rays, by number, whose hits are noted.
+struct Pending {
+    rays: [usize; 4],
+    ids: [u32; 4],
+    places: [u32; 4],
+    count: usize,
+}
+
+impl Pending {
+    const NONE: Self = Self { rays: [0; 4], ids: [NONE; 4], places: [FIXED; 4], count: 0 };
+
+    /// Whether they are four now.
+    #[inline(always)]
+    fn push(&mut self, ray: usize, found: &Found) -> bool {
+        let i = self.count % 4;
+        (self.rays[i], self.ids[i], self.places[i]) = (ray, found.noted, found.place);
+        self.count += 1;
+        self.count == 4
+    }
+
+    /// Those that are missing are the first: that is computed twice, or again.
+    fn fill_up(&mut self) {
+        for i in self.count..4 {
+            (self.rays[i], self.ids[i], self.places[i]) = (self.rays[0], self.ids[0], self.places[0]);
+        }
+    }
+}
+
+/// Where answers of a flight go.
+struct Answers<'a, Q: Query> {
+    bvh: &'a Bvh,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    first: usize,
+    t: &'a mut [f64; bundle::RAYS],
+}
+
+impl<Q: Query> Answers<'_, Q> {
+    #[inline(always)]
+    fn take(&mut self, ray: usize, t: f64, hit: Option<Hit>) {
+        (self.answers[ray], self.t[(self.first + ray) % bundle::RAYS]) = (Q::answer(hit), t);
+    }
+
+    /// Answers for four rays, of which all hits are fixed, or all are placed.
+    #[inline(always)]
+    fn compute<S: Simd>(&mut self, pending: &mut Pending) {
+        let Pending { rays: [a, b, c, d], ids, places, count } = pending;
+        let each = [&self.rays[*a], &self.rays[*b], &self.rays[*c], &self.rays[*d]];
+        let rays = Rays::new::<S>(each);
+        let (t, hits) = if places[0] == FIXED {
+            let (t, [a, b, c, d]) = self.bvh.fixed.triangles.hits::<S>(&rays, *ids);
+            (t, [Some(a), Some(b), Some(c), Some(d)])
+        } else {
+            self.bvh.placed_hits::<S>(each, 0b1111, &rays, *ids, *places)
+        };
+        *count = 0;
+        for ((ray, t), hit) in [*a, *b, *c, *d].into_iter().zip(t).zip(hits) {
+            self.take(ray, t, hit);
         }
     }
 }

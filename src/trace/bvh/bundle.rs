@@ -8,10 +8,17 @@
 //! **Turning.** Shadow rays towards a point light do not share their origin but their end. They are turned round: the
 //! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
 //! asked of the rays as they were given.
+//!
+//! **Placed.** In the coordinates of an object the same rays are a bundle again ([`Bundle::place`]), with an origin that is not quite
+//! the one that is meant, and directions that are rounded: each component by u, so that slopes are off by twice as much as in the
+//! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
 
 use super::filter::largest_axis;
+use super::footprint::Rows;
 use super::node::{Node, WIDTH};
+use super::place::Place;
 use super::query::Query;
+use super::range::Range;
 use super::simd::{Array, Group, Mask, Simd, Vector};
 use super::slab::columns;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -43,11 +50,15 @@ pub(super) struct Bundle {
     pub direction: [PerRay; 3],
     /// The axis' component of each direction, without its sign: t' of t = 1.
     pub depth: PerRay,
+    /// The least of them.
+    least_depth: f32,
     /// Directions on the other two axes over `depth`, the smallest and largest of them, and the largest magnitude (or 1).
     pub slope: [PerRay; 2],
     pub low: [f32; 2],
     pub high: [f32; 2],
     pub largest: f32,
+    /// The same of eight rays at a time.
+    pub rows: Rows,
     /// 1 / slope.
     pub reciprocal: [PerRay; 2],
     /// Least and most that t' may be; rounded inwards, so that what lies between is within the range for sure.
@@ -77,6 +88,8 @@ pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
 pub(super) const TINY: f32 = 1e-37;
 /// Products of this size are not trusted to be finite after a sum.
 const HUGE: f32 = 1e37;
+/// Error of a direction's component, over the depth, that counts for nothing beside its rounding.
+const NOISE: f32 = UNIT_ROUNDOFF / 8.0;
 /// Slopes beyond this spoil the bounds for all rays.
 const STEEPEST: f32 = 16.0;
 
@@ -89,10 +102,12 @@ impl Bundle {
             forward: 1.0,
             direction: [PerRay::ZERO; 3],
             depth: PerRay::ZERO,
+            least_depth: 0.0,
             slope: [PerRay::ZERO; 2],
             low: [0.0; 2],
             high: [0.0; 2],
             largest: 1.0,
+            rows: Rows::NONE,
             reciprocal: [PerRay::ZERO; 2],
             begin: PerRay::ZERO,
             end: PerRay::ZERO,
@@ -105,14 +120,39 @@ impl Bundle {
     /// Takes the rays, of which the bundle is valid only if they fit as a whole. Those that end in one point fit only if
     /// any hit is asked for.
     #[inline(always)]
-    pub fn fill<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS]) -> Fit {
-        let fit = self.gather::<S, Q>(rays);
-        if fit == Fit::Whole { self.project::<S>() } else { fit }
+    pub fn fill<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
+        let fit = self.gather::<S, Q>(rays, range);
+        if fit != Fit::Whole {
+            return fit;
+        }
+        range.open::<S>(self.is_turned);
+        self.project::<S>(range)
+    }
+
+    /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need not run
+    /// into one octant. True if they fit as a whole.
+    #[inline(always)]
+    pub fn place<S: Simd>(&mut self, world: &Self, place: &Place, range: &Range) -> bool {
+        let (origin, blur) = place.point::<S>(Vec3::from_array(world.origin), world.blur);
+        (self.origin, self.blur, self.is_turned) = (origin.to_array(), blur, world.is_turned);
+        let noise = place.directions::<S>(&world.direction, &mut self.direction);
+        if self.is_turned {
+            // A ray's own origin is told from the common end and its direction, whose components are rounded.
+            let mut longest = S::Wide::splat(0.0);
+            for group in 0..RAYS / S::Wide::LANES {
+                for direction in &self.direction {
+                    longest = S::Wide::at(direction, group).abs().max(longest);
+                }
+            }
+            self.blur += UNIT_ROUNDOFF * 1.01 * longest.largest() + noise;
+        }
+        let (is_finite, fit) = (self.blur < HUGE && origin.is_finite(), self.project::<S>(range));
+        is_finite && fit == Fit::Whole && noise <= NOISE * self.least_depth
     }
 
     /// Directions and ranges as they are; where all rays start, or end.
     #[inline(always)]
-    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS]) -> Fit {
+    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
         let zero = S::V8::splat(0.0);
         let start = splat::<S>(rays[0].origin);
         let last = rays[0].origin + rays[0].direction;
@@ -136,8 +176,8 @@ impl Bundle {
             }
             in_range &= zero.at_most(tmin).and(tmin.at_most(tmax)).bits();
             latest = latest.max(tmax);
-            store::<S>(&mut self.begin, i, tmin);
-            store::<S>(&mut self.end, i, tmax);
+            store::<S>(&mut range.begin, i, tmin);
+            store::<S>(&mut range.limit, i, tmax);
         }
         let is_shared = spread.at_most(zero).bits() == 0xff;
         (self.origin, self.blur, self.is_turned) = (rays[0].origin.to_array(), 0.0, !is_shared);
@@ -162,9 +202,18 @@ impl Bundle {
         Fit::Whole
     }
 
+    /// The most t' that is wanted of each ray.
+    #[inline(always)]
+    pub fn limit_of<S: Simd>(&self, range: &Range, limit: &mut PerRay) {
+        for group in 0..RAYS / S::Wide::LANES {
+            let (most, depth) = (S::Wide::at(&range.limit, group), S::Wide::at(&self.depth, group));
+            most.mul(depth).mul_add(S::Wide::splat(1.0 + SLACK), S::Wide::splat(TINY)).put(limit, group);
+        }
+    }
+
     /// Everything that is derived from the directions.
     #[inline(always)]
-    fn project<S: Simd>(&mut self) -> Fit {
+    fn project<S: Simd>(&mut self, range: &Range) -> Fit {
         let [x, y, z] = &self.direction;
         self.axis = largest_axis(Vec3::new(x.0[0], y.0[0], z.0[0]).abs());
         let [p, q, along] = axes(self.axis);
@@ -185,14 +234,8 @@ impl Bundle {
                 splat(1.0).div(slope).put(&mut self.reciprocal[i], group);
                 (low[i], high[i]) = (slope.min(low[i]), slope.max(high[i]));
             }
-            let (begin, end) = (S::Wide::at(&self.begin, group), S::Wide::at(&self.end, group));
-            // In turned t, both inwards and both outwards. 1 - t is off by half a step of 1 at most.
-            let (begin, end, start, limit) = if self.is_turned {
-                let (a, b) = (splat(1.0 + 1e-6), splat(1.0 - 1e-6));
-                (a.sub(end), b.sub(begin), b.sub(end), a.sub(begin))
-            } else {
-                (begin, end, begin, end)
-            };
+            let (begin, start) = (S::Wide::at(&range.begin, group), S::Wide::at(&range.start, group));
+            let (end, limit) = (S::Wide::at(&range.sure, group), S::Wide::at(&range.limit, group));
             begin.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.begin, group);
             end.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).put(&mut self.end, group);
             limit.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.limit, group);
@@ -205,11 +248,14 @@ impl Bundle {
         if !(one_sided(0) && one_sided(1) && one_sided(2)) {
             return Fit::Parts;
         }
-        self.forward = if low[2] > 0.0 { 1.0 } else { -1.0 };
+        (self.forward, self.least_depth) = if low[2] > 0.0 { (1.0, low[2]) } else { (-1.0, -high[2]) };
         (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
         self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
-        // NaN and infinity, too: a direction whose smallest component vanishes against the others.
-        if self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
+        self.rows = Rows::new::<S>(&self.slope);
+        // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's coordinates
+        // a depth may be infinite, which leaves no slope.
+        let is_small = high[2].max(-low[2]) < HUGE;
+        if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
 
     /// The slope rectangle's reciprocals, against the boxes of a tree that reaches that far. None where they are too
@@ -230,9 +276,9 @@ impl Bundle {
         let mut is_finite = true;
         for (i, axis) in axes.into_iter().enumerate() {
             let span = self.origin[axis].abs() + reach[axis];
-            // Origin and box are subtracted (2 u of the span), the slope is off by 2 u, its reciprocal and the product
-            // by another each.
-            let pad = sign[i] * (8.0 * UNIT_ROUNDOFF * span + self.blur);
+            // Origin and box are subtracted (2 u of the span), the slope is off by 2 u (in an object's coordinates by
+            // 4.25 u), its reciprocal and the product by another each.
+            let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * span + self.blur);
             slab.near_origin[i] = self.origin[axis] + pad;
             slab.far_origin[i] = self.origin[axis] - pad;
             (slab.near[i], slab.far[i]) =

@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
 
     /// The placement with this index among the leaves of the upper tree.
     fn placement(&self, index: u32) -> &'a Placement {
-        &self.bvh.placements.leaf(index..index + 1)[0]
+        &self.bvh.placements.at(index).placement
     }
 
     fn triangles(&self, level: Level) -> Option<&'a TriangleTree> {

@@ -1,4 +1,4 @@
-//! Four triangles seen from the common origin of a bundle: normals of their edges, and bounds on the rounding.
+//! Eight triangles seen from the common origin of a bundle: normals of their edges, and bounds on the rounding.
 //!
 //! With A, B, C the corners relative to the origin, the edge function at A is d . (B x C) = d . (B x (C - B)). The second
 //! form is computed: its products are of the size of the edge, not of the distance, so it does not cancel. The direction
@@ -14,8 +14,11 @@
 //! Where the bundle is turned, a ray's own origin is at its far end, most often on a surface. On which side of the plane
 //! it lies, t' is too coarse to tell, but C . N does, C being A less the ray's end: C is off by u L + b and small, N by
 //! 8 u s^2 a component, and product and sum by as much again.
+//!
+//! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first two. All
+//! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b.
 
-use super::block::LANES;
+use super::block::{Block, LANES};
 use super::bundle::{Bundle, axes};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
@@ -39,17 +42,17 @@ pub(super) struct Edges {
 }
 
 impl Edges {
-    /// Also a bit for every triangle that some ray of the bundle may hit before `most`. `AXIS` is the bundle's.
+    /// Also a bit for every triangle that some ray of the bundle may hit before `most`; none if there is none.
     #[inline(always)]
-    pub fn new<S: Simd, const AXIS: usize>(
-        corners: &[[[f32; LANES]; 3]; 3],
-        bundle: &Bundle,
-        most: f32,
-    ) -> (u32, Self) {
+    pub fn new<S: Simd>(block: &Block, bundle: &Bundle, most: f32) -> Option<(u32, Self)> {
+        let corners = &block.corners;
         let splat = S::V8::splat;
-        let [x, y, z] = bundle.origin;
-        let origin = [splat(x), splat(y), splat(z)];
-        let (pa, pb, pc) = (corner::<S>(corners, 0), corner::<S>(corners, 1), corner::<S>(corners, 2));
+        // On the bundle's axes from here on: they turn in a cycle, so a cross product is what it was.
+        let axes = axes(bundle.axis);
+        let [p, q, along] = axes;
+        let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
+        let (pa, pb, pc) =
+            (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
         let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
         let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
         let n = cross(eb, ec);
@@ -67,10 +70,10 @@ impl Edges {
 
         let forward = splat(bundle.forward);
         let mut normals = [
-            turned::<S, AXIS>(cross(b, ea), forward),
-            turned::<S, AXIS>(cross(c, eb), forward),
-            turned::<S, AXIS>(cross(a, ec), forward),
-            turned::<S, AXIS>(n, forward),
+            turned(cross(b, ea), forward),
+            turned(cross(c, eb), forward),
+            turned(cross(a, ec), forward),
+            turned(n, forward),
         ];
         let (least_slope, most_slope) = ends::<S>(&normals[3], bundle);
         let zero = splat(0.0);
@@ -95,6 +98,10 @@ impl Edges {
         let nearest = height.sub(height_error);
         let beyond = most_slope.add(slope_error).mul(splat(most * (1.0 + 1e-6))).less(nearest);
         let culled = misses.or(behind).or(beyond).bits() & !two_sided;
+        let lanes = !culled & block.lanes;
+        if lanes == 0 {
+            return None;
+        }
         // t' is off by (1 + x)(1 + y) - 1, x and y being the relative errors of height and slope, and by a few roundings.
         let (x, y) = (height_error.div(height), slope_error.div(least_slope.sub(slope_error)));
         let quarter = splat(0.25);
@@ -104,7 +111,7 @@ impl Edges {
         for (stored, normal) in stored.iter_mut().zip(&normals) {
             *stored = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
         }
-        let a = turned::<S, AXIS>(a, forward);
+        let a = turned(a, forward);
         let edges = Self {
             normals: stored,
             near_height: height.sub(height.mul(error)).to_array(),
@@ -115,22 +122,23 @@ impl Edges {
             normal_error: square.mul(splat(24.0 * u)).to_array(),
             is_vague: two_sided | !tame.bits(),
         };
-        (!culled & 0b1111_1111, edges)
+        Some((lanes, edges))
     }
 }
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
 
+/// A corner of each triangle, on the given axes.
 #[inline(always)]
-fn corner<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], k: usize) -> [S::V8; 3] {
-    [S::V8::load(&corners[0][k]), S::V8::load(&corners[1][k]), S::V8::load(&corners[2][k])]
+fn corner<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], k: usize, axes: [usize; 3]) -> [S::V8; 3] {
+    let [x, y, z] = axes;
+    [S::V8::load(&corners[x][k]), S::V8::load(&corners[y][k]), S::V8::load(&corners[z][k])]
 }
 
-/// On the bundle's axes, the third turned forward.
+/// The third component turned forward.
 #[inline(always)]
-fn turned<S: Simd, const AXIS: usize>(n: [S::V8; 3], forward: S::V8) -> [S::V8; 3] {
-    let [p, q, along] = axes(AXIS);
-    [n[p], n[q], n[along].mul(forward)]
+fn turned<V: Vector>(n: [V; 3], forward: V) -> [V; 3] {
+    [n[0], n[1], n[2].mul(forward)]
 }
 
 #[inline(always)]

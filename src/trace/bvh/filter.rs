@@ -10,9 +10,15 @@
 //! than L = Z + S, Z being the largest along the ray. A sheared component errs by e = 8 u L (a subtraction, the shear's
 //! two roundings, a product and a subtraction), an edge function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by
 //! three such errors. A triangle that is not hit may be bounded wrongly, to no harm.
+//!
+//! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
+//! of the direction by r times the largest, r <= 2^-10: the shear is off by (1 + k) r / (1 - r), so that a sheared component errs by 2 b + 2.1 r L
+//! besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
+//! but for their errors; and t |along| by r.
 
 use super::block::{Block, LANES};
 use super::bundle::axes;
+use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -34,10 +40,8 @@ pub(super) struct Filter {
     shorten: f32,
     /// Least t, rounded down, times the magnitude of `along`.
     begin: f32,
-    /// Error of a sheared component, relative to the largest component of a corner relative to the origin.
-    error: f32,
-    /// Added to that largest component: how far the origin itself may be off, in its own roundings.
-    blur: f32,
+    /// How far all that may be from the ray that is meant.
+    blur: Blur,
 }
 
 /// Triangles of a block that a ray may hit.
@@ -65,9 +69,8 @@ const ERROR: f32 = 9.0 * UNIT_ROUNDOFF;
 const TINY: f32 = 1e-36;
 
 impl Filter {
-    /// `blur` is by how much more than its own rounding the ray may be off (1: not at all).
     #[inline(always)]
-    pub fn new(ray: &Ray, blur: f32) -> Self {
+    pub fn new(ray: &Ray, blur: Blur) -> Self {
         let [x, y, z] = axes(largest_axis(ray.direction.abs()));
         let (direction, origin) = (ray.direction.to_array(), ray.origin.to_array());
         let reciprocal = 1.0 / direction[z];
@@ -80,8 +83,7 @@ impl Filter {
             along: direction[z],
             shorten: reciprocal.abs(),
             begin: ray.tmin * direction[z].abs() * (1.0 - SLACK),
-            error: ERROR * blur,
-            blur: if blur > 1.0 { ray.origin.abs().max_element() } else { 0.0 },
+            blur,
         }
     }
 
@@ -92,13 +94,21 @@ impl Filter {
         origin: [f32; 3],
         shear: [f32; 2],
         [width, along, shorten, begin]: [f32; 4],
+        blur: Blur,
     ) -> Self {
-        Self { axes, origin, shear, width, along, shorten, begin, error: ERROR, blur: 0.0 }
+        Self { axes, origin, shear, width, along, shorten, begin, blur }
     }
 
-    /// The triangles that the ray may hit up to `limit`.
+    /// In the order of [`Self::of_eight`].
     #[inline(always)]
-    pub fn candidates<S: Simd>(&self, block: &Block, limit: f32) -> Candidates {
+    pub fn fields(&self) -> ([usize; 3], [f32; 3], [f32; 2], [f32; 4]) {
+        let Self { axes, origin, shear, width, along, shorten, begin, .. } = *self;
+        (axes, origin, shear, [width, along, shorten, begin])
+    }
+
+    /// The triangles that the ray may hit up to `limit`. If it is not `BLURRED`, it is the ray that is meant.
+    #[inline(always)]
+    pub fn candidates<S: Simd, const BLURRED: bool>(&self, block: &Block, limit: f32) -> Candidates {
         let splat = S::V8::splat;
         let [kx, ky, kz] = self.axes;
         let (cx, cy, cz) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
@@ -118,14 +128,16 @@ impl Filter {
         let deep = z[0].abs().add(splat(block.size));
         // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
         // less than e.
-        let e = deep.mul_add(splat(self.error), splat((reach + self.blur) * self.error));
+        let Blur { origin: blur, direction } = if BLURRED { self.blur } else { Blur::NONE };
+        let (relative, slack) = (ERROR + 2.2 * direction, SLACK + 2.0 * direction);
+        let e = deep.mul_add(splat(relative), splat(reach * relative + 2.2 * blur));
         let bound = e.add(splat(reach)).mul(e).mul_add(splat(6.0), splat(TINY));
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let zero = splat(0.0);
         // Whatever overflowed is not rejected.
         let passed = !bound.less(most.min(zero.sub(least))).bits() & block.lanes;
-        if passed == 0 || self.blur > 0.0 {
-            return Candidates { lanes: passed, ..Candidates::NONE };
+        if passed == 0 {
+            return Candidates::NONE;
         }
         // t |along| = depth / determinant, both multiplied by the determinant.
         let determinant = u.add(v).add(w);
@@ -133,11 +145,13 @@ impl Filter {
         let error = bound.mul_add(splat(4.0), size.mul(splat(SLACK))).mul(size);
         let square = determinant.mul(determinant);
         let (least_square, most_square) = (square.sub(error), square.add(error));
-        let begin = least_square.mul(splat(self.begin));
-        let end = most_square.mul(splat(limit * self.along.abs() * (1.0 + SLACK)));
+        let begin = least_square.mul(splat(if BLURRED { self.begin * (1.0 - slack) } else { self.begin }));
+        let end = most_square.mul(splat(limit * self.along.abs() * (1.0 + slack)));
         let turn = determinant.mul(splat(1.0f32.copysign(self.along)));
         let depth = zero.sub(u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2])))).mul(turn);
+        // The sum of all edges is at most the determinant and 6 bounds.
         let depth_error = error.mul_add(deep, splat(f32::MIN_POSITIVE));
+        let depth_error = if BLURRED { most_square.mul_add(splat(1.6 * blur), depth_error) } else { depth_error };
         let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
         let mut lanes = passed & !far.less(begin).or(end.less(near)).bits();
         let four = splat(4.0);
@@ -146,7 +160,7 @@ impl Filter {
             // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
             // That rarely, corners are better loaded again than kept: the black box keeps them from being kept.
             let corners = std::hint::black_box(&block.corners);
-            let (height, height_error) = height::<S>([&corners[kx], &corners[ky], &corners[kz]], [ox, oy, oz]);
+            let (height, height_error) = height::<S>([&corners[kx], &corners[ky], &corners[kz]], [ox, oy, oz], blur);
             let (depth, depth_error) = (height.mul(turn), height_error.mul_add(size, splat(f32::MIN_POSITIVE)));
             let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
             // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
@@ -163,8 +177,8 @@ impl Filter {
         Candidates {
             lanes,
             sure: inside.and(precise).and(apart).bits(),
-            low: near.div(most_square).mul(splat(self.shorten * (1.0 - SLACK))).to_array(),
-            high: far.div(least_square).mul(splat(self.shorten * (1.0 + SLACK))).to_array(),
+            low: near.div(most_square).mul(splat(self.shorten * (1.0 - slack))).to_array(),
+            high: far.div(least_square).mul(splat(self.shorten * (1.0 + slack))).to_array(),
         }
     }
 }
@@ -232,10 +246,10 @@ fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
 
 /// Twice the area times the distance of the origin from the plane: the normal's product with p, which leads from the first
 /// corner to the origin; and its error. Let u = 2^-24 and N be the normal with all signs positive. Edges err by u,
-/// the normal by 4 u N, p by u, and the scalar product by another 3 u N p.
+/// the normal by 4 u N, p by u (and `blur`), and the scalar product by another 3 u N p.
 #[inline(always)]
-fn height<S: Simd>(corners: [&[[f32; LANES]; 3]; 3], origin: [S::V8; 3]) -> (S::V8, S::V8) {
-    let tiny = S::V8::splat(TINY);
+fn height<S: Simd>(corners: [&[[f32; LANES]; 3]; 3], origin: [S::V8; 3], blur: f32) -> (S::V8, S::V8) {
+    let (tiny, unit, blur) = (S::V8::splat(TINY), S::V8::splat(12.0 * UNIT_ROUNDOFF), S::V8::splat(1.1 * blur));
     let [(bx, cx), (by, cy), (bz, cz)] = [edges::<S>(corners[0]), edges::<S>(corners[1]), edges::<S>(corners[2])];
     let [cx0, cy0, cz0] = corners;
     let p =
@@ -245,10 +259,10 @@ fn height<S: Simd>(corners: [&[[f32; LANES]; 3]; 3], origin: [S::V8; 3]) -> (S::
     let height = bx.mul_sub(cy, by.mul(cx)).mul_add(p[2], height);
     let (bx, by, bz) = (bx.abs(), by.abs(), bz.abs());
     let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
-    let sum = by.mul_add(cz, bz.mul_add(cy, tiny)).mul(p[0].abs());
-    let sum = bz.mul_add(cx, bx.mul_add(cz, tiny)).mul_add(p[1].abs(), sum);
-    let sum = bx.mul_add(cy, by.mul_add(cx, tiny)).mul_add(p[2].abs(), sum);
-    (height, sum.mul_add(S::V8::splat(12.0 * UNIT_ROUNDOFF), S::V8::splat(f32::MIN_POSITIVE)))
+    let off = [p[0].abs().mul_add(unit, blur), p[1].abs().mul_add(unit, blur), p[2].abs().mul_add(unit, blur)];
+    let error = by.mul_add(cz, bz.mul_add(cy, tiny)).mul_add(off[0], S::V8::splat(f32::MIN_POSITIVE));
+    let error = bz.mul_add(cx, bx.mul_add(cz, tiny)).mul_add(off[1], error);
+    (height, bx.mul_add(cy, by.mul_add(cx, tiny)).mul_add(off[2], error))
 }
 
 /// From the first corner to the others, along one axis.

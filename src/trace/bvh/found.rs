@@ -4,10 +4,10 @@
 //! nearest, its number will do; t, u and v are computed once, of what remains in the end. Where they leave doubt,
 //! [`triangle::intersect`](crate::shape::triangle::intersect) decides at once.
 
+use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
 use super::query::Query;
-use super::triangles::TriangleTree;
 use crate::ray::Ray;
 use crate::trace::nearest::Nearest;
 
@@ -23,6 +23,8 @@ pub(super) struct Found {
     sure: f32,
     /// Found without doubt, but not computed yet: block and lane.
     pub noted: u32,
+    /// Where that triangle is: the number of a placement, or [`FIXED`](super::placements::FIXED).
+    pub place: u32,
     /// Whether anything was computed.
     is_computed: bool,
     /// That, if `noted` is [`NONE`].
@@ -31,7 +33,8 @@ pub(super) struct Found {
 
 impl Found {
     /// Nothing.
-    pub const NONE: Self = Self { limit: 0.0, sure: 0.0, noted: NONE, is_computed: false, nearest: Nearest::NONE };
+    pub const NONE: Self =
+        Self { limit: 0.0, sure: 0.0, noted: NONE, place: NONE, is_computed: false, nearest: Nearest::NONE };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up.
     #[inline(always)]
@@ -51,11 +54,12 @@ impl Found {
         self.noted != NONE || self.is_computed && self.nearest.hit().is_some()
     }
 
-    /// Takes the candidates of block `index`; all of them in the world.
+    /// Takes the candidates of block `index` of the triangles at `place`.
     #[inline(always)]
     pub fn offer<Q: Query>(
         &mut self,
-        tree: &TriangleTree,
+        bvh: &Bvh,
+        place: u32,
         index: u32,
         block: &Block,
         candidates: &Candidates,
@@ -68,7 +72,7 @@ impl Found {
             let (low, high) = (candidates.low[lane], candidates.high[lane]);
             if candidates.sure >> lane & 1 != 0 {
                 if ray.tmin <= low && high <= self.sure {
-                    self.noted = LANES as u32 * index + lane as u32;
+                    (self.noted, self.place) = (LANES as u32 * index + lane as u32, place);
                     (self.sure, self.limit) = (low, high);
                     if Q::ANY {
                         return;
@@ -79,15 +83,16 @@ impl Found {
                     continue;
                 }
             }
-            self.decide(tree, block, lane, ray);
+            self.decide(bvh, place, block, lane, ray);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, tree: &TriangleTree, block: &Block, lane: usize, ray: &Ray) {
-        let mut nearest = self.nearest(tree, ray);
-        tree.offer(block, lane, ray, None, &mut nearest);
+    fn decide(&mut self, bvh: &Bvh, place: u32, block: &Block, lane: usize, ray: &Ray) {
+        let mut nearest = self.nearest(bvh, ray);
+        let (tree, through) = bvh.triangles_at(place);
+        tree.offer(block, lane, ray, through, &mut nearest);
         self.limit = nearest.limit();
         if let Some(hit) = nearest.hit() {
             self.sure = hit.t.next_down();
@@ -96,15 +101,14 @@ impl Found {
     }
 
     /// The nearest of all, computed.
-    pub fn nearest(&self, tree: &TriangleTree, ray: &Ray) -> Nearest {
-        let mut nearest = Nearest::new(ray);
+    pub fn nearest(&self, bvh: &Bvh, ray: &Ray) -> Nearest {
         if self.noted != NONE {
             // It is nearer than whatever was computed before.
-            tree.offer_one(self.noted, ray, &mut nearest);
-            debug_assert!(nearest.hit().is_some(), "what is noted is hit without doubt");
+            bvh.noted_hit(self.place, self.noted, ray)
         } else if self.is_computed {
-            nearest = self.nearest;
+            self.nearest
+        } else {
+            Nearest::new(ray)
         }
-        nearest
     }
 }

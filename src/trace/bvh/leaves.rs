@@ -169,16 +169,16 @@ impl Leaves {
         }
     }
 
-    /// Has a block loaded that will be needed soon.
+    /// Where in memory a block is.
     #[inline(always)]
-    pub fn prefetch<S: Simd>(&self, index: u32) {
+    pub fn address<S: Simd>(&self, index: u32) -> *const u8 {
         match self {
-            Self::Blocks(blocks) => S::prefetch(S::address(blocks, index)),
-            Self::Numbers(numbers) => S::prefetch(S::address(&numbers.blocks, index)),
+            Self::Blocks(blocks) => blocks.address::<S>(index),
+            Self::Numbers(numbers) => numbers.address::<S>(index),
         }
     }
 
-    /// Part and index in it of a triangle: lane `id % 4` of block `id / 4`.
+    /// Part and index in it of a triangle: lane `id % 8` of block `id / 8`.
     #[inline(always)]
     pub fn number(&self, id: u32) -> (u32, u32) {
         let (block, lane) = ((id / LANES as u32) as usize, id as usize % LANES);
@@ -200,7 +200,7 @@ impl Leaves {
     }
 }
 
-/// One block for each four items of a leaf.
+/// One block for each eight items of a leaf.
 fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) -> T + Sync) -> Vec<T> {
     let of_node = |node: &Node| node.items.iter().map(|&items| usize::from(items).div_ceil(LANES)).sum::<usize>();
     let chunks = tree.nodes_mut().par_chunks_mut(CHUNK);

@@ -1,6 +1,7 @@
 //! Everything in one coordinate system: that of the world, or that of an object which is placed in it.
 
 use super::filter::Filter;
+use super::place::{Blur, Place};
 use super::preset::Options;
 use super::query::Query;
 use super::shapes::ShapeTree;
@@ -26,9 +27,6 @@ pub(super) struct Through<'a> {
     pub to_world: &'a Affine3,
 }
 
-/// Blur of a ray in an object's coordinates: rounding it moves it by as much again as the slab test itself may err.
-pub(super) const PLACED: f32 = 4.0;
-
 impl Level {
     /// Of a tree over the triangles of `parts`; that over their shapes, of which there are few, is built.
     pub fn new(triangles: TriangleTree, parts: &[Part], options: &Options<'_>) -> Self {
@@ -39,47 +37,47 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// Offers what `ray` hits in this level placed by `through`; `local` is the same ray in this level's coordinates,
-    /// rounded.
+    /// Offers the triangles that `ray`, in the world, hits in this level, which `place` places; all by itself.
     #[inline(always)]
-    pub fn trace_placed<S: Simd, Q: Query>(
+    pub fn trace_triangles<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
-        local: &Ray,
-        through: Through<'_>,
+        place: &Place,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
-        if !self.triangles.tree().is_empty() {
-            let slab = SlabRay::new(local, self.triangles.tree().reach(), PLACED);
-            let filter = Filter::new(local, PLACED);
-            walk::single::<S, Q>(
-                stack,
-                self.triangles.tree(),
-                &slab,
-                nearest.limit(),
-                #[inline(always)]
-                |leaf| {
-                    self.triangles.offer_leaf::<S>(leaf, ray, &filter, through, nearest);
-                    Visit::after::<Q>(nearest)
-                },
-            );
+        let tree = self.triangles.tree();
+        let is_done = Q::ANY && nearest.hit().is_some();
+        if is_done || tree.is_empty() {
+            return;
         }
-        self.trace_shapes::<S, Q>(local, Some(through), PLACED, stack, nearest);
+        let (local, blur) = place.local::<S>(ray);
+        let (slab, filter) = (SlabRay::new(&local, tree.reach(), blur), Filter::new(&local, blur));
+        walk::single::<S, Q>(
+            stack,
+            tree,
+            &slab,
+            nearest.limit(),
+            #[inline(always)]
+            |leaf| {
+                self.triangles.offer_leaf::<S>(leaf, ray, &filter, place.through(), nearest);
+                Visit::after::<Q>(nearest)
+            },
+        );
     }
 
+    /// Offers the shapes that `local` hits in this level: the ray in this level's coordinates, whose rounding is part of it.
     #[inline(always)]
     pub fn trace_shapes<S: Simd, Q: Query>(
         &self,
         local: &Ray,
         through: Option<Through<'_>>,
-        blur: f32,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
         let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
-            let slab = SlabRay::new(local, self.shapes.tree().reach(), blur);
+            let slab = SlabRay::new(local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Q>(
                 stack,
                 self.shapes.tree(),

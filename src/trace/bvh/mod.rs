@@ -9,17 +9,18 @@
 //! | `cache` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `walk` | one ray, from the root to the leaves |
-//! | `batch`, `query` | many rays, as bundles or one by one; the two questions |
+//! | `batch`, `query` | many rays, as bundles or in flight; the two questions |
 //! | `flight` | single rays, several of them in turn |
-//! | `tile`, `bundle`, `edges` | 64 rays that start, or end, in one point, at once |
+//! | `tile`, `bundle`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
+//! | `walk` | one ray by itself, from the root to the leaves |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
+//! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
-//! | `quad` | t, u and v of four hits |
+//! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
@@ -40,16 +41,20 @@ mod clusters;
 mod edges;
 mod filter;
 mod flight;
+mod footprint;
 mod found;
 mod isa;
 mod leaves;
 mod level;
 mod meshes;
 mod node;
+mod noted;
+mod place;
 mod placements;
 mod preset;
 mod quad;
 mod query;
+mod range;
 mod refit;
 mod room;
 mod shapes;
@@ -125,8 +130,7 @@ impl Bvh {
         let mut levels = triangles.into_iter().zip(parts).map(level);
         let fixed = levels.next().expect("the fixed parts are a level");
         let objects: Vec<Level> = levels.collect();
-        let bounds: Vec<Aabb> = objects.iter().map(Level::bounds).collect();
-        let placements = PlacementTree::build(&world.placements, &bounds, options);
+        let placements = PlacementTree::build(&world.placements, &objects, options);
         Self { fixed, objects, placements, unbounded: Unbounded::new(world), preset, isa }
     }
 
@@ -149,7 +153,7 @@ impl Bvh {
         let objects: Vec<f64> =
             self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
         let placed = self.placements.tree().cost(|items| {
-            let costs = self.placements.leaf(items).iter().map(|placement| objects[placement.object as usize]);
+            let costs = items.map(|item| objects[self.placements.at(item).placement.object as usize]);
             costs.sum()
         });
         let whole = area(self.fixed.bounds().union(self.placements.tree().bounds()));

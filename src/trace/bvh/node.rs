@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::build::{NODE_COST, Record};
 use crate::math::{Aabb, Vec3};
 use crate::memory::Array;
+use crate::trace::limits;
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
@@ -17,6 +18,9 @@ pub(super) const WIDTH: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Child(pub u32);
 
+/// The largest number that a leaf can name is kept for [`Child::NONE`].
+const _: () = assert!(Child::NAMES < 1 << Child::COUNT_SHIFT);
+
 impl Child {
     /// Nothing; its box is empty, so that no ray enters it.
     pub const NONE: Self = Self(u32::MAX);
@@ -25,7 +29,7 @@ impl Child {
     /// Blocks that a leaf can hold. From 1 to 8 rates hardly differ; with 1 a triangle takes a quarter more memory.
     pub const MOST: u32 = 4;
     /// Blocks, or items before blocks are made of them, that leaves can name.
-    pub const NAMES: usize = (1 << Self::COUNT_SHIFT) - 1;
+    pub const NAMES: usize = limits::MOST_PRIMITIVES as usize;
 
     /// Set for a leaf.
     const LEAF: u32 = 1 << 31;

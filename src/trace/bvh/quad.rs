@@ -1,9 +1,9 @@
 //! t, u and v of four rays, each of which hits a triangle of its own for sure.
 //!
-//! The same operations in the same order as [`triangle::intersect`](crate::shape::triangle::intersect), so the same bits;
-//! none is fused.
+//! The same operations in the same order as [`triangle::intersect`], so the same bits; none is fused.
 
-use super::simd::{Array, Doubles, Simd};
+use super::simd::{Array, Doubles};
+use crate::shape::triangle;
 
 /// Four triangles as seen from the origins of four rays: numbers as in [`triangle`](crate::shape::triangle).
 pub(super) struct Quad<D> {
@@ -22,10 +22,9 @@ pub(super) struct Numbers {
 }
 
 impl<D: Doubles> Quad<D> {
-    /// As in a block: component by component, corner by corner.
+    /// Of the corners in the world.
     #[inline(always)]
-    pub fn new<S: Simd<D4 = D>>(origin: [D; 3], direction: [D; 3], corners: &[[f32; 4]; 9]) -> Self {
-        let (pa, pb, pc) = (corner::<S>(corners, 0), corner::<S>(corners, 1), corner::<S>(corners, 2));
+    pub fn new(origin: [D; 3], direction: [D; 3], [pa, pb, pc]: [[D; 3]; 3]) -> Self {
         let (a, c) = (minus(pa, origin), minus(pc, origin));
         let (eb, ec) = (minus(pa, pc), minus(pb, pa));
         let normal = cross(eb, ec);
@@ -34,6 +33,38 @@ impl<D: Doubles> Quad<D> {
             slope: dot(direction, normal),
             height: dot(a, normal),
         }
+    }
+
+    /// A bit for each triangle, of those that are hit for sure and whose corners were rounded in f64, for which
+    /// [`triangle::intersect`] decides by these numbers, without exact arithmetic. `slack` is at least what the errors of corners
+    /// are relative to.
+    ///
+    /// Its bounds, with largest components in place of all: let s be that of the edges, L of the corners relative to the
+    /// origin, d of the direction, k the slack, R its unit of rounding. A vector product of two differences
+    /// errs by no more than R C in each component, C = 2 (x (y + y') + x' y + R (x + x') (y + y')), sizes being x and y and
+    /// slacks x' and y'. For L and s these are k and 2 k, for s and s 2 k both.
+    #[inline(always)]
+    pub fn is_certain(&self, origin: [D; 3], direction: [D; 3], [pa, pb, pc]: [[D; 3]; 3], slack: D) -> u32 {
+        let splat = D::splat;
+        // A little more than the unit, since this is rounded as well.
+        let unit = splat(1.01 * triangle::ROUNDING);
+        let (two, three) = (splat(2.0), splat(3.0));
+        let far = size(minus(pa, origin)).max(size(minus(pb, origin))).max(size(minus(pc, origin)));
+        let long = size(minus(pc, pb)).max(size(minus(pa, pc))).max(size(minus(pb, pa)));
+        let steep = size(direction).mul(three);
+        let loose = slack.add(slack);
+        let edge = long.add(loose);
+        let error = far.mul(edge).add(slack.mul(long)).add(unit.mul(far.add(slack)).mul(edge)).mul(two);
+        let bound = unit.mul(steep).mul(error);
+        let w = dot(direction, cross(minus(pb, origin), minus(pc, pb)));
+        let least = self.volumes[0].abs().min(self.volumes[1].abs()).min(w.abs());
+        let normal_error = long.mul(edge).add(loose.mul(long)).add(unit.mul(edge).mul(edge)).mul(two);
+        let normal = long.mul(long).mul(two);
+        let height_error =
+            far.mul(three).mul(normal_error).add(slack.mul(three).mul(normal.add(unit.mul(normal_error))));
+        let t = self.height.div(self.slope).abs();
+        let t_error = unit.mul(height_error.add(steep.mul(normal_error).mul(t)));
+        bound.less(least) & t_error.less(self.height.abs().mul(splat(triangle::T_PRECISION)))
     }
 
     #[inline(always)]
@@ -45,14 +76,10 @@ impl<D: Doubles> Quad<D> {
     }
 }
 
+/// The largest magnitude of a component.
 #[inline(always)]
-pub(super) fn widen<S: Simd>(values: &[f32; 4]) -> S::D4 {
-    S::D4::widen(S::V4::load(values))
-}
-
-#[inline(always)]
-fn corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize) -> [S::D4; 3] {
-    [widen::<S>(&corners[k]), widen::<S>(&corners[3 + k]), widen::<S>(&corners[6 + k])]
+fn size<D: Doubles>(p: [D; 3]) -> D {
+    p[0].abs().max(p[1].abs()).max(p[2].abs())
 }
 
 #[inline(always)]

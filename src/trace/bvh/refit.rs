@@ -11,7 +11,6 @@ use super::placements::PlacementTree;
 use super::preset::Options;
 use super::shapes::ShapeTree;
 use crate::error::{Error, Result};
-use crate::math::Aabb;
 use crate::trace::unbounded::Unbounded;
 use crate::trace::{Part, World};
 
@@ -31,8 +30,7 @@ impl Bvh {
         for (level, parts) in self.objects.iter_mut().zip(&world.objects) {
             level.refit(&world.parts[parts.clone()], &options)?;
         }
-        let bounds: Vec<Aabb> = self.objects.iter().map(Level::bounds).collect();
-        self.placements = PlacementTree::build(&world.placements, &bounds, &options);
+        self.placements = PlacementTree::build(&world.placements, &self.objects, &options);
         self.unbounded = Unbounded::new(world);
         Ok(())
     }

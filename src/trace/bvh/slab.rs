@@ -9,9 +9,14 @@
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
 //! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows is left
 //! open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
+//!
+//! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the largest
+//! component: at the t of a hit, at most the largest span over that component, it is off by b + r span, and the pad is wider
+//! by this over the component.
 
 use super::filter::{Filter, Filters};
 use super::node::Node;
+use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -41,13 +46,13 @@ const HUGE: f32 = 1e37;
 const OPEN: f32 = f32::MIN_POSITIVE;
 
 impl SlabRay {
-    /// `reach` is the tree's, `blur` by how much more than its own rounding the ray may be off (1: not at all).
+    /// `reach` is the tree's.
     #[inline(always)]
-    pub fn new(ray: &Ray, reach: Vec3, blur: f32) -> Self {
+    pub fn new(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let largest = ray.direction.abs().max_element();
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
         let span = ray.origin.abs() + reach;
-        let stray = 4.0 * (smallest / largest) * span.max_element();
+        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * span.max_element() + 1.1 * blur.origin;
         let mut slab = Self {
             reciprocal: [0.0; 3],
             near_offset: [0.0; 3],
@@ -59,7 +64,7 @@ impl SlabRay {
             let component = ray.direction[axis];
             let kept = if component.abs() < smallest { smallest.copysign(component) } else { component };
             let reciprocal = 1.0 / kept;
-            let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * blur * span[axis] + stray);
+            let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * span[axis] + stray);
             let offset = -ray.origin[axis] * reciprocal;
             let is_small = reciprocal.abs() * span[axis] < HUGE && width < HUGE;
             (slab.reciprocal[axis], slab.near_offset[axis], slab.far_offset[axis]) = if is_small {
@@ -114,9 +119,50 @@ impl ReadyRay {
 
     #[inline(always)]
     pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], _] = self.rows;
+        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
+            self.rows;
         let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
-        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin])
+        let blur = Blur { origin: b, direction: r };
+        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
+    }
+
+    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
+    #[inline(always)]
+    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+        let splat = S::V4::splat;
+        let (o, d, zero) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction), splat(0.0));
+        let largest = ray.direction.abs().max_element();
+        let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
+        let span = o.abs().add(lanes::<S>(reach));
+        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element()
+            + 1.1 * blur.origin;
+        let is_negative = d.less(zero);
+        let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
+        let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));
+        let steep = reciprocal.abs();
+        let width = steep.mul(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)));
+        let is_small = steep.mul(span).less(splat(HUGE)).and(width.less(splat(HUGE)));
+        let offset = zero.sub(o).mul(reciprocal);
+        let open = S::V4::select(is_negative, splat(-OPEN), splat(OPEN));
+        let reciprocal = S::V4::select(is_small, reciprocal, open);
+        let near = S::V4::select(is_small, offset.sub(width), splat(-f32::MAX));
+        let far = S::V4::select(is_small, offset.add(width), splat(f32::MAX));
+        let sides = S::V4::select(is_negative, splat(f32::from_bits(1)), zero);
+        let filter = Filter::new(ray, blur);
+        let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
+        let [ax, ay, az] = [axis(ax), axis(ay), axis(az)];
+        let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), near.to_array());
+        let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
+        // Rounded down, for t is rounded before it is held against it.
+        let tmin = (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0);
+        Self {
+            rows: [
+                [rx, ry, rz, tmin, nx, ny, nz, begin],
+                [fx, fy, fz, width, x, y, z, shorten],
+                [p, q, along, ax, ay, az, 0.0, 0.0],
+                [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
+            ],
+        }
     }
 
     /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.
@@ -125,6 +171,17 @@ impl ReadyRay {
         let [.., tmax, limit] = self.rows[2];
         [tmax, limit]
     }
+}
+
+#[inline(always)]
+fn lanes<S: Simd>(v: Vec3) -> S::V4 {
+    S::V4::load(&[v.x, v.y, v.z, 0.0])
+}
+
+/// The number of an axis as bits of a number.
+#[inline(always)]
+const fn axis(number: usize) -> f32 {
+    f32::from_bits(number as u32)
 }
 
 /// As [`SlabRay::new`] and [`Filter::new`] for eight rays, with no blur; and a bit for each that

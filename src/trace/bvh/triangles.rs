@@ -11,7 +11,6 @@ use super::level::Through;
 use super::meshes::Meshes;
 use super::node::{Child, Tree};
 use super::preset::{Options, Preset};
-use super::quad::{Numbers, Quad};
 use super::simd::Simd;
 use super::{PartId, refit};
 use crate::error::Result;
@@ -124,7 +123,7 @@ impl TriangleTree {
     /// Has a block loaded that will be needed soon.
     #[inline(always)]
     pub fn prefetch<S: Simd>(&self, index: u32) {
-        self.leaves.prefetch::<S>(index);
+        S::prefetch(self.leaves.address::<S>(index));
     }
 
     pub fn leaves(&self) -> &Leaves {
@@ -150,7 +149,7 @@ impl TriangleTree {
         for index in leaf.blocks() {
             let mut scratch = None;
             let block = self.block(index, &mut scratch);
-            let mut open = filter.candidates::<S>(block, nearest.limit()).lanes;
+            let mut open = filter.candidates::<S, true>(block, nearest.limit()).lanes;
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;
                 open &= open - 1;
@@ -159,33 +158,16 @@ impl TriangleTree {
         }
     }
 
-    /// The hits of four rays, each of which hits a triangle for sure, and t in f64; `ids` as in [`Self::offer_one`].
-    ///
-    /// The caller knows that f64 is precise enough for what [`triangle::intersect`] would answer.
-    #[inline(always)]
-    pub fn hits<S: Simd>(&self, origin: [S::D4; 3], direction: [S::D4; 3], ids: [u32; 4]) -> ([f64; 4], [Hit; 4]) {
-        let [a, b, c, d] = ids;
-        let corners = gather(self.corners(a), self.corners(b), self.corners(c), self.corners(d));
-        let Numbers { t, t32, u, v } = Quad::new::<S>(origin, direction, &corners).numbers();
-        let hits = [
-            self.hit(a, t32[0], u[0], v[0]),
-            self.hit(b, t32[1], u[1], v[1]),
-            self.hit(c, t32[2], u[2], v[2]),
-            self.hit(d, t32[3], u[3], v[3]),
-        ];
-        (t, hits)
-    }
-
-    /// Offers what `ray` hits of one triangle: lane `id % 4` of block `id / 4`.
+    /// Offers what `ray` hits of one triangle, which may be placed: lane `id % 8` of block `id / 8`.
     #[inline]
-    pub fn offer_one(&self, id: u32, ray: &Ray, nearest: &mut Nearest) {
+    pub fn offer_one(&self, id: u32, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         let mut scratch = None;
-        self.offer(self.block(id / LANES as u32, &mut scratch), id as usize % LANES, ray, None, nearest);
+        self.offer(self.block(id / LANES as u32, &mut scratch), id as usize % LANES, ray, through, nearest);
     }
 
     /// The corners of a triangle, numbered as in [`Self::offer_one`], in the order of a block.
     #[inline(always)]
-    fn corners(&self, id: u32) -> [f32; 9] {
+    pub fn corners(&self, id: u32) -> [f32; 9] {
         let mut scratch = None;
         let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
         let mut corners = [0.0; 9];
@@ -197,7 +179,7 @@ impl TriangleTree {
 
     /// A hit with a triangle, numbered as in [`Self::offer_one`].
     #[inline(always)]
-    fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
+    pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
         let (part, primitive) = self.leaves.number(id);
         let PartId { geometry, instance } = self.parts[part as usize];
         Hit { t, u, v, primitive, geometry, instance }
@@ -218,14 +200,4 @@ impl TriangleTree {
             nearest.offer(hit.t, Hit { t, u, v, primitive, geometry, instance });
         }
     }
-}
-
-/// Component by component.
-#[inline(always)]
-fn gather(a: [f32; 9], b: [f32; 9], c: [f32; 9], d: [f32; 9]) -> [[f32; 4]; 9] {
-    let mut corners = [[0.0; 4]; 9];
-    for (i, corner) in corners.iter_mut().enumerate() {
-        *corner = [a[i], b[i], c[i], d[i]];
-    }
-    corners
 }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::record::Record;
 use crate::math::{Aabb, Vec3};
 use crate::trace::bvh::meshes::Meshes;
+use crate::trace::bvh::node::Child;
 
 /// New references for each triangle, at most.
 const BUDGET: f64 = 0.3;
@@ -35,7 +36,8 @@ pub(in crate::trace::bvh) fn presplit(items: &[Record], meshes: &Meshes) -> Vec<
     let least = (LARGE * area / items.len().max(1) as f64) as f32;
     let priorities: Vec<f32> =
         items.par_iter().map(|item| grid.priority(&item.bounds(), &corners(item), least)).collect();
-    let scale = scale(&priorities, (items.len() as f64 * BUDGET) as u64);
+    let budget = (items.len() as f64 * BUDGET) as u64;
+    let scale = scale(&priorities, budget.min(Child::NAMES.saturating_sub(items.len()) as u64));
     let chunks = items.par_chunks(CHUNK).zip(priorities.par_chunks(CHUNK));
     let pieces: Vec<Vec<Record>> = chunks
         .map(|(items, priorities)| {

@@ -109,6 +109,7 @@ pub(super) trait Doubles: Copy {
     /// As many f32.
     type F: Array<4>;
     fn splat(value: f64) -> Self;
+    fn load(values: &[f64; 4]) -> Self;
     /// Exact.
     fn widen(values: Self::F) -> Self;
     /// Rounded to nearest.
@@ -118,4 +119,11 @@ pub(super) trait Doubles: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
+    /// The second where one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// The second where one is NaN.
+    fn min(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Bit i is set where self is less than other in lane i; not for NaN.
+    fn less(self, other: Self) -> u32;
 }

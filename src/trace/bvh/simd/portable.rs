@@ -193,10 +193,28 @@ impl Doubles for [f64; 4] {
         sub: |a, b| a - b;
         mul: |a, b| a * b;
         div: |a, b| a / b;
+        max: |a, b| if a > b { a } else { b };
+        min: |a, b| if a < b { a } else { b };
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
         [value; 4]
+    }
+    #[inline(always)]
+    fn load(values: &[f64; 4]) -> Self {
+        *values
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(f64::abs)
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        let mut bits = 0;
+        for i in 0..4 {
+            bits |= u32::from(self[i] < other[i]) << i;
+        }
+        bits
     }
     #[inline(always)]
     fn widen(values: [f32; 4]) -> Self {

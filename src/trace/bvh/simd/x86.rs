@@ -345,10 +345,24 @@ impl Doubles for D4 {
         sub: _mm256_sub_pd;
         mul: _mm256_mul_pd;
         div: _mm256_div_pd;
+        max: _mm256_max_pd;
+        min: _mm256_min_pd;
     }
     #[inline(always)]
     fn splat(value: f64) -> Self {
         Self(unsafe { _mm256_set1_pd(value) })
+    }
+    #[inline(always)]
+    fn load(values: &[f64; 4]) -> Self {
+        Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
     #[inline(always)]
     fn widen(values: V4) -> Self {

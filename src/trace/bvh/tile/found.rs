@@ -2,12 +2,13 @@
 
 use crate::math::Vec3;
 use crate::ray::Ray;
+use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
 use crate::trace::bvh::found::NONE;
-use crate::trace::bvh::quad::widen;
+use crate::trace::bvh::noted::{Rays, widen};
+use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Doubles, Simd};
-use crate::trace::bvh::triangles::TriangleTree;
 use crate::trace::nearest::Nearest;
 
 /// What the rays of a bundle have hit so far.
@@ -18,6 +19,8 @@ pub(super) struct Found {
     pub sure: PerRay,
     /// What was found without doubt, but not computed yet: block and lane.
     pub noted: [u32; RAYS],
+    /// Where that triangle is.
+    pub place: [u32; RAYS],
     /// What was computed: valid for the rays of the bit mask `computed`.
     pub nearest: [Nearest; RAYS],
     pub computed: u64,
@@ -29,35 +32,47 @@ pub(super) const DONE: f32 = f32::NEG_INFINITY;
 impl Found {
     pub fn new() -> Self {
         let nothing = Nearest::new(&Ray::new(Vec3::ZERO, Vec3::X));
-        Self { limit: PerRay::ZERO, sure: PerRay::ZERO, noted: [NONE; RAYS], nearest: [nothing; RAYS], computed: 0 }
+        Self {
+            limit: PerRay::ZERO,
+            sure: PerRay::ZERO,
+            noted: [NONE; RAYS],
+            place: [FIXED; RAYS],
+            nearest: [nothing; RAYS],
+            computed: 0,
+        }
     }
 
     /// Nothing yet.
     #[inline(always)]
-    pub fn start(&mut self, bundle: &Bundle) {
-        (self.limit, self.sure, self.noted, self.computed) = (bundle.limit, bundle.end, [NONE; RAYS], 0);
+    pub fn start(&mut self) {
+        (self.noted, self.place, self.computed) = ([NONE; RAYS], [FIXED; RAYS], 0);
+    }
+
+    /// In another tree, for which `bundle` was made ready.
+    #[inline(always)]
+    pub fn enter(&mut self, bundle: &Bundle) {
+        (self.limit, self.sure) = (bundle.limit, bundle.end);
     }
 
     /// Makes `nearest` valid for a ray, from what is noted.
-    pub fn compute(&mut self, tree: &TriangleTree, rays: &[Ray; RAYS], ray: usize) {
+    pub fn compute(&mut self, bvh: &Bvh, rays: &[Ray; RAYS], ray: usize) {
         let id = std::mem::replace(&mut self.noted[ray], NONE);
-        // What is noted is nearer than whatever was computed before.
-        if id != NONE || self.computed >> ray & 1 == 0 {
-            self.nearest[ray] = Nearest::new(&rays[ray]);
-            self.computed |= 1 << ray;
-        }
         if id != NONE {
-            tree.offer_one(id, &rays[ray], &mut self.nearest[ray]);
-            debug_assert!(self.nearest[ray].hit().is_some(), "what is noted is hit without doubt");
+            // It is nearer than whatever was computed before.
+            self.nearest[ray] = bvh.noted_hit(self.place[ray], id, &rays[ray]);
+        } else if self.computed >> ray & 1 == 0 {
+            self.nearest[ray] = Nearest::new(&rays[ray]);
         }
+        self.computed |= 1 << ray;
     }
 
-    /// Computes what is noted, and answers for the first `count` rays.
+    /// Computes what is noted, and answers for the first `count` rays; `bundle` is theirs in the world.
     #[inline(always)]
     pub fn finish<S: Simd, Q: Query>(
         &mut self,
-        tree: &TriangleTree,
+        bvh: &Bvh,
         bundle: &Bundle,
+        rays: &[Ray; RAYS],
         count: usize,
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
@@ -65,20 +80,21 @@ impl Found {
         for chunk in 0..count.div_ceil(4) {
             let chunk = chunk % (RAYS / 4);
             let ids: [u32; 4] = self.noted.as_chunks().0[chunk];
+            let places: [u32; 4] = self.place.as_chunks().0[chunk];
             let answers: &mut [Q::Answer; 4] = &mut answers.as_chunks_mut().0[chunk];
             let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
-            // NONE is the largest number.
             let [a, b, c, d] = ids;
+            let [pa, pb, pc, pd] = places;
+            // NONE and FIXED are the largest numbers.
             let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-            if all != NONE {
-                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+            if all != NONE && pa.min(pb).min(pc.min(pd)) == FIXED {
+                let (exact, [a, b, c, d]) = bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), ids);
+                *t = exact;
+                *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
                 continue;
             }
             if some != NONE {
-                // Lanes without a triangle compute something harmless.
-                let or_some = |id: u32| if id == NONE { some } else { id };
-                let ids = [or_some(a), or_some(b), or_some(c), or_some(d)];
-                answer_noted::<S, Q>(tree, bundle, chunk, ids, t, answers);
+                answer_some::<S, Q>(bvh, bundle, rays, chunk, &ids, &places, t, answers);
             }
             for lane in 0..4 {
                 let ray = 4 * chunk + lane;
@@ -92,28 +108,64 @@ impl Found {
     }
 }
 
-/// Answers for the four rays of a chunk, each of which hits a triangle for sure.
+/// Answers for those of the four rays of a chunk that hit a triangle for sure: first for those that hit a fixed one, then for those
+/// that hit a placed one. The other lanes compute something harmless meanwhile.
 ///
-/// What remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough. It is: where
-/// a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::super::edges::Edges)). f64
-/// rounds 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50 roundings of the same products.
+/// For fixed ones what remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough.
+/// It is: where a hit is sure, height and slope are known to a quarter of themselves in f32
+/// ([`Edges`](super::super::edges::Edges)). f64 rounds 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50
+/// roundings of the same products.
 #[inline(always)]
-fn answer_noted<S: Simd, Q: Query>(
-    tree: &TriangleTree,
+#[expect(clippy::too_many_arguments, reason = "four lanes of everything")]
+fn answer_some<S: Simd, Q: Query>(
+    bvh: &Bvh,
     bundle: &Bundle,
+    rays: &[Ray; RAYS],
     chunk: usize,
-    ids: [u32; 4],
+    ids: &[u32; 4],
+    places: &[u32; 4],
     t: &mut [f64; 4],
     answers: &mut [Q::Answer; 4],
 ) {
+    let four = four::<S>(bundle, chunk);
+    let (mut fixed, mut placed) = (0, 0);
+    for lane in 0..4 {
+        let bit = u32::from(ids[lane] != NONE) << lane;
+        (fixed, placed) = if places[lane] == FIXED { (fixed | bit, placed) } else { (fixed, placed | bit) };
+    }
+    if fixed != 0 {
+        let (exact, hits) = bvh.fixed.triangles.hits::<S>(&four, repeated(ids, fixed));
+        for lane in (0..4).filter(|lane| fixed >> lane & 1 != 0) {
+            (t[lane], answers[lane]) = (exact[lane], Q::answer(Some(hits[lane])));
+        }
+    }
+    if placed != 0 {
+        let each: &[Ray; 4] = &rays.as_chunks().0[chunk];
+        let (ids, places) = (repeated(ids, placed), repeated(places, placed));
+        let (exact, hits) = bvh.placed_hits::<S>(each.each_ref(), placed, &four, ids, places);
+        for lane in (0..4).filter(|lane| placed >> lane & 1 != 0) {
+            (t[lane], answers[lane]) = (exact[lane], Q::answer(hits[lane]));
+        }
+    }
+}
+
+/// The values of the lanes that are named; in the others the first of these.
+#[inline(always)]
+fn repeated(values: &[u32; 4], lanes: u32) -> [u32; 4] {
+    let first = values[lanes.trailing_zeros() as usize % 4];
+    let mut all = *values;
+    for (lane, value) in all.iter_mut().enumerate() {
+        *value = if lanes >> lane & 1 != 0 { *value } else { first };
+    }
+    all
+}
+
+/// The rays of a chunk, as they were given.
+#[inline(always)]
+fn four<S: Simd>(bundle: &Bundle, chunk: usize) -> Rays<S::D4> {
     let [x, y, z] = &bundle.direction;
     let lanes = |d: &PerRay| d.0.as_chunks().0[chunk];
     let direction = [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))];
     let [x, y, z] = bundle.origin;
-    let origin = [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())];
-    let (exact, hits) = tree.hits::<S>(origin, direction, ids);
-    *t = exact;
-    for (answer, hit) in answers.iter_mut().zip(hits) {
-        *answer = Q::answer(Some(hit));
-    }
+    Rays { origin: [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())], direction }
 }

@@ -4,10 +4,12 @@ use std::marker::PhantomData;
 
 use super::found::{DONE, Found};
 use crate::ray::Ray;
+use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::LANES;
-use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, RAYS, SLACK, TINY, axes};
+use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::edges::Edges;
-use crate::trace::bvh::node::{Child, WIDTH};
+use crate::trace::bvh::footprint::Footprints;
+use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::triangles::TriangleTree;
@@ -17,96 +19,86 @@ use crate::trace::bvh::triangles::TriangleTree;
 pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
     near: f32,
-    child: Child,
+    pub child: Child,
     /// The first group with a ray that enters it.
-    first: u8,
+    pub first: u8,
 }
 
 impl Entry {
-    pub const ROOT: Self = Self { near: 0.0, child: Child::ROOT, first: 0 };
-}
-
-/// A bundle on its way through a tree of triangles.
-pub(super) struct Walk<'a, Q, const AXIS: usize> {
-    tree: &'a TriangleTree,
-    rays: &'a [Ray; RAYS],
-    bundle: &'a Bundle,
-    found: &'a mut Found,
-    groups: usize,
-    /// The largest limit of all rays.
-    most: f32,
-    query: PhantomData<Q>,
-}
-
-impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
-    #[inline(always)]
-    pub fn new(
-        tree: &'a TriangleTree,
-        rays: &'a [Ray; RAYS],
-        bundle: &'a Bundle,
-        found: &'a mut Found,
-        groups: usize,
-    ) -> Self {
-        found.start(bundle);
-        Self { tree, rays, bundle, found, groups, most: 0.0, query: PhantomData }
+    /// The root of a tree, of interest to groups from `first` on.
+    pub const fn root(first: u8) -> Self {
+        Self { near: 0.0, child: Child::ROOT, first }
     }
+}
 
+/// What a bundle looks for in a tree: triangles, or placements.
+pub(super) trait Goal {
+    fn tree(&self) -> &Tree;
+    /// The most t' that is wanted of each ray.
+    fn limit(&self) -> &PerRay;
+    /// Has a leaf's contents loaded that will be needed soon.
+    fn prefetch<S: Simd>(&self, leaf: Child);
+}
+
+/// Children that wait to be visited, the nearest on top, and the bundle's way to them.
+pub(super) struct Way<'a> {
+    pub bundle: &'a Bundle,
+    pub slab: BundleSlab,
+    pub groups: usize,
+    /// The largest limit of all rays.
+    pub most: f32,
+}
+
+impl Way<'_> {
     #[inline(always)]
-    fn measure<S: Simd>(&mut self) {
-        let mut most = S::Wide::at(&self.found.limit, 0);
+    pub fn measure<S: Simd>(&mut self, limit: &PerRay) {
+        let mut most = S::Wide::at(limit, 0);
         for group in 1..self.groups {
-            most = most.max(S::Wide::at(&self.found.limit, group));
+            most = most.max(S::Wide::at(limit, group));
         }
         self.most = most.largest();
     }
 
+    /// The next leaf of what waits on the stack.
     #[inline(always)]
-    pub fn run<S: Simd>(mut self, stack: &mut [Entry], slab: &BundleSlab) {
-        self.measure::<S>();
-        let tree = self.tree.tree();
-        let mut len = 0;
-        let mut next = Entry::ROOT;
+    pub fn next_leaf<S: Simd>(&self, goal: &impl Goal, stack: &mut [Entry], len: &mut usize) -> Option<Entry> {
+        let tree = goal.tree();
         loop {
-            if !next.child.is_leaf() {
-                let node = tree.node(next.child);
-                let (mut mask, near, boxes) = slab.enter::<S>(node, self.bundle.first, self.most);
-                let base = len;
-                while mask != 0 {
-                    let slot = mask.trailing_zeros() as usize % WIDTH;
-                    mask &= mask - 1;
-                    let Some(first) = self.first_group::<S>(&boxes, slot, next.first) else { continue };
-                    let entry = Entry { near: near[slot], child: node.child[slot], first };
-                    let mut at = len;
-                    while at > base && stack[at - 1].near < entry.near {
-                        stack[at] = stack[at - 1];
-                        at -= 1;
-                    }
-                    stack[at] = entry;
-                    len += 1;
-                    if entry.child.is_leaf() {
-                        self.tree.prefetch::<S>(entry.child.first());
-                    } else {
-                        S::prefetch(S::address(tree.nodes(), entry.child.node()));
-                    }
-                }
-            } else if self.visit::<S>(next) {
-                self.measure::<S>();
+            *len = len.checked_sub(1)?;
+            let next = stack[*len];
+            if next.near > self.most {
+                continue;
             }
-            next = loop {
-                if len == 0 {
-                    return;
+            if next.child.is_leaf() {
+                return Some(next);
+            }
+            let node = tree.node(next.child);
+            let (mut mask, near, boxes) = self.slab.enter::<S>(node, self.bundle.first, self.most);
+            let base = *len;
+            while mask != 0 {
+                let slot = mask.trailing_zeros() as usize % WIDTH;
+                mask &= mask - 1;
+                let Some(first) = self.first_group::<S>(goal.limit(), &boxes, slot, next.first) else { continue };
+                let entry = Entry { near: near[slot], child: node.child[slot], first };
+                let mut at = *len;
+                while at > base && stack[at - 1].near < entry.near {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
                 }
-                len -= 1;
-                if stack[len].near <= self.most {
-                    break stack[len];
+                stack[at] = entry;
+                *len += 1;
+                if entry.child.is_leaf() {
+                    goal.prefetch::<S>(entry.child);
+                } else {
+                    S::prefetch(S::address(tree.nodes(), entry.child.node()));
                 }
-            };
+            }
         }
     }
 
     /// The first group, from `from` on, with a ray that enters the box.
     #[inline(always)]
-    fn first_group<S: Simd>(&self, boxes: &Boxes, slot: usize, from: u8) -> Option<u8> {
+    fn first_group<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, from: u8) -> Option<u8> {
         let splat = S::Wide::splat;
         let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
         let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
@@ -114,7 +106,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
             let p = S::Wide::at(&self.bundle.reciprocal[0], group);
             let q = S::Wide::at(&self.bundle.reciprocal[1], group);
             let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
-            let limit = S::Wide::at(&self.found.limit, group).min(far[2]);
+            let limit = S::Wide::at(limit, group).min(far[2]);
             let last = far[0].mul(p).min(far[1].mul(q)).min(limit);
             if first.at_most(last).bits() != 0 {
                 return Some(group as u8);
@@ -122,35 +114,86 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
         }
         None
     }
+}
+
+/// A bundle on its way through a tree of triangles.
+pub(super) struct Walk<'a, Q> {
+    pub bvh: &'a Bvh,
+    /// Of the triangles.
+    pub place: u32,
+    pub tree: &'a TriangleTree,
+    /// In the world.
+    pub rays: &'a [Ray; RAYS],
+    /// In the tree's coordinates.
+    pub bundle: &'a Bundle,
+    pub found: &'a mut Found,
+    pub groups: usize,
+    pub query: PhantomData<Q>,
+}
+
+impl<Q> Goal for Walk<'_, Q> {
+    #[inline(always)]
+    fn tree(&self) -> &Tree {
+        self.tree.tree()
+    }
+    #[inline(always)]
+    fn limit(&self) -> &PerRay {
+        &self.found.limit
+    }
+    #[inline(always)]
+    fn prefetch<S: Simd>(&self, leaf: Child) {
+        self.tree.prefetch::<S>(leaf.first());
+    }
+}
+
+impl<Q: Query> Walk<'_, Q> {
+    #[inline(always)]
+    pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, first: u8) {
+        self.found.enter(self.bundle);
+        way.measure::<S>(&self.found.limit);
+        stack[0] = Entry::root(first);
+        let mut len = 1;
+        while let Some(leaf) = way.next_leaf::<S>(&self, stack, &mut len) {
+            if self.visit::<S>(leaf, way.most) {
+                way.measure::<S>(&self.found.limit);
+            }
+        }
+    }
 
     /// Tests the blocks of a leaf; true where a limit has changed.
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, leaf: Entry) -> bool {
+    fn visit<S: Simd>(&mut self, leaf: Entry, most: f32) -> bool {
         let mut changed = false;
+        // Those of the groups that enter the leaf.
+        let per_group = S::Wide::LANES / 8;
+        let rows = (1 << (self.groups * per_group)) - (1 << (usize::from(leaf.first) * per_group));
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            let (lanes, edges) = Edges::new::<S, AXIS>(&block.corners, self.bundle, self.most);
-            let mut lanes = lanes & block.lanes;
+            let Some((mut lanes, edges)) = Edges::new::<S>(block, self.bundle, most) else { continue };
+            let seen = Footprints::new::<S>(&block.corners, self.bundle);
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize % LANES;
                 lanes &= lanes - 1;
-                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, leaf.first);
+                let rows = seen.rows::<S>(lane, &self.bundle.rows) & rows;
+                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, rows);
             }
         }
         changed
     }
 
-    /// One triangle against the groups from `first` on.
+    /// One triangle against the groups of the rows that are named.
     #[inline(always)]
-    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, first: u8) -> bool {
+    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, mut rows: u32) -> bool {
         let splat = S::Wide::splat;
         let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
         let bound = splat(edges.edge_error[lane]);
         let below = splat(-edges.edge_error[lane]);
         let is_vague = edges.is_vague >> lane & 1 != 0;
         let (mut changed, first_t) = (false, splat(self.bundle.first));
-        for group in usize::from(first)..self.groups {
+        while rows != 0 {
+            let group = rows.trailing_zeros() as usize / (S::Wide::LANES / 8);
+            rows &= (!0 << (S::Wide::LANES / 8)) << (group * (S::Wide::LANES / 8));
             let p = S::Wide::at(&self.bundle.slope[0], group);
             let q = S::Wide::at(&self.bundle.slope[1], group);
             let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
@@ -175,6 +218,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
                     S::Wide::select(sure, high, limit).put(&mut self.found.limit, group);
                     S::Wide::select(sure, low, before).put(&mut self.found.sure, group);
                     S::Wide::put_where(sure, id, &mut self.found.noted, group);
+                    S::Wide::put_where(sure, self.place, &mut self.found.place, group);
                     changed = true;
                 }
                 if open != 0 && self.bundle.is_turned {
@@ -194,7 +238,7 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
     #[inline(always)]
     fn behind_starts<S: Simd>(&self, edges: &Edges, lane: usize, group: usize) -> u32 {
         let splat = S::Wide::splat;
-        let [p, q, along] = axes(AXIS);
+        let [p, q, along] = axes(self.bundle.axis);
         let direction = &self.bundle.direction;
         // The bundle's direction is the given one, turned round.
         let x = splat(edges.corner[0][lane]).add(S::Wide::at(&direction[p], group));
@@ -212,13 +256,14 @@ impl<'a, Q: Query, const AXIS: usize> Walk<'a, Q, AXIS> {
     #[cold]
     #[inline(never)]
     fn decide(&mut self, ray: usize, id: u32) -> bool {
-        let Self { tree, rays, bundle, found, .. } = self;
+        let Self { bvh, rays, bundle, found, .. } = self;
         if Q::ANY && found.limit.0[ray] < 0.0 {
             return false;
         }
-        found.compute(tree, rays, ray);
+        found.compute(bvh, rays, ray);
         let before = found.nearest[ray].limit();
-        tree.offer_one(id, &rays[ray], &mut found.nearest[ray]);
+        let (tree, through) = bvh.triangles_at(self.place);
+        tree.offer_one(id, &rays[ray], through, &mut found.nearest[ray]);
         let Some(hit) = found.nearest[ray].hit() else { return false };
         if Q::ANY {
             (found.sure.0[ray], found.limit.0[ray]) = (DONE, DONE);

@@ -1,0 +1,108 @@
+//! What rays travel through: the triangles of the world alone, or these and placed objects.
+//!
+//! Rounds are compiled once for each, so that scenes without placements pay nothing for them.
+
+use super::traveller::Space;
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::block::Block;
+use crate::trace::bvh::leaves::Blocks;
+use crate::trace::bvh::node::{Child, Node, Tree};
+use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::triangles::TriangleTree;
+
+/// What rays travel through.
+pub(super) trait Ground {
+    const HAS_PLACEMENTS: bool;
+    fn node(&self, space: Space, child: Child) -> &Node;
+    /// A leaf's block; `scratch` is where it may be put together.
+    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    /// Where in memory a node is.
+    fn node_address<S: Simd>(&self, space: Space, next: Child) -> *const u8;
+    /// Where in memory a leaf's first block is, or a placement.
+    fn leaf_address<S: Simd>(&self, space: Space, next: Child) -> *const u8;
+}
+
+/// The triangles of the world, and nothing else.
+pub(super) struct Plain<'a, L: ?Sized> {
+    pub tree: &'a Tree,
+    pub leaves: &'a L,
+}
+
+impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
+    const HAS_PLACEMENTS: bool = false;
+
+    #[inline(always)]
+    fn node(&self, _: Space, child: Child) -> &Node {
+        self.tree.node(child)
+    }
+    #[inline(always)]
+    fn block<'a>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.leaves.block(index, scratch)
+    }
+    #[inline(always)]
+    fn node_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
+        S::address(self.tree.nodes(), next.node())
+    }
+    #[inline(always)]
+    fn leaf_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
+        self.leaves.address::<S>(next.first())
+    }
+}
+
+/// The triangles of the world and of objects in their places: what each space has, in one table, since rays of a list are in
+/// different ones, and nobody can predict which.
+pub(super) struct Placed<'a>(Vec<Region<'a>>);
+
+/// What a space has.
+struct Region<'a> {
+    nodes: &'a [Node],
+    triangles: &'a TriangleTree,
+    /// Where in memory leaves' first blocks or placements are, and how far apart.
+    leaves: *const u8,
+    stride: usize,
+}
+
+impl<'a> Placed<'a> {
+    pub fn new<S: Simd>(bvh: &'a Bvh) -> Self {
+        let fixed = Region::new::<S>(&bvh.fixed.triangles);
+        let places = bvh.placements.places();
+        let upper = Region {
+            nodes: bvh.placements.tree().nodes(),
+            triangles: &bvh.fixed.triangles,
+            leaves: S::address(places, 0),
+            stride: size_of_val(places) / places.len().max(1),
+        };
+        let objects = bvh.objects.iter().map(|level| Region::new::<S>(&level.triangles));
+        Self([fixed, upper].into_iter().chain(objects).collect())
+    }
+}
+
+impl<'a> Region<'a> {
+    fn new<S: Simd>(triangles: &'a TriangleTree) -> Self {
+        let leaves = triangles.leaves();
+        let stride = leaves.bytes() / leaves.len().max(1);
+        Self { nodes: triangles.tree().nodes(), triangles, leaves: leaves.address::<S>(0), stride }
+    }
+}
+
+impl Ground for Placed<'_> {
+    const HAS_PLACEMENTS: bool = true;
+
+    #[inline(always)]
+    fn node(&self, space: Space, child: Child) -> &Node {
+        &self.0[space.0 as usize].nodes[child.node() as usize]
+    }
+    #[inline(always)]
+    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0[space.0 as usize].triangles.block(index, scratch)
+    }
+    #[inline(always)]
+    fn node_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
+        S::address(self.0[space.0 as usize].nodes, next.node())
+    }
+    #[inline(always)]
+    fn leaf_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
+        let region = &self.0[space.0 as usize];
+        region.leaves.wrapping_add(region.stride * next.first() as usize)
+    }
+}

@@ -1,0 +1,215 @@
+//! A ray of a flight, and the one step at a time that it takes.
+
+use std::hint::select_unpredictable;
+
+use super::ground::Ground;
+use crate::ray::Ray;
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::build::MAX_DEPTH;
+use crate::trace::bvh::found::Found;
+use crate::trace::bvh::node::{Child, Node, WIDTH};
+use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::{Mask, Simd};
+use crate::trace::bvh::slab::ReadyRay;
+
+/// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
+/// placements, and each has [`Child::NONE`] at its bottom.
+const STACK: usize = 512;
+
+const _: () = assert!(2 * MAX_DEPTH * (WIDTH - 1) + 3 < STACK);
+
+/// Where a ray is: at the fixed triangles, among the placements, or (2 and more) in an object's tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Space(pub u32);
+
+impl Space {
+    pub const FIXED: Self = Self(0);
+    /// Among the placements; and whoever arrives does so from here.
+    pub const UPPER: Self = Self(1);
+
+    #[inline(always)]
+    pub fn object(index: u32) -> Self {
+        Self(index + 2)
+    }
+
+    #[inline(always)]
+    pub fn is_object(self) -> bool {
+        self.0 >= 2
+    }
+}
+
+/// What a ray does next.
+pub(super) enum Step {
+    Node,
+    Leaf,
+    Arrived,
+    /// Enter a placement.
+    Placement,
+    /// Leave an object, or the fixed triangles, for the placements.
+    Return,
+}
+
+impl Step {
+    pub const COUNT: usize = 5;
+}
+
+/// A ray on its way.
+#[repr(align(64))]
+#[derive(Clone, Copy)]
+pub(super) struct Traveller {
+    /// The ray in the world, and in the object where it is.
+    ready: [ReadyRay; 2],
+    pub found: Found,
+    /// Which of the rays it is.
+    pub ray: usize,
+    /// Children on the stack.
+    len: usize,
+    pub next: Child,
+    pub space: Space,
+    /// The placement that the ray is in, or [`FIXED`].
+    place: u32,
+    /// Children waiting to be visited, the nearest on top; above the top is room for what is not entered.
+    stack: [Child; STACK + WIDTH],
+    /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it.
+    near: [u32; STACK + WIDTH],
+}
+
+impl Traveller {
+    pub const NONE: Self = Self {
+        ready: [ReadyRay::NONE; 2],
+        found: Found::NONE,
+        ray: 0,
+        len: 1,
+        next: Child::NONE,
+        space: Space::UPPER,
+        place: FIXED,
+        stack: [Child::NONE; STACK + WIDTH],
+        near: [0; STACK + WIDTH],
+    };
+
+    /// At a root, with a ray of its own: at that of the fixed triangles, if there are any, and where there are placements, then at
+    /// theirs.
+    #[inline(always)]
+    pub fn start<G: Ground>(&mut self, ray: usize, ready: &ReadyRay, has_fixed: bool) {
+        self.ready[0] = *ready;
+        self.found.start(ready.end());
+        (self.ray, self.len, self.next) = (ray, 1, Child::ROOT);
+        if G::HAS_PLACEMENTS {
+            (self.place, self.space) = (FIXED, Space::UPPER);
+            if has_fixed {
+                // Near entries of 0: they stay whatever the ray hits.
+                (self.near[1], self.stack[1]) = (0, Child::ROOT);
+                (self.near[2], self.stack[2]) = (0, Child::NONE);
+                (self.len, self.space) = (3, Space::FIXED);
+            }
+        }
+    }
+
+    /// What it does next; without a branch, since nobody can predict it.
+    #[inline(always)]
+    pub fn step<G: Ground>(&self) -> usize {
+        let kind = self.next.kind();
+        if !G::HAS_PLACEMENTS {
+            return kind;
+        }
+        const STEPS: [[u8; 4]; 2] = [
+            [Step::Node as u8, Step::Leaf as u8, Step::Return as u8, 0],
+            [Step::Node as u8, Step::Placement as u8, Step::Arrived as u8, 0],
+        ];
+        usize::from(STEPS[usize::from(self.space == Space::UPPER)][kind % 4])
+    }
+
+    /// The ray in the space where it is.
+    #[inline(always)]
+    fn ready<G: Ground>(&self) -> &ReadyRay {
+        &self.ready[usize::from(G::HAS_PLACEMENTS && self.space.is_object())]
+    }
+
+    /// One node.
+    #[inline(always)]
+    pub fn enter<S: Simd, G: Ground>(&mut self, node: &Node) {
+        let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
+        let len = self.len % STACK;
+        let (nears, stack) = (self.near[len..].first_chunk_mut(), self.stack[len..].first_chunk_mut());
+        if let (Some(nears), Some(stack)) = (nears, stack) {
+            S::far_to_near(near, mask, &node.child, nears, stack);
+        }
+        self.len = len + mask.bits().count_ones() as usize;
+        self.pop();
+    }
+
+    /// One block of a leaf.
+    #[inline(always)]
+    pub fn visit<S: Simd, Q: Query, G: Ground>(&mut self, bvh: &Bvh, ground: &G, rays: &[Ray]) {
+        let (index, limit) = (self.next.first(), self.found.limit);
+        let mut scratch = None;
+        let block = ground.block(self.space, index, &mut scratch);
+        let filter = self.ready::<G>().filter();
+        // The bounds of a ray in the world cost less, and are tighter.
+        let candidates = if G::HAS_PLACEMENTS {
+            filter.candidates::<S, true>(block, limit)
+        } else {
+            filter.candidates::<S, false>(block, limit)
+        };
+        if candidates.lanes != 0 {
+            let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
+            self.found.offer::<Q>(bvh, place, index, block, &candidates, &rays[self.ray]);
+            if Q::ANY && self.found.is_hit() {
+                (self.next, self.space) = (Child::NONE, Space::UPPER);
+                return;
+            }
+            if self.found.limit < limit {
+                self.shorten();
+            }
+        }
+        // On to the next block, or to what is on the stack; without a branch.
+        let is_more = self.next.count() > 1;
+        self.len -= usize::from(!is_more);
+        self.next = select_unpredictable(is_more, self.next.rest(), self.stack[self.len % STACK]);
+    }
+
+    /// Into the placement that the leaf of the upper tree is.
+    #[inline(always)]
+    pub fn descend<S: Simd>(&mut self, bvh: &Bvh, rays: &[Ray]) {
+        let number = self.next.first();
+        let place = bvh.placements.at(number);
+        let object = place.placement.object;
+        let tree = bvh.objects[object as usize].triangles.tree();
+        if tree.is_empty() {
+            self.pop();
+            return;
+        }
+        let (local, blur) = place.local::<S>(&rays[self.ray]);
+        self.ready[1] = ReadyRay::new::<S>(&local, tree.reach(), blur);
+        let top = self.len % STACK;
+        (self.near[top], self.stack[top]) = (0, Child::NONE);
+        self.len = top + 1;
+        (self.place, self.space, self.next) = (number, Space::object(object), Child::ROOT);
+    }
+
+    /// Out of it again.
+    #[inline(always)]
+    pub fn leave(&mut self) {
+        self.space = Space::UPPER;
+        self.pop();
+    }
+
+    /// Goes on to the nearest; at last to [`Child::NONE`].
+    #[inline(always)]
+    fn pop(&mut self) {
+        self.len -= 1;
+        self.next = self.stack[self.len % STACK];
+    }
+
+    /// Leaves out what is beyond the limit.
+    #[inline(always)]
+    fn shorten(&mut self) {
+        let mut kept = 1;
+        for i in 1..self.len % STACK {
+            (self.near[kept], self.stack[kept]) = (self.near[i], self.stack[i]);
+            kept += usize::from(f32::from_bits(self.near[i] & !7) <= self.found.limit);
+        }
+        self.len = kept;
+    }
+}

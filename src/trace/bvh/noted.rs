@@ -1,0 +1,166 @@
+//! Hits that are noted, four at a time: t, u and v of triangles that rays hit for sure, among the fixed ones or in placed
+//! objects.
+
+use super::Bvh;
+use super::level::Through;
+use super::placements::FIXED;
+use super::quad::{Numbers, Quad};
+use super::simd::{Array, Doubles, Simd};
+use super::triangles::TriangleTree;
+use crate::math::Vec3;
+use crate::ray::{Hit, Ray};
+use crate::trace::nearest::Nearest;
+
+/// Four rays, component by component.
+pub(super) struct Rays<D> {
+    pub origin: [D; 3],
+    pub direction: [D; 3],
+}
+
+impl<D: Doubles> Rays<D> {
+    #[inline(always)]
+    pub fn new<S: Simd<D4 = D>>([a, b, c, d]: [&Ray; 4]) -> Self {
+        Self {
+            origin: columns::<S>([a.origin, b.origin, c.origin, d.origin]),
+            direction: columns::<S>([a.direction, b.direction, c.direction, d.direction]),
+        }
+    }
+}
+
+#[inline(always)]
+fn columns<S: Simd>([a, b, c, d]: [Vec3; 4]) -> [S::D4; 3] {
+    [widen::<S>(&[a.x, b.x, c.x, d.x]), widen::<S>(&[a.y, b.y, c.y, d.y]), widen::<S>(&[a.z, b.z, c.z, d.z])]
+}
+
+#[inline(always)]
+pub(super) fn widen<S: Simd>(values: &[f32; 4]) -> S::D4 {
+    S::D4::widen(S::V4::load(values))
+}
+
+impl TriangleTree {
+    /// The hits of four rays, each of which hits a triangle for sure, and t in f64; `ids` as in [`Self::offer_one`].
+    ///
+    /// The caller knows that f64 is precise enough for what [`triangle::intersect`](crate::shape::triangle::intersect) would
+    /// answer.
+    #[inline(always)]
+    pub fn hits<S: Simd>(&self, rays: &Rays<S::D4>, ids: [u32; 4]) -> ([f64; 4], [Hit; 4]) {
+        let [a, b, c, d] = ids;
+        let corners = gather([self.corners(a), self.corners(b), self.corners(c), self.corners(d)]);
+        let corners = [corner::<S>(&corners, 0), corner::<S>(&corners, 1), corner::<S>(&corners, 2)];
+        let Numbers { t, t32, u, v } = Quad::new(rays.origin, rays.direction, corners).numbers();
+        let hits = [
+            self.hit(a, t32[0], u[0], v[0]),
+            self.hit(b, t32[1], u[1], v[1]),
+            self.hit(c, t32[2], u[2], v[2]),
+            self.hit(d, t32[3], u[3], v[3]),
+        ];
+        (t, hits)
+    }
+}
+
+impl Bvh {
+    /// The triangles at a place, and how rays come to them.
+    #[inline(always)]
+    pub(super) fn triangles_at(&self, place: u32) -> (&TriangleTree, Option<Through<'_>>) {
+        if place == FIXED {
+            return (&self.fixed.triangles, None);
+        }
+        let place = self.placements.at(place);
+        (&self.objects[place.placement.object as usize].triangles, Some(place.through()))
+    }
+
+    /// As [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise enough, exactly. Only lanes of
+    /// the mask matter.
+    #[inline(always)]
+    pub(super) fn placed_hits<S: Simd>(
+        &self,
+        each: [&Ray; 4],
+        lanes: u32,
+        rays: &Rays<S::D4>,
+        ids: [u32; 4],
+        places: [u32; 4],
+    ) -> ([f64; 4], [Option<Hit>; 4]) {
+        let [(a, la), (b, lb), (c, lc), (d, ld)] =
+            [self.placed(places[0]), self.placed(places[1]), self.placed(places[2]), self.placed(places[3])];
+        let corners = gather([a.corners(ids[0]), b.corners(ids[1]), c.corners(ids[2]), d.corners(ids[3])]);
+        let columns = gather([la.columns, lb.columns, lc.columns, ld.columns]);
+        let corners = [
+            world_corner::<S>(&corners, 0, &columns),
+            world_corner::<S>(&corners, 1, &columns),
+            world_corner::<S>(&corners, 2, &columns),
+        ];
+        let quad = Quad::new(rays.origin, rays.direction, corners);
+        let slack = S::D4::load(&[la.slack, lb.slack, lc.slack, ld.slack]);
+        let certain = quad.is_certain(rays.origin, rays.direction, corners, slack);
+        let Numbers { mut t, t32, u, v } = quad.numbers();
+        let mut hits = [None; 4];
+        let (trees, instances) = ([a, b, c, d], [la.instance, lb.instance, lc.instance, ld.instance]);
+        for i in (0..4).filter(|i| lanes >> i & 1 != 0) {
+            if certain >> i & 1 != 0 {
+                hits[i] = Some(Hit { instance: instances[i], ..trees[i].hit(ids[i], t32[i], u[i], v[i]) });
+            } else {
+                let nearest = self.noted_hit(places[i], ids[i], each[i]);
+                (t[i], hits[i]) = (nearest.t(), nearest.hit());
+            }
+        }
+        (t, hits)
+    }
+
+    #[inline(always)]
+    fn placed(&self, place: u32) -> (&TriangleTree, Location) {
+        let place = self.placements.at(place);
+        let m = &place.placement.to_world;
+        let (x, y, z, t) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation);
+        let columns = [x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z, t.x, t.y, t.z];
+        let location = Location { columns, slack: place.slack, instance: place.placement.instance };
+        (&self.objects[place.placement.object as usize].triangles, location)
+    }
+
+    /// What is noted for one ray, by [`triangle::intersect`](crate::shape::triangle::intersect).
+    #[cold]
+    #[inline(never)]
+    pub(super) fn noted_hit(&self, place: u32, id: u32, ray: &Ray) -> Nearest {
+        let (tree, through) = self.triangles_at(place);
+        let mut nearest = Nearest::new(ray);
+        tree.offer_one(id, ray, through, &mut nearest);
+        debug_assert!(nearest.hit().is_some(), "what is noted is hit without doubt");
+        nearest
+    }
+}
+
+/// What the corners of a placed triangle are computed from.
+struct Location {
+    /// Of the transform to the world, column by column; then the translation.
+    columns: [f32; 12],
+    slack: f64,
+    instance: u32,
+}
+
+/// Component by component.
+#[inline(always)]
+fn gather<const N: usize>([a, b, c, d]: [[f32; N]; 4]) -> [[f32; 4]; N] {
+    let mut rows = [[0.0; 4]; N];
+    for (i, row) in rows.iter_mut().enumerate() {
+        *row = [a[i], b[i], c[i], d[i]];
+    }
+    rows
+}
+
+/// Corner k of those that are ordered as in a block.
+#[inline(always)]
+fn corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize) -> [S::D4; 3] {
+    [widen::<S>(&corners[k]), widen::<S>(&corners[3 + k]), widen::<S>(&corners[6 + k])]
+}
+
+/// The same in the world, with the bits of [`DAffine3::transform_point3`](crate::math::DAffine3::transform_point3).
+#[inline(always)]
+fn world_corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize, columns: &[[f32; 4]; 12]) -> [S::D4; 3] {
+    let p = corner::<S>(corners, k);
+    [component::<S>(columns, 0, p), component::<S>(columns, 1, p), component::<S>(columns, 2, p)]
+}
+
+#[inline(always)]
+fn component<S: Simd>(columns: &[[f32; 4]; 12], i: usize, [x, y, z]: [S::D4; 3]) -> S::D4 {
+    let [a, b, c] = [widen::<S>(&columns[i]), widen::<S>(&columns[3 + i]), widen::<S>(&columns[6 + i])];
+    a.mul(x).add(b.mul(y)).add(c.mul(z)).add(widen::<S>(&columns[9 + i]))
+}

@@ -1,0 +1,246 @@
+//! An object in its place, and rays in its coordinates.
+//!
+//! A transform keeps volumes' signs (or turns all of them round), t, u and v. So a ray can be held against an object's own
+//! triangles in the object's coordinates, as long as it is known how far the ray that was computed is from the one
+//! that is meant: its [`Blur`]. Moving the triangles into the world instead would take as much memory as the scene
+//! without instances; moving every node's box, the other alternative, widens it.
+//!
+//! With A x + T the transform to the world, whose entries are f32 and exact, B the inverse and b the translation that were computed
+//! in f64, R = 1 - B A, and norms the largest sums of a row, or component: A^-1 = (1 - R)^-1 B, so that it differs from B by at
+//! most |R| / (1 - |R|) |B|. R is computed, which is off by gamma(5) |B| |A|, and so is b + B T, by gamma(5) |B| |T|. With q the
+//! sum of that quotient and gamma(8), the moved origin is off by q |B| (|o| + |T|) + |b + B T|, and the direction by q |B| |d|. Then
+//! both are rounded to f32. For a transform that is anywhere near a rotation only this last step counts.
+
+use super::bundle::{PerRay, RAYS};
+use super::level::Through;
+use super::simd::{Array, Doubles, Simd, Vector};
+use crate::math::{DMat3, DVec3, UNIT_ROUNDOFF, Vec3, gamma64};
+use crate::ray::Ray;
+use crate::trace::Placement;
+
+/// How far a ray may be from the one that is meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Blur {
+    /// In each component of the origin.
+    pub origin: f32,
+    /// In each component of the direction, relative to the largest of them; at most [`Blur::MOST`].
+    pub direction: f32,
+}
+
+impl Blur {
+    /// The ray is the one that is meant.
+    pub const NONE: Self = Self { origin: 0.0, direction: 0.0 };
+
+    /// Of a direction; a larger one is treated as unknown.
+    const MOST: f32 = 1.0 / 1024.0;
+
+    /// The ray may be anywhere: it meets all boxes, and no triangle is rejected or hit without doubt.
+    const UNKNOWN: Self = Self { origin: f32::INFINITY, direction: 0.0 };
+}
+
+/// An object in its place.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub placement: Placement,
+    /// To the object's coordinates: the columns of the matrix, and the translation.
+    to_object: [[f64; 4]; 4],
+    /// |B|.
+    stretch: f64,
+    /// q |B|.
+    relative: f64,
+    /// |b + B T| + q |B| |T|.
+    absolute: f64,
+    /// At least what the error of a corner in the world is relative to: [`Corners::slack`](crate::shape::triangle::Corners::slack).
+    pub slack: f64,
+}
+
+impl Place {
+    /// `reach` is that of the object's triangles.
+    pub fn new(placement: Placement, reach: Vec3) -> Self {
+        let to_world = placement.to_world.as_daffine3();
+        let to_object = &placement.to_object;
+        let (matrix, b) = (to_object.matrix3, to_object.translation);
+        let norm = |m: DMat3| {
+            let m = m.abs();
+            (m.x_axis + m.y_axis + m.z_axis).max_element()
+        };
+        let stretch = norm(matrix);
+        let residue = norm(DMat3::IDENTITY - matrix * to_world.matrix3) + gamma64(8) * stretch * norm(to_world.matrix3);
+        // Also where it is NaN.
+        let quotient = if residue < 0.5 { residue / (1.0 - residue) + gamma64(16) } else { f64::INFINITY };
+        let away = to_world.translation.abs().max_element();
+        let offset = (b + matrix * to_world.translation).abs().max_element();
+        let farthest = to_world.matrix3.abs() * reach.as_dvec3() + to_world.translation.abs();
+        let column = |v: DVec3| [v.x, v.y, v.z, 0.0];
+        Self {
+            to_object: [column(matrix.x_axis), column(matrix.y_axis), column(matrix.z_axis), column(b)],
+            stretch,
+            relative: quotient * stretch,
+            absolute: offset + quotient * stretch * away,
+            slack: farthest.max_element(),
+            placement,
+        }
+    }
+
+    pub fn through(&self) -> Through<'_> {
+        Through { instance: self.placement.instance, to_world: &self.placement.to_world }
+    }
+
+    /// `ray` in the object's coordinates, at the same t.
+    #[inline(always)]
+    pub fn local<S: Simd>(&self, ray: &Ray) -> (Ray, Blur) {
+        let [x, y, z, b] = self.columns::<S>();
+        let (o, d) = (ray.origin, ray.direction);
+        let (origin, direction) = (moved::<S>([x, y, z], o).add(b).narrow(), moved::<S>([x, y, z], d).narrow());
+        let ([ox, oy, oz, _], [dx, dy, dz, _]) = (origin.to_array(), direction.to_array());
+        let local = Ray { origin: Vec3::new(ox, oy, oz), direction: Vec3::new(dx, dy, dz), ..*ray };
+        match self.blur(ray, &local) {
+            Some(blur) => (local, blur),
+            None => (Ray { origin: Vec3::ZERO, direction: Vec3::ONE, ..local }, Blur::UNKNOWN),
+        }
+    }
+
+    /// None where nothing is known.
+    #[inline(always)]
+    fn blur(&self, ray: &Ray, local: &Ray) -> Option<Blur> {
+        let largest = local.direction.abs().max_element();
+        let noise = self.relative * f64::from(ray.direction.abs().max_element());
+        let origin = self.origin_blur(ray.origin, local.origin);
+        let direction = (noise / f64::from(largest)) as f32 + UNIT_ROUNDOFF;
+        // Written so that NaN is unknown.
+        let is_finite = (f32::MIN_POSITIVE..f32::INFINITY).contains(&largest) && origin < f32::MAX;
+        (is_finite && direction <= Blur::MOST).then_some(Blur { origin, direction: direction * 1.01 })
+    }
+
+    /// How far an origin may be off, given where it was and is.
+    #[inline(always)]
+    fn origin_blur(&self, world: Vec3, local: Vec3) -> f32 {
+        let computed = self.relative * f64::from(world.abs().max_element()) + self.absolute;
+        (computed as f32 + UNIT_ROUNDOFF * local.abs().max_element()) * 1.01 + f32::MIN_POSITIVE
+    }
+
+    /// A point that is off by `blur` in each component, in the object's coordinates; and by how much it is off there.
+    #[inline(always)]
+    pub fn point<S: Simd>(&self, point: Vec3, blur: f32) -> (Vec3, f32) {
+        let [x, y, z, b] = self.columns::<S>();
+        let [px, py, pz, _] = moved::<S>([x, y, z], point).add(b).narrow().to_array();
+        let local = Vec3::new(px, py, pz);
+        (local, self.origin_blur(point, local) + self.stretch as f32 * blur * 1.01)
+    }
+
+    /// Directions in the object's coordinates; each component is off by the rounding to f32, and by the least component
+    /// that is worth mentioning, which is the result.
+    #[inline(always)]
+    pub fn directions<S: Simd>(&self, world: &[PerRay; 3], local: &mut [PerRay; 3]) -> f32 {
+        let [mx, my, mz, _] = &self.to_object;
+        let mut largest = S::V4::splat(0.0);
+        for i in 0..RAYS / 4 {
+            let (x, y, z) = (four::<S>(&world[0], i), four::<S>(&world[1], i), four::<S>(&world[2], i));
+            largest = x.abs().max(y.abs()).max(z.abs()).max(largest);
+            let (x, y, z) = (S::D4::widen(x), S::D4::widen(y), S::D4::widen(z));
+            for axis in 0..3 {
+                let (a, b, c) = (S::D4::splat(mx[axis]), S::D4::splat(my[axis]), S::D4::splat(mz[axis]));
+                let direction = a.mul(x).add(b.mul(y)).add(c.mul(z));
+                local[axis].0.as_chunks_mut().0[i] = direction.narrow().to_array();
+            }
+        }
+        (self.relative * f64::from(largest.largest())) as f32 * 1.01 + f32::MIN_POSITIVE
+    }
+
+    #[inline(always)]
+    fn columns<S: Simd>(&self) -> [S::D4; 4] {
+        let [x, y, z, b] = &self.to_object;
+        [S::D4::load(x), S::D4::load(y), S::D4::load(z), S::D4::load(b)]
+    }
+}
+
+/// The linear part.
+#[inline(always)]
+fn moved<S: Simd>([x, y, z]: [S::D4; 3], v: Vec3) -> S::D4 {
+    let (vx, vy, vz) = (S::D4::splat(v.x.into()), S::D4::splat(v.y.into()), S::D4::splat(v.z.into()));
+    x.mul(vx).add(y.mul(vy)).add(z.mul(vz))
+}
+
+#[inline(always)]
+fn four<S: Simd>(values: &PerRay, i: usize) -> S::V4 {
+    S::V4::load(&values.0.as_chunks().0[i % (RAYS / 4)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::expansion::{Expansion, cross, dot};
+    use crate::math::{Affine3, Mat3};
+    use crate::trace::bvh::simd::Portable;
+
+    struct Random(u64);
+
+    impl Random {
+        /// In [-1, 1).
+        fn unit(&mut self) -> f32 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
+        }
+        fn vec3(&mut self) -> Vec3 {
+            Vec3::new(self.unit(), self.unit(), self.unit())
+        }
+    }
+
+    /// The solution of A x = v, by Cramer's rule in exact arithmetic.
+    fn solve(matrix: &Mat3, v: &[Expansion; 3]) -> DVec3 {
+        let column = |c: Vec3| c.to_array().map(Expansion::from);
+        let [x, y, z] = [column(matrix.x_axis), column(matrix.y_axis), column(matrix.z_axis)];
+        let determinant = dot(&x, &cross(&y, &z)).estimate();
+        let [p, q, r] = [(&y, &z), (&z, &x), (&x, &y)].map(|(a, b)| dot(v, &cross(a, b)).estimate() / determinant);
+        DVec3::new(p, q, r)
+    }
+
+    /// From turned and scaled objects to shears that f64 all but loses: nowhere is a ray farther off than its blur says, and
+    /// for an object that is merely turned the blur is not much more than the rounding to f32.
+    #[test]
+    fn rays_are_no_farther_off_than_their_blur() {
+        let mut random = Random(1);
+        let (mut known, mut worst) = (0, 0.0f64);
+        for case in 0..4000 {
+            let shear = [0.0, 1e2, 1e5, 1e7][case % 4];
+            let away = [0.0, 1.0, 1e3, 1e6][case / 4 % 4];
+            let rotation = Mat3::from_quat(glam::Quat::from_scaled_axis(random.vec3() * 3.0));
+            let mut matrix = rotation;
+            matrix.x_axis = rotation.x_axis + rotation.y_axis * shear;
+            let to_world = Affine3 { matrix3: matrix, translation: random.vec3() * away };
+            let to_object = to_world.as_daffine3().inverse();
+            let place = Place::new(Placement { instance: 0, object: 0, to_world, to_object }, Vec3::ONE);
+            let ray = Ray::new(random.vec3() * away.max(3.0), random.vec3());
+            let (local, blur) = place.local::<Portable>(&ray);
+            if blur == Blur::UNKNOWN {
+                continue;
+            }
+            known += 1;
+            let (from, to) = (ray.origin.to_array(), to_world.translation.to_array());
+            let relative = [0, 1, 2].map(|i| &Expansion::from(from[i]) - &Expansion::from(to[i]));
+            let origin = solve(&to_world.matrix3, &relative);
+            let direction = solve(&to_world.matrix3, &ray.direction.to_array().map(Expansion::from));
+            let off = (local.origin.as_dvec3() - origin).abs().max_element();
+            assert!(off <= blur.origin.into(), "{case}: origin off by {off}, not {}", blur.origin);
+            let largest = f64::from(local.direction.abs().max_element());
+            let off = (local.direction.as_dvec3() - direction).abs().max_element() / largest;
+            assert!(off <= blur.direction.into(), "{case}: direction off by {off}, not {}", blur.direction);
+            if shear == 0.0 {
+                worst = worst.max(f64::from(blur.direction));
+            }
+        }
+        assert!(known > 2000, "{known} of 4000");
+        assert!(worst < 1.1 * f64::from(UNIT_ROUNDOFF), "{worst}");
+    }
+
+    /// What f64 cannot turn round is traced all the same, as a ray that may be anywhere.
+    #[test]
+    fn a_transform_that_f64_loses_leaves_everything_open() {
+        let matrix = Mat3::from_cols(Vec3::X, Vec3::new(1.0, f32::EPSILON, 0.0) * 1e30, Vec3::Z * 1e-30);
+        let to_world = Affine3 { matrix3: matrix, translation: Vec3::ZERO };
+        let placement = Placement { instance: 0, object: 0, to_world, to_object: to_world.as_daffine3().inverse() };
+        let place = Place::new(placement, Vec3::ONE);
+        let (_, blur) = place.local::<Portable>(&Ray::new(Vec3::ONE, Vec3::new(1.0, 1.0, 1e30)));
+        assert_eq!(blur, Blur::UNKNOWN);
+    }
+}

@@ -1,0 +1,64 @@
+//! How far the rays of a bundle still look, in a unit that they share in all systems of coordinates: t.
+
+use super::bundle::{Bundle, PerRay, RAYS, SLACK, TINY};
+use super::simd::{Group, Mask, Simd, Vector};
+
+/// Which t of each ray are still of interest, in units of its direction; of the turned one where the bundle is turned.
+pub(super) struct Range {
+    /// The least t, rounded inwards and outwards.
+    pub begin: PerRay,
+    pub start: PerRay,
+    /// A hit nearer than this is the nearest for sure.
+    pub sure: PerRay,
+    /// No hit beyond this is wanted; rounded outwards. Below every t for a ray that is done.
+    pub limit: PerRay,
+}
+
+impl Range {
+    pub fn new() -> Self {
+        Self { begin: PerRay::ZERO, start: PerRay::ZERO, sure: PerRay::ZERO, limit: PerRay::ZERO }
+    }
+
+    /// From tmin, in `begin`, and tmax, in `limit`.
+    #[inline(always)]
+    pub fn open<S: Simd>(&mut self, is_turned: bool) {
+        let splat = S::Wide::splat;
+        for group in 0..RAYS / S::Wide::LANES {
+            let (begin, end) = (S::Wide::at(&self.begin, group), S::Wide::at(&self.limit, group));
+            let (begin, start, sure, limit) = if is_turned {
+                // In turned t, both inwards and both outwards. 1 - t is off by half a step of 1 at most.
+                let (a, b) = (splat(1.0 + 1e-6), splat(1.0 - 1e-6));
+                (a.sub(end), b.sub(end), b.sub(begin), a.sub(begin))
+            } else {
+                (begin, begin, end, end)
+            };
+            begin.put(&mut self.begin, group);
+            start.put(&mut self.start, group);
+            sure.put(&mut self.sure, group);
+            limit.put(&mut self.limit, group);
+        }
+    }
+
+    /// Takes what has become less in t' since `bundle` was made ready.
+    #[inline(always)]
+    pub fn shorten<S: Simd>(&mut self, bundle: &Bundle, sure: &PerRay, limit: &PerRay) {
+        let splat = S::Wide::splat;
+        for group in 0..RAYS / S::Wide::LANES {
+            let (least, most) = (S::Wide::at(sure, group), S::Wide::at(limit, group));
+            let is_less = most.less(S::Wide::at(&bundle.limit, group)).or(least.less(S::Wide::at(&bundle.end, group)));
+            if is_less.bits() != 0 {
+                let shrink = splat(1.0).div(S::Wide::at(&bundle.depth, group));
+                let (old_sure, old_limit) = (S::Wide::at(&self.sure, group), S::Wide::at(&self.limit, group));
+                let least = least.mul(shrink).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(old_sure);
+                let most = most.mul(shrink).mul_add(splat(1.0 + SLACK), splat(TINY)).min(old_limit);
+                S::Wide::select(is_less, least, old_sure).put(&mut self.sure, group);
+                S::Wide::select(is_less, most, old_limit).put(&mut self.limit, group);
+            }
+        }
+    }
+
+    /// One ray's, from t.
+    pub fn set(&mut self, ray: usize, sure: f32, limit: f32) {
+        (self.sure.0[ray], self.limit.0[ray]) = (sure, limit);
+    }
+}

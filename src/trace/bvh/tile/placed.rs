@@ -1,0 +1,106 @@
+//! A bundle among placed objects: it goes through the tree of placements as through any other, and from each of them on
+//! in the object's coordinates.
+
+use super::found::{DONE, Found};
+use super::walk::{Entry, Goal, Way};
+use crate::ray::Ray;
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
+use crate::trace::bvh::node::{Child, Tree};
+use crate::trace::bvh::placements::{FIXED, PlacementTree};
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::range::Range;
+use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::walk::Stack;
+
+/// The placements, as what a bundle looks for.
+struct Places<'a> {
+    placements: &'a PlacementTree,
+    limit: PerRay,
+}
+
+impl Goal for Places<'_> {
+    #[inline(always)]
+    fn tree(&self) -> &Tree {
+        self.placements.tree()
+    }
+    #[inline(always)]
+    fn limit(&self) -> &PerRay {
+        &self.limit
+    }
+    #[inline(always)]
+    fn prefetch<S: Simd>(&self, leaf: Child) {
+        S::prefetch(S::address(self.placements.places(), leaf.first()));
+    }
+}
+
+/// The way of a bundle from place to place: first to the fixed triangles, then to placements in the order in which it enters
+/// their boxes, as long as these are near enough.
+pub(super) struct Tour<'a> {
+    places: Places<'a>,
+    /// None where there are no placements.
+    way: Option<Way<'a>>,
+    stack: &'a mut [Entry],
+    len: usize,
+    visits_fixed: bool,
+}
+
+impl<'a> Tour<'a> {
+    /// None where the bundle is too steep for one of the trees.
+    #[inline(always)]
+    pub fn new(bvh: &'a Bvh, bundle: &'a Bundle, groups: usize, stack: &'a mut [Entry]) -> Option<Self> {
+        let (fixed, placements) = (bvh.fixed.triangles.tree(), &bvh.placements);
+        let visits_fixed = !fixed.is_empty();
+        if visits_fixed && bundle.slab(fixed.reach()).is_none() {
+            return None;
+        }
+        let way = if placements.has_triangles() {
+            Some(Way { bundle, slab: bundle.slab(placements.reach())?, groups, most: 0.0 })
+        } else {
+            None
+        };
+        stack[0] = Entry::root(0);
+        Some(Self { places: Places { placements, limit: PerRay::ZERO }, way, stack, len: 1, visits_fixed })
+    }
+
+    /// The next place, and the first group with a ray that goes there.
+    #[inline(always)]
+    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u8)> {
+        if std::mem::take(&mut self.visits_fixed) {
+            return Some((FIXED, 0));
+        }
+        let way = self.way.as_mut()?;
+        way.bundle.limit_of::<S>(range, &mut self.places.limit);
+        way.measure::<S>(&self.places.limit);
+        let leaf = way.next_leaf::<S>(&self.places, self.stack, &mut self.len)?;
+        Some((leaf.child.first(), leaf.first))
+    }
+}
+
+/// Traces the first `count` rays through one placed object each by itself, where they are no bundle.
+#[inline(always)]
+pub(super) fn one_by_one<S: Simd, Q: Query>(
+    bvh: &Bvh,
+    place: u32,
+    rays: &[Ray; RAYS],
+    count: usize,
+    stack: &mut Stack,
+    range: &mut Range,
+    found: &mut Found,
+) {
+    let place = bvh.placements.at(place);
+    let level = &bvh.objects[place.placement.object as usize];
+    for (i, ray) in rays.iter().enumerate().take(count) {
+        if range.limit.0[i] < 0.0 {
+            continue;
+        }
+        found.compute(bvh, rays, i);
+        let nearest = &mut found.nearest[i];
+        level.trace_triangles::<S, Q>(ray, place, stack, nearest);
+        match nearest.hit() {
+            Some(_) if Q::ANY => range.set(i, DONE, DONE),
+            Some(hit) => range.set(i, hit.t.next_down(), nearest.limit()),
+            None => {}
+        }
+    }
+}

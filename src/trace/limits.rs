@@ -1,0 +1,42 @@
+//! How large a scene may be: told before any tree is built.
+
+use super::Part;
+use crate::error::{Error, Result};
+
+/// Primitives that may stand in one system of coordinates, that of the world or of an object: what a leaf of the native tracer's
+/// trees can name.
+pub(crate) const MOST_PRIMITIVES: u64 = (1 << 29) - 1;
+
+/// Whether `what`, which has these parts, can be traced.
+///
+/// # Errors
+/// [`Error::Backend`] for more than [`MOST_PRIMITIVES`], with the number.
+pub(super) fn check(parts: &[Part], what: &str) -> Result<()> {
+    check_count(parts.iter().map(|part| part.primitives.len() as u64).sum(), what)
+}
+
+fn check_count(count: u64, what: &str) -> Result<()> {
+    if count <= MOST_PRIMITIVES {
+        return Ok(());
+    }
+    let remedy = "simplify it, or store what repeats once and place it as instances";
+    let message = format!("{what} has {count} primitives, more than {MOST_PRIMITIVES}; {remedy}");
+    Err(Error::Backend { backend: "scene", message })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn too_many_primitives_are_an_error_with_their_number() {
+        assert!(check_count(MOST_PRIMITIVES, "the scene").is_ok());
+        let error = check_count(600_000_000, "the scene").expect_err("too many");
+        assert_eq!(error.exit_code(), 3);
+        let message = error.to_string();
+        assert!(
+            message.contains("600000000") && message.contains("536870911") && message.contains("simplify"),
+            "{message}"
+        );
+    }
+}
