@@ -33,33 +33,40 @@ enum Branch {
 }
 
 /// A cell with everything that is in it.
-struct Part<'a> {
-    boxes: &'a [Aabb],
+struct Part {
     bounds: Aabb,
-    items: Vec<u32>,
+    items: Vec<Entry>,
     /// How many more planes may cut it.
     depth: u32,
     /// How many more references there may be in it.
     room: usize,
 }
 
+/// An item, and its box as far as that is in the cell. Copied from cell to cell: numbers alone would take a seventh of the memory, and boxes
+/// be read in random order, which takes longer than all else.
+#[derive(Clone, Copy)]
+struct Entry {
+    bounds: Aabb,
+    item: u32,
+}
+
 /// The tree over all items, whose boxes are within `bounds`.
 pub(super) fn tree(input: &Input<'_>, bounds: Aabb) -> Tree {
-    let items = input.all();
+    let items: Vec<Entry> = input.boxes.iter().zip(0..).map(|(&bounds, item)| Entry { bounds, item }).collect();
     let room = MOST_REFERENCES * items.len();
     // As deep as Havran 2000 found to pay, plus some for uneven scenes.
     let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
-    let whole = Part { boxes: input.boxes, bounds, items, depth: depth.min(STACK as u32), room };
+    let whole = Part { bounds, items, depth: depth.min(STACK as u32), room };
     let mut tree = Tree::default();
     tree.place(whole.build());
     tree
 }
 
 impl Tree {
-    fn add_leaf(&mut self, items: &[u32]) {
+    fn add_leaf(&mut self, items: &[Entry]) {
         let first = f32::from_bits(self.items.len() as u32);
         self.nodes.push(Node { plane: first, link: (items.len() as u32) << 2 | LEAF });
-        self.items.extend(items);
+        self.items.extend(items.iter().map(|entry| entry.item));
     }
 
     /// Adds a node and, by two calls of `add`, its children.
@@ -88,7 +95,7 @@ impl Tree {
     }
 }
 
-impl<'a> Part<'a> {
+impl Part {
     fn build(self) -> Branch {
         if self.items.len() >= MANY {
             return match self.divide() {
@@ -130,31 +137,29 @@ impl<'a> Part<'a> {
     /// The parts below and above a plane, what lies within it above; or the whole, where there is no room for both.
     fn cut(self, Split { axis, plane, counts, .. }: Split) -> Result<[Self; 2], Self> {
         let [mut below, mut above] = counts.map(Vec::with_capacity);
-        for &item in &self.items {
-            let Aabb { min, max } = self.boxes[item as usize];
+        for &entry in &self.items {
+            let Aabb { min, max } = entry.bounds;
             let is_below = min[axis] < plane;
             if is_below {
-                below.push(item);
+                let mut part = entry;
+                part.bounds.max[axis] = max[axis].min(plane);
+                below.push(part);
             }
             if !is_below || max[axis] > plane {
-                above.push(item);
+                let mut part = entry;
+                part.bounds.min[axis] = min[axis].max(plane);
+                above.push(part);
             }
         }
         let references = below.len() + above.len();
         let Some(left) = (self.items.len() + self.room).checked_sub(references) else { return Err(self) };
         let (mut lower, mut upper) = (self.bounds, self.bounds);
         (lower.max[axis], upper.min[axis]) = (plane, plane);
-        let part = |bounds, items: Vec<u32>| {
+        let part = |bounds, items: Vec<Entry>| {
             let room = share(left, items.len(), references);
-            Part { boxes: self.boxes, bounds, items, depth: self.depth - 1, room }
+            Part { bounds, items, depth: self.depth - 1, room }
         };
         Ok([part(lower, below), part(upper, above)])
-    }
-
-    /// The sides of an item's box, as far as it is in the cell.
-    fn extent(&self, item: u32) -> [[f32; 3]; 2] {
-        let Aabb { min, max } = self.boxes[item as usize];
-        [min.max(self.bounds.min).to_array(), max.min(self.bounds.max).to_array()]
     }
 
     fn best_split(&self) -> Option<Split> {
@@ -165,10 +170,9 @@ impl<'a> Part<'a> {
     /// The best on each axis among the sides of all boxes.
     fn sweep(&self) -> [Option<Split>; 3] {
         let (mut begins, mut ends) = ([[0.0; FEW]; 3], [[0.0; FEW]; 3]);
-        for (i, &item) in self.items.iter().enumerate() {
-            let [low, high] = self.extent(item);
+        for (i, Entry { bounds, .. }) in self.items.iter().enumerate() {
             for axis in 0..3 {
-                (begins[axis][i], ends[axis][i]) = (low[axis], high[axis]);
+                (begins[axis][i], ends[axis][i]) = (bounds.min[axis], bounds.max[axis]);
             }
         }
         let count = self.items.len();
@@ -200,11 +204,10 @@ impl<'a> Part<'a> {
         let scale: [f32; 3] = std::array::from_fn(|axis| BINS as f32 / (end[axis] - start[axis]));
         let bin = |x: f32, axis: usize| (((x - start[axis]) * scale[axis]) as usize).min(BINS - 1);
         let (mut begins, mut ends) = ([[0; BINS]; 3], [[0; BINS]; 3]);
-        for &item in &self.items {
-            let [low, high] = self.extent(item);
+        for Entry { bounds, .. } in &self.items {
             for axis in 0..3 {
-                begins[axis][bin(low[axis], axis)] += 1;
-                ends[axis][bin(high[axis], axis)] += 1;
+                begins[axis][bin(bounds.min[axis], axis)] += 1;
+                ends[axis][bin(bounds.max[axis], axis)] += 1;
             }
         }
         std::array::from_fn(|axis| {
