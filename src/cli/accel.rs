@@ -74,10 +74,10 @@ impl AccelArg {
 }
 
 impl AccelOptions {
-    /// What is said here, of an accelerator that is named elsewhere.
-    fn search(&self, accel: Option<Accel>) -> Search {
+    /// What is said here.
+    fn search(&self) -> Search {
         let Self { grid, triangle_method, sphere_method } = *self;
-        Search { accel, grid, triangle_method, sphere_method }
+        Search { accel: None, grid, triangle_method, sphere_method }
     }
 
     /// For these accelerators; what is not said here, `request` may say.
@@ -88,7 +88,7 @@ impl AccelOptions {
         if self.grid.is_some() && !accels.contains(&Accel::Grid) {
             return Err(Error::Usage("--grid is the resolution of --accel grid; give both or neither".to_owned()));
         }
-        let said = self.search(None);
+        let said = self.search();
         let has_choice = accels.iter().any(|accel| accel.has_methods());
         if said.asks_for_methods() && !has_choice {
             let problem =
@@ -144,8 +144,8 @@ impl AccelArgs {
         let flag = self.accel.map(AccelArg::accel);
         if backend == BackendArg::Embree && flag.is_none() {
             // What a scene asks of the native engine does not concern Embree, but for what it would not see.
-            let search = request;
             self.options.choose(&[Accel::Bvh], Search::default())?;
+            let search = self.options.search().or(request);
             if search.asks_for_methods() {
                 return Err(Error::Usage(unmet(&search, "Embree has its own", "--backend native")));
             }

@@ -174,6 +174,7 @@ fn scenes_choose_their_accelerator_and_flags_win() {
         assert!(render("accel = \"octree\"", &["--backend", "embree"]).1.contains("embree"));
         let (code, said) = render(methods, &["--backend", "embree"]);
         assert!(code == Some(2) && said.contains("--backend native"), "{said}");
+        assert_eq!(render(methods, &["--backend", "embree", "--sphere-method", "exact"]).0, Some(0));
         // Embree beside the scene's accelerator, and beside the flag's.
         let (code, said) = render("accel = \"octree\"", &["--backend", "both"]);
         assert!(code == Some(0) && said.contains("native (octree)") && said.contains("pixels of native"), "{said}");
