@@ -13,7 +13,7 @@ use twincast::math::Vec3;
 use twincast::scene::{Geometry, Material, Mesh, terrain};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::{Bvh, Options, Preset};
-use twincast::{Batch, Ray, Scene, Tracer, Width, World};
+use twincast::{Batch, Ray, Scene, Shape, Sphere, Tracer, Width, World};
 
 fn world(mesh: Mesh) -> World {
     World::new(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()])).expect("a plain mesh")
@@ -27,6 +27,25 @@ fn triangles(c: &mut Criterion) {
     let mut group = c.benchmark_group("triangle");
     group.throughput(Throughput::Elements(rays.len() as u64 * world.primitive_count()));
     group.bench_function("exact", |b| b.iter(|| brute.closest_batch(black_box(&rays), &mut hits, Batch::default())));
+    group.finish();
+}
+
+/// Spheres that overlap, so that a ray meets several of them before it knows the nearest.
+fn shapes(c: &mut Criterion) {
+    let ball = |i: u16| {
+        let place = |step: f32| (f32::from(i) * step).fract();
+        Shape::Sphere(Sphere { centre: Vec3::new(place(0.754_877_6), place(0.569_840_3), place(0.3)), radius: 0.06 })
+    };
+    let geometry = Geometry::Shapes { shapes: (0..2000).map(ball).collect(), material: 0 };
+    let world = World::new(&Scene::from_geometries(vec![geometry], vec![Material::default()])).expect("plain spheres");
+    let (bvh, rays) = (Bvh::build(&world), across(64));
+    let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+    let mut group = c.benchmark_group("spheres");
+    group.throughput(Throughput::Elements(rays.len() as u64));
+    group.bench_function("closest", |b| b.iter(|| bvh.closest_batch(black_box(&rays), &mut hits, Batch::default())));
+    group.bench_function("occluded", |b| {
+        b.iter(|| bvh.occluded_batch(black_box(&rays), &mut occluded, Batch::default()));
+    });
     group.finish();
 }
 
@@ -97,5 +116,5 @@ fn builds(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(native, triangles, boxes, rays, builds);
+criterion_group!(native, triangles, shapes, boxes, rays, builds);
 criterion_main!(native);

@@ -17,7 +17,7 @@ pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
 }
 
 #[track_caller]
-fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
+pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
     let every = Preset::ALL.into_iter().flat_map(|preset| Isa::ALL.map(|isa| (preset, isa)));
     for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {

@@ -7,15 +7,15 @@ use super::cache::CacheArgs;
 use super::common::by_name;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
-use crate::math::UVec3;
+use crate::scene::{Accel, Resolution, Search};
 use crate::shape::{SphereMethod, TriangleMethod};
-use crate::trace::accel::{Accel, Methods, Options, Resolution};
+use crate::trace::accel::{Methods, Options};
 
 #[derive(Debug, Args)]
 pub(super) struct AccelArgs {
-    /// How the native engine searches the scene; never changes a picture
-    #[arg(long, value_enum, default_value_t)]
-    pub(super) accel: AccelArg,
+    /// How the native engine searches the scene (default: as the scene asks, else bvh); never changes a picture
+    #[arg(long, value_enum)]
+    accel: Option<AccelArg>,
 
     #[command(flatten)]
     pub(super) options: AccelOptions,
@@ -38,10 +38,9 @@ pub(super) struct AccelOptions {
     sphere_method: Option<SphereMethod>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum AccelArg {
     /// The eight-wide BVH
-    #[default]
     Bvh,
     /// Every primitive for every ray
     Brute,
@@ -75,46 +74,95 @@ impl AccelArg {
 }
 
 impl AccelOptions {
-    /// For these accelerators.
+    /// What is said here.
+    fn search(&self) -> Search {
+        let Self { grid, triangle_method, sphere_method } = *self;
+        Search { accel: None, grid, triangle_method, sphere_method }
+    }
+
+    /// For these accelerators; what is not said here, `request` may say.
     ///
     /// # Errors
     /// [`Error::Usage`] for a resolution without a grid, and for methods without an accelerator that has a choice.
-    pub(super) fn choose(&self, accels: &[Accel]) -> Result<Options> {
+    pub(super) fn choose(&self, accels: &[Accel], request: Search) -> Result<Options> {
         if self.grid.is_some() && !accels.contains(&Accel::Grid) {
             return Err(Error::Usage("--grid is the resolution of --accel grid; give both or neither".to_owned()));
         }
-        let has_choice = |accel: &Accel| !matches!(accel, Accel::Bvh | Accel::Brute);
-        if (self.triangle_method.is_some() || self.sphere_method.is_some()) && !accels.iter().any(has_choice) {
+        let said = self.search();
+        let has_choice = accels.iter().any(|accel| accel.has_methods());
+        if said.asks_for_methods() && !has_choice {
             let problem =
                 "are for the classic accelerators: add --accel binary-bvh or another; bvh and brute are exact";
             return Err(Error::Usage(format!("--triangle-method and --sphere-method {problem}")));
         }
-        let methods = Methods {
-            triangle: self.triangle_method.unwrap_or_default(),
-            sphere: self.sphere_method.unwrap_or_default(),
-        };
-        Ok(Options { grid: self.grid, methods, ..Options::default() })
+        let search = said.or(request);
+        if search.asks_for_methods() && !has_choice {
+            return Err(Error::Usage(unmet(&search, "bvh and brute are exact", "another --accel")));
+        }
+        Ok(options(&search))
     }
 }
 
+/// What the scene asks for and is not to be had.
+fn unmet(search: &Search, why: &str, instead: &str) -> String {
+    let triangle = search.triangle_method.map(|method| format!("triangle_method = {:?}", method.name()));
+    let sphere = search.sphere_method.map(|method| format!("sphere_method = {:?}", method.name()));
+    let asked: Vec<_> = [triangle, sphere].into_iter().flatten().collect();
+    let asked = asked.join(" and ");
+    format!("the scene asks for {asked}, and {why}; write {instead}, or --triangle-method exact --sphere-method exact")
+}
+
+fn options(search: &Search) -> Options {
+    let Search { grid, triangle_method, sphere_method, .. } = *search;
+    let methods = Methods { triangle: triangle_method.unwrap_or_default(), sphere: sphere_method.unwrap_or_default() };
+    Options { grid, methods, ..Options::default() }
+}
+
 impl AccelArgs {
-    /// The accelerator and its options.
+    /// What can be told to be wrong before the scene is read.
+    ///
+    /// # Errors
+    /// Those of [`AccelArgs::choose`], where an accelerator is named.
+    pub(super) fn check(&self, backend: BackendArg, build: Option<&BuildArgs>, cache: &CacheArgs) -> Result<()> {
+        match self.accel {
+            Some(_) => self.choose(Search::default(), backend, build, cache).map(drop),
+            None => Ok(()),
+        }
+    }
+
+    /// The accelerator and its options: the flags', else what the scene asks for.
     ///
     /// # Errors
     /// [`Error::Usage`] where Embree alone renders, and where something is said about a native BVH that is not built.
     pub(super) fn choose(
         &self,
+        request: Search,
         backend: BackendArg,
         build: Option<&BuildArgs>,
         cache: &CacheArgs,
     ) -> Result<(Accel, Options)> {
-        let accel = self.accel.accel();
-        let options = self.options.choose(&[accel])?;
+        let flag = self.accel.map(AccelArg::accel);
+        if backend == BackendArg::Embree && flag.is_none() {
+            // What a scene asks of the native engine does not concern Embree, but for what it would not see.
+            self.options.choose(&[Accel::Bvh], Search::default())?;
+            let search = self.options.search().or(request);
+            if search.asks_for_methods() {
+                return Err(Error::Usage(unmet(&search, "Embree has its own", "--backend native")));
+            }
+            return Ok((Accel::Bvh, Options::default()));
+        }
+        let accel = flag.or(request.accel).unwrap_or_default();
+        let options = self.options.choose(&[accel], Search { accel: Some(accel), ..request })?;
         if accel == Accel::Bvh {
             return Ok((accel, options));
         }
         let name = accel.name();
-        let refuse = |problem: &str| Err(Error::Usage(format!("--accel {name} {problem}; leave one of them out")));
+        let refuse = |problem: &str| {
+            Err(Error::Usage(match flag {
+                Some(_) => format!("--accel {name} {problem}; leave one of them out"),
+                None => format!("the scene's accel = {name:?} {problem}; leave that out, or write --accel bvh"),
+            }))
+        };
         match backend {
             BackendArg::Embree => refuse("searches the scene in place of --backend embree"),
             _ if cache.is_given() => refuse("is not what --cache keeps: that is native BVHs"),
@@ -135,14 +183,7 @@ fn parse_sphere_method(name: &str) -> std::result::Result<SphereMethod, String> 
 }
 
 fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=Resolution::MOST).contains(side));
-    let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(side).collect();
-    match sides.as_deref() {
-        Some(&[n]) => Ok(Resolution::Longest(n)),
-        Some(&[x, y, z]) if u64::from(x) * u64::from(y) * u64::from(z) <= Resolution::MOST_CELLS => {
-            Ok(Resolution::Axes(UVec3::new(x, y, z)))
-        }
-        Some(&[_, _, _]) => Err(format!("expected at most {} cells in all", Resolution::MOST_CELLS)),
-        _ => Err(format!("expected N or XxYxZ, each 1 to {}, as in 64 or 100x20x100", Resolution::MOST)),
-    }
+    let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(|side| side.parse().ok()).collect();
+    let resolution = Resolution::of_sides(&sides.unwrap_or_default());
+    resolution.map_err(|expected| format!("expected N or XxYxZ, as in 64 or 100x20x100: {expected}"))
 }

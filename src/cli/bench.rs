@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::accel::{AccelArg, AccelOptions};
-use super::common::UpAxis;
+use super::common::{UpAxis, parse_bytes};
 use super::engine::BackendArg;
 use super::scaling;
 use crate::error::Result;
@@ -91,6 +91,11 @@ pub(super) struct BenchArgs {
     /// Most triangles of --scaling
     #[arg(long, value_name = "N", default_value_t = 1_000_000, requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
     pub(super) max: u64,
+
+    /// Most memory that --scaling may hold, as in 8G or 500M (powers of 1024): accelerators that would take more are not asked
+    /// for more triangles (default: three quarters of what is free)
+    #[arg(long, value_name = "SIZE", requires = "scaling", value_parser = parse_bytes)]
+    pub(super) max_memory: Option<u64>,
 
     /// Print the figures as one JSON document, and nothing else; of several scenes, a list
     #[arg(long)]
@@ -187,6 +192,7 @@ mod with_embree {
     use crate::cli::{interrupt, outputs, progress, say, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
+    use crate::scene::Search;
     use crate::trace::World;
     use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
@@ -220,7 +226,8 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let options = args.options.choose(&args.accel.iter().map(|accel| accel.accel()).collect::<Vec<_>>())?;
+        let accels: Vec<Accel> = args.accel.iter().map(|accel| accel.accel()).collect();
+        let options = args.options.choose(&accels, Search::default())?;
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();

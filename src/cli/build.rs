@@ -4,8 +4,8 @@ use clap::{Args, ValueEnum};
 
 use super::common::parse_bytes;
 use super::engine::BackendArg;
-use super::report::held_memory;
 use crate::error::{Error, Result};
+use crate::memory::process;
 use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, Lighting, NotEnoughMemory, Plan};
 use crate::trace::bvh::Preset;
 
@@ -77,7 +77,7 @@ impl BuildArgs {
         let request = BuildRequest {
             triangles,
             rays: samples.saturating_mul(1 + shadow_lights),
-            held: held_memory().unwrap_or(0).saturating_add(picture).saturating_add(embree),
+            held: process::held().unwrap_or(0).saturating_add(picture).saturating_add(embree),
             max_memory: self.max_memory,
             wanted: self.build.wanted(),
         };

@@ -13,6 +13,7 @@ use super::common::{SceneArgs, Size};
 use super::engine::BackendArg;
 use super::{interrupt, say, warn};
 use crate::error::{Error, Result};
+use crate::render::Settings;
 use crate::scene::{Camera, Scene};
 
 /// Compare native with Embree on every ray of a picture and on difficult rays
@@ -85,6 +86,14 @@ impl CompareArgs {
         Ok((scene, camera))
     }
 
+    /// Of the picture: rays are sent on as often as the scene asks for.
+    fn settings(&self, scene: &Scene) -> Settings {
+        let Size { width, height } = self.size;
+        let usual = Settings::default();
+        let max_depth = scene.request.max_depth.unwrap_or(usual.max_depth);
+        Settings { width, height, max_depth, seed: self.seed, ..usual }
+    }
+
     /// Says what came of it, as was asked for.
     fn print(&self, report: &(impl Serialize + Display)) -> Result<()> {
         if self.json {
@@ -114,22 +123,23 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::image::Metadata;
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
-    use crate::render::{Control, Renderer, Settings};
+    use crate::render::{Control, Renderer};
     use crate::trace::accel::{Accel, Built};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
     use crate::trace::{Tracer, World};
 
-    let (accel, options) = args.accel.choose(BackendArg::Both, None, &args.cache)?;
+    args.accel.check(BackendArg::Both, None, &args.cache)?;
     let diff = args.diff.as_slice();
     outputs::check(diff, None, [&args.scene.scene])?;
     let cache = args.cache.open(BackendArg::Both)?;
     let cancel = interrupt::install()?;
     let (scene, camera) = args.view()?;
-    let Size { width, height } = args.size;
+    let (accel, options) = args.accel.choose(scene.request.search, BackendArg::Both, None, &args.cache)?;
     let world = World::new(&scene)?;
-    let settings = Settings { width, height, spp: args.spp, seed: args.seed, ..Settings::default() };
+    let settings = Settings { spp: args.spp, ..args.settings(&scene) };
+    let Settings { width, height, .. } = settings;
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
     let native = match accel {
         Accel::Bvh => Built::from(cache::bvh(cache.as_ref(), &world, bvh::Options::default()).0),
@@ -168,16 +178,16 @@ fn compare(args: &CompareArgs) -> Result<()> {
 fn compare_all(args: &CompareArgs) -> Result<()> {
     use super::progress;
     use crate::lab::{Entrant, all};
-    use crate::render::{Control, Renderer, Settings};
+    use crate::render::{Control, Renderer};
     use crate::trace::World;
     use crate::trace::accel::Accel;
 
-    let options = args.accel.options.choose(&Accel::ALL)?;
     let cancel = interrupt::install()?;
     let (scene, camera) = args.view()?;
-    let Size { width, height } = args.size;
+    let options = args.accel.options.choose(&Accel::ALL, scene.request.search)?;
     let world = World::new(&scene)?;
-    let settings = Settings { width, height, spp: 1, seed: args.seed, ..Settings::default() };
+    let settings = Settings { spp: 1, ..args.settings(&scene) };
+    let Settings { width, height, .. } = settings;
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
     let bar = progress::bar(Entrant::all().len() as u64, "comparing", args.json);
     let setup = all::Setup {

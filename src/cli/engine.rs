@@ -10,7 +10,7 @@ use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::render::{Control, Counted, Renderer};
-use crate::trace::accel::{Accel, Options as AccelOptions};
+use crate::trace::accel::{Accel, Built, Options as AccelOptions};
 use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
 use crate::trace::{Tracer, Width, World};
 
@@ -94,11 +94,13 @@ impl Job<'_> {
             BackendArg::Native if self.accel.0 == Accel::Bvh => {
                 Ok(Outcome { passes: vec![self.native()?.1], verdict: None })
             }
-            BackendArg::Native => Ok(Outcome { passes: vec![self.accelerated()?], verdict: None }),
+            BackendArg::Native => Ok(Outcome { passes: vec![self.accelerated()?.1], verdict: None }),
             #[cfg(feature = "embree")]
             BackendArg::Embree => Ok(Outcome { passes: vec![self.embree()?.1], verdict: None }),
             #[cfg(feature = "embree")]
-            BackendArg::Both => self.both(),
+            BackendArg::Both if self.accel.0 == Accel::Bvh => self.both(self.native()?),
+            #[cfg(feature = "embree")]
+            BackendArg::Both => self.both(self.accelerated()?),
             #[cfg(not(feature = "embree"))]
             BackendArg::Embree | BackendArg::Both => unreachable!("check_available refused it"),
         }
@@ -120,12 +122,13 @@ impl Job<'_> {
     }
 
     /// By another accelerator than the native BVH.
-    fn accelerated(&self) -> Result<Pass> {
+    fn accelerated(&self) -> Result<(Built, Pass)> {
         let (accel, options) = self.accel;
         let bar = progress::spinner("building", self.quiet);
         let build = || Ok(accel.build(self.world, options));
         let (built, pass) = self.pass(&bar, build, |_| format!("native ({})", accel.name()), |built| built.bytes)?;
-        Ok(Pass { notes: built.notes, ..pass })
+        let notes = built.notes.clone();
+        Ok((built, Pass { notes, ..pass }))
     }
 
     #[cfg(feature = "embree")]
@@ -138,9 +141,9 @@ impl Job<'_> {
         self.pass(&bar, build, |embree| format!("embree {}", embree.version()), Embree::bytes)
     }
 
+    /// Embree beside a tracer that has rendered, and what the pixels that differ come from.
     #[cfg(feature = "embree")]
-    fn both(&self) -> Result<Outcome> {
-        let (native, native_pass) = self.native()?;
+    fn both(&self, (native, native_pass): (impl Tracer, Pass)) -> Result<Outcome> {
         let (embree, embree_pass) = self.embree()?;
         let report =
             crate::lab::explain_pixels(self.renderer, &native, &embree, &native_pass.image, &embree_pass.image);

@@ -13,13 +13,14 @@ use super::common::{SceneArgs, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
 use super::picture::PictureArgs;
-use super::report::{EngineStats, Stats, peak_memory};
+use super::report::{EngineStats, Stats};
 use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image};
 use crate::io;
 use crate::math::{DVec3, Vec3};
+use crate::memory::process;
 use crate::render::Renderer;
 use crate::scene::{Geometry, Light, Request, Scene};
 use crate::trace::accel::Accel;
@@ -100,12 +101,7 @@ pub(super) struct RenderArgs {
 
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
-    let accel = args.accel.choose(args.backend, Some(&args.build), &args.cache)?;
-    if args.backend == BackendArg::Both && accel.0 != Accel::Bvh {
-        let name = accel.0.name();
-        let problem = "renders by itself; twincast compare --accel holds it against Embree";
-        return Err(Error::Usage(format!("--accel {name} {problem}")));
-    }
+    args.accel.check(args.backend, Some(&args.build), &args.cache)?;
     let cancel = interrupt::install()?;
     if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
@@ -126,6 +122,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
+        let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
         let settings = args.picture.settings(&scene.request, args.backend.best_width());
         let (width, height) = (settings.width, settings.height);
         args.check_reference(reference.as_ref(), width, height)?;
@@ -183,7 +180,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             load_seconds,
             prepare_seconds,
             write_seconds,
-            peak_memory: peak_memory(),
+            peak_memory: process::peak(),
             engines: outcome
                 .passes
                 .iter()

@@ -71,22 +71,6 @@ impl EngineStats {
     }
 }
 
-/// The most memory this process has held, bytes; none where the system does not tell.
-pub(super) fn peak_memory() -> Option<u64> {
-    status("VmHWM:")
-}
-
-/// The memory this process holds now, bytes; none where the system does not tell.
-pub(super) fn held_memory() -> Option<u64> {
-    status("VmRSS:")
-}
-
-fn status(name: &str) -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix(name))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
-}
-
 /// Aligned lines of a name and what there is to say.
 #[derive(Debug, Default)]
 pub(super) struct Summary(String);
@@ -152,13 +136,6 @@ mod tests {
         assert_eq!(counted(1, "mesh", "meshes"), "1 mesh");
         assert_eq!([9_999, 123_456, 12_345_678, 12_345_678_901].map(size), ["9999 B", "123 kB", "12 MB", "12.3 GB"]);
         assert_eq!([0.0123, 5.678, 125.0].map(time), ["12.3 ms", "5.68 s", "2 min 05 s"]);
-    }
-
-    #[test]
-    fn this_process_has_held_memory() {
-        if cfg!(target_os = "linux") {
-            assert!(peak_memory().zip(held_memory()).is_some_and(|(peak, held)| held > 100_000 && peak > 100_000));
-        }
     }
 
     #[test]

@@ -4,13 +4,15 @@ use super::bench::BenchArgs;
 use super::{interrupt, outputs, progress, say};
 use crate::error::{Error, Result};
 use crate::lab::bench::{Scaling, processor, scaling_chart};
+use crate::memory::process;
 
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let cancel = interrupt::install()?;
     outputs::check(&[], &args.chart, [])?;
     let bar = progress::spinner("measuring", args.json);
     let on_step = |what: &str| bar.set_message(what.to_owned());
-    let scaling = Scaling { max: args.max, cancel: Some(cancel), on_step: Some(&on_step) };
+    let max_memory = args.max_memory.or_else(|| process::available().map(|bytes| bytes / 4 * 3));
+    let scaling = Scaling { max: args.max, max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     let report = pool.install(|| scaling.run());

@@ -13,15 +13,15 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::Placeless;
 use super::parts::Parts;
 use super::statement::{Statement, statements};
 use super::suggest::suggestion;
 use super::text::{name, quoted};
-use super::{Placeless, light_or_darkness};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Geometry, Group, Instance, Light, Material, Scene, Specular};
+use crate::scene::{Attenuation, Camera, Geometry, Group, Instance, Light, Material, Scene, Specular, Unlit};
 use crate::shape::{Shape, Sphere};
 
 /// Every statement as it should look; the first word is the keyword.
@@ -246,7 +246,7 @@ impl Reader {
         // The file's ambient colours stand for the surface and the light at once.
         scene.ambient = Vec3::ONE;
         scene.background = Some(Vec3::ZERO);
-        light_or_darkness(&mut scene.lights);
+        scene.unlit = Unlit::Darkness;
         scene.geometries = self.parts.into_geometries();
         let identity = DAffine3::IDENTITY;
         if !scene.geometries.is_empty() {

@@ -31,9 +31,9 @@ pub use self::save::{SAVE_SUFFIXES, save};
 
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Geometry, Light, Mesh, Scene};
+use crate::scene::{Geometry, Mesh, Scene};
 
 /// How a file is understood.
 #[derive(Clone, Copy, Debug, Default)]
@@ -206,15 +206,6 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
         Geometry::Mesh(mesh) => Some(mesh),
         Geometry::Shapes { .. } => None,
     })
-}
-
-/// Of formats that describe all light: where a file has no lights there is darkness, a light of no colour. With none at
-/// all the renderer would add a headlight, which is for formats that know shapes alone.
-fn light_or_darkness(lights: &mut Vec<Light>) {
-    if lights.is_empty() {
-        let (position, color, attenuation) = (DVec3::ZERO, Vec3::ZERO, Attenuation::NONE);
-        lights.push(Light::Point { position, color, attenuation, range: f64::INFINITY, radius: 0.0 });
-    }
 }
 
 /// What the system says about a file, as a message.

@@ -17,7 +17,7 @@
 //!   its error makes one of the moved origin, o', and direction, d': |o'| . |d x (b - a)| and |d'| . |a x b| in an edge,
 //!   |n| . |o'| and t |n| . |d'| in the numerator of t.
 //! - **Shapes** are intersected in f64, or exactly, by every engine; only the ray that they are given, which is f32, is
-//!   rounded (`rounding/shapes.rs`).
+//!   rounded, and the boxes around them are met in f32 (`rounding/shapes.rs`).
 //!
 //! The counts are rounded up to [`Precision::operations`]. Measuring the error instead, by evaluating each engine's
 //! formula again, would need the engine's own formula, and Embree has one for each instruction set.
@@ -116,7 +116,12 @@ pub fn outcome(ray: &Ray, primitive: &Primitive, precision: Precision) -> Outcom
     match primitive.body {
         Body::Triangle(corners) if !corners.into_iter().all(is_traceable) => Outcome::MISS,
         Body::Triangle(corners) => triangle(ray, corners, primitive.to_world.as_ref(), &local, precision),
-        Body::Shape(shape) => shapes::outcome(shape, &local.rounded(primitive.to_world.is_some())),
+        Body::Shape(shape) => {
+            // Embree's boxes are f32, whatever is in them.
+            let may_pass = precision == Precision::Single && shapes::may_pass_box(shape, &local);
+            let outcome = shapes::outcome(shape, &local.rounded(primitive.to_world.is_some()));
+            Outcome { may_pass: outcome.may_pass || may_pass, ..outcome }
+        }
     }
 }
 

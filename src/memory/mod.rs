@@ -8,6 +8,7 @@
 
 mod array;
 mod mapped;
+pub(crate) mod process;
 
 pub(crate) use array::Array;
 pub(crate) use mapped::Mapped;

@@ -12,7 +12,7 @@ use std::fmt;
 pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
-use crate::scene::{Geometry, Light, Material, Scene};
+use crate::scene::{Geometry, Light, Material, Scene, Unlit};
 use crate::shade::Attributes;
 use crate::trace::World;
 
@@ -30,7 +30,7 @@ pub enum Levels {
 pub enum Lighting {
     /// No surface reflects anything: no light is looked at.
     None,
-    /// The scene has no light, so that the viewer carries one; it needs no shadow rays.
+    /// The scene has no light and is not meant to be dark, so that the viewer carries one; it needs no shadow rays.
     Headlight,
     /// The scene's lights by index, without those that are black; each casts shadows.
     Lights(Vec<usize>),
@@ -68,10 +68,10 @@ impl Plan {
         let materials: Vec<_> = used.iter().map(|&m| scene.materials.get(m as usize).unwrap_or(&default)).collect();
 
         let reflects = materials.iter().any(|m| m.diffuse != Vec3::ZERO || m.specular != Vec3::ZERO);
-        let lighting = match (reflects, scene.lights.is_empty()) {
-            (false, _) => Lighting::None,
-            (true, true) => Lighting::Headlight,
-            (true, false) => {
+        let lighting = match scene.unlit {
+            _ if !reflects => Lighting::None,
+            Unlit::Headlight if scene.lights.is_empty() => Lighting::Headlight,
+            Unlit::Headlight | Unlit::Darkness => {
                 Lighting::Lights((0..scene.lights.len()).filter(|&i| gives_light(&scene.lights[i])).collect())
             }
         };
@@ -132,6 +132,7 @@ impl fmt::Display for Plan {
         };
         let lights = match &self.lighting {
             Lighting::None => "no light".to_owned(),
+            Lighting::Lights(lights) if lights.is_empty() => "no light".to_owned(),
             Lighting::Headlight => "a headlight without shadows".to_owned(),
             Lighting::Lights(lights) if lights.len() == 1 => "1 light with hard shadows".to_owned(),
             Lighting::Lights(lights) => format!("{} lights with hard shadows", lights.len()),
@@ -180,6 +181,13 @@ mod tests {
         assert_eq!((plan.lighting.clone(), plan.shadows()), (Lighting::Headlight, false));
         assert_eq!(plan.attributes, Attributes { normals: true, uvs: false, colors: false });
         assert_eq!((plan.levels, plan.primitives, plan.background), (Levels::One, 1, None));
+    }
+
+    #[test]
+    fn a_scene_that_is_meant_to_be_dark_has_no_headlight() {
+        let dark = Scene { unlit: Unlit::Darkness, ..scene() };
+        assert_eq!(plan(&dark).lighting, Lighting::Lights(Vec::new()));
+        assert!(!plan(&dark).shadows() && plan(&dark).to_string().contains("no light"));
     }
 
     #[test]

@@ -77,6 +77,16 @@ pub enum Light {
     },
 }
 
+/// What a scene without lights is lit by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unlit {
+    /// A light that the viewer carries: for formats that know shapes alone.
+    #[default]
+    Headlight,
+    /// Nothing: the file describes all light there is.
+    Darkness,
+}
+
 /// The surface of a light.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AreaShape {

@@ -12,11 +12,12 @@ mod procedural;
 mod recipes;
 mod request;
 mod rocks;
+mod search;
 mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use instance::{Group, Instance};
-pub use light::{AreaShape, Attenuation, Light};
+pub use light::{AreaShape, Attenuation, Light, Unlit};
 pub use material::{Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
@@ -24,6 +25,7 @@ pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
 pub use request::Request;
 pub use rocks::rocks;
+pub use search::{Accel, Resolution, Search};
 pub use texture::{Filter, Texture, Wrap};
 
 use crate::math::{DAabb, DAffine3, DMat3, DVec3, Vec3};
@@ -42,8 +44,10 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub textures: Vec<Texture>,
-    /// Light sources; where there are none, the renderer adds a headlight.
+    /// Light sources.
     pub lights: Vec<Light>,
+    /// What the scene is lit by where it has no light sources.
+    pub unlit: Unlit,
     /// Viewpoints; where there are none, the view is framed on the bounds.
     pub cameras: Vec<Camera>,
     /// Light that reaches every point from everywhere, linear RGB.

@@ -1,5 +1,7 @@
 //! What a scene file says about the picture that is to be made of it.
 
+use super::search::Search;
+
 /// Settings of a render that a scene file may carry. They stand where the caller says nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Request {
@@ -13,4 +15,6 @@ pub struct Request {
     pub max_depth: Option<u32>,
     /// Name of the picture's file, as it stands in the scene file.
     pub output: Option<String>,
+    /// How the scene is searched.
+    pub search: Search,
 }

@@ -237,13 +237,12 @@ fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> 
 /// Of the first two intersections the one nearest to `t`.
 fn select_root(shape: &Shape, ray: &Ray, t: f32) -> Option<ShapeHit> {
     let whole = Ray { tmax: f32::INFINITY, ..*ray };
-    let first = shape.intersect(&whole)?;
-    let beyond = Ray { tmin: (first.t as f32).next_up(), ..whole };
-    let distance = |hit: &ShapeHit| (hit.t - f64::from(t)).abs();
-    match shape.intersect(&beyond) {
-        Some(second) if distance(&second) < distance(&first) => Some(second),
-        _ => Some(first),
-    }
+    let mut crossings = shape.crossings(&whole);
+    let first = crossings.next()?;
+    let second = crossings.find(|&second| second as f32 > first as f32);
+    let distance = |crossing: f64| (crossing - f64::from(t)).abs();
+    let nearest = second.filter(|&second| distance(second) < distance(first)).unwrap_or(first);
+    Some(shape.hit_at(ray, nearest))
 }
 
 /// How far along `normal` f32 rounding may move a ray's origin at `position` on its way to the primitive: by the

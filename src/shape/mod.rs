@@ -76,14 +76,8 @@ pub struct ShapeHit {
     pub uv: Vec2,
 }
 
-impl ShapeHit {
-    /// Whether it lies within the ray's range.
-    pub(crate) fn is_within(&self, ray: &Ray) -> bool {
-        is_within(self.t, ray)
-    }
-}
-
-fn is_within(t: f64, ray: &Ray) -> bool {
+/// Whether t, rounded, lies within the ray's range.
+pub(crate) fn is_within(t: f64, ray: &Ray) -> bool {
     let t = t as f32;
     ray.tmin <= t && t <= ray.tmax && t.is_finite()
 }
@@ -198,7 +192,15 @@ impl Shape {
     /// shapes, of which a line that touches crosses twice in one place.
     pub fn intersect_all(&self, ray: &Ray) -> impl Iterator<Item = ShapeHit> {
         let ray = *ray;
-        self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray)).map(move |t| self.hit_at(&ray, t))
+        self.crossings(&ray).map(move |t| self.hit_at(&ray, t))
+    }
+
+    /// The t of [`Shape::intersect_all`] by themselves. Angles cost more than the intersection, so tracers ask for the
+    /// parameters of what is nearest so far, and of nothing else.
+    #[inline]
+    pub(crate) fn crossings(&self, ray: &Ray) -> impl Iterator<Item = f64> + use<> {
+        let ray = *ray;
+        self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray))
     }
 
     /// The hit at a known `t`.

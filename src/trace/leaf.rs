@@ -4,7 +4,7 @@ use super::Part;
 use super::nearest::Nearest;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::{self, Corners};
-use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod};
+use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod, is_within};
 
 /// How primitives are met: exactly, or by a textbook's method where there are several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +29,12 @@ impl Id {
     fn hit(self, t: f64, u: f32, v: f32) -> Hit {
         let Self { instance, geometry, primitive } = self;
         Hit { t: t as f32, u, v, primitive, geometry, instance }
+    }
+
+    /// The order that decides between hits at equal t.
+    #[inline]
+    fn order(self) -> (u32, u32, u32) {
+        (self.instance, self.geometry, self.primitive)
     }
 
     /// A hit of a shape.
@@ -57,8 +63,16 @@ pub(super) fn offer_triangle(nearest: &mut Nearest, ray: &Ray, corners: &impl Co
 /// Offers where `local`, the ray in the shape's coordinates, meets it.
 #[inline]
 pub(super) fn offer_shape(nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
-    if let Some(hit) = shape.intersect(local) {
-        nearest.offer(hit.t, id.of_shape(&hit));
+    if let Some(t) = shape.crossings(local).next() {
+        offer_crossing(nearest, local, shape, t, id);
+    }
+}
+
+/// Offers the hit at a t at which a shape is met; its parameters are computed only if it is taken.
+#[inline]
+pub(super) fn offer_crossing(nearest: &mut Nearest, local: &Ray, shape: &Shape, t: f64, id: Id) {
+    if nearest.takes(t, id.order()) {
+        nearest.offer(t, id.of_shape(&shape.hit_at(local, t)));
     }
 }
 
@@ -78,9 +92,9 @@ impl Methods {
     pub(super) fn offer_shape(self, nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
         match shape {
             Shape::Sphere(sphere) if self.sphere != SphereMethod::Exact => {
-                let roots = self.sphere.roots(local, sphere).into_iter().flatten();
-                if let Some(hit) = roots.map(|t| shape.hit_at(local, t)).find(|hit| hit.is_within(local)) {
-                    nearest.offer(hit.t, id.of_shape(&hit));
+                let mut roots = self.sphere.roots(local, sphere).into_iter().flatten();
+                if let Some(t) = roots.find(|&t| is_within(t, local)) {
+                    offer_crossing(nearest, local, shape, t, id);
                 }
             }
             _ => offer_shape(nearest, local, shape, id),

@@ -39,12 +39,16 @@ impl Nearest {
         self.hit
     }
 
-    /// Takes the hit if it is nearer, or as near with a lower id. `hit.t` is set from `t`.
+    /// Whether a hit at `t` with this [id](Hit::id) is nearer, or as near with a lower id.
+    #[inline]
+    pub fn takes(&self, t: f64, id: (u32, u32, u32)) -> bool {
+        t < self.t || (t == self.t && self.hit.is_some_and(|best| id < best.id())) || self.hit.is_none()
+    }
+
+    /// Takes the hit if it is better. `hit.t` is set from `t`.
     #[inline]
     pub fn offer(&mut self, t: f64, hit: Hit) {
-        let better =
-            t < self.t || (t == self.t && self.hit.is_some_and(|best| hit.id() < best.id())) || self.hit.is_none();
-        if better {
+        if self.takes(t, hit.id()) {
             self.t = t;
             self.hit = Some(Hit { t: t as f32, ..hit });
             self.limit = (t as f32).next_up();

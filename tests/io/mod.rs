@@ -5,6 +5,7 @@ pub mod gltf;
 mod models;
 pub mod nff;
 pub mod obj;
+mod placements;
 pub mod ply;
 mod save;
 pub mod stl;

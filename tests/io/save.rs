@@ -2,7 +2,7 @@
 
 use twincast::io::save;
 use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, Projection, RECIPES, Scene};
+use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, Projection, RECIPES, Scene, Unlit};
 use twincast::{Error, Shape};
 
 use super::Files;
@@ -154,4 +154,20 @@ fn every_shape_comes_back_from_toml() {
         (again.request, again.ambient, &again.cameras[0].name),
         (scene.request, scene.ambient, &scene.cameras[0].name)
     );
+}
+
+/// What a scene without lights is lit by comes back, and is not said where the format has no word for it.
+#[test]
+fn darkness_stays_dark() {
+    let files = Files::one("dark.test", "ambient 0.5 0 0\nsphere 0 0 0 1\n");
+    let dark = files.scene("dark.test");
+    assert_eq!((dark.lights.len(), dark.unlit), (0, Unlit::Darkness));
+    save(&dark, &files.path("dark.toml")).unwrap();
+    let again = files.scene("dark.toml");
+    assert_eq!((again.lights.len(), again.unlit), (0, Unlit::Darkness));
+    let lit_from_the_eye = Scene { unlit: Unlit::Headlight, lights: Vec::new(), ..RECIPES[0].make(1) };
+    save(&lit_from_the_eye, &files.path("b.toml")).unwrap();
+    assert_eq!(files.scene("b.toml").unlit, Unlit::Headlight);
+    let error = save(&lit_from_the_eye, &files.path("b.nff")).unwrap_err().to_string();
+    assert!(error.contains("light from the viewer") && error.contains(".toml"), "{error}");
 }

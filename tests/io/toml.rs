@@ -1,8 +1,10 @@
 //! Twincast's own scene format.
 
-use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{AreaShape, Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
-use twincast::{Shape, World};
+use twincast::math::{DVec2, DVec3, UVec3, Vec3};
+use twincast::scene::{
+    Accel, AreaShape, Distortion, Fov, Geometry, Light, Projection, Resolution, Scene, Search, Specular, ThinLens,
+};
+use twincast::{Shape, SphereMethod, TriangleMethod, World};
 
 use super::{Files, obj, refused, refused_bytes};
 
@@ -87,6 +89,13 @@ fn what_the_file_asks_of_a_render() {
     let request = &scene.request;
     assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
     assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
+    let search = Search {
+        accel: Some(Accel::Grid),
+        grid: Some(Resolution::Axes(UVec3::new(20, 10, 20))),
+        triangle_method: Some(TriangleMethod::Woop),
+        sphere_method: Some(SphereMethod::Accurate),
+    };
+    assert_eq!(request.search, search);
     assert_eq!((scene.background, scene.ambient), (Some(Vec3::new(0.1, 0.2, 0.4)), Vec3::splat(0.1)));
     let camera = &scene.cameras[0];
     assert_eq!(
@@ -230,6 +239,12 @@ fn faults_are_told_with_line_and_remedy() {
         ("[material.a]\ntexture = \"none.png\"\n", 2, "there is no file"),
         ("[render]\nsize = [0, 1]\n", 2, "whole numbers from 1 to"),
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
+        ("[render]\naccel = \"octre\"\n", 2, "did you mean \"octree\"?"),
+        ("[render]\ngrid = 5\n", 2, "write that, too"),
+        ("[render]\naccel = \"grid\"\ngrid = [1, 2]\n", 3, "one number of cells or three"),
+        ("[render]\naccel = \"grid\"\ngrid = 0\n", 3, "a whole number from 1 to 2048"),
+        ("[render]\ntriangle_method = \"woop\"\n", 2, "write accel = \"binary-bvh\" or another"),
+        ("[render]\naccel = \"bvh\"\nsphere_method = \"geometric\"\n", 3, "bvh and brute are exact"),
         ("[[light]]\ntype = \"spt\"\n", 2, "did you mean \"spot\"?"),
         ("[[light]]\ntype = \"point\"\nposition = [0, 0, 0]\nattenuation = 0\n", 4, "divides by zero"),
         (

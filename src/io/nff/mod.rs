@@ -18,15 +18,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use self::view::View;
+use super::Placeless;
 use super::parts::Parts;
 use super::polygon::triangulate;
 use super::statement::{Statement, statements};
 use super::text::quoted;
-use super::{Placeless, light_or_darkness};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Light, Material, Scene, Specular};
+use crate::scene::{Attenuation, Light, Material, Scene, Specular, Unlit};
 use crate::shape::{Cone, Cylinder, Polygon, Shape, Sphere};
 
 /// What sets the material.
@@ -299,7 +299,7 @@ impl Reader {
             Light::Point { position, color, attenuation, range: f64::INFINITY, radius: 0.0 }
         };
         scene.lights = self.lights.into_iter().map(light).collect();
-        light_or_darkness(&mut scene.lights);
+        scene.unlit = Unlit::Darkness;
         scene
     }
 }

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Projection, Scene, Specular};
+use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Projection, Scene, Specular, Unlit};
 use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
@@ -48,6 +48,9 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
         return elsewhere(
             "cameras with a shift, a lens or pixels that are not square, or without perspective".to_owned(),
         );
+    }
+    if scene.lights.is_empty() && scene.unlit == Unlit::Headlight {
+        return elsewhere("light from the viewer, which scenes without lights have elsewhere".to_owned());
     }
     let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, .. } if range.is_infinite());
     if scene.lights.iter().all(is_bare) {

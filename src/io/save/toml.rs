@@ -4,12 +4,12 @@
 use std::io::{self, Write};
 
 use super::Unsayable;
-use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
+use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
-    AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request, Scene,
-    Specular, ThinLens,
+    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request,
+    Resolution, Scene, Specular, ThinLens, Unlit,
 };
-use crate::shape::{Shape, Sphere};
+use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
@@ -100,7 +100,7 @@ fn lists<T>(items: &[T], list: impl Fn(&T) -> String) -> String {
 }
 
 fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
-    let Request { size, spp, seed, max_depth, output } = &scene.request;
+    let Request { size, spp, seed, max_depth, output, search } = &scene.request;
     writeln!(out, "[render]")?;
     if let Some([width, height]) = size {
         writeln!(out, "size = [{width}, {height}]")?;
@@ -111,6 +111,22 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     }
     if let Some(output) = output {
         writeln!(out, "output = {}", quoted(output))?;
+    }
+    let names = [
+        ("accel", search.accel.map(Accel::name)),
+        ("triangle_method", search.triangle_method.map(TriangleMethod::name)),
+        ("sphere_method", search.sphere_method.map(SphereMethod::name)),
+    ];
+    for (key, name) in names.into_iter().filter_map(|(key, name)| Some((key, name?))) {
+        writeln!(out, "{key} = \"{name}\"")?;
+    }
+    match search.grid {
+        Some(Resolution::Longest(cells)) => writeln!(out, "grid = {cells}")?,
+        Some(Resolution::Axes(UVec3 { x, y, z })) => writeln!(out, "grid = [{x}, {y}, {z}]")?,
+        None => {}
+    }
+    if scene.unlit == Unlit::Darkness {
+        writeln!(out, "headlight = false")?;
     }
     if let Some(background) = scene.background {
         writeln!(out, "background = {}", list(background))?;

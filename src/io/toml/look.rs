@@ -3,8 +3,10 @@
 use super::table::{Read, Table, Value};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{
-    AreaShape, Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Specular, ThinLens,
+    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Resolution, Search,
+    Specular, ThinLens,
 };
+use crate::shape::{SphereMethod, TriangleMethod};
 
 /// Longest side of a picture.
 const LONGEST_SIDE: u64 = 65_536;
@@ -53,6 +55,7 @@ impl Render {
             seed: table.optional("seed", |value| value.whole(0..=u64::MAX))?,
             max_depth: table.optional("max_depth", |value| value.whole(0..=u32::MAX.into()))?.map(|depth| depth as u32),
             output: table.optional("output", |value| value.text())?.map(str::to_owned),
+            search: search(&mut table)?,
         };
         render.ambient = table.optional("ambient", |value| value.color())?.unwrap_or_default();
         let background = table.optional("background", |value| value.color())?;
@@ -66,6 +69,39 @@ impl Render {
         table.finish()?;
         Ok(render)
     }
+}
+
+/// The keys of `[render]` that say how the scene is searched.
+fn search(table: &mut Table<'_>) -> Read<Search> {
+    let accel = table.optional("accel", |value| value.choice(&Accel::ALL.map(|accel| (accel.name(), accel))))?;
+    let grid = table.optional("grid", |value| {
+        let side = |value: Value<'_>| value.whole(1..=Resolution::MOST.into()).map(|side| side as u32);
+        let sides =
+            if value.is_list() { value.items()?.map(side).collect() } else { side(value).map(|side| vec![side]) };
+        Resolution::of_sides(&sides?).map_err(|expected| value.fault(format!("\"grid\" wants {expected}")))
+    })?;
+    let fault = |table: &mut Table<'_>, key, remedy: &str| match table.get(key) {
+        Some(value) => value.fault(format!("{key:?} {remedy}")),
+        None => table.fault(remedy),
+    };
+    if grid.is_some() && accel != Some(Accel::Grid) {
+        return Err(fault(table, "grid", "is the resolution of accel = \"grid\"; write that, too, or leave it out"));
+    }
+    let triangles = TriangleMethod::ALL.map(|method| (method.name(), method));
+    let spheres = SphereMethod::ALL.map(|method| (method.name(), method));
+    let search = Search {
+        accel,
+        grid,
+        triangle_method: table.optional("triangle_method", |value| value.choice(&triangles))?,
+        sphere_method: table.optional("sphere_method", |value| value.choice(&spheres))?,
+    };
+    if search.asks_for_methods() && !accel.unwrap_or_default().has_methods() {
+        let key = if search.triangle_method.is_some() { "triangle_method" } else { "sphere_method" };
+        let remedy =
+            "is for the classic accelerators, bvh and brute are exact; write accel = \"binary-bvh\" or another, too";
+        return Err(fault(table, key, remedy));
+    }
+    Ok(search)
 }
 
 /// `[material.NAME]`. A texture is left to the caller.

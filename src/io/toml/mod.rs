@@ -3,29 +3,35 @@
 //!
 //! The document is parsed into a tree that knows its places ([`table`]). The top of the file and each group are bodies:
 //! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
-//! ([`group`]). What is seen of it all, and from where, is in [`look`]. A key that nobody reads is refused.
+//! ([`group`]); where there are very many, they are read in [`pieces`]. What is seen of it all, and from where, is in [`look`]. A key that
+//! nobody reads is refused.
 
 mod group;
 mod include;
 mod look;
+mod pieces;
 mod primitives;
 mod table;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
+use ::toml::Spanned;
 use ::toml::de::DeTable;
+use rayon::prelude::*;
 
 use self::group::{Body, Child, Groups, Place, Target};
 use self::include::{Include, Includes};
 use self::look::{Render, Shading};
+use self::pieces::Cut;
 use self::table::{Fault, Read, Table, Value};
 use super::suggest::suggestion;
-use super::{light_or_darkness, texture};
+use super::texture;
 use crate::error::{Error, Result, Warning};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture};
+use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture, Unlit};
 use crate::shape::Shape;
 
 /// What stops the reading of a file: something in it, or in a file it names.
@@ -47,11 +53,15 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         Error::input(path, format!("line {line}"), message)
     };
     let text = str::from_utf8(file).map_err(|e| fault(e.valid_up_to(), "bytes that are no UTF-8".to_owned()))?;
-    let document = DeTable::parse(text).map_err(|error| {
-        // Its messages may span lines and quote the file.
-        let message: String = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-        fault(error.span().map_or(0, |span| span.start), format!("not TOML: {}", shortened(&message)))
-    })?;
+    let refused = |Fault { at, message }| fault(at, shortened(&message));
+    let cut = Cut::new(text);
+    let mut document = parse(cut.as_ref().map_or(text, |cut| &cut.rest)).map_err(refused)?;
+    let mut pieces = cut.as_ref().map_or(&[][..], |cut| &cut.pieces);
+    if !pieces.is_empty() && document.get_ref().contains_key("instance") {
+        // Said twice, in two ways: for the parser to judge.
+        document = parse(text).map_err(refused)?;
+        pieces = &[];
+    }
     let mut reader = Reader {
         folder: path.parent().unwrap_or(Path::new("")),
         scene: Scene::default(),
@@ -60,15 +70,56 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         plain: None,
         includes: Includes::default(),
     };
-    match reader.read(Table::new(document.get_ref(), 0, "the file")) {
+    let read = || placements(text, pieces).map_err(Stop::Here);
+    match read().and_then(|placed| reader.read(Table::new(document.get_ref(), 0, "the file"), placed)) {
         Ok(()) => {
             let scene = reader.scene;
             file.done(file);
             Ok(scene)
         }
-        Err(Stop::Here(Fault { at, message })) => Err(fault(at, shortened(&message))),
+        Err(Stop::Here(fault)) => Err(refused(fault)),
         Err(Stop::Elsewhere(error)) => Err(error),
     }
+}
+
+/// The tree of a text.
+fn parse(text: &str) -> Read<Spanned<DeTable<'_>>> {
+    DeTable::parse(text).map_err(|error| {
+        // Its messages may span lines and quote the file.
+        let message: String = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+        Fault { at: error.span().map_or(0, |span| span.start), message: format!("not TOML: {message}") }
+    })
+}
+
+/// What stands in pieces of `[[instance]]` tables.
+fn placements(text: &str, pieces: &[Range<usize>]) -> Read<Vec<Child>> {
+    let read = |piece: &Range<usize>| {
+        let tree = parse(&text[piece.clone()])?;
+        let mut table = Table::new(tree.get_ref(), 0, "the file");
+        let placed = instances(&mut table)?;
+        table.finish().map(|()| placed)
+    };
+    let shifted = |piece: &Range<usize>| match read(piece) {
+        Ok(placed) => Ok(placed.into_iter().map(|child| Child { at: child.at + piece.start, ..child }).collect()),
+        Err(fault) => Err(Fault { at: fault.at + piece.start, ..fault }),
+    };
+    let read: Vec<Read<Vec<Child>>> = pieces.par_iter().map(shifted).collect();
+    // Of several faults the first.
+    let placed: Vec<Vec<Child>> = read.into_iter().collect::<Read<_>>()?;
+    Ok(placed.into_iter().flatten().collect())
+}
+
+/// The placements of `[[instance]]`.
+fn instances(table: &mut Table<'_>) -> Read<Vec<Child>> {
+    let read = |mut instance: Table<'_>| {
+        let value = instance.need("group")?;
+        let group = value.text()?;
+        let name = instance.optional("name", Value::text)?.unwrap_or(group).to_owned();
+        let place = Place::read(&mut instance)?;
+        instance.finish()?;
+        Ok(Child { name, place, target: Target::Group(group.to_owned()), at: value.at })
+    };
+    table.tables("instance")?.into_iter().map(read).collect()
 }
 
 /// Names in a file may be of any length; messages may not.
@@ -93,7 +144,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn read(&mut self, mut top: Table<'_>) -> std::result::Result<(), Stop> {
+    /// The whole file, of which `placed` was cut out.
+    fn read(&mut self, mut top: Table<'_>, placed: Vec<Child>) -> std::result::Result<(), Stop> {
         let render = Render::read(top.get("render").map(|value| value.table("[render]".to_owned())).transpose()?)?;
         (self.scene.ambient, self.scene.background) = (render.ambient, render.background);
         self.scene.request = render.request;
@@ -112,7 +164,8 @@ impl Reader<'_> {
             table.finish()?;
             named.insert(name, body);
         }
-        let body = self.body("", &mut top)?;
+        let mut body = self.body("", &mut top)?;
+        body.children.extend(placed);
         top.finish()?;
         Groups { top: body, named }.unroll(&mut self.scene)?;
         if render.shading == Shading::Minray {
@@ -120,7 +173,7 @@ impl Reader<'_> {
             self.scene.lights.extend(lamps);
         }
         if !render.headlight || render.shading == Shading::Minray {
-            light_or_darkness(&mut self.scene.lights);
+            self.scene.unlit = Unlit::Darkness;
         }
         Ok(())
     }
@@ -148,14 +201,7 @@ impl Reader<'_> {
             body.children.push(self.file(&mut file)?);
             file.finish()?;
         }
-        for mut instance in table.tables("instance")? {
-            let value = instance.need("group")?;
-            let group = value.text()?;
-            let name = instance.optional("name", Value::text)?.unwrap_or(group).to_owned();
-            let place = Place::read(&mut instance)?;
-            body.children.push(Child { name, place, target: Target::Group(group.to_owned()), at: value.at });
-            instance.finish()?;
-        }
+        body.children.extend(instances(table)?);
         if !geometries.is_empty() {
             let first = self.scene.geometries.len() as u32;
             self.scene.geometries.extend(geometries);

@@ -3,7 +3,8 @@
 //! Two families of triangles: *scattered* ones of no order, with edges of about the distance to the next, which is what grids are
 //! good at; and a *terrain*, a mesh in which most of space is empty. The same rays for all accelerators, from a sphere around the scene to points in its
 //! bounds; the best of a few passes counts, since whatever else the machine does makes passes slower and never faster. An accelerator
-//! that takes longer than a limit for a step is not asked for more primitives.
+//! that takes longer than a limit for a step is not asked for more primitives, nor is one that would take more memory than there may be, by
+//! what it took for each primitive while it was built before.
 //!
 //! A grid is as good as its resolution: a second series traces one scene with grids from too coarse to too fine.
 
@@ -18,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::lab::Entrant;
 use crate::lab::rays::Random;
 use crate::math::Vec3;
+use crate::memory::process;
 use crate::ray::Ray;
 use crate::scene::{self, Geometry, Material, Mesh, Scene};
 use crate::trace::accel::{Accel, Options, Resolution};
@@ -33,6 +35,10 @@ const PASSES: usize = 5;
 const PASS: Duration = Duration::from_millis(500);
 /// An accelerator that took so long to build, or so long for 2^14 rays, is not asked for more primitives.
 const LONGEST: Duration = Duration::from_secs(10);
+/// Bytes of a scene for each triangle: corners and indices, and their copies while they are made.
+const MESH_BYTES: f64 = 120.0;
+/// By how much more memory is counted with than it was before: numbers of primitives are not all that it depends on.
+const SPARE: f64 = 1.25;
 /// Triangles in the series over resolutions.
 const SWEPT: u64 = 100_000;
 /// Grids of that series, cells along the longest side.
@@ -42,6 +48,8 @@ const RESOLUTIONS: [u32; 9] = [2, 4, 8, 16, 32, 64, 128, 256, 512];
 pub struct Scaling<'a> {
     /// Most primitives.
     pub max: u64,
+    /// Most memory that the process may hold, bytes; None for any.
+    pub max_memory: Option<u64>,
     /// Stops it once set.
     pub cancel: Option<&'a AtomicBool>,
     /// Called before each step, with what it is.
@@ -73,6 +81,9 @@ pub struct Point {
     pub microseconds_a_ray: f64,
     /// Memory for each triangle.
     pub bytes_a_primitive: f64,
+    /// By how much more the process held while it was built, at most; less than was used where freed memory was used again. None
+    /// where the system does not tell.
+    pub bytes_a_primitive_building: Option<f64>,
     /// What there is to say about how it was built.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -152,27 +163,38 @@ impl Scaling<'_> {
     pub fn run(&self) -> Result<ScalingReport> {
         let mut report = ScalingReport::default();
         for family in Family::ALL {
-            let mut entrants = Entrant::all();
-            let mut count = 10;
+            let mut entrants: Vec<_> = Entrant::all().into_iter().map(|entrant| (entrant, 0.0)).collect();
+            let (mut count, mut last) = (10, 0);
             while count <= self.max && !entrants.is_empty() {
+                let name = family.name();
+                if let Some(why) = self.too_much(MESH_BYTES, count) {
+                    report.stopped.push(format!("{name} ends at {last}: {count} triangles {why}"));
+                    break;
+                }
                 let world = world(family.mesh(count))?;
                 let rays = rays(&world);
                 let mut kept = Vec::new();
-                for entrant in entrants {
-                    self.step(&format!("{} {count}: {}", family.name(), entrant.name()))?;
+                for (entrant, bytes) in entrants {
+                    let accel = entrant.name();
+                    if let Some(why) = self.too_much(bytes, count) {
+                        report.stopped.push(format!("{name}: {accel} ends at {last}, building for {count} {why}"));
+                        continue;
+                    }
+                    self.step(&format!("{name} {count}: {accel}"))?;
                     let point = measure(&world, &rays, family, entrant, &Options::default())?;
                     let longest = LONGEST.as_secs_f64();
                     let (build, trace) = (point.build_seconds, point.microseconds_a_ray * 1e-6 * RAYS as f64);
                     if build.max(trace) < longest {
-                        kept.push(entrant);
+                        let most = point.bytes_a_primitive_building.unwrap_or(0.0).max(point.bytes_a_primitive);
+                        kept.push((entrant, most));
                     } else if count < self.max {
-                        let (name, what) = (entrant.name(), if build > trace { "building" } else { "tracing" });
-                        let scene = family.name();
-                        report.stopped.push(format!("{scene}: {name} ends at {count}, {what} takes over {longest} s"));
+                        let what = if build > trace { "building" } else { "tracing" };
+                        report.stopped.push(format!("{name}: {accel} ends at {count}, {what} takes over {longest} s"));
                     }
                     report.points.push(point);
                 }
                 entrants = kept;
+                last = count;
                 // 10, 30, 100, 300 ...
                 count = if count.to_string().starts_with('1') { count * 3 } else { count / 3 * 10 };
             }
@@ -194,6 +216,15 @@ impl Scaling<'_> {
         Ok(())
     }
 
+    /// Where so many bytes for each of `count` primitives, and some to spare, are more than there may be: that, in words.
+    fn too_much(&self, bytes: f64, count: u64) -> Option<String> {
+        let limit = self.max_memory? as f64;
+        let wanted = process::held().unwrap_or(0) as f64 + SPARE * bytes * count as f64;
+        let gigabytes = |bytes: f64| bytes / 1e9;
+        (wanted > limit)
+            .then(|| format!("may take {:.1} GB in all, of {:.1} allowed", gigabytes(wanted), gigabytes(limit)))
+    }
+
     fn step(&self, what: &str) -> Result<()> {
         if let Some(on_step) = self.on_step {
             on_step(what);
@@ -209,8 +240,8 @@ fn world(mesh: Mesh) -> Result<World> {
 
 fn measure(world: &World, rays: &[Ray], family: Family, entrant: Entrant, options: &Options) -> Result<Point> {
     let start = Instant::now();
-    let built = entrant.build(world, options)?;
-    let build_seconds = start.elapsed().as_secs_f64();
+    let (built, growth) = process::growth(|| entrant.build(world, options));
+    let (built, build_seconds) = (built?, start.elapsed().as_secs_f64());
     let best = (0..PASSES).map(|_| pass(&built, rays)).fold(f64::INFINITY, f64::min);
     let primitives = world.primitive_count();
     Ok(Point {
@@ -220,6 +251,7 @@ fn measure(world: &World, rays: &[Ray], family: Family, entrant: Entrant, option
         build_seconds,
         microseconds_a_ray: best * 1e6,
         bytes_a_primitive: built.bytes as f64 / primitives as f64,
+        bytes_a_primitive_building: growth.map(|bytes| bytes as f64 / primitives as f64),
         notes: built.notes,
     })
 }

@@ -181,6 +181,7 @@ mod tests {
             build_seconds: seconds,
             microseconds_a_ray: (primitives * primitives) as f64,
             bytes_a_primitive: 1.0,
+            bytes_a_primitive_building: None,
             notes: Vec::new(),
         };
         let points = vec![point(10, 1.0), point(100, 1.0), point(1000, 1.0)];

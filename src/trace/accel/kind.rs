@@ -9,31 +9,10 @@ use super::octree::Octree;
 use super::{Accelerated, Cell, Index, Options};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
+use crate::scene::Accel;
 use crate::trace::brute::Brute;
 use crate::trace::bvh::Bvh;
 use crate::trace::{Batch, Tracer, World};
-
-/// How a scene is searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Accel {
-    /// The native [`Bvh`], which is what renders.
-    #[default]
-    Bvh,
-    /// Nothing: every primitive for every ray.
-    Brute,
-    /// A flat list of bounding volumes, one a geometry.
-    Groups,
-    /// A binary BVH.
-    Binary,
-    /// A uniform grid, nested where it is crowded.
-    Grid,
-    /// An octree.
-    Octree,
-    /// A kd-tree.
-    Kd,
-    /// A BSP tree of general planes.
-    Bsp,
-}
 
 /// A tracer that may know where points are.
 pub trait Accelerator: Tracer + Send {
@@ -66,24 +45,6 @@ pub struct Built {
 }
 
 impl Accel {
-    /// All of them.
-    pub const ALL: [Self; 8] =
-        [Self::Bvh, Self::Brute, Self::Groups, Self::Binary, Self::Grid, Self::Octree, Self::Kd, Self::Bsp];
-
-    /// As flags and reports have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bvh => "bvh",
-            Self::Brute => "brute",
-            Self::Groups => "groups",
-            Self::Binary => "binary-bvh",
-            Self::Grid => "grid",
-            Self::Octree => "octree",
-            Self::Kd => "kd-tree",
-            Self::Bsp => "bsp",
-        }
-    }
-
     /// Builds it.
     pub fn build(self, world: &World, options: &Options) -> Built {
         match self {

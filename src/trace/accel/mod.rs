@@ -42,9 +42,9 @@ use placed::{Placed, Spread, stray_of_shapes};
 use ray::{IndexRay, limit};
 
 pub use super::leaf::Methods;
+pub use crate::scene::{Accel, Resolution};
 pub use cell::Cell;
-pub use grid::Resolution;
-pub use kind::{Accel, Accelerator, Built};
+pub use kind::{Accelerator, Built};
 
 /// What an accelerator may be told.
 #[derive(Clone, Debug, Default)]

@@ -163,7 +163,8 @@ impl Filter {
             let (height, height_error) = height::<S>([&corners[kx], &corners[ky], &corners[kz]], [ox, oy, oz], blur);
             let (depth, depth_error) = (height.mul(turn), height_error.mul_add(size, splat(f32::MIN_POSITIVE)));
             let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
-            lanes &= !far.less(begin).or(end.less(near)).bits();
+            // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
+            lanes &= !far.less(begin).or(end.less(near)).and(zero.less(least_square)).bits();
         }
         if lanes == 0 {
             return Candidates::NONE;

@@ -85,7 +85,7 @@ impl Level {
                 nearest.limit(),
                 #[inline(always)]
                 |leaf| {
-                    self.shapes.offer_leaf(leaf, local, through, nearest);
+                    self.shapes.offer_leaf::<Q>(leaf, local, through, nearest);
                     Visit::after::<Q>(nearest)
                 },
             );

@@ -5,8 +5,10 @@ use super::build::{self, Record};
 use super::level::Through;
 use super::node::{Child, Tree};
 use super::preset::Options;
+use super::query::{Query, SOMETHING};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
+use crate::trace::leaf::{Id, offer_crossing};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -63,13 +65,16 @@ impl ShapeTree {
 
     /// Offers what `local` (the ray in this level's coordinates) hits in a leaf.
     #[inline]
-    pub fn offer_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer_leaf<Q: Query>(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
-            if let Some(hit) = shape.intersect(local) {
-                let instance = through.map_or(part.instance, |through| through.instance);
-                let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
-                nearest.offer(hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance });
+            let Some(t) = shape.crossings(local).next() else { continue };
+            if Q::ANY {
+                nearest.offer(t, SOMETHING);
+                return;
             }
+            let instance = through.map_or(part.instance, |through| through.instance);
+            let id = Id { instance, geometry: part.geometry, primitive: *primitive };
+            offer_crossing(nearest, local, shape, t, id);
         }
     }
 
@@ -78,10 +83,8 @@ impl ShapeTree {
     pub fn gather_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, hits: &mut Vec<(f64, Hit)>) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
             let instance = through.map_or(part.instance, |through| through.instance);
-            hits.extend(shape.intersect_all(local).map(|hit| {
-                let (t, u, v) = (hit.t as f32, hit.uv.x, hit.uv.y);
-                (hit.t, Hit { t, u, v, primitive: *primitive, geometry: part.geometry, instance })
-            }));
+            let id = Id { instance, geometry: part.geometry, primitive: *primitive };
+            hits.extend(shape.intersect_all(local).map(|hit| (hit.t, id.of_shape(&hit))));
         }
     }
 }

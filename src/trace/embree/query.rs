@@ -10,7 +10,7 @@ use super::single::{SingleRay, SingleRayHit};
 use super::sys;
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
-use crate::shape::{Shape, ShapeHit};
+use crate::shape::Shape;
 
 /// How queries are made: the context of Embree 3. What its inline functions would initialise is written out, for
 /// bindgen passes over those.
@@ -120,6 +120,9 @@ packet_query!(1, rtcIntersect4, rtcOccluded4);
 packet_query!(2, rtcIntersect8, rtcOccluded8);
 packet_query!(4, rtcIntersect16, rtcOccluded16);
 
+/// By how much of a coordinate bounds are made larger: four steps of f32.
+const BOUNDS_PAD: f32 = 4.0 * f32::EPSILON;
+
 /// `RTCBoundsFunction`: the bounds of one shape; empty ones make Embree leave it out.
 ///
 /// # Safety
@@ -131,7 +134,12 @@ pub(super) unsafe extern "C" fn on_bounds(args: *const sys::RTCBoundsFunctionArg
     let (args, bounds) = unsafe { (&*args, &mut *(*args).bounds_o) };
     // SAFETY: the user data is a ShapeList, kept by the scene that Embree is building.
     let list = unsafe { shape_list(args.geometryUserPtr) };
-    let Aabb { min, max } = guard(list, Aabb::EMPTY, || list.shapes[args.primID as usize].bounds());
+    let Aabb { mut min, mut max } = guard(list, Aabb::EMPTY, || list.shapes[args.primID as usize].bounds());
+    if min.cmple(max).all() {
+        // A ray along the very side of a box is outside for Embree, and the side of a box may be a shape's.
+        let pad = (min.abs().max(max.abs()) * BOUNDS_PAD).max(Vec3::splat(f32::MIN_POSITIVE));
+        (min, max) = (min - pad, max + pad);
+    }
     [bounds.lower_x, bounds.lower_y, bounds.lower_z] = min.to_array();
     [bounds.upper_x, bounds.upper_y, bounds.upper_z] = max.to_array();
 }
@@ -157,7 +165,7 @@ pub(super) unsafe extern "C" fn on_intersect(args: *const sys::RTCIntersectFunct
     // SAFETY: Embree always passes a context.
     let instance = unsafe { (*args.context).instID[0] };
     let (rays, hits) = words.split_at_mut(ray_row::COUNT * width);
-    each_hit(list, args.primID, rays, active, |lane, hit, rays| {
+    each_hit(list, args.primID, rays, active, Shape::hit_at, |lane, hit, rays| {
         rays[ray_row::TFAR * width + lane] = (hit.t as f32).to_bits();
         let mut set = |row: usize, bits: u32| hits[row * width + lane] = bits;
         // Nobody asks for the normal; zeros, because Embree's filters and debuggers may look at it.
@@ -186,18 +194,26 @@ pub(super) unsafe extern "C" fn on_occluded(args: *const sys::RTCOccludedFunctio
             std::slice::from_raw_parts_mut(args.valid, width),
         )
     };
-    each_hit(list, args.primID, rays, active, |lane, _, rays| {
-        rays[ray_row::TFAR * width + lane] = f32::NEG_INFINITY.to_bits();
-    });
+    each_hit(
+        list,
+        args.primID,
+        rays,
+        active,
+        |_, _, _| (),
+        |lane, (), rays| {
+            rays[ray_row::TFAR * width + lane] = f32::NEG_INFINITY.to_bits();
+        },
+    );
 }
 
-/// Calls `found` with the lane, the hit and the rays for each active ray that hits the shape.
-fn each_hit(
+/// Calls `found` with the lane, what `hit_at` makes of the shape, the ray and t, and the rays for each active ray that hits the shape.
+fn each_hit<T>(
     list: &ShapeList,
     primitive: u32,
     rays: &mut [u32],
     active: &mut [i32],
-    mut found: impl FnMut(usize, ShapeHit, &mut [u32]),
+    hit_at: impl Fn(&Shape, &Ray, f64) -> T,
+    mut found: impl FnMut(usize, T, &mut [u32]),
 ) {
     let width = active.len();
     for (lane, active) in active.iter_mut().enumerate() {
@@ -214,7 +230,10 @@ fn each_hit(
             // A shape stands still in its own coordinates.
             time: 0.0,
         };
-        let hit = guard(list, None, || Shape::intersect(&list.shapes[primitive as usize], &ray));
+        let hit = guard(list, None, || {
+            let shape = &list.shapes[primitive as usize];
+            shape.crossings(&ray).next().map(|t| hit_at(shape, &ray, t))
+        });
         // Version 4 reads the answer from the mask, version 3 goes on using it as the mask of its own.
         if cfg!(embree4) {
             *active = if hit.is_some() { -1 } else { 0 };

@@ -7,6 +7,7 @@
 
 use super::{Block, Grid, NESTED, SLACK};
 use crate::math::{Aabb, DVec3, UVec3};
+use crate::scene::Resolution;
 use crate::trace::accel::items::bounds_of;
 
 /// Cells for each item, where no resolution is asked for.
@@ -20,22 +21,7 @@ const MOST_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
 const MOST_ENTRIES: usize = 1 << 30;
 
-/// How many cells a grid has. Halved along all axes as often as it takes to have no more than [`Resolution::MOST_CELLS`], and than
-/// a billion references to items.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resolution {
-    /// So many along the longest side; cubes.
-    Longest(u32),
-    /// So many along each axis.
-    Axes(UVec3),
-}
-
 impl Resolution {
-    /// Most cells along an axis.
-    pub const MOST: u32 = 2048;
-    /// Most cells: 1 GB of numbers that say where their items are.
-    pub const MOST_CELLS: u64 = 1 << 28;
-
     fn counts(self, bounds: &Aabb) -> UVec3 {
         let counts = match self {
             Self::Axes(counts) => counts,

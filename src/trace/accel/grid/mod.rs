@@ -14,8 +14,6 @@ use super::ray::IndexRay;
 use super::{Index, Options};
 use crate::math::{DVec3, UNIT_ROUNDOFF_64, UVec3};
 
-pub use build::Resolution;
-
 /// By how much of a cell's width items reach into the neighbours.
 const SLACK: f64 = 1.0 / 128.0;
 /// Marks an entry of a cell that names a nested grid.

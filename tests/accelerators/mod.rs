@@ -1,16 +1,20 @@
-//! Every accelerator gives the hits of brute force, to the bit; and what is said about them: tables, charts, refusals.
+//! Every accelerator gives the hits of brute force, to the bit, and those of exact arithmetic.
 
-use std::process::{Command, Output};
+mod matrix;
+mod methods;
+mod program;
+mod subjects;
+
 use std::time::Duration;
 
+use twincast::lab::Entrant;
 use twincast::lab::all::{Report, Setup};
-use twincast::lab::{Entrant, bench};
 use twincast::math::{DAffine3, DMat3, DVec3, UVec3, Vec3};
 use twincast::render::Control;
 use twincast::scene::{Camera, Geometry, Group, Instance, Material, Mesh, Scene};
-use twincast::trace::accel::{Accel, Methods, Options, Resolution};
+use twincast::trace::accel::{Accel, Options, Resolution};
 use twincast::trace::brute::Brute;
-use twincast::{Batch, Hit, Ray, Renderer, Settings, Shape, Sphere, SphereMethod, Tracer, TriangleMethod, World};
+use twincast::{Batch, Hit, Ray, Renderer, Settings, Tracer, World};
 
 use crate::scenes::{self, Random};
 
@@ -228,177 +232,5 @@ fn trees_that_divide_space_know_where_points_are() {
                 assert!(cell.contains(point.as_dvec3()) && cell.items.len() < 300, "{point} {cell:?}");
             }
         }
-    }
-}
-
-fn twincast(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the program runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn pyramid(folder: &tempfile::TempDir) -> String {
-    let path = folder.path().join("scene.obj");
-    let scene = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 1.5 0\nf 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
-    std::fs::write(&path, scene).expect("a file");
-    path.to_str().expect("UTF-8").to_owned()
-}
-
-#[test]
-fn every_accelerator_renders_the_same_file() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let scene = pyramid(&folder);
-    let render = |name: &str, more: &[&str]| {
-        let path = folder.path().join(name);
-        let args = ["render", &scene, "-o", path.to_str().expect("UTF-8"), "--size", "60x40"];
-        let output = twincast(&[&args[..], more].concat());
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        let picture = twincast::image::read(&path).expect("a picture");
-        (picture, text(&output.stdout))
-    };
-    let (expected, _) = render("bvh.exr", &[]);
-    for accel in Accel::ALL {
-        let name = accel.name();
-        let (picture, summary) = render(&format!("{name}.exr"), &["--accel", name]);
-        assert!(picture == expected, "{name}");
-        assert!(accel == Accel::Bvh || summary.contains(&format!("native ({name})")), "{summary}");
-    }
-    let (picture, summary) = render("grid.exr", &["--accel", "grid", "--grid", "7"]);
-    assert!(picture == expected && summary.contains("a grid of 7 x 5 x 7 cells"), "{summary}");
-}
-
-#[test]
-fn what_does_not_go_together_ends_with_2() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let kept = folder.path().join("kept");
-    let kept = kept.to_str().expect("UTF-8");
-    for (more, words) in [
-        (&["--accel", "kd-tree", "--cache", kept][..], "--cache"),
-        (&["--accel", "grid", "--build", "high"], "--build"),
-        (&["--accel", "grid", "--max-memory", "1G"], "--max-memory"),
-        (&["--grid", "5"], "--accel grid"),
-        (&["--accel", "octree", "--grid", "5"], "--accel grid"),
-        (&["--accel", "grid", "--grid", "0"], "1 to 2048"),
-        (&["--accel", "grid", "--grid", "1x2"], "XxYxZ"),
-        (&["--accel", "quadtree"], "kd-tree"),
-    ] {
-        let output = twincast(&[&["render", "x.glb", "-o", "x.png"][..], more].concat());
-        let message = text(&output.stderr);
-        assert!(output.status.code() == Some(2) && message.contains(words), "{more:?}: {message}");
-    }
-    if cfg!(feature = "embree") {
-        for backend in ["embree", "both"] {
-            let output = twincast(&["render", "x.glb", "-o", "x.png", "--accel", "grid", "--backend", backend]);
-            let message = text(&output.stderr);
-            assert!(output.status.code() == Some(2) && message.contains("--accel grid"), "{message}");
-        }
-    }
-    for args in [
-        &["compare", "x.glb", "--all", "--accel", "grid"][..],
-        &["compare", "x.glb", "--seconds", "3"],
-        &["bench", "--max", "100"],
-        &["bench", "--scaling", "--modes", "fast"],
-        &["bench", "--scaling", "--max", "5"],
-    ] {
-        assert_eq!(twincast(args).status.code(), Some(2), "{args:?}");
-    }
-}
-
-#[test]
-fn compare_all_prints_a_table_or_one_document() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let scene = pyramid(&folder);
-    let args = ["compare", &scene, "--all", "--size", "40x30", "--random", "1000"];
-    let output = twincast(&args);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let table = text(&output.stdout);
-    assert!(Accel::ALL.iter().all(|accel| table.contains(accel.name())), "{table}");
-    let output = twincast(&[&args[..], &["--json"]].concat());
-    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
-    assert_eq!(document["rays"], 40 * 30 + 1000);
-    assert_eq!(document["rows"].as_array().map(Vec::len), Some(Entrant::all().len()));
-    assert_eq!(document["rows"][0]["name"], "brute");
-}
-
-#[cfg(feature = "embree")]
-#[test]
-fn an_accelerator_is_compared_with_embree() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let scene = pyramid(&folder);
-    let output = twincast(&["compare", &scene, "--accel", "octree", "--size", "40x30", "--random", "1000"]);
-    let table = text(&output.stdout);
-    assert!(output.status.success() && table.contains("native_wrong                   0"), "{table}");
-}
-
-#[cfg(feature = "embree")]
-#[test]
-fn accelerators_are_measured_beside_the_engines() {
-    let args =
-        ["bench", "terrain20", "--modes", "default", "--rays", "primary,shadow", "--size", "64", "--repeat", "1"];
-    let output = twincast(&[&args[..], &["--accel", "grid,kd-tree", "--grid", "9"]].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let table = text(&output.stdout);
-    assert!(table.contains("native grid") && table.contains("native kd-tree"), "{table}");
-    let output = twincast(&[&args[..], &["--accel", "octree", "--grid", "9"]].concat());
-    assert_eq!(output.status.code(), Some(2), "a resolution without a grid");
-}
-
-#[test]
-fn scaling_prints_a_table_or_one_document_and_draws() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let chart = folder.path().join("scaling.svg");
-    let args = ["bench", "--scaling", "--max", "100", "--threads", "1"];
-    let output = twincast(&[&args[..], &["--json", "--chart", chart.to_str().expect("UTF-8")]].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
-    let points = document["points"].as_array().expect("points");
-    assert_eq!(points.len(), 2 * 3 * Entrant::all().len(), "families, numbers, accelerators");
-    assert!(points.iter().all(|p| p["microseconds_a_ray"].as_f64().is_some_and(|t| t > 0.0)), "{document}");
-    assert_eq!(document["grids"].as_array().map(Vec::len), Some(10));
-    let drawn = std::fs::read_to_string(&chart).expect("a chart");
-    assert!(drawn.contains("terrain: microseconds a ray") && drawn.contains(">kd-tree<"), "{drawn}");
-    let report = bench::ScalingReport::default();
-    assert!(bench::scaling_chart(&report, &[]).contains("</svg>"), "an empty report is drawn, too");
-}
-
-/// A textbook's method misses rays at the edges that triangles share, and the accelerator shows it; the exact one does not.
-#[test]
-fn methods_can_be_chosen_and_show_what_they_miss() {
-    // A fan of slivers around the origin, in a plane that leans; rays at points of the shared edges.
-    let corner = |i: u32| {
-        let angle = f64::from(i) / 50.0 * std::f64::consts::TAU;
-        Vec3::new(angle.cos() as f32 * 0.7, angle.sin() as f32 * 0.9, (angle.cos() * 0.3 + angle.sin() * 0.1) as f32)
-    };
-    let positions: Vec<_> = (0..50).map(corner).chain([Vec3::new(1e-3, 2e-3, 0.0)]).collect();
-    let triangles = (0..50).map(|i| [i, (i + 1) % 50, 50]).collect();
-    let scene = Scene::from_geometries(vec![Geometry::Mesh(Mesh::new(positions.clone(), triangles))], Vec::new());
-    let world = World::new(&scene).unwrap();
-    let origin = Vec3::new(0.37, -0.21, 5.3);
-    let rays: Vec<_> = (0..50)
-        .flat_map(|i| (1..200).map(move |k| (i, k as f32 / 200.0)))
-        .map(|(i, s)| Ray::new(origin, positions[50].lerp(positions[i], s) - origin))
-        .collect();
-    let misses = |triangle: TriangleMethod| {
-        let options = Options { methods: Methods { triangle, ..Methods::default() }, ..Options::default() };
-        let tracer = Accel::Binary.build(&world, &options);
-        rays.iter().filter(|ray| tracer.closest(ray).is_none()).count()
-    };
-    assert_eq!(misses(TriangleMethod::Exact), 0);
-    assert!(misses(TriangleMethod::MoellerTrumbore) > 0, "it is not watertight");
-}
-
-/// Where nothing cancels, every sphere method sees the same sphere from outside and from inside.
-#[test]
-fn sphere_methods_agree_on_plain_rays() {
-    let sphere = Shape::Sphere(Sphere { centre: Vec3::new(1.0, 2.0, 3.0), radius: 2.0 });
-    let geometry = Geometry::Shapes { shapes: vec![sphere], material: 0 };
-    let world = World::new(&Scene::from_geometries(vec![geometry], Vec::new())).unwrap();
-    for method in SphereMethod::ALL {
-        let options = Options { methods: Methods { sphere: method, ..Methods::default() }, ..Options::default() };
-        let tracer = Accel::Kd.build(&world, &options);
-        let t = |z: f32| tracer.closest(&Ray::new(Vec3::new(1.0, 2.0, z), Vec3::Z)).map(|hit| hit.t);
-        assert_eq!([t(-3.0), t(3.0), t(6.0)], [Some(4.0), Some(2.0), None], "{method:?}");
     }
 }
