@@ -21,7 +21,7 @@ use super::{Placeless, light_or_darkness};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Geometry, Group, Instance, Light, Material, Scene, Specular};
+use crate::scene::{Attenuation, Camera, Geometry, Group, Instance, Integrator, Light, Material, Scene, Specular};
 use crate::shape::{Shape, Sphere};
 
 /// Every statement as it should look; the first word is the keyword.
@@ -246,6 +246,8 @@ impl Reader {
         // The file's ambient colours stand for the surface and the light at once.
         scene.ambient = Vec3::ONE;
         scene.background = Some(Vec3::ZERO);
+        // Of which the format's formula is the first terms.
+        scene.request.integrator = Some(Integrator::Whitted);
         light_or_darkness(&mut scene.lights);
         scene.geometries = self.parts.into_geometries();
         let identity = DAffine3::IDENTITY;

@@ -17,13 +17,15 @@ const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
 
 /// A scene that has most of what there is.
 pub fn text() -> String {
-    let with_files = |example: &&String| !example.contains("wood.png") && !example.contains("[[file]]");
+    let with_files = |example: &&String| {
+        !example.contains("wood.png") && !example.contains("sky.exr") && !example.contains("[[file]]")
+    };
     examples().iter().filter(with_files).map(String::as_str).collect()
 }
 
 /// A folder with the scene and with what the examples refer to.
 fn files(text: &str) -> Files {
-    Files::one("a.toml", text).and("wood.png", obj::picture()).and("mesh.obj", TRIANGLE)
+    Files::one("a.toml", text).and("wood.png", obj::picture()).and("sky.exr", obj::picture()).and("mesh.obj", TRIANGLE)
 }
 
 fn scene(text: &str) -> Scene {
@@ -40,7 +42,7 @@ fn every_example_of_the_documentation_is_a_scene() {
         World::new(&scene).expect("it can be traced");
     }
     // All of them at once.
-    assert_eq!(scene(&examples.concat()).materials.len(), 5);
+    assert_eq!(scene(&examples.concat()).materials.len(), 8);
 }
 
 #[test]
@@ -56,6 +58,7 @@ fn the_documentation_has_every_key() {
         "[[light]]\ntype = \"sphere\"\nposition = [0, 0, 0]\nradius = 1\nradiance = 1",
         "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nhalf_edges = [[1, 0, 0], [0, 1, 0]]\nradiance = 1",
         "[material.a]",
+        "[environment]\nimage = \"sky.exr\"",
         "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1",
         "[[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]",
         "[[disk]]\ncentre = [0, 0, 0]\nnormal = [1, 0, 0]\nradius = 1",

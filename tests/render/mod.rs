@@ -2,8 +2,10 @@
 
 mod camera;
 mod determinism;
+mod glass;
 mod shading;
 mod toy;
+mod transport;
 mod whitted;
 
 use twincast::math::{DVec3, Vec2, Vec3};

@@ -15,6 +15,11 @@ const BLACK: Material = Material {
     reflection: Vec3::ZERO,
     transmission: Vec3::ZERO,
     ior: 1.5,
+    interface: twincast::scene::Interface::Shares,
+    absorption: None,
+    gloss: None,
+    energy_conserving: false,
+    unlit: false,
     emission: Vec3::ZERO,
     diffuse_texture: None,
     model: twincast::scene::Specular::BlinnPhong,
@@ -43,7 +48,7 @@ fn pixel(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec4 {
 }
 
 fn deep(max_depth: u32) -> Settings {
-    Settings { max_depth, ..settings(1, 1, 1) }
+    Settings { max_depth: Some(max_depth), ..settings(1, 1, 1) }
 }
 
 /// Each of two facing mirrors gives off e and reflects r: n mirrors deep it is e (1 + r + ... + r^n).
@@ -135,7 +140,7 @@ fn a_flood_of_rays_is_followed_to_its_end() {
     });
     let scene = scene([planes, mirrors].concat());
     let world = World::new(&scene).unwrap();
-    let settings = Settings { max_depth: 16, ..settings(3, 2, 1) };
+    let settings = Settings { max_depth: Some(16), ..settings(3, 2, 1) };
     let renderer = Renderer::new(&scene, &world, from_above(), settings.clone()).unwrap();
     for engine in engines(&world) {
         let picture = render(&scene, &from_above(), &settings, &engine);

@@ -6,13 +6,14 @@
 use std::collections::HashMap;
 
 use super::Document;
+use super::extension;
 use super::phong::{self, MetallicRoughness};
 use super::schema::{self, MetallicRoughness as Source};
 use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::texture;
 use crate::math::{Vec2, Vec3};
-use crate::scene::{Filter, Material, Scene, Texture, Wrap};
+use crate::scene::{Filter, Interface, Material, Scene, Texture, Wrap};
 
 /// The materials of a document, converted when a primitive first uses them.
 pub(super) struct Materials<'a> {
@@ -23,8 +24,8 @@ pub(super) struct Materials<'a> {
     /// By glTF's texture; None where the file is missing.
     known_textures: HashMap<usize, Option<u32>>,
     textures: Vec<Texture>,
-    /// Mean metalness and roughness by glTF's image; None where the file is missing.
-    known_means: HashMap<usize, Option<(f32, f32)>>,
+    /// Means of textures of numbers by glTF's image; None where the file is missing.
+    known_means: HashMap<usize, Option<Vec3>>,
     transparent: Vec<String>,
     warnings: Vec<Warning>,
 }
@@ -58,7 +59,7 @@ impl<'a> Materials<'a> {
         }
         let material = match (index, source) {
             (Some(index), Some(source)) => self.convert(index, source)?,
-            _ => self.phong(&Source::default(), None, "")?,
+            _ => self.values(&Source::default(), None, "")?.phong(),
         };
         self.list.push(material);
         let new = self.list.len() as u32 - 1;
@@ -89,54 +90,72 @@ impl<'a> Materials<'a> {
         if matches!(source.alpha_mode.as_deref(), Some("BLEND" | "MASK")) {
             self.transparent.push(format!("{:?}", source.name));
         }
-        let strength = source.extensions.get("KHR_materials_emissive_strength");
-        let strength = strength.and_then(|e| e.get("emissiveStrength")).and_then(serde_json::Value::as_f64);
-        let strength = strength.unwrap_or(1.0) as f32;
+        let extensions = extension::read(&source.extensions)
+            .map_err(|message| self.document.error(format!("{pointer}/extensions"), message))?;
         let texture = match &pbr.base_color_texture {
             Some(info) => {
                 self.texture(info.index, &format!("{pointer}/pbrMetallicRoughness/baseColorTexture/index"))?
             }
             None => None,
         };
-        let emission = Vec3::from(source.emissive_factor) * strength;
+        let emission = Vec3::from(source.emissive_factor) * extensions.emissive_strength;
         if !(emission.is_finite() && emission.min_element() >= 0.0) {
             return Err(self.document.error(pointer, "the emissive strength has to be finite and from 0 up"));
         }
-        let phong = self.phong(pbr, texture, &pointer)?;
-        Ok(Material { name: source.name.clone(), emission, diffuse_texture: texture, ..phong })
+        let mut values = self.values(pbr, texture, &pointer)?;
+        values.ior = extensions.ior;
+        values.transmission = extensions.transmission;
+        if let Some(info) = &extensions.transmission_texture {
+            let pointer = format!("{pointer}/extensions/KHR_materials_transmission/transmissionTexture/index");
+            if let Some(means) = self.means(info.index, &pointer)? {
+                values.transmission *= means.x;
+            }
+        }
+        let glass = Material { name: source.name.clone(), emission, diffuse_texture: texture, ..values.phong() };
+        if extensions.unlit {
+            let [r, g, b, _] = pbr.base_color_factor;
+            return Ok(Material { diffuse: Vec3::new(r, g, b), unlit: true, emission: Vec3::ZERO, ..glass });
+        }
+        if values.transmission == 0.0 {
+            return Ok(glass);
+        }
+        let interface = if extensions.is_volume { Interface::Fresnel } else { Interface::Thin };
+        Ok(Material { interface, absorption: extensions.absorption, ..glass })
     }
 
-    /// The material with one value for each texture.
-    fn phong(&mut self, source: &Source, texture: Option<u32>, pointer: &str) -> Result<Material> {
+    /// What the material is with one value for each texture.
+    fn values(&mut self, source: &Source, texture: Option<u32>, pointer: &str) -> Result<MetallicRoughness> {
         let [r, g, b, _] = source.base_color_factor;
         let (metal, roughness) = match &source.metallic_roughness_texture {
             Some(info) => {
                 let pointer = format!("{pointer}/pbrMetallicRoughness/metallicRoughnessTexture/index");
-                self.mean_metal_roughness(info.index, &pointer)?
+                // As without one where it is missing. Metalness is in blue, roughness in green.
+                self.means(info.index, &pointer)?.map_or((1.0, 1.0), |mean| (mean.z, mean.y))
             }
             None => (1.0, 1.0),
         };
-        let values = MetallicRoughness {
+        Ok(MetallicRoughness {
             base: Vec3::new(r, g, b),
             texture: texture.map_or(Vec3::ONE, |t| phong::mean_color(&self.textures[t as usize])),
             metal: source.metallic_factor * metal,
             roughness: source.roughness_factor * roughness,
-        };
-        Ok(values.phong())
+            ior: None,
+            transmission: 0.0,
+        })
     }
 
-    /// Metalness and roughness of a texture; 1 and 1 where it is missing, as without one.
-    fn mean_metal_roughness(&mut self, index: usize, pointer: &str) -> Result<(f32, f32)> {
-        let Some(image) = self.image_of(index, pointer)? else { return Ok((1.0, 1.0)) };
+    /// The mean of a texture of numbers; none where it is missing.
+    fn means(&mut self, index: usize, pointer: &str) -> Result<Option<Vec3>> {
+        let Some(image) = self.image_of(index, pointer)? else { return Ok(None) };
         let means = match self.known_means.get(&image) {
             Some(known) => *known,
             None => {
-                let means = self.image(image)?.map(|picture| phong::mean_metal_roughness(&picture));
+                let means = self.image(image)?.map(|picture| phong::mean_number(&picture));
                 self.known_means.insert(image, means);
                 means
             }
         };
-        Ok(means.unwrap_or((1.0, 1.0)))
+        Ok(means)
     }
 
     fn texture(&mut self, index: usize, pointer: &str) -> Result<Option<u32>> {

@@ -5,9 +5,11 @@
 //! [`primitives`], mesh files ([`include`]) and placements of groups, which are unrolled into one list of instances
 //! ([`group`]). What is seen of it all, and from where, is in [`look`]. A key that nobody reads is refused.
 
+mod environment;
 mod group;
 mod include;
 mod look;
+mod material;
 mod primitives;
 mod table;
 
@@ -103,6 +105,9 @@ impl Reader<'_> {
         for table in top.tables("light")? {
             self.scene.lights.push(look::light(table)?);
         }
+        if let Some(value) = top.get("environment") {
+            self.scene.environment = Some(environment::environment(value, self.folder)?);
+        }
         for (name, table) in top.named_tables("material")? {
             self.material(name, table)?;
         }
@@ -126,7 +131,7 @@ impl Reader<'_> {
     }
 
     fn material(&mut self, name: &str, mut table: Table<'_>) -> std::result::Result<(), Stop> {
-        let mut material = look::material(name, &mut table)?;
+        let mut material = material::material(name, &mut table)?;
         if let Some(value) = table.get("texture") {
             let path = self.folder.join(value.text()?);
             let picture: Option<Texture> = texture::open(&path).map_err(Stop::Elsewhere)?;

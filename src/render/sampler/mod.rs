@@ -62,6 +62,19 @@ impl fmt::Display for Sampling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Dimension(u32);
 
+/// What a path chooses where it meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Choice {
+    /// Which light is asked, and which lobe is followed.
+    Which,
+    /// The point on the light.
+    Light,
+    /// The direction to go on in.
+    Direction,
+    /// Whether it ends.
+    End,
+}
+
 impl Dimension {
     /// The point on the pixel.
     pub(super) const FILM: Self = Self(0);
@@ -71,6 +84,16 @@ impl Dimension {
     /// The point on a light, as asked by the ray of a pixel's tree of rays that has the number `branch`.
     pub(super) const fn light(light: u32, branch: u32) -> Self {
         Self(branch.wrapping_mul(0x9e37_79b9).wrapping_add(2).wrapping_add(light))
+    }
+
+    /// How a glossy surface spreads the ray that has the number `branch`.
+    pub(super) const fn gloss(branch: u32) -> Self {
+        Self(branch.wrapping_mul(0x85eb_ca6b).wrapping_add(0x4000_0000))
+    }
+
+    /// One of the choices where a path was scattered `depth` times.
+    pub(super) const fn bounce(depth: u32, choice: Choice) -> Self {
+        Self(0x8000_0000 + depth * 4 + choice as u32)
     }
 }
 
