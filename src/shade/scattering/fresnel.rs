@@ -37,7 +37,7 @@ mod tests {
         // Under Brewster's angle nothing polarised in the plane is mirrored: half of ((1 - n^2) / (1 + n^2))^2 is left.
         let brewster = 1.5f64.atan().to_degrees();
         assert!((reflectance(cos(brewster), 1.5) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-12);
-        assert_eq!((reflectance(0.0, 1.5), reflectance(0.3, 1.0)), (1.0, 0.0));
+        assert!(reflectance(0.0, 1.5) == 1.0 && reflectance(0.3, 1.0) < 1e-30);
     }
 
     #[test]
