@@ -32,7 +32,7 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// Shadow rays to each light with a surface, where a ray hits
+    /// Shadow rays to each light with a surface, where a ray hits; paths ask one light
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
     light_samples: u32,
 

@@ -32,12 +32,13 @@ pub(super) fn check(scene: &Scene) -> Placeless<()> {
             material.transmission,
             material.emission,
             Vec3::new(material.shininess, material.ior, material.gloss.unwrap_or(0.0)),
+            Vec3::splat(material.opacity),
             material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
         ];
         if !colors.into_iter().all(finite) || material.ior == 0.0 {
             return Err(format!("material {:?} has values that are negative or not finite", material.name));
         }
-        if material.diffuse_texture.is_some_and(|t| t as usize >= scene.textures.len()) {
+        if material.textures().any(|t| t as usize >= scene.textures.len()) {
             return Err(format!("material {:?} has a texture that does not exist", material.name));
         }
     }

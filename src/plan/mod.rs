@@ -13,7 +13,7 @@ use std::fmt;
 pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
-use crate::scene::{Geometry, Integrator, Light, Material, Scene};
+use crate::scene::{Alpha, Geometry, Integrator, Light, Material, Scene};
 use crate::shade::Attributes;
 use crate::shade::light::LightSource;
 use crate::shade::lights::has_emitters;
@@ -74,6 +74,10 @@ pub struct Plan {
     pub depth: u32,
     /// Whether anything takes light from rays on their way through it.
     pub absorption: bool,
+    /// Whether textures bend normals.
+    pub normal_maps: bool,
+    /// Whether rays pass through surfaces that are not all there.
+    pub alpha: bool,
     /// Whether light comes from all around.
     pub environment: bool,
     /// Linear RGB behind everything, which then is opaque; none leaves it transparent.
@@ -129,6 +133,7 @@ impl Plan {
         };
         // What ambient light stands for, paths find.
         let ambient = !is_path && scene.ambient != Vec3::ZERO && any(|m| m.ambient != Vec3::ZERO);
+        let alpha = any(|m| m.alpha != Alpha::Opaque);
         let meshes = || {
             geometries.iter().filter_map(|g| match g {
                 Geometry::Mesh(mesh) => Some(mesh),
@@ -137,8 +142,9 @@ impl Plan {
         };
         let attributes = Attributes {
             normals: (lit || depth > 0 || environment) && meshes().any(|m| !m.normals.is_empty()),
-            uvs: (lit || ambient || any(|m| m.unlit)) && materials.iter().any(|m| m.diffuse_texture.is_some()),
-            colors: (lit || ambient || any(|m| m.unlit)) && meshes().any(|m| !m.colors.is_empty()),
+            uvs: (lit || ambient || alpha || any(|m| m.unlit || m.emission_texture.is_some()))
+                && any(|m| m.textures().next().is_some()),
+            colors: (lit || ambient || alpha || any(|m| m.unlit)) && meshes().any(|m| !m.colors.is_empty()),
         };
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
@@ -149,6 +155,8 @@ impl Plan {
             why,
             depth,
             absorption: depth > 0 && any(|m| m.absorption.is_some()),
+            alpha,
+            normal_maps: (lit || depth > 0) && any(|m| m.normal_texture.is_some()),
             environment,
             background: wishes.background.or(scene.background),
             primitives: world.primitive_count(),
@@ -186,6 +194,7 @@ impl fmt::Display for Plan {
         let lights = match &self.lighting {
             Lighting::None => "no light".to_owned(),
             Lighting::Headlight => "a headlight without shadows".to_owned(),
+            Lighting::Lights(lights) if lights.is_empty() => "no lights".to_owned(),
             Lighting::Lights(lights) if lights.len() == 1 => "1 light with hard shadows".to_owned(),
             Lighting::Lights(lights) => format!("{} lights with hard shadows", lights.len()),
         };
@@ -198,6 +207,8 @@ impl fmt::Display for Plan {
             (self.ambient, "ambient light"),
             (self.environment, "an environment"),
             (self.absorption, "absorption"),
+            (self.alpha, "alpha"),
+            (self.normal_maps, "normal maps"),
         ];
         for (_, name) in parts.iter().filter(|(on, _)| *on) {
             write!(f, ", {name}")?;

@@ -3,6 +3,7 @@
 //! A picture depends on scene, camera, size, samples and seed. Threads, tiles and their order, and how rays are bundled
 //! change when a pixel is computed, never what.
 
+mod alpha;
 mod camera;
 mod counted;
 mod film;
@@ -62,7 +63,7 @@ pub struct Settings {
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
-    /// Shadow rays to each extended light where a ray hits.
+    /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
     pub light_samples: u32,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,

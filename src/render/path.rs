@@ -50,14 +50,17 @@ impl Renderer<'_> {
             let batch = if depth == 0 { self.settings.batch } else { self.incoherent() };
             self.scatter(depth, sample, current, next, buffers);
             self.add_unshadowed(tracer, batch, buffers);
-            let Buffers { waves, hits, .. } = buffers;
-            let rays = &waves[next].rays;
+            let Buffers { patterns, waves, hits, .. } = &mut *buffers;
+            let Wave { rays, paths } = &mut waves[next];
             if rays.is_empty() {
                 return;
             }
             hits.clear();
             hits.resize(rays.len(), None);
-            tracer.closest_batch(rays, hits, self.incoherent());
+            self.closest(tracer, rays, hits, self.incoherent(), |i| {
+                let pattern = &patterns[paths[i].pixel as usize];
+                self.sampler.pair(pattern, sample, Dimension::bounce(depth, Choice::Alpha))
+            });
         }
     }
 
@@ -77,7 +80,7 @@ impl Renderer<'_> {
                 *pixel += share.extend(1.0) * self.behind(ray.direction, depth == 0);
                 continue;
             };
-            let point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
+            let point = self.surface(ray, hit);
             let material = self.material(&point);
             let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);

@@ -9,13 +9,13 @@ use crate::math::{DVec3, Vec3, Vec4};
 use crate::plan::Lighting;
 use crate::ray::{Hit, Ray};
 use crate::scene::{Absorption, Integrator, Interface, Material};
-use crate::shade::SurfacePoint;
 use crate::shade::light::LightSource;
 use crate::shade::lights::Lights;
+use crate::shade::{SurfacePoint, normal_map};
 use crate::trace::{Batch, Tracer};
 
 use super::camera::View;
-use super::sampler::Pattern;
+use super::sampler::{Dimension, Pattern};
 use super::whitted::Lit;
 use super::{Renderer, tiles::Tile};
 
@@ -148,15 +148,20 @@ impl Renderer<'_> {
         for (pixel, ray) in rest.iter().zip(&mut rays[groups * LANES..]) {
             *ray = self.ray(pixel, sample);
         }
-        tracer.closest_batch(rays, hits, self.settings.batch);
+        let even = |i: usize| self.sampler.pair(&patterns[i], sample, Dimension::alpha(0));
+        self.closest(tracer, rays, hits, self.settings.batch, even);
     }
 
     /// Traces the shadow rays, and adds what is worth those that are free.
     pub(super) fn add_unshadowed<T: Tracer>(&self, tracer: &T, batch: Batch, buffers: &mut Buffers) {
-        let Buffers { radiance, shadow_rays, shadow_light, occluded, .. } = buffers;
-        if shadow_rays.is_empty() {
+        if buffers.shadow_rays.is_empty() {
             return;
         }
+        if self.plan.alpha {
+            self.add_through(tracer, buffers);
+            return;
+        }
+        let Buffers { radiance, shadow_rays, shadow_light, occluded, .. } = buffers;
         occluded.clear();
         occluded.resize(shadow_rays.len(), false);
         tracer.occluded_batch(shadow_rays, occluded, batch);
@@ -199,6 +204,16 @@ impl Renderer<'_> {
             Interface::Shares | Interface::Fresnel => material.absorption,
             Interface::Thin => None,
         }
+    }
+
+    /// What is where a ray hit.
+    pub(super) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let mut point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
+        if self.plan.normal_maps {
+            let material = self.material(&point);
+            normal_map::bend(&mut point, self.scene, self.world, hit, material);
+        }
+        point
     }
 
     pub(super) fn material(&self, point: &SurfacePoint) -> &Material {

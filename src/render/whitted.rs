@@ -67,11 +67,15 @@ impl Renderer<'_> {
         let mut begin = 0;
         while let Some(range) = buffers.waves[depth as usize + 1].batch(begin) {
             begin = range.end;
-            let Buffers { waves, hits, .. } = buffers;
-            let rays = &waves[depth as usize + 1].rays[range.clone()];
+            let Buffers { patterns, waves, hits, .. } = &mut *buffers;
+            let Wave { rays, paths } = &mut waves[depth as usize + 1];
+            let (rays, paths) = (&mut rays[range.clone()], &paths[range.clone()]);
             hits.clear();
             hits.resize(rays.len(), None);
-            tracer.closest_batch(rays, hits, self.incoherent());
+            self.closest(tracer, rays, hits, self.incoherent(), |i| {
+                let Path { pixel, branch, .. } = paths[i];
+                self.sampler.pair(&patterns[pixel as usize], sample, Dimension::alpha(branch))
+            });
             self.radiance(tracer, Stage { sample, depth: depth + 1 }, range.start, buffers);
         }
     }
@@ -88,7 +92,7 @@ impl Renderer<'_> {
                 *pixel += path.weight.extend(1.0) * self.behind(ray.direction, depth == 0);
                 continue;
             };
-            let point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
+            let point = self.surface(ray, hit);
             let material = self.material(&point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
             let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };

@@ -27,6 +27,21 @@ pub enum Interface {
     Thin,
 }
 
+/// How much of a surface is there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Alpha {
+    /// All of it.
+    #[default]
+    Opaque,
+    /// All of it where its alpha is at least `cutoff`, else nothing.
+    Mask {
+        /// From 0 to 1.
+        cutoff: f32,
+    },
+    /// As much as its alpha says.
+    Blend,
+}
+
 /// Light is lost on its way through the inside (Beer's law): of a colour, what it is after a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absorption {
@@ -78,6 +93,16 @@ pub struct Material {
     pub emission: Vec3,
     /// Multiplies `diffuse` (and `ambient`); index into [`Scene::textures`](crate::Scene::textures).
     pub diffuse_texture: Option<u32>,
+    /// Multiplies `emission`; index into [`Scene::textures`](crate::Scene::textures).
+    pub emission_texture: Option<u32>,
+    /// Bends the shading normal; index into [`Scene::textures`](crate::Scene::textures), whose colours are numbers then.
+    pub normal_texture: Option<u32>,
+    /// Multiplies how far it is bent.
+    pub normal_scale: f32,
+    /// How much of the surface is there.
+    pub alpha: Alpha,
+    /// Its alpha, which that of the diffuse texture and of the vertices multiplies; from 0 to 1.
+    pub opacity: f32,
     /// Which highlight.
     pub model: Specular,
 }
@@ -101,6 +126,11 @@ impl Default for Material {
             unlit: false,
             emission: Vec3::ZERO,
             diffuse_texture: None,
+            emission_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            alpha: Alpha::default(),
+            opacity: 1.0,
             model: Specular::default(),
         }
     }
@@ -118,6 +148,11 @@ impl Material {
             ior,
             ..Self::default()
         }
+    }
+
+    /// The textures it uses.
+    pub fn textures(&self) -> impl Iterator<Item = u32> {
+        [self.diffuse_texture, self.emission_texture, self.normal_texture].into_iter().flatten()
     }
 
     /// Whether a ray goes on from it.

@@ -19,7 +19,7 @@ pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use environment::Environment;
 pub use instance::{Group, Instance};
 pub use light::{AreaShape, Attenuation, Light};
-pub use material::{Absorption, Interface, Material, Specular};
+pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};

@@ -2,7 +2,8 @@
 //!
 //! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area. Spheres are lights of
 //! their own, sampled by the cone they fill. What stands in a light's place is that light's body. Of
-//! all other shapes no points are chosen: rays find them by chance, which is as right, and noisier.
+//! all other shapes, and of what a texture lights or cuts out, no points are chosen: rays find them by chance, which is as right, and
+//! noisier.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -12,7 +13,7 @@ use super::bodies;
 use super::light::{Illumination, LightSource};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, tangents};
 use crate::ray::Hit;
-use crate::scene::{AreaShape, Light, Material, Scene};
+use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
 use crate::shape::Shape;
 use crate::trace::{Primitives, World};
 
@@ -82,7 +83,13 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
     let (mut patches, mut glowing) = (Patches::default(), Glowing::new());
     let own = lights.len();
     for (instance, geometry) in placed(scene, is_emitter) {
-        let emission = scene.materials[scene.geometries[geometry as usize].material() as usize].emission;
+        let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
+        let emission = material.emission;
+        // Where it is bright only its texture knows, and whether it is there at all its alpha.
+        if material.emission_texture.is_some() || material.alpha != Alpha::Opaque {
+            glowing.insert((instance, geometry), Seats::All(Seat::Alone));
+            continue;
+        }
         let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0, geometry, instance };
         let (part, placement) = world.locate(&hit);
         let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());

@@ -6,10 +6,12 @@
 
 mod area;
 mod bodies;
+pub mod coverage;
 mod emitters;
 mod environment;
 pub mod light;
 pub mod lights;
+pub mod normal_map;
 pub mod scattering;
 pub mod surface;
 pub mod texture;

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Absorption, Attenuation, Filter, Fov, Interface, Light, Projection, Wrap};
+use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Projection, Wrap};
 
 use super::{Files, corners, meshes, obj, refused};
 
@@ -188,6 +188,22 @@ fn metalness_and_roughness_are_the_means_of_their_texture() {
 }
 
 #[test]
+fn alpha_and_emission_of_materials() {
+    let with = |changes: &[(&str, Value)]| changed(changes).scene("a.gltf").materials[0].clone();
+    let color = ("/materials/0/pbrMetallicRoughness/baseColorFactor", json!([1, 1, 1, 0.25]));
+    let blend = with(&[("/materials/0/alphaMode", json!("BLEND")), color.clone()]);
+    assert_eq!((blend.alpha, blend.opacity), (Alpha::Blend, 0.25));
+    let mask = |cutoff: &[(&str, Value)]| with(&[&[("/materials/0/alphaMode", json!("MASK"))], cutoff].concat()).alpha;
+    assert_eq!(mask(&[]), Alpha::Mask { cutoff: 0.5 });
+    assert_eq!(mask(&[("/materials/0/alphaCutoff", json!(0.125))]), Alpha::Mask { cutoff: 0.125 });
+    assert_eq!(with(&[color]).alpha, Alpha::Opaque);
+    let glowing = with(&[("/materials/0/emissiveTexture", json!({"index": 0}))]);
+    assert!(glowing.emission_texture.is_some() && glowing.emission_texture == glowing.diffuse_texture);
+    let rough = with(&[("/materials/0/normalTexture", json!({"index": 0, "scale": 0.5}))]);
+    assert_eq!((rough.normal_texture, rough.normal_scale), (rough.diffuse_texture, 0.5));
+}
+
+#[test]
 fn extensions_of_materials() {
     let with =
         |extensions: Value| changed(&[("/materials/0/extensions", extensions)]).scene("a.gltf").materials[0].clone();
@@ -265,7 +281,6 @@ fn what_is_not_rendered_is_a_warning() {
         assert!(warnings.len() == 1, "{warnings:?}");
         assert!(warnings[0].place == place && warnings[0].message.contains(words), "{}", warnings[0]);
     };
-    say(&[("/materials/0/alphaMode", json!("BLEND"))], "/materials", "gold");
     say(&[("/meshes/0/primitives/1/mode", json!(1))], "/meshes", "1 primitives are points or lines");
     say(&[("/meshes/0/primitives/1/targets", json!([{}]))], "/meshes", "morph");
     say(&[("/nodes/1/skin", json!(0))], "/skins", "skins");
@@ -319,6 +334,7 @@ fn faults_are_told_with_their_pointer() {
     fault("/nodes/3/camera", json!(1), "/nodes/3/camera", "no camera 1");
     fault("/cameras/0/perspective/yfov", json!(4), "/cameras/0/perspective/yfov", "between 0 and pi");
     fault("/scene", json!(2), "/scene", "no scene 2");
+    fault("/materials/0/alphaMode", json!("GLASS"), "/materials/0", "expected OPAQUE, BLEND, or MASK");
     for (name, value, words) in [
         ("KHR_materials_ior", json!({"ior": 0.5}), "from 1 up, or 0"),
         ("KHR_materials_transmission", json!({"transmissionFactor": 1.5}), "from 0 to 1"),

@@ -1,7 +1,9 @@
 //! Twincast's own scene format.
 
 use twincast::math::{DVec2, DVec3, Vec3};
-use twincast::scene::{AreaShape, Distortion, Fov, Geometry, Light, Projection, Scene, Specular, ThinLens};
+use twincast::scene::{
+    Absorption, Alpha, AreaShape, Distortion, Fov, Geometry, Interface, Light, Projection, Scene, Specular, ThinLens,
+};
 use twincast::{Shape, World};
 
 use super::{Files, obj, refused, refused_bytes};
@@ -132,11 +134,20 @@ fn lights_and_materials() {
     assert!((inner_angle.to_degrees() - 20.0).abs() < 1e-4 && (outer_angle.to_degrees() - 30.0).abs() < 1e-4);
     assert_eq!((*centre, *half_edges), (DVec3::Y * 3.0, [DVec3::X * 0.5, DVec3::Z * 0.5]));
     assert_eq!((*radiance, *normal, *ball), (Vec3::new(10.0, 9.0, 8.0), DVec3::NEG_Y, 0.25));
-    let glass = &scene.materials[0];
+    let glass = &scene.materials[1];
     assert_eq!((glass.name.as_str(), glass.diffuse, glass.ambient), ("glass", Vec3::splat(0.02), Vec3::splat(0.02)));
     assert_eq!((glass.transmission, glass.ior, glass.shininess), (Vec3::splat(0.85), 1.5, 100.0));
     assert_eq!((glass.model, glass.emission), (Specular::BlinnPhong, Vec3::new(0.0, 0.0, 0.01)));
-    assert_eq!((scene.materials[1].diffuse_texture, scene.textures.len()), (Some(0), 1));
+    let wood = &scene.materials[4];
+    let slots = [wood.diffuse_texture, wood.emission_texture, wood.normal_texture];
+    assert_eq!((slots, scene.textures.len()), ([Some(0), Some(1), Some(2)], 3));
+    assert_eq!((wood.alpha, wood.opacity, wood.normal_scale), (Alpha::Mask { cutoff: 0.5 }, 1.0, 1.0));
+    let [bottle, pane, sign] = [0, 2, 3].map(|i| &scene.materials[i]);
+    assert_eq!((bottle.interface, bottle.reflection, bottle.diffuse), (Interface::Fresnel, Vec3::ONE, Vec3::ZERO));
+    let green = Absorption { color: Vec3::new(0.3, 0.8, 0.4), distance: 0.02 };
+    assert_eq!((bottle.absorption, bottle.ior, pane.interface), (Some(green), 1.52, Interface::Thin));
+    assert_eq!((sign.unlit, sign.diffuse), (true, Vec3::new(1.0, 0.9, 0.1)));
+    assert_eq!((glass.gloss, glass.energy_conserving, glass.interface), (Some(500.0), true, Interface::Shares));
 }
 
 #[test]
@@ -210,6 +221,13 @@ fn faults_are_told_with_line_and_remedy() {
         .chain(["[[instance]]\ngroup = \"g0\"\n[[group.g9.sphere]]\ncentre = [0, 0, 0]\nradius = 1\n".to_owned()])
         .collect();
     for (text, line, words) in [
+        ("[material.a]\nthin = true\n", 2, "type = \"glass\" alone"),
+        ("[material.a]\nattenuation_distance = 2\n", 1, "one of them is missing"),
+        ("[material.a]\nattenuation_distance = 0\n", 2, "a number above 0"),
+        ("[material.a]\nalpha = \"blend\"\nalpha_cutoff = 0.5\n", 1, "alpha = \"mask\" alone"),
+        ("[material.a]\nopacity = 2\n", 2, "from 0 to 1"),
+        ("[environment]\nimage = \"none.exr\"\n", 2, "there is no file"),
+        ("[render]\nintegrator = \"paths\"\n", 2, "did you mean \"path\""),
         ("[render\n", 1, "not TOML"),
         ("a = 1\n", 1, "the file has no key \"a\""),
         ("[[spheer]]\nradius = 1\n", 1, "did you mean \"sphere\"?"),

@@ -1,5 +1,6 @@
 //! Pictures: against closed forms, and against themselves under everything that must not change them.
 
+mod alpha;
 mod camera;
 mod determinism;
 mod glass;

@@ -22,6 +22,11 @@ const BLACK: Material = Material {
     unlit: false,
     emission: Vec3::ZERO,
     diffuse_texture: None,
+    emission_texture: None,
+    normal_texture: None,
+    normal_scale: 1.0,
+    alpha: twincast::scene::Alpha::Opaque,
+    opacity: 1.0,
     model: twincast::scene::Specular::BlinnPhong,
 };
 

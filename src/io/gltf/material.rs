@@ -13,7 +13,7 @@ use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::texture;
 use crate::math::{Vec2, Vec3};
-use crate::scene::{Filter, Interface, Material, Scene, Texture, Wrap};
+use crate::scene::{Alpha, Filter, Interface, Material, Scene, Texture, Wrap};
 
 /// The materials of a document, converted when a primitive first uses them.
 pub(super) struct Materials<'a> {
@@ -26,7 +26,6 @@ pub(super) struct Materials<'a> {
     textures: Vec<Texture>,
     /// Means of textures of numbers by glTF's image; None where the file is missing.
     known_means: HashMap<usize, Option<Vec3>>,
-    transparent: Vec<String>,
     warnings: Vec<Warning>,
 }
 
@@ -39,7 +38,6 @@ impl<'a> Materials<'a> {
             known_textures: HashMap::new(),
             textures: Vec::new(),
             known_means: HashMap::new(),
-            transparent: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -52,7 +50,11 @@ impl<'a> Materials<'a> {
             document.check_index(&format!("{pointer}/material"), index, materials.len(), "material")?;
         }
         let source = index.map(|i| &materials[i]);
-        let coordinates = source.and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
+        // A mesh has one set: that of the first texture here.
+        let coordinates = source.and_then(|m| {
+            let base = m.pbr_metallic_roughness.base_color_texture.as_ref();
+            base.or(m.emissive_texture.as_ref()).or(m.normal_texture.as_ref())
+        });
         let set = coordinates.map(|info| info.tex_coord);
         if let Some(known) = self.known.get(&index) {
             return Ok((*known, set));
@@ -70,11 +72,6 @@ impl<'a> Materials<'a> {
     /// Hands materials and textures over to the scene.
     pub(super) fn finish(self, scene: &mut Scene, warnings: &mut Vec<Warning>) {
         warnings.extend(self.warnings);
-        if !self.transparent.is_empty() {
-            let message =
-                format!("transparency is not supported; rendered opaque: materials {}", self.transparent.join(", "));
-            warnings.push(self.document.warning("/materials", message));
-        }
         scene.materials = self.list;
         scene.textures = self.textures;
     }
@@ -87,9 +84,17 @@ impl<'a> Materials<'a> {
         if !numbers.all(|x| x.is_finite() && *x >= 0.0) || !shares.iter().all(|x| (0.0..=1.0).contains(x)) {
             return Err(self.document.error(pointer, "factors have to be finite and from 0 up, shares from 0 to 1"));
         }
-        if matches!(source.alpha_mode.as_deref(), Some("BLEND" | "MASK")) {
-            self.transparent.push(format!("{:?}", source.name));
-        }
+        let alpha = match (source.alpha_mode.as_deref(), source.alpha_cutoff.unwrap_or(0.5)) {
+            (None | Some("OPAQUE"), _) => Alpha::Opaque,
+            (Some("MASK"), cutoff) if cutoff >= 0.0 => Alpha::Mask { cutoff },
+            (Some("BLEND"), _) => Alpha::Blend,
+            (Some(mode), cutoff) => {
+                let message = format!(
+                    "alphaMode {mode:?} with cutoff {cutoff}; expected OPAQUE, BLEND, or MASK and a cutoff from 0 up"
+                );
+                return Err(self.document.error(pointer, message));
+            }
+        };
         let extensions = extension::read(&source.extensions)
             .map_err(|message| self.document.error(format!("{pointer}/extensions"), message))?;
         let texture = match &pbr.base_color_texture {
@@ -111,10 +116,37 @@ impl<'a> Materials<'a> {
                 values.transmission *= means.x;
             }
         }
-        let glass = Material { name: source.name.clone(), emission, diffuse_texture: texture, ..values.phong() };
+        let emission_texture = match &source.emissive_texture {
+            Some(info) if emission != Vec3::ZERO => {
+                self.texture(info.index, &format!("{pointer}/emissiveTexture/index"))?
+            }
+            _ => None,
+        };
+        let normal_texture = match &source.normal_texture {
+            Some(info) => self.texture(info.index, &format!("{pointer}/normalTexture/index"))?,
+            None => None,
+        };
+        let normal_scale = source.normal_texture.as_ref().and_then(|info| info.scale).unwrap_or(1.0);
+        let glass = Material {
+            name: source.name.clone(),
+            emission,
+            diffuse_texture: texture,
+            emission_texture,
+            normal_texture,
+            normal_scale,
+            alpha,
+            opacity: pbr.base_color_factor[3],
+            ..values.phong()
+        };
         if extensions.unlit {
             let [r, g, b, _] = pbr.base_color_factor;
-            return Ok(Material { diffuse: Vec3::new(r, g, b), unlit: true, emission: Vec3::ZERO, ..glass });
+            return Ok(Material {
+                diffuse: Vec3::new(r, g, b),
+                unlit: true,
+                emission: Vec3::ZERO,
+                emission_texture: None,
+                ..glass
+            });
         }
         if values.transmission == 0.0 {
             return Ok(glass);

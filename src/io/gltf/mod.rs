@@ -5,8 +5,7 @@
 //! unused is refused. A mesh becomes a group, each primitive with area a geometry of it, each node with a mesh an
 //! instance.
 //!
-//! Not rendered, and told in warnings: animation poses other than the rest pose, transparency,
-//! points and lines.
+//! Not rendered, and told in warnings: animation poses other than the rest pose, points and lines.
 
 mod accessor;
 mod container;

@@ -4,7 +4,9 @@ use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular};
+use crate::scene::{
+    Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular,
+};
 use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
@@ -33,7 +35,8 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
         let sayable = specular == reflection && is_grey(specular) && is_grey(transmission);
         let has_more = ambient != Vec3::ZERO && scene.ambient != Vec3::ZERO
             || emission != Vec3::ZERO
-            || material.diffuse_texture.is_some()
+            || material.textures().next().is_some()
+            || material.alpha != Alpha::Opaque
             || material.interface != Interface::Shares
             || material.gloss.is_some()
             || material.absorption.is_some()

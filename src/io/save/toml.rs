@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::Unsayable;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, Vec3};
 use crate::scene::{
-    Absorption, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Interface, Light, Material, Mesh,
+    Absorption, Alpha, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Interface, Light, Material, Mesh,
     Projection, Request, Scene, Specular, ThinLens,
 };
 use crate::shape::{Shape, Sphere};
@@ -205,6 +205,13 @@ fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::R
     }
     if let Some(gloss) = material.gloss {
         writeln!(out, "gloss = {gloss}")?;
+    }
+    match material.alpha {
+        Alpha::Opaque => {}
+        Alpha::Mask { cutoff } => {
+            writeln!(out, "alpha = \"mask\"\nalpha_cutoff = {cutoff}\nopacity = {}", material.opacity)?
+        }
+        Alpha::Blend => writeln!(out, "alpha = \"blend\"\nopacity = {}", material.opacity)?,
     }
     writeln!(out, "energy_conserving = {}\n", material.energy_conserving)
 }

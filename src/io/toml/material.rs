@@ -2,7 +2,7 @@
 
 use super::table::{Read, Table};
 use crate::math::Vec3;
-use crate::scene::{Absorption, Interface, Material, Specular};
+use crate::scene::{Absorption, Alpha, Interface, Material, Specular};
 
 /// What kinds there are.
 #[derive(Clone, Copy, PartialEq)]
@@ -42,6 +42,9 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         interface: interface(table, kind)?,
         absorption: absorption(table)?,
         unlit: kind == Kind::Unlit,
+        normal_scale: table.optional("normal_scale", |value| value.number())?.unwrap_or(1.0) as f32,
+        alpha: alpha(table)?,
+        opacity: unit(table, "opacity")?.unwrap_or(1.0),
         emission,
         ..plain
     })
@@ -56,6 +59,26 @@ fn interface(table: &mut Table<'_>, kind: Kind) -> Read<Interface> {
         (Kind::Glass, false) => Ok(Interface::Fresnel),
         (Kind::Phong | Kind::Unlit, _) => Err(thin.fault("\"thin\" is for type = \"glass\" alone")),
     }
+}
+
+/// `alpha` and `alpha_cutoff`.
+fn alpha(table: &mut Table<'_>) -> Read<Alpha> {
+    let modes = [("opaque", Alpha::Opaque), ("mask", Alpha::Mask { cutoff: 0.5 }), ("blend", Alpha::Blend)];
+    let mode = table.optional("alpha", |value| value.choice(&modes))?.unwrap_or_default();
+    let cutoff = unit(table, "alpha_cutoff")?;
+    match (mode, cutoff) {
+        (Alpha::Mask { .. }, Some(cutoff)) => Ok(Alpha::Mask { cutoff }),
+        (Alpha::Opaque | Alpha::Blend, Some(_)) => Err(table.fault("\"alpha_cutoff\" is for alpha = \"mask\" alone")),
+        (mode, None) => Ok(mode),
+    }
+}
+
+/// A number from 0 to 1.
+fn unit(table: &mut Table<'_>, key: &'static str) -> Read<Option<f32>> {
+    table.optional(key, |value| {
+        let number = value.share()?;
+        if number <= 1.0 { Ok(number) } else { Err(value.unlike("a number from 0 to 1")) }
+    })
 }
 
 /// `attenuation_color` and `attenuation_distance`, which stand together.

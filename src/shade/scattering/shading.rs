@@ -31,19 +31,25 @@ impl Shading {
         textures: &[Texture],
         ambient: Vec3,
     ) -> Self {
-        let texture = material.diffuse_texture.and_then(|i| textures.get(i as usize));
-        let texel = texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv).truncate());
-        let tint = texel * point.color.truncate();
+        let texel = |texture: Option<u32>| {
+            let texture = texture.and_then(|i| textures.get(i as usize));
+            texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv).truncate())
+        };
+        let tint = texel(material.diffuse_texture) * point.color.truncate();
+        let emission = match material.emission_texture {
+            None => material.emission,
+            texture => material.emission * texel(texture),
+        };
         let mut shading = Self {
             to_viewer: -direction.as_dvec3().normalize(),
             normal: point.shading_normal,
             geometric: point.normal,
             diffuse: material.diffuse * tint,
             highlight: Highlight::new(material),
-            base: material.emission + material.ambient * tint * ambient,
+            base: emission + material.ambient * tint * ambient,
         };
         if material.unlit {
-            shading.base = material.emission + shading.diffuse;
+            shading.base = emission + shading.diffuse;
             shading.scale(0.0);
         }
         if material.energy_conserving {
