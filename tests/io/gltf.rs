@@ -281,6 +281,8 @@ fn what_is_not_rendered_is_a_warning() {
         assert!(warnings.len() == 1, "{warnings:?}");
         assert!(warnings[0].place == place && warnings[0].message.contains(words), "{}", warnings[0]);
     };
+    let second = json!({"index": 0, "texCoord": 1});
+    say(&[("/materials/0/normalTexture", second)], "/materials/0/normalTexture", "wants coordinates of set 1");
     say(&[("/meshes/0/primitives/1/mode", json!(1))], "/meshes", "1 primitives are points or lines");
     say(&[("/meshes/0/primitives/1/targets", json!([{}]))], "/meshes", "morph");
     say(&[("/nodes/1/skin", json!(0))], "/skins", "skins");

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use super::Document;
 use super::extension;
 use super::phong::{self, MetallicRoughness};
-use super::schema::{self, MetallicRoughness as Source};
+use super::schema::{self, MetallicRoughness as Source, TextureInfo};
 use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::texture;
@@ -50,12 +50,7 @@ impl<'a> Materials<'a> {
             document.check_index(&format!("{pointer}/material"), index, materials.len(), "material")?;
         }
         let source = index.map(|i| &materials[i]);
-        // A mesh has one set: that of the first texture here.
-        let coordinates = source.and_then(|m| {
-            let base = m.pbr_metallic_roughness.base_color_texture.as_ref();
-            base.or(m.emissive_texture.as_ref()).or(m.normal_texture.as_ref())
-        });
-        let set = coordinates.map(|info| info.tex_coord);
+        let set = source.and_then(coordinate_set);
         if let Some(known) = self.known.get(&index) {
             return Ok((*known, set));
         }
@@ -116,16 +111,9 @@ impl<'a> Materials<'a> {
                 values.transmission *= means.x;
             }
         }
-        let emission_texture = match &source.emissive_texture {
-            Some(info) if emission != Vec3::ZERO => {
-                self.texture(info.index, &format!("{pointer}/emissiveTexture/index"))?
-            }
-            _ => None,
-        };
-        let normal_texture = match &source.normal_texture {
-            Some(info) => self.texture(info.index, &format!("{pointer}/normalTexture/index"))?,
-            None => None,
-        };
+        let emissive = source.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO);
+        let emission_texture = self.slot(source, emissive, &format!("{pointer}/emissiveTexture"))?;
+        let normal_texture = self.slot(source, source.normal_texture.as_ref(), &format!("{pointer}/normalTexture"))?;
         let normal_scale = source.normal_texture.as_ref().and_then(|info| info.scale).unwrap_or(1.0);
         let glass = Material {
             name: source.name.clone(),
@@ -188,6 +176,21 @@ impl<'a> Materials<'a> {
             }
         };
         Ok(means)
+    }
+
+    /// The texture of a slot beside the base colour's. None, and a warning, where its coordinates are others than the mesh has.
+    fn slot(&mut self, source: &schema::Material, info: Option<&TextureInfo>, pointer: &str) -> Result<Option<u32>> {
+        let Some(info) = info else { return Ok(None) };
+        let set = coordinate_set(source).unwrap_or(info.tex_coord);
+        if info.tex_coord != set {
+            let message = format!(
+                "the texture wants coordinates of set {}, but set {set} is read; rendered without it",
+                info.tex_coord
+            );
+            self.warnings.push(self.document.warning(pointer, message));
+            return Ok(None);
+        }
+        self.texture(info.index, &format!("{pointer}/index"))
     }
 
     fn texture(&mut self, index: usize, pointer: &str) -> Result<Option<u32>> {
@@ -286,4 +289,11 @@ impl<'a> Materials<'a> {
             other => other,
         }
     }
+}
+
+/// Which texture coordinates a mesh of this material needs: it has one set, that of the first texture here.
+fn coordinate_set(source: &schema::Material) -> Option<u32> {
+    let base = source.pbr_metallic_roughness.base_color_texture.as_ref();
+    let first = base.or(source.emissive_texture.as_ref()).or(source.normal_texture.as_ref());
+    first.map(|info| info.tex_coord)
 }
