@@ -23,7 +23,7 @@ fn every_channel_is_within_one_of_the_original() {
     let world = World::new(&scene).unwrap();
     let request = &scene.request;
     let [width, height] = request.size.unwrap();
-    let (spp, max_depth) = (request.spp.unwrap(), request.max_depth.unwrap());
+    let (spp, max_depth) = (request.spp.unwrap(), request.max_depth);
     let settings = Settings { width, height, spp, max_depth, ..Settings::default() };
     let renderer = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings).unwrap();
     let image = renderer.render(&Bvh::build(&world), Default::default()).unwrap();

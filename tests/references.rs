@@ -34,8 +34,8 @@ fn pictures(path: &Path) -> Vec<(&'static str, Image)> {
     let usual = Settings::default();
     let request = &scene.request;
     let [width, height] = request.size.unwrap_or([WIDTH, HEIGHT]);
-    let (spp, max_depth) = (request.spp.unwrap_or(usual.spp), request.max_depth.unwrap_or(usual.max_depth));
-    let settings = Settings { width, height, spp, max_depth, ..usual };
+    let (integrator, max_depth) = (request.integrator, request.max_depth);
+    let settings = Settings { width, height, spp: request.spp.unwrap_or(usual.spp), integrator, max_depth, ..usual };
     let renderer = Renderer::new(&scene, &world, camera, settings).expect("sound settings");
     let control = Control::default();
     let native = renderer.render(&Bvh::build(&world), control).expect("rendered");

@@ -86,12 +86,12 @@ impl CompareArgs {
         Ok((scene, camera))
     }
 
-    /// Of the picture: rays are sent on as often as the scene asks for.
+    /// Of the picture: rays are sent on as, and as often as, the scene asks for.
     fn settings(&self, scene: &Scene) -> Settings {
         let Size { width, height } = self.size;
         let usual = Settings::default();
-        let max_depth = scene.request.max_depth.unwrap_or(usual.max_depth);
-        Settings { width, height, max_depth, seed: self.seed, ..usual }
+        let max_depth = scene.request.max_depth.or(usual.max_depth);
+        Settings { width, height, max_depth, integrator: scene.request.integrator, seed: self.seed, ..usual }
     }
 
     /// Says what came of it, as was asked for.

@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use super::common::{Size, by_name, parse_vector};
 use crate::math::Vec3;
 use crate::render::{Filter, Sampling, Settings, TileOrder};
-use crate::scene::Request;
+use crate::scene::{Integrator, Request};
 use crate::trace::{Batch, Width};
 
 /// Everything about a picture but its camera.
@@ -19,7 +19,12 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: Option<u32>,
 
-    /// How often a ray may be mirrored or refracted; what it would see after that is black (default: the scene's, else 5)
+    /// How far light is followed: ray-cast, whitted (mirrors and glass), path (all light), or auto, the cheapest that
+    /// shows everything (default: the scene's, else auto)
+    #[arg(long, value_name = "NAME", value_parser = parse_integrator)]
+    integrator: Option<Wish>,
+
+    /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for paths 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
     max_depth: Option<u32>,
 
@@ -27,7 +32,7 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// Shadow rays to each light with a surface, where a ray hits
+    /// Shadow rays to each light with a surface, where a ray hits; paths ask one light
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
     light_samples: u32,
 
@@ -96,7 +101,8 @@ impl PictureArgs {
             sampling: self.sampler,
             filter: self.filter,
             light_samples: self.light_samples,
-            max_depth: self.max_depth.or(request.max_depth).unwrap_or(usual.max_depth),
+            integrator: self.integrator.map_or(request.integrator, |Wish(integrator)| integrator),
+            max_depth: self.max_depth.or(request.max_depth),
             batch: Batch { width, coherent: true },
             tile_order: match self.tile_order {
                 Order::Scanline => TileOrder::Scanline,
@@ -106,6 +112,18 @@ impl PictureArgs {
             background: self.background,
         }
     }
+}
+
+/// An integrator, or none for the one that is chosen.
+#[derive(Clone, Copy, Debug)]
+struct Wish(Option<Integrator>);
+
+fn parse_integrator(name: &str) -> std::result::Result<Wish, String> {
+    if name == "auto" {
+        return Ok(Wish(None));
+    }
+    let found = by_name(Integrator::ALL, Integrator::name, name).map(|integrator| Wish(Some(integrator)));
+    found.map_err(|expected| format!("{expected}, auto"))
 }
 
 fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {

@@ -22,7 +22,7 @@ use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::memory::process;
 use crate::render::Renderer;
-use crate::scene::{Geometry, Light, Request, Scene};
+use crate::scene::{Environment, Geometry, Light, Request, Scene};
 use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
 use crate::trace::{Primitives, World};
@@ -86,6 +86,11 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
     sun: Option<DVec3>,
 
+    /// Picture of all that is around the scene, equirectangular: light, and what is seen behind everything, in place of
+    /// the scene's
+    #[arg(long, value_name = "FILE")]
+    environment: Option<PathBuf>,
+
     /// Say more: plan, rays, memory
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
@@ -118,6 +123,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         warn(&warnings);
         if let Some(sun) = args.sun {
             scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];
+        }
+        if let Some(path) = &args.environment {
+            scene.environment = Some(Environment::new(image::read(path)?));
         }
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
@@ -224,7 +232,7 @@ impl RenderArgs {
 
     /// The files it reads.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        [Some(&self.scene.scene), self.reference.as_ref()].into_iter().flatten()
+        [Some(&self.scene.scene), self.reference.as_ref(), self.environment.as_ref()].into_iter().flatten()
     }
 
     fn check_reference(&self, reference: Option<&Image>, width: u32, height: u32) -> Result<()> {

@@ -24,12 +24,21 @@ pub(super) fn check(scene: &Scene) -> Placeless<()> {
     }
     for material in &scene.materials {
         let finite = |color: Vec3| color.is_finite() && color.min_element() >= 0.0;
-        let colors = [material.ambient, material.diffuse, material.specular, material.emission];
-        let shininess = Vec3::splat(material.shininess);
-        if !colors.into_iter().chain([shininess]).all(finite) {
+        let colors = [
+            material.ambient,
+            material.diffuse,
+            material.specular,
+            material.reflection,
+            material.transmission,
+            material.emission,
+            Vec3::new(material.shininess, material.ior, material.gloss.unwrap_or(0.0)),
+            Vec3::splat(material.opacity),
+            material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
+        ];
+        if !colors.into_iter().all(finite) || material.ior == 0.0 {
             return Err(format!("material {:?} has values that are negative or not finite", material.name));
         }
-        if material.diffuse_texture.is_some_and(|t| t as usize >= scene.textures.len()) {
+        if material.textures().any(|t| t as usize >= scene.textures.len()) {
             return Err(format!("material {:?} has a texture that does not exist", material.name));
         }
     }

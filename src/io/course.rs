@@ -21,7 +21,9 @@ use super::text::{name, quoted};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Camera, Geometry, Group, Instance, Light, Material, Scene, Specular, Unlit};
+use crate::scene::{
+    Attenuation, Camera, Geometry, Group, Instance, Integrator, Light, Material, Scene, Specular, Unlit,
+};
 use crate::shape::{Shape, Sphere};
 
 /// Every statement as it should look; the first word is the keyword.
@@ -246,6 +248,8 @@ impl Reader {
         // The file's ambient colours stand for the surface and the light at once.
         scene.ambient = Vec3::ONE;
         scene.background = Some(Vec3::ZERO);
+        // Of which the format's formula is the first terms.
+        scene.request.integrator = Some(Integrator::Whitted);
         scene.unlit = Unlit::Darkness;
         scene.geometries = self.parts.into_geometries();
         let identity = DAffine3::IDENTITY;

@@ -5,6 +5,7 @@
 //! ambient term, lights that are black. The renderer reads the plan and never asks the scene again.
 
 mod build;
+mod integrator;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -12,8 +13,10 @@ use std::fmt;
 pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
-use crate::scene::{Geometry, Light, Material, Scene, Unlit};
+use crate::scene::{Alpha, Geometry, Integrator, Light, Material, Scene, Unlit};
 use crate::shade::Attributes;
+use crate::shade::light::LightSource;
+use crate::shade::lights::has_emitters;
 use crate::trace::World;
 
 /// Whether instances are traced as such.
@@ -36,6 +39,22 @@ pub enum Lighting {
     Lights(Vec<usize>),
 }
 
+/// How often rays are sent on by mirrors and glass where nobody says.
+pub const USUAL_DEPTH: u32 = 5;
+/// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
+pub const USUAL_PATH_DEPTH: u32 = 64;
+
+/// What is wanted of a render. What is none is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wishes {
+    /// How far light is followed.
+    pub integrator: Option<Integrator>,
+    /// Stands in for the scene's own; linear RGB.
+    pub background: Option<Vec3>,
+    /// How often rays may be sent on.
+    pub max_depth: Option<u32>,
+}
+
 /// What a render will do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -49,8 +68,20 @@ pub struct Plan {
     pub motion: bool,
     /// Whether ambient light is added.
     pub ambient: bool,
-    /// How often rays may be mirrored or refracted; 0 where no material does either.
+    /// How far light is followed.
+    pub integrator: Integrator,
+    /// Why that far, in words.
+    pub why: &'static str,
+    /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
+    /// Whether anything takes light from rays on their way through it.
+    pub absorption: bool,
+    /// Whether textures bend normals.
+    pub normal_maps: bool,
+    /// Whether rays pass through surfaces that are not all there.
+    pub alpha: bool,
+    /// Whether light comes from all around.
+    pub environment: bool,
     /// Linear RGB behind everything, which then is opaque; none leaves it transparent.
     pub background: Option<Vec3>,
     /// Primitives as placed.
@@ -60,25 +91,52 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for a scene. `background` stands in for the scene's own, `max_depth` limits how often rays are sent on.
-    pub fn new(scene: &Scene, world: &World, background: Option<Vec3>, max_depth: u32) -> Self {
+    /// The plan for a scene.
+    pub fn new(scene: &Scene, world: &World, wishes: &Wishes) -> Self {
         let geometries = placed_geometries(scene);
         let used: BTreeSet<u32> = geometries.iter().map(|g| g.material()).collect();
         let default = Material::default();
         let materials: Vec<_> = used.iter().map(|&m| scene.materials.get(m as usize).unwrap_or(&default)).collect();
 
-        let reflects = materials.iter().any(|m| m.diffuse != Vec3::ZERO || m.specular != Vec3::ZERO);
-        let lighting = match scene.unlit {
-            _ if !reflects => Lighting::None,
-            Unlit::Headlight if scene.lights.is_empty() => Lighting::Headlight,
-            Unlit::Headlight | Unlit::Darkness => {
-                Lighting::Lights((0..scene.lights.len()).filter(|&i| gives_light(&scene.lights[i])).collect())
-            }
+        let any = |holds: fn(&Material) -> bool| materials.iter().any(|material| holds(material));
+        let environment = scene.environment.as_ref().is_some_and(|light| light.intensity > 0.0);
+        let given: Vec<usize> = (0..scene.lights.len()).filter(|&i| gives_light(&scene.lights[i])).collect();
+        let bodies = || {
+            let sources: Vec<_> = given.iter().map(|&i| LightSource::new(&scene.lights[i], world.centre)).collect();
+            has_emitters(scene, world, &sources)
         };
-        let lit = lighting != Lighting::None && lighting != Lighting::Lights(Vec::new());
-        let sends_on = |m: &&Material| m.reflection != Vec3::ZERO || m.transmission != Vec3::ZERO;
-        let depth = if materials.iter().any(sends_on) { max_depth } else { 0 };
-        let ambient = scene.ambient != Vec3::ZERO && materials.iter().any(|m| m.ambient != Vec3::ZERO);
+        let is_meant_dark = scene.unlit == Unlit::Darkness || !scene.lights.is_empty();
+        let census = integrator::Census {
+            sends_on: any(Material::sends_on),
+            is_lit: any(Material::is_lit),
+            is_dark: is_meant_dark && given.is_empty() && !environment && scene.ambient == Vec3::ZERO,
+            emitters: &bodies,
+        };
+        let (integrator, why) = integrator::choose(wishes.integrator, &census);
+        let is_path = integrator == Integrator::Path;
+
+        let reflects = any(Material::is_lit) || is_path && any(Material::sends_on);
+        // To paths, what is behind everything is light too.
+        let shines = |color: Option<Vec3>| color.is_some_and(|color| color != Vec3::ZERO);
+        let found = is_path && (shines(wishes.background.or(scene.background)) || bodies());
+        let headlight = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && !environment && !found;
+        let lighting = match (reflects, headlight) {
+            (false, _) => Lighting::None,
+            (true, true) => Lighting::Headlight,
+            (true, false) => Lighting::Lights(given),
+        };
+        let lit =
+            is_path || environment || !matches!(&lighting, Lighting::None) && lighting != Lighting::Lights(vec![]);
+        let sends_on = any(Material::sends_on);
+        let depth = match integrator {
+            Integrator::RayCast => 0,
+            Integrator::Whitted if sends_on => wishes.max_depth.unwrap_or(USUAL_DEPTH),
+            Integrator::Path if reflects => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
+            Integrator::Whitted | Integrator::Path => 0,
+        };
+        // What ambient light stands for, paths find.
+        let ambient = !is_path && scene.ambient != Vec3::ZERO && any(|m| m.ambient != Vec3::ZERO);
+        let alpha = any(|m| m.alpha != Alpha::Opaque);
         let meshes = || {
             geometries.iter().filter_map(|g| match g {
                 Geometry::Mesh(mesh) => Some(mesh),
@@ -86,9 +144,10 @@ impl Plan {
             })
         };
         let attributes = Attributes {
-            normals: (lit || depth > 0) && meshes().any(|m| !m.normals.is_empty()),
-            uvs: (lit || ambient) && materials.iter().any(|m| m.diffuse_texture.is_some()),
-            colors: (lit || ambient) && meshes().any(|m| !m.colors.is_empty()),
+            normals: (lit || depth > 0 || environment) && meshes().any(|m| !m.normals.is_empty()),
+            uvs: (lit || ambient || alpha || any(|m| m.unlit || m.emission_texture.is_some()))
+                && any(|m| m.textures().next().is_some()),
+            colors: (lit || ambient || alpha || any(|m| m.unlit)) && meshes().any(|m| !m.colors.is_empty()),
         };
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
@@ -96,8 +155,14 @@ impl Plan {
             lighting,
             motion: world.moves(),
             ambient,
+            integrator,
+            why,
             depth,
-            background: background.or(scene.background),
+            absorption: depth > 0 && any(|m| m.absorption.is_some()),
+            alpha,
+            normal_maps: (lit || depth > 0) && any(|m| m.normal_texture.is_some()),
+            environment,
+            background: wishes.background.or(scene.background),
             primitives: world.primitive_count(),
             materials: materials.len(),
         }
@@ -134,10 +199,11 @@ impl fmt::Display for Plan {
             Lighting::None => "no light".to_owned(),
             Lighting::Lights(lights) if lights.is_empty() => "no light".to_owned(),
             Lighting::Headlight => "a headlight without shadows".to_owned(),
+            Lighting::Lights(lights) if lights.is_empty() => "no lights".to_owned(),
             Lighting::Lights(lights) if lights.len() == 1 => "1 light with hard shadows".to_owned(),
             Lighting::Lights(lights) => format!("{} lights with hard shadows", lights.len()),
         };
-        write!(f, "{} primitives on {levels}, {lights}", self.primitives)?;
+        write!(f, "{} ({}): {} primitives on {levels}, {lights}", self.integrator, self.why, self.primitives)?;
         let Attributes { normals, uvs, colors } = self.attributes;
         let parts = [
             (normals, "smooth normals"),
@@ -145,12 +211,21 @@ impl fmt::Display for Plan {
             (colors, "vertex colours"),
             (self.motion, "motion"),
             (self.ambient, "ambient light"),
+            (self.environment, "an environment"),
+            (self.absorption, "absorption"),
+            (self.alpha, "alpha"),
+            (self.normal_maps, "normal maps"),
         ];
         for (_, name) in parts.iter().filter(|(on, _)| *on) {
             write!(f, ", {name}")?;
         }
         if self.depth > 0 {
-            write!(f, ", mirrored and refracted rays to depth {}", self.depth)?;
+            match self.integrator {
+                Integrator::RayCast | Integrator::Whitted => {
+                    write!(f, ", mirrored and refracted rays to depth {}", self.depth)?;
+                }
+                Integrator::Path => write!(f, ", paths scattered up to {} times", self.depth)?,
+            }
         }
         write!(f, ", {} {}", self.materials, if self.materials == 1 { "material" } else { "materials" })
     }
@@ -172,7 +247,11 @@ mod tests {
     }
 
     fn plan(scene: &Scene) -> Plan {
-        Plan::new(scene, &World::new(scene).unwrap(), None, 5)
+        wished(scene, &Wishes::default())
+    }
+
+    fn wished(scene: &Scene, wishes: &Wishes) -> Plan {
+        Plan::new(scene, &World::new(scene).unwrap(), wishes)
     }
 
     #[test]
@@ -213,6 +292,34 @@ mod tests {
         let plan = plan(&scene);
         assert_eq!((plan.depth, plan.lighting), (5, Lighting::None));
         assert!(plan.attributes.normals, "they bend the ray");
+    }
+
+    #[test]
+    fn the_cheapest_integrator_that_shows_everything_is_chosen() {
+        let of = |scene: &Scene| plan(scene).integrator;
+        let mut lit = scene();
+        assert_eq!(of(&lit), Integrator::RayCast);
+        lit.materials[0].reflection = Vec3::X;
+        assert_eq!(of(&lit), Integrator::Whitted);
+        // Darkness, and something that glows: nothing else lights the scene.
+        let mut dark = scene();
+        dark.lights = vec![Light::Directional { direction: DVec3::NEG_Y, color: Vec3::ZERO }];
+        assert_eq!(of(&dark), Integrator::RayCast);
+        dark.materials[0].emission = Vec3::ONE;
+        assert_eq!((of(&dark), plan(&dark).depth), (Integrator::Path, USUAL_PATH_DEPTH));
+        dark.ambient = Vec3::ONE;
+        assert_eq!(of(&dark), Integrator::RayCast, "ambient light lights it too");
+        dark.lights.clear();
+        assert_eq!(plan(&dark).lighting, Lighting::Headlight);
+        for integrator in Integrator::ALL {
+            let wishes = Wishes { integrator: Some(integrator), max_depth: Some(7), ..Wishes::default() };
+            let plan = wished(&lit, &wishes);
+            assert_eq!(plan.integrator, integrator);
+            assert_eq!(plan.depth, if integrator == Integrator::RayCast { 0 } else { 7 });
+        }
+        let wishes = Wishes { integrator: Some(Integrator::Path), ..Wishes::default() };
+        let path = wished(&dark, &wishes);
+        assert_eq!((path.lighting, path.ambient), (Lighting::Lights(vec![]), false), "what glows is light enough");
     }
 
     #[test]

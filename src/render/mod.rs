@@ -3,15 +3,19 @@
 //! A picture depends on scene, camera, size, samples and seed. Threads, tiles and their order, and how rays are bundled
 //! change when a pixel is computed, never what.
 
+mod alpha;
 mod camera;
 mod counted;
 mod film;
 mod filter;
+mod path;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
+mod whitted;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
@@ -22,10 +26,11 @@ pub use tiles::TileOrder;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::{DVec2, Vec3, Vec4};
-use crate::plan::Plan;
+use crate::plan::{Plan, Wishes};
 use crate::ray::Ray;
-use crate::scene::{Camera, Material, Scene};
-use crate::shade::light::LightSource;
+use crate::scene::{Camera, Integrator, Material, Scene};
+use crate::shade::EnvironmentLight;
+use crate::shade::lights::Lights;
 use crate::trace::{Batch, Tracer, World};
 use camera::View;
 use film::Film;
@@ -58,14 +63,17 @@ pub struct Settings {
     pub tile_order: TileOrder,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
-    /// Shadow rays to each extended light where a ray hits.
+    /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
     pub light_samples: u32,
-    /// How often a ray may be mirrored or refracted; what it would see after that is black.
-    pub max_depth: u32,
+    /// How far light is followed; none for the cheapest way that shows all the scene contains.
+    pub integrator: Option<Integrator>,
+    /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
+    /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
+    pub max_depth: Option<u32>,
 }
 
 impl Default for Settings {
-    /// 1280 x 720 pixels of 4 samples, 5 mirrors deep.
+    /// 1280 x 720 pixels of 4 samples, as deep as is usual.
     fn default() -> Self {
         Self {
             width: 1280,
@@ -78,7 +86,8 @@ impl Default for Settings {
             tile_order: TileOrder::default(),
             background: None,
             light_samples: 1,
-            max_depth: 5,
+            integrator: None,
+            max_depth: None,
         }
     }
 }
@@ -105,7 +114,9 @@ pub struct Renderer<'a> {
     filter: FilterSampler,
     /// Of all shadow rays of a pixel to a light.
     light_sampler: Sampler,
-    lights: Vec<LightSource>,
+    lights: Lights,
+    /// What is around the scene; none where that is black.
+    environment: Option<Arc<EnvironmentLight>>,
     /// Ambient light, zero where the plan leaves it out.
     ambient: Vec3,
     /// What a geometry is made of whose material does not exist.
@@ -138,7 +149,9 @@ impl<'a> Renderer<'a> {
         if settings.light_samples == 0 {
             return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
         }
-        let plan = Plan::new(scene, world, settings.background, settings.max_depth);
+        let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
+        let Settings { integrator, background, max_depth, .. } = settings;
+        let plan = Plan::new(scene, world, &Wishes { integrator, background, max_depth });
         let mut renderer = Self {
             scene,
             world,
@@ -148,13 +161,14 @@ impl<'a> Renderer<'a> {
             light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
             // A single sample is the pixel's middle, whatever the filter.
             filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
-            lights: Vec::new(),
+            lights: Lights::default(),
+            environment: environment.map(Arc::new),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
             plan,
             settings,
         };
-        renderer.lights = renderer.light_sources(camera.eye - world.centre);
+        renderer.lights = renderer.plan_lights(camera.eye - world.centre);
         Ok(renderer)
     }
 

@@ -4,6 +4,7 @@
 //! origin, transforms are f64. What the tracers see is made of it by [`World`](crate::World).
 
 mod camera;
+mod environment;
 mod instance;
 mod light;
 mod material;
@@ -16,14 +17,15 @@ mod search;
 mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
+pub use environment::Environment;
 pub use instance::{Group, Instance};
 pub use light::{AreaShape, Attenuation, Light, Unlit};
-pub use material::{Material, Specular};
+pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
 pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
-pub use request::Request;
+pub use request::{Integrator, Request};
 pub use rocks::rocks;
 pub use search::{Accel, Resolution, Search};
 pub use texture::{Filter, Texture, Wrap};
@@ -52,7 +54,9 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Light that reaches every point from everywhere, linear RGB.
     pub ambient: Vec3,
-    /// What a ray that hits nothing sees, linear RGB; none where the picture is to be transparent.
+    /// Light from infinitely far, all around.
+    pub environment: Option<Environment>,
+    /// What a ray that hits nothing sees, linear RGB; before an environment, camera rays alone; none where the picture is to be transparent.
     pub background: Option<Vec3>,
     /// What the file wants of a render.
     pub request: Request,

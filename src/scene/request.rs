@@ -1,6 +1,36 @@
 //! What a scene file says about the picture that is to be made of it.
 
 use super::search::Search;
+/// How far light is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integrator {
+    /// From lights to what the camera sees: no ray is sent on. Mirrors and glass show the environment, if there is one.
+    RayCast,
+    /// As ray casting, with mirrored and refracted rays followed.
+    Whitted,
+    /// All light, however often it was scattered.
+    Path,
+}
+
+impl Integrator {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::RayCast, Self::Whitted, Self::Path];
+
+    /// As flags and scenes have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RayCast => "ray-cast",
+            Self::Whitted => "whitted",
+            Self::Path => "path",
+        }
+    }
+}
+
+impl std::fmt::Display for Integrator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 /// Settings of a render that a scene file may carry. They stand where the caller says nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -11,7 +41,9 @@ pub struct Request {
     pub spp: Option<u32>,
     /// Chooses among equally good sample patterns.
     pub seed: Option<u64>,
-    /// How often a ray may be mirrored or refracted.
+    /// How far light is followed; none for the cheapest way that shows all the scene contains.
+    pub integrator: Option<Integrator>,
+    /// How often a ray may be sent on.
     pub max_depth: Option<u32>,
     /// Name of the picture's file, as it stands in the scene file.
     pub output: Option<String>,

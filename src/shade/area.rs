@@ -38,7 +38,8 @@ fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumina
         return None;
     }
     let color = radiance * (facing / (std::f64::consts::PI * squared)) as f32;
-    color.is_finite().then(|| Illumination { to_light, color, end: Some(short_of(at, to_light, point)) })
+    let (end, density) = (Some(short_of(at, to_light, point)), Some(squared / facing));
+    color.is_finite().then_some(Illumination { to_light, color, end, density })
 }
 
 /// From a direction of the cone that the sphere fills.
@@ -46,9 +47,7 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, even: DVec2)
     let offset = centre - point;
     let distance = offset.length();
     let axis = offset.try_normalize().unwrap_or(DVec3::Y);
-    // 1 - cos of the cone's half angle, without the difference; of all directions for a point inside.
-    let sine = (radius / distance).min(1.0);
-    let opening = if distance > radius { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 };
+    let opening = opening(distance, radius);
     let height = even.x * opening;
     let (cosine, off_axis) = (1.0 - height, (height * (2.0 - height)).max(0.0).sqrt());
     let [x, y] = tangents(axis);
@@ -57,9 +56,36 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, even: DVec2)
     // The solid angle is 2 pi times the opening.
     let color = radiance * (2.0 * opening) as f32;
     let half_chord = (radius * radius - (distance * off_axis).powi(2)).max(0.0).sqrt();
-    let way = distance * cosine + if distance > radius { -half_chord } else { half_chord };
+    let way = distance * cosine + if is_outside(distance, radius) { -half_chord } else { half_chord };
     let at = point + to_light * way.max(0.0);
-    Some(Illumination { to_light, color, end: Some(short_of(at, to_light, point)) })
+    let density = Some(1.0 / (std::f64::consts::TAU * opening));
+    Some(Illumination { to_light, color, end: Some(short_of(at, to_light, point)), density })
+}
+
+/// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point inside.
+fn opening(distance: f64, radius: f64) -> f64 {
+    let sine = (radius / distance).min(1.0);
+    if is_outside(distance, radius) { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 }
+}
+
+/// What lies on the sphere, up to rounding, counts as inside: it sees all of it.
+fn is_outside(distance: f64, radius: f64) -> bool {
+    distance > radius * (1.0 + 1e-6)
+}
+
+/// How densely [`illuminate`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where the
+/// light turns its back.
+pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
+    let area = match *shape {
+        AreaShape::Rectangle { half_edges: [a, b], .. } => a.cross(b) * 4.0,
+        AreaShape::Disk { normal, radius, .. } => normal * (std::f64::consts::PI * radius * radius),
+        AreaShape::Sphere { centre, radius } => {
+            return Some(1.0 / (std::f64::consts::TAU * opening((centre - point).length(), radius)));
+        }
+    };
+    let offset = at - point;
+    let facing = -offset.normalize_or_zero().dot(area);
+    (facing > 0.0).then(|| offset.length_squared() / facing)
 }
 
 /// A point before `at` on the way from `point`, by what f32 may move the surface there: what stands in the light's place must
@@ -109,6 +135,24 @@ mod tests {
         assert!((reflected(&corner, DVec3::ZERO, DVec3::Y) - expected).abs() < 1e-5, "X x Z is -Y: it shines down");
         let back = AreaShape::Disk { centre: up, normal: DVec3::Y, radius: r };
         assert_eq!(reflected(&back, DVec3::ZERO, DVec3::Y), 0.0, "behind it is dark");
+    }
+
+    /// The density that is told afterwards is the one that was sampled with, and color is radiance / (pi density).
+    #[test]
+    fn densities_agree() {
+        let centre = DVec3::new(1.0, 4.0, 2.0);
+        for shape in [
+            AreaShape::Sphere { centre, radius: 1.5 },
+            AreaShape::Sphere { centre, radius: 15.0 },
+            AreaShape::Disk { centre, normal: DVec3::new(0.6, -0.8, 0.0), radius: 2.0 },
+            AreaShape::Rectangle { centre, half_edges: [DVec3::X, DVec3::Z * 2.0] },
+        ] {
+            let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, DVec2::new(0.3, 0.6)).unwrap();
+            let (sampled, at) = (arriving.density.unwrap(), arriving.end.unwrap());
+            let told = density(&shape, DVec3::ZERO, at).unwrap();
+            assert!((sampled / told - 1.0).abs() < 1e-4, "{shape:?}: {sampled} {told}");
+            assert!((f64::from(arriving.color.x) * std::f64::consts::PI * sampled - 1.0).abs() < 1e-6);
+        }
     }
 
     #[test]

@@ -3,18 +3,32 @@
 //! Falloff follows the glTF extension [KHR_lights_punctual](https://github.com/KhronosGroup/glTF/blob/main/extensions/2.0/Khronos/KHR_lights_punctual/README.md):
 //! a range window that reaches zero smoothly, and a spot whose edge is the square of a linear ramp in the cosine.
 
-use super::SurfacePoint;
+use std::sync::Arc;
+
 use super::area::{self, short_of};
+use super::emitters::Patches;
+use super::{EnvironmentLight, SurfacePoint};
 use crate::math::{DAffine3, DVec2, DVec3, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Attenuation, Light};
 
 /// A light as the renderer uses it, in world coordinates.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct LightSource {
-    light: Light,
+    kind: Kind,
     /// Whether anything can stand between it and what the camera sees.
     pub casts_shadows: bool,
+}
+
+/// What shines.
+#[derive(Clone, Debug)]
+enum Kind {
+    /// A light of the scene.
+    Light(Light),
+    /// What is around the scene.
+    Environment(Arc<EnvironmentLight>),
+    /// Surfaces that glow.
+    Patches(Patches),
 }
 
 /// Light that arrives at a point, before any shadow.
@@ -26,6 +40,8 @@ pub struct Illumination {
     pub color: Vec3,
     /// Up to where the way must be free, world coordinates; none for all of it.
     pub end: Option<DVec3>,
+    /// How densely the direction was chosen, per steradian, among those to an extended light.
+    pub density: Option<f64>,
 }
 
 impl LightSource {
@@ -33,7 +49,17 @@ impl LightSource {
     pub fn new(light: &Light, centre: DVec3) -> Self {
         let mut light = light.clone();
         light.transform(&DAffine3::from_translation(-centre));
-        Self { light, casts_shadows: true }
+        Self { kind: Kind::Light(light), casts_shadows: true }
+    }
+
+    /// What is around the scene.
+    pub fn environment(environment: Arc<EnvironmentLight>) -> Self {
+        Self { kind: Kind::Environment(environment), casts_shadows: true }
+    }
+
+    /// Surfaces that glow.
+    pub(super) fn patches(patches: Patches) -> Self {
+        Self { kind: Kind::Patches(patches), casts_shadows: true }
     }
 
     /// A white light at the viewer's `eye` (world coordinates), the same at any distance. Its shadows lie where the
@@ -41,36 +67,32 @@ impl LightSource {
     pub fn headlight(eye: DVec3) -> Self {
         let (attenuation, range) = (Attenuation::NONE, f64::INFINITY);
         let light = Light::Point { position: eye, color: Vec3::ONE, attenuation, range, radius: 0.0 };
-        Self { light, casts_shadows: false }
+        Self { kind: Kind::Light(light), casts_shadows: false }
     }
 
     /// Whether what arrives depends on which part of the light is asked.
     pub const fn is_extended(&self) -> bool {
-        matches!(self.light, Light::Area { .. })
+        match &self.kind {
+            Kind::Light(light) => matches!(light, Light::Area { .. }),
+            Kind::Environment(_) | Kind::Patches(_) => true,
+        }
+    }
+
+    /// The light of the scene, in world coordinates, if it is one.
+    pub(super) const fn light(&self) -> Option<&Light> {
+        match &self.kind {
+            Kind::Light(light) => Some(light),
+            Kind::Environment(_) | Kind::Patches(_) => None,
+        }
     }
 
     /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
     /// asked that `even`, a point of the unit square, chooses.
     pub fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
-        match &self.light {
-            Light::Directional { direction, color } => {
-                Some(Illumination { to_light: -*direction, color: *color, end: None })
-            }
-            Light::Point { position, color, attenuation, range, radius } => {
-                let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
-                if *radius > 0.0 {
-                    // Within the lamp nothing is in between.
-                    let way = ((*position - point).length() - radius).max(0.0);
-                    arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point));
-                }
-                Some(arriving)
-            }
-            Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, even),
-            Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
-                let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
-                arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
-                (arriving.color != Vec3::ZERO).then_some(arriving)
-            }
+        match &self.kind {
+            Kind::Light(light) => from_light(light, point, even),
+            Kind::Environment(environment) => environment.illuminate(even),
+            Kind::Patches(patches) => patches.illuminate(point, even),
         }
     }
 
@@ -79,6 +101,30 @@ impl LightSource {
         match arriving.end {
             None => surface.spawn(arriving.to_light.as_vec3(), f32::INFINITY),
             Some(end) => surface.spawn_to(end),
+        }
+    }
+}
+
+/// What arrives from a light of the scene.
+fn from_light(light: &Light, point: DVec3, even: DVec2) -> Option<Illumination> {
+    match light {
+        Light::Directional { direction, color } => {
+            Some(Illumination { to_light: -*direction, color: *color, end: None, density: None })
+        }
+        Light::Point { position, color, attenuation, range, radius } => {
+            let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
+            if *radius > 0.0 {
+                // Within the lamp nothing is in between.
+                let way = ((*position - point).length() - radius).max(0.0);
+                arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point));
+            }
+            Some(arriving)
+        }
+        Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, even),
+        Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
+            let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
+            arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
+            (arriving.color != Vec3::ZERO).then_some(arriving)
         }
     }
 }
@@ -98,6 +144,7 @@ fn from_point(
         to_light: offset / distance,
         color,
         end: Some(position),
+        density: None,
     })
 }
 

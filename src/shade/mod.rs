@@ -1,14 +1,20 @@
 //! From hits to radiance: what stands at a hit, how much light reaches it, how much of it is sent to the viewer.
 //!
-//! [`surface`] is the only place that knows what a [`Hit`](crate::Hit) means geometrically; [`light`], [`phong`] and [`whitted`] see
+//! [`surface`] is the only place that knows what a [`Hit`](crate::Hit) means geometrically; [`light`] and [`scattering`] see
 //! a [`SurfacePoint`] and never a primitive. Shading is f32 arithmetic without fused operations, and sines and powers
 //! come from libm, so that a picture is the same with every C library.
 
 mod area;
+mod bodies;
+pub mod coverage;
+mod emitters;
+mod environment;
 pub mod light;
-pub mod phong;
+pub mod lights;
+pub mod normal_map;
+pub mod scattering;
 pub mod surface;
 pub mod texture;
-pub mod whitted;
 
+pub use environment::EnvironmentLight;
 pub use surface::{Attributes, SurfacePoint};

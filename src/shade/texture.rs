@@ -9,6 +9,15 @@ use crate::scene::{Filter, Texture, Wrap};
 
 /// The linear RGBA colour at `uv` (v up). White for an image without pixels and for coordinates that are not finite.
 pub fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
+    interpolate(texture, uv, srgb_to_linear)
+}
+
+/// The same of an image whose colours are numbers, from 0 to 1, that are not encoded.
+pub fn numbers(texture: &Texture, uv: Vec2) -> Vec4 {
+    interpolate(texture, uv, |code| f32::from(code) / 255.0)
+}
+
+fn interpolate(texture: &Texture, uv: Vec2, decode: impl Fn(u8) -> f32 + Copy) -> Vec4 {
     let st = uv * texture.scale + texture.offset;
     if texture.pixels.is_empty() || !st.is_finite() {
         return Vec4::ONE;
@@ -17,12 +26,12 @@ pub fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
     let x = st.x * texture.width as f32;
     let y = (1.0 - st.y) * texture.height as f32;
     match texture.filter {
-        Filter::Nearest => texel(texture, index(x), index(y)),
+        Filter::Nearest => texel(texture, index(x), index(y), decode),
         Filter::Linear => {
             let (x, y) = (x - 0.5, y - 0.5);
             let (left, top) = (index(x), index(y));
             let (fx, fy) = (x - x.floor(), y - y.floor());
-            let row = |y| texel(texture, left, y) * (1.0 - fx) + texel(texture, left + 1, y) * fx;
+            let row = |y| texel(texture, left, y, decode) * (1.0 - fx) + texel(texture, left + 1, y, decode) * fx;
             row(top) * (1.0 - fy) + row(top + 1) * fy
         }
     }
@@ -33,11 +42,11 @@ fn index(x: f32) -> i64 {
     x.floor().clamp(-1e15, 1e15) as i64
 }
 
-fn texel(texture: &Texture, x: i64, y: i64) -> Vec4 {
+fn texel(texture: &Texture, x: i64, y: i64, decode: impl Fn(u8) -> f32) -> Vec4 {
     let x = wrap(texture.wrap_u, x, i64::from(texture.width));
     let y = wrap(texture.wrap_v, y, i64::from(texture.height));
     let [r, g, b, a] = texture.pixels[(y * i64::from(texture.width) + x) as usize];
-    Vec4::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), f32::from(a) / 255.0)
+    Vec4::new(decode(r), decode(g), decode(b), f32::from(a) / 255.0)
 }
 
 /// Brings an index into `0..size`.

@@ -28,7 +28,12 @@ pub fn of_kind(kind: Kind, fixed: usize, placed: usize, random: &mut Random) -> 
     let (fixed, placed) = (subjects(fixed), subjects(placed));
     let transforms = if placed.is_empty() { Vec::new() } else { vec![turned(), sheared()] };
     let at_home = Instance { name: "fixed".into(), group: 0, transform: DAffine3::IDENTITY, transform_end: None };
-    let elsewhere = transforms.iter().map(|&transform| Instance { name: "placed".into(), group: 1, transform, transform_end: None });
+    let elsewhere = transforms.iter().map(|&transform| Instance {
+        name: "placed".into(),
+        group: 1,
+        transform,
+        transform_end: None,
+    });
     let mut scene = Scene {
         geometries: vec![geometry(&fixed)],
         groups: vec![Group { name: String::new(), geometries: 0..1 }],
@@ -125,7 +130,7 @@ impl Allowed {
 
 /// Whether `found` is an answer that is right; `Ok(true)` where only one was.
 fn judge(world: &World, ray: &Ray, found: Option<Hit>) -> Result<bool, String> {
-    let allowed: Vec<Allowed> = oracle::primitives(world).map(|(id, p)| Allowed::new(ray, id, &p)).collect();
+    let allowed: Vec<Allowed> = oracle::primitives(world, ray.time).map(|(id, p)| Allowed::new(ray, id, &p)).collect();
     let surely = || allowed.iter().filter(|a| !a.miss);
     // Nothing that is surely hit is nearer, whatever the rounding.
     let nearest = surely().map(|a| a.t.1).fold(f64::INFINITY, f64::min);

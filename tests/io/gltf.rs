@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Attenuation, Filter, Fov, Light, Projection, Wrap};
+use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Projection, Wrap};
 
 use super::{Files, corners, meshes, obj, refused};
 
@@ -188,6 +188,43 @@ fn metalness_and_roughness_are_the_means_of_their_texture() {
 }
 
 #[test]
+fn alpha_and_emission_of_materials() {
+    let with = |changes: &[(&str, Value)]| changed(changes).scene("a.gltf").materials[0].clone();
+    let color = ("/materials/0/pbrMetallicRoughness/baseColorFactor", json!([1, 1, 1, 0.25]));
+    let blend = with(&[("/materials/0/alphaMode", json!("BLEND")), color.clone()]);
+    assert_eq!((blend.alpha, blend.opacity), (Alpha::Blend, 0.25));
+    let mask = |cutoff: &[(&str, Value)]| with(&[&[("/materials/0/alphaMode", json!("MASK"))], cutoff].concat()).alpha;
+    assert_eq!(mask(&[]), Alpha::Mask { cutoff: 0.5 });
+    assert_eq!(mask(&[("/materials/0/alphaCutoff", json!(0.125))]), Alpha::Mask { cutoff: 0.125 });
+    assert_eq!(with(&[color]).alpha, Alpha::Opaque);
+    let glowing = with(&[("/materials/0/emissiveTexture", json!({"index": 0}))]);
+    assert!(glowing.emission_texture.is_some() && glowing.emission_texture == glowing.diffuse_texture);
+    let rough = with(&[("/materials/0/normalTexture", json!({"index": 0, "scale": 0.5}))]);
+    assert_eq!((rough.normal_texture, rough.normal_scale), (rough.diffuse_texture, 0.5));
+}
+
+#[test]
+fn extensions_of_materials() {
+    let with =
+        |extensions: Value| changed(&[("/materials/0/extensions", extensions)]).scene("a.gltf").materials[0].clone();
+    let pane =
+        with(json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}, "KHR_materials_ior": {"ior": 1.2}}));
+    assert_eq!((pane.interface, pane.ior, pane.absorption), (Interface::Thin, 1.2, None));
+    // A quarter goes through: half of what is not metal, of the base colour times the picture's mean.
+    assert_eq!(pane.transmission, Vec3::new(0.5, 0.0, 0.125) * 0.25);
+    assert_eq!((pane.emission, pane.unlit), (Vec3::new(0.0, 0.5, 0.0), false));
+    let volume = json!({"thicknessFactor": 0.1, "attenuationDistance": 2.0, "attenuationColor": [0.5, 1.0, 0.25]});
+    let block = with(json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}));
+    let absorption = Absorption { color: Vec3::new(0.5, 1.0, 0.25), distance: 2.0 };
+    assert_eq!((block.interface, block.absorption, block.ior), (Interface::Fresnel, Some(absorption), 1.5));
+    let textured = json!({"transmissionFactor": 1, "transmissionTexture": {"index": 0}});
+    let textured = with(json!({"KHR_materials_transmission": textured}));
+    assert_eq!(textured.transmission, pane.transmission, "half of the picture is red");
+    let flat = with(json!({"KHR_materials_unlit": {}}));
+    assert_eq!((flat.unlit, flat.diffuse, flat.emission), (true, Vec3::new(1.0, 0.5, 0.25), Vec3::ZERO));
+}
+
+#[test]
 fn files_beside_it() {
     let uris = [("/buffers/0/uri", json!("my%20data.bin")), ("/images/0/uri", json!("pic%2Epng"))];
     let files = changed(&uris).and("my data.bin", triangle_bytes()).and("pic.png", obj::picture());
@@ -244,7 +281,8 @@ fn what_is_not_rendered_is_a_warning() {
         assert!(warnings.len() == 1, "{warnings:?}");
         assert!(warnings[0].place == place && warnings[0].message.contains(words), "{}", warnings[0]);
     };
-    say(&[("/materials/0/alphaMode", json!("BLEND"))], "/materials", "gold");
+    let second = json!({"index": 0, "texCoord": 1});
+    say(&[("/materials/0/normalTexture", second)], "/materials/0/normalTexture", "wants coordinates of set 1");
     say(&[("/meshes/0/primitives/1/mode", json!(1))], "/meshes", "1 primitives are points or lines");
     say(&[("/meshes/0/primitives/1/targets", json!([{}]))], "/meshes", "morph");
     say(&[("/nodes/1/skin", json!(0))], "/skins", "skins");
@@ -298,6 +336,15 @@ fn faults_are_told_with_their_pointer() {
     fault("/nodes/3/camera", json!(1), "/nodes/3/camera", "no camera 1");
     fault("/cameras/0/perspective/yfov", json!(4), "/cameras/0/perspective/yfov", "between 0 and pi");
     fault("/scene", json!(2), "/scene", "no scene 2");
+    fault("/materials/0/alphaMode", json!("GLASS"), "/materials/0", "expected OPAQUE, BLEND, or MASK");
+    for (name, value, words) in [
+        ("KHR_materials_ior", json!({"ior": 0.5}), "from 1 up, or 0"),
+        ("KHR_materials_transmission", json!({"transmissionFactor": 1.5}), "from 0 to 1"),
+        ("KHR_materials_volume", json!({"thicknessFactor": 1, "attenuationDistance": 0}), "above 0"),
+        ("KHR_materials_volume", json!({"thicknessFactor": "thick"}), "KHR_materials_volume: invalid type"),
+    ] {
+        fault("/materials/0/extensions", json!({ name: value }), "/materials/0/extensions", words);
+    }
     fault("/materials/0/pbrMetallicRoughness/metallicFactor", json!(2), "/materials/0", "from 0 to 1");
     fault(
         "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture",

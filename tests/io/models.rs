@@ -15,7 +15,7 @@ fn models_load_with_the_known_number_of_triangles() {
         ("teapot.obj", None, &[]),
         ("suzanne.obj", None, &[]),
         ("cow.obj", None, &[]),
-        ("gltf/FlightHelmet/FlightHelmet.gltf", None, &["transparency"]),
+        ("gltf/FlightHelmet/FlightHelmet.gltf", None, &[]),
         ("gltf/CornellBox.glb", None, &[]),
         ("gltf/Fox.glb", Some(576), &["skins"]),
         ("gltf/MorphStressTest.gltf", None, &["morph"]),

@@ -2,7 +2,8 @@
 
 use twincast::math::{DVec2, DVec3, UVec3, Vec3};
 use twincast::scene::{
-    Accel, AreaShape, Distortion, Fov, Geometry, Light, Projection, Resolution, Scene, Search, Specular, ThinLens,
+    Absorption, Accel, Alpha, AreaShape, Distortion, Fov, Geometry, Interface, Light, Projection, Resolution, Scene,
+    Search, Specular, ThinLens,
 };
 use twincast::{Shape, SphereMethod, TriangleMethod, World};
 
@@ -19,13 +20,15 @@ const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
 
 /// A scene that has most of what there is.
 pub fn text() -> String {
-    let with_files = |example: &&String| !example.contains("wood.png") && !example.contains("[[file]]");
+    let with_files = |example: &&String| {
+        !example.contains("wood.png") && !example.contains("sky.exr") && !example.contains("[[file]]")
+    };
     examples().iter().filter(with_files).map(String::as_str).collect()
 }
 
 /// A folder with the scene and with what the examples refer to.
 fn files(text: &str) -> Files {
-    Files::one("a.toml", text).and("wood.png", obj::picture()).and("mesh.obj", TRIANGLE)
+    Files::one("a.toml", text).and("wood.png", obj::picture()).and("sky.exr", obj::picture()).and("mesh.obj", TRIANGLE)
 }
 
 fn scene(text: &str) -> Scene {
@@ -42,7 +45,7 @@ fn every_example_of_the_documentation_is_a_scene() {
         World::new(&scene).expect("it can be traced");
     }
     // All of them at once.
-    assert_eq!(scene(&examples.concat()).materials.len(), 5);
+    assert_eq!(scene(&examples.concat()).materials.len(), 8);
 }
 
 #[test]
@@ -58,6 +61,7 @@ fn the_documentation_has_every_key() {
         "[[light]]\ntype = \"sphere\"\nposition = [0, 0, 0]\nradius = 1\nradiance = 1",
         "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nhalf_edges = [[1, 0, 0], [0, 1, 0]]\nradiance = 1",
         "[material.a]",
+        "[environment]\nimage = \"sky.exr\"",
         "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1",
         "[[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]",
         "[[disk]]\ncentre = [0, 0, 0]\nnormal = [1, 0, 0]\nradius = 1",
@@ -138,11 +142,20 @@ fn lights_and_materials() {
     assert!((inner_angle.to_degrees() - 20.0).abs() < 1e-4 && (outer_angle.to_degrees() - 30.0).abs() < 1e-4);
     assert_eq!((*centre, *half_edges), (DVec3::Y * 3.0, [DVec3::X * 0.5, DVec3::Z * 0.5]));
     assert_eq!((*radiance, *normal, *ball), (Vec3::new(10.0, 9.0, 8.0), DVec3::NEG_Y, 0.25));
-    let glass = &scene.materials[0];
+    let glass = &scene.materials[1];
     assert_eq!((glass.name.as_str(), glass.diffuse, glass.ambient), ("glass", Vec3::splat(0.02), Vec3::splat(0.02)));
     assert_eq!((glass.transmission, glass.ior, glass.shininess), (Vec3::splat(0.85), 1.5, 100.0));
     assert_eq!((glass.model, glass.emission), (Specular::BlinnPhong, Vec3::new(0.0, 0.0, 0.01)));
-    assert_eq!((scene.materials[1].diffuse_texture, scene.textures.len()), (Some(0), 1));
+    let wood = &scene.materials[4];
+    let slots = [wood.diffuse_texture, wood.emission_texture, wood.normal_texture];
+    assert_eq!((slots, scene.textures.len()), ([Some(0), Some(1), Some(2)], 3));
+    assert_eq!((wood.alpha, wood.opacity, wood.normal_scale), (Alpha::Mask { cutoff: 0.5 }, 1.0, 1.0));
+    let [bottle, pane, sign] = [0, 2, 3].map(|i| &scene.materials[i]);
+    assert_eq!((bottle.interface, bottle.reflection, bottle.diffuse), (Interface::Fresnel, Vec3::ONE, Vec3::ZERO));
+    let green = Absorption { color: Vec3::new(0.3, 0.8, 0.4), distance: 0.02 };
+    assert_eq!((bottle.absorption, bottle.ior, pane.interface), (Some(green), 1.52, Interface::Thin));
+    assert_eq!((sign.unlit, sign.diffuse), (true, Vec3::new(1.0, 0.9, 0.1)));
+    assert_eq!((glass.gloss, glass.energy_conserving, glass.interface), (Some(500.0), true, Interface::Shares));
 }
 
 #[test]
@@ -218,6 +231,13 @@ fn faults_are_told_with_line_and_remedy() {
         .chain(["[[instance]]\ngroup = \"g0\"\n[[group.g9.sphere]]\ncentre = [0, 0, 0]\nradius = 1\n".to_owned()])
         .collect();
     for (text, line, words) in [
+        ("[material.a]\nthin = true\n", 2, "type = \"glass\" alone"),
+        ("[material.a]\nattenuation_distance = 2\n", 1, "one of them is missing"),
+        ("[material.a]\nattenuation_distance = 0\n", 2, "a number above 0"),
+        ("[material.a]\nalpha = \"blend\"\nalpha_cutoff = 0.5\n", 1, "alpha = \"mask\" alone"),
+        ("[material.a]\nopacity = 2\n", 2, "from 0 to 1"),
+        ("[environment]\nimage = \"none.exr\"\n", 2, "there is no file"),
+        ("[render]\nintegrator = \"paths\"\n", 2, "did you mean \"path\""),
         ("[render\n", 1, "not TOML"),
         ("a = 1\n", 1, "the file has no key \"a\""),
         ("[[spheer]]\nradius = 1\n", 1, "did you mean \"sphere\"?"),

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use twincast::math::{DAffine3, DVec3, Vec3, Vec4};
 use twincast::render::{Control, Counted, TileOrder};
-use twincast::scene::{Attenuation, Camera, Fov, Geometry, Instance, Light, Material, Projection};
+use twincast::scene::{Attenuation, Camera, Fov, Geometry, Instance, Integrator, Light, Material, Projection};
 use twincast::{Batch, Error, Renderer, Scene, Settings, Width, World};
 
 use super::{engines, floor, matte, render, settings, torus};
@@ -40,21 +40,44 @@ fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
-#[test]
-fn threads_tile_orders_and_packets_do_not_show() {
+/// The busy scene with all that paths know beside: glass that absorbs, gloss, what glows, light from all around.
+fn busier_scene() -> Scene {
     let mut scene = busy_scene(DVec3::ZERO);
+    let absorption = Some(twincast::scene::Absorption { color: Vec3::new(0.5, 0.9, 0.7), distance: 0.5 });
+    scene.materials[0] = Material { absorption, ..Material::glass(1.5) };
+    scene.materials[1].gloss = Some(40.0);
+    let lamp = twincast::Shape::Sphere(twincast::Sphere { centre: Vec3::new(-3.0, 2.0, 0.0), radius: 0.5 });
+    scene.geometries.push(Geometry::Shapes { shapes: vec![lamp], material: 2 });
+    scene.materials.push(Material { emission: Vec3::new(9.0, 5.0, 2.0), ..matte(0.2) });
+    scene.groups.push(twincast::scene::Group { name: String::new(), geometries: 2..3 });
+    let at_rest = Instance { name: String::new(), group: 2, transform: DAffine3::IDENTITY, transform_end: None };
     let beside = DAffine3::from_translation(DVec3::new(-2.0, 1.0, 0.5));
     let moved = DAffine3::from_translation(DVec3::new(-1.5, 1.5, 0.0)) * DAffine3::from_rotation_y(0.5);
-    scene.instances.push(Instance { name: String::new(), group: 1, transform: beside, transform_end: Some(moved) });
-    let world = World::new(&scene).unwrap();
+    let flies = Instance { group: 1, transform: beside, transform_end: Some(moved), ..at_rest.clone() };
+    scene.instances.extend([at_rest, flies]);
+    let pixels = (0..128).map(|i| Vec4::new(0.1, 0.2, 0.3, 1.0) * (i % 5) as f32).collect();
+    scene.environment = Some(twincast::scene::Environment::new(twincast::Image { width: 16, height: 8, pixels }));
+    scene
+}
+
+#[test]
+fn threads_tile_orders_and_packets_do_not_show() {
     let plain = Settings { tile_order: TileOrder::Scanline, seed: 5, ..settings(70, 45, 3) };
+    check_bits(&busy_scene(DVec3::ZERO), &plain);
+    for integrator in Integrator::ALL {
+        check_bits(&busier_scene(), &Settings { integrator: Some(integrator), spp: 2, ..plain.clone() });
+    }
+}
+
+fn check_bits(scene: &Scene, plain: &Settings) {
+    let world = World::new(scene).unwrap();
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     for engine in engines(&world) {
         let picture = |settings: &Settings, threads| {
-            pool(threads).install(|| render(&scene, &scene.cameras[0], settings, &engine))
+            pool(threads).install(|| render(scene, &scene.cameras[0], settings, &engine))
         };
-        let reference = bits(&picture(&plain, 1).pixels);
-        assert_eq!(reference, bits(&picture(&plain, 2).pixels), "{}: 2 threads", engine.name);
+        let reference = bits(&picture(plain, 1).pixels);
+        assert_eq!(reference, bits(&picture(plain, 2).pixels), "{}: 2 threads", engine.name);
         for tile_order in [TileOrder::Hilbert, TileOrder::Spiral] {
             let settings = Settings { tile_order, ..plain.clone() };
             assert_eq!(reference, bits(&picture(&settings, 3).pixels), "{}: {tile_order:?}", engine.name);
@@ -73,11 +96,17 @@ fn threads_tile_orders_and_packets_do_not_show() {
 
 #[test]
 fn a_pixel_alone_is_the_pixel_in_the_picture() {
-    let scene = busy_scene(DVec3::ZERO);
+    let scene = busier_scene();
     let world = World::new(&scene).unwrap();
-    let settings = settings(40, 35, 4);
-    let renderer = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings).unwrap();
-    for engine in engines(&world) {
+    for integrator in Integrator::ALL {
+        let settings = Settings { integrator: Some(integrator), ..settings(40, 35, 4) };
+        check_pixels(&scene, &world, settings);
+    }
+}
+
+fn check_pixels(scene: &Scene, world: &World, settings: Settings) {
+    let renderer = Renderer::new(scene, world, scene.cameras[0].clone(), settings).unwrap();
+    for engine in engines(world) {
         let image = renderer.render(&engine, Control::default()).unwrap();
         for (x, y) in (0..40).step_by(3).zip((0..35).cycle().step_by(4)) {
             let alone = renderer.pixel(&engine, x, y);

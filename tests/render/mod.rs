@@ -1,9 +1,12 @@
 //! Pictures: against closed forms, and against themselves under everything that must not change them.
 
+mod alpha;
 mod camera;
 mod determinism;
+mod glass;
 mod shading;
 mod toy;
+mod transport;
 mod whitted;
 
 use twincast::math::{DVec3, Vec2, Vec3};

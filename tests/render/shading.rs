@@ -121,6 +121,35 @@ fn textures_lie_the_right_way_up() {
     }
 }
 
+/// One colour all over: the normal leans by as much, towards +x where u grows, and towards -z where v does.
+#[test]
+fn normal_maps_lean_along_u_and_v() {
+    // (0.8, 0, 0.6) and (0, -0.6, 0.8), as codes: x = 2 code / 255 - 1.
+    let code = |x: f64| ((x + 1.0) * 127.5).round() as u8;
+    for (texel, mirrored) in [([0.8, 0.0, 0.6], false), ([0.0, -0.6, 0.8], false), ([0.8, 0.0, 0.6], true)] {
+        let texture = Texture {
+            width: 1,
+            height: 1,
+            pixels: vec![[code(texel[0]), code(texel[1]), code(texel[2]), 255]],
+            scale: Vec2::ONE,
+            ..Texture::default()
+        };
+        let material = Material { normal_texture: Some(0), ..matte(1.0) };
+        let mut scene = floor_scene(material, vec![Light::Directional { direction: -towards(30.0), color: Vec3::ONE }]);
+        scene.textures = vec![texture];
+        if mirrored {
+            // u grows along -x.
+            let Geometry::Mesh(mesh) = &mut scene.geometries[0] else { unreachable!() };
+            mesh.uvs.iter_mut().for_each(|uv| uv.x = 1.0 - uv.x);
+        }
+        let decoded = texel.map(|x| f64::from(code(x)) / 127.5 - 1.0);
+        let across = if mirrored { -decoded[0] } else { decoded[0] };
+        let normal = DVec3::new(across, decoded[2], -decoded[1]).normalize();
+        let expected = normal.dot(towards(30.0)).max(0.0) as f32;
+        assert_close(middle(&scene), Vec3::splat(expected), "bent");
+    }
+}
+
 /// A ball of radius 1 above the floor, lit from straight above: the shadow is a disc of radius 1, to the last pixel.
 #[test]
 fn a_ball_casts_a_round_shadow() {

@@ -34,7 +34,7 @@ fn pixel(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec4 {
 }
 
 fn deep(max_depth: u32) -> Settings {
-    Settings { max_depth, ..settings(1, 1, 1) }
+    Settings { max_depth: Some(max_depth), ..settings(1, 1, 1) }
 }
 
 /// Each of two facing mirrors gives off e and reflects r: n mirrors deep it is e (1 + r + ... + r^n).
@@ -130,7 +130,7 @@ fn a_flood_of_rays_is_followed_to_its_end() {
     let disks = [(0.0, &doubling), (20.0, &doubling), (-5.0, &mirror), (25.0, &mirror)];
     let scene = scene(disks.map(|(y, material)| (disk(y), material.clone())).to_vec());
     let world = World::new(&scene).unwrap();
-    let settings = Settings { max_depth: 20, ..settings(3, 2, 1) };
+    let settings = Settings { max_depth: Some(20), ..settings(3, 2, 1) };
     let renderer = Renderer::new(&scene, &world, from_above(), settings.clone()).unwrap();
     for engine in engines(&world) {
         let counted = Counted::new(&engine);

@@ -6,13 +6,14 @@
 use std::collections::HashMap;
 
 use super::Document;
+use super::extension;
 use super::phong::{self, MetallicRoughness};
-use super::schema::{self, MetallicRoughness as Source};
+use super::schema::{self, MetallicRoughness as Source, TextureInfo};
 use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::texture;
 use crate::math::{Vec2, Vec3};
-use crate::scene::{Filter, Material, Scene, Texture, Wrap};
+use crate::scene::{Alpha, Filter, Interface, Material, Scene, Texture, Wrap};
 
 /// The materials of a document, converted when a primitive first uses them.
 pub(super) struct Materials<'a> {
@@ -23,9 +24,8 @@ pub(super) struct Materials<'a> {
     /// By glTF's texture; None where the file is missing.
     known_textures: HashMap<usize, Option<u32>>,
     textures: Vec<Texture>,
-    /// Mean metalness and roughness by glTF's image; None where the file is missing.
-    known_means: HashMap<usize, Option<(f32, f32)>>,
-    transparent: Vec<String>,
+    /// Means of textures of numbers by glTF's image; None where the file is missing.
+    known_means: HashMap<usize, Option<Vec3>>,
     warnings: Vec<Warning>,
 }
 
@@ -38,7 +38,6 @@ impl<'a> Materials<'a> {
             known_textures: HashMap::new(),
             textures: Vec::new(),
             known_means: HashMap::new(),
-            transparent: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -51,14 +50,13 @@ impl<'a> Materials<'a> {
             document.check_index(&format!("{pointer}/material"), index, materials.len(), "material")?;
         }
         let source = index.map(|i| &materials[i]);
-        let coordinates = source.and_then(|m| m.pbr_metallic_roughness.base_color_texture.as_ref());
-        let set = coordinates.map(|info| info.tex_coord);
+        let set = source.and_then(coordinate_set);
         if let Some(known) = self.known.get(&index) {
             return Ok((*known, set));
         }
         let material = match (index, source) {
             (Some(index), Some(source)) => self.convert(index, source)?,
-            _ => self.phong(&Source::default(), None, "")?,
+            _ => self.values(&Source::default(), None, "")?.phong(),
         };
         self.list.push(material);
         let new = self.list.len() as u32 - 1;
@@ -69,11 +67,6 @@ impl<'a> Materials<'a> {
     /// Hands materials and textures over to the scene.
     pub(super) fn finish(self, scene: &mut Scene, warnings: &mut Vec<Warning>) {
         warnings.extend(self.warnings);
-        if !self.transparent.is_empty() {
-            let message =
-                format!("transparency is not supported; rendered opaque: materials {}", self.transparent.join(", "));
-            warnings.push(self.document.warning("/materials", message));
-        }
         scene.materials = self.list;
         scene.textures = self.textures;
     }
@@ -86,57 +79,118 @@ impl<'a> Materials<'a> {
         if !numbers.all(|x| x.is_finite() && *x >= 0.0) || !shares.iter().all(|x| (0.0..=1.0).contains(x)) {
             return Err(self.document.error(pointer, "factors have to be finite and from 0 up, shares from 0 to 1"));
         }
-        if matches!(source.alpha_mode.as_deref(), Some("BLEND" | "MASK")) {
-            self.transparent.push(format!("{:?}", source.name));
-        }
-        let strength = source.extensions.get("KHR_materials_emissive_strength");
-        let strength = strength.and_then(|e| e.get("emissiveStrength")).and_then(serde_json::Value::as_f64);
-        let strength = strength.unwrap_or(1.0) as f32;
+        let alpha = match (source.alpha_mode.as_deref(), source.alpha_cutoff.unwrap_or(0.5)) {
+            (None | Some("OPAQUE"), _) => Alpha::Opaque,
+            (Some("MASK"), cutoff) if cutoff >= 0.0 => Alpha::Mask { cutoff },
+            (Some("BLEND"), _) => Alpha::Blend,
+            (Some(mode), cutoff) => {
+                let message = format!(
+                    "alphaMode {mode:?} with cutoff {cutoff}; expected OPAQUE, BLEND, or MASK and a cutoff from 0 up"
+                );
+                return Err(self.document.error(pointer, message));
+            }
+        };
+        let extensions = extension::read(&source.extensions)
+            .map_err(|message| self.document.error(format!("{pointer}/extensions"), message))?;
         let texture = match &pbr.base_color_texture {
             Some(info) => {
                 self.texture(info.index, &format!("{pointer}/pbrMetallicRoughness/baseColorTexture/index"))?
             }
             None => None,
         };
-        let emission = Vec3::from(source.emissive_factor) * strength;
+        let emission = Vec3::from(source.emissive_factor) * extensions.emissive_strength;
         if !(emission.is_finite() && emission.min_element() >= 0.0) {
             return Err(self.document.error(pointer, "the emissive strength has to be finite and from 0 up"));
         }
-        let phong = self.phong(pbr, texture, &pointer)?;
-        Ok(Material { name: source.name.clone(), emission, diffuse_texture: texture, ..phong })
+        let mut values = self.values(pbr, texture, &pointer)?;
+        values.ior = extensions.ior;
+        values.transmission = extensions.transmission;
+        if let Some(info) = &extensions.transmission_texture {
+            let pointer = format!("{pointer}/extensions/KHR_materials_transmission/transmissionTexture/index");
+            if let Some(means) = self.means(info.index, &pointer)? {
+                values.transmission *= means.x;
+            }
+        }
+        let emissive = source.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO);
+        let emission_texture = self.slot(source, emissive, &format!("{pointer}/emissiveTexture"))?;
+        let normal_texture = self.slot(source, source.normal_texture.as_ref(), &format!("{pointer}/normalTexture"))?;
+        let normal_scale = source.normal_texture.as_ref().and_then(|info| info.scale).unwrap_or(1.0);
+        let glass = Material {
+            name: source.name.clone(),
+            emission,
+            diffuse_texture: texture,
+            emission_texture,
+            normal_texture,
+            normal_scale,
+            alpha,
+            opacity: pbr.base_color_factor[3],
+            ..values.phong()
+        };
+        if extensions.unlit {
+            let [r, g, b, _] = pbr.base_color_factor;
+            return Ok(Material {
+                diffuse: Vec3::new(r, g, b),
+                unlit: true,
+                emission: Vec3::ZERO,
+                emission_texture: None,
+                ..glass
+            });
+        }
+        if values.transmission == 0.0 {
+            return Ok(glass);
+        }
+        let interface = if extensions.is_volume { Interface::Fresnel } else { Interface::Thin };
+        Ok(Material { interface, absorption: extensions.absorption, ..glass })
     }
 
-    /// The material with one value for each texture.
-    fn phong(&mut self, source: &Source, texture: Option<u32>, pointer: &str) -> Result<Material> {
+    /// What the material is with one value for each texture.
+    fn values(&mut self, source: &Source, texture: Option<u32>, pointer: &str) -> Result<MetallicRoughness> {
         let [r, g, b, _] = source.base_color_factor;
         let (metal, roughness) = match &source.metallic_roughness_texture {
             Some(info) => {
                 let pointer = format!("{pointer}/pbrMetallicRoughness/metallicRoughnessTexture/index");
-                self.mean_metal_roughness(info.index, &pointer)?
+                // As without one where it is missing. Metalness is in blue, roughness in green.
+                self.means(info.index, &pointer)?.map_or((1.0, 1.0), |mean| (mean.z, mean.y))
             }
             None => (1.0, 1.0),
         };
-        let values = MetallicRoughness {
+        Ok(MetallicRoughness {
             base: Vec3::new(r, g, b),
             texture: texture.map_or(Vec3::ONE, |t| phong::mean_color(&self.textures[t as usize])),
             metal: source.metallic_factor * metal,
             roughness: source.roughness_factor * roughness,
-        };
-        Ok(values.phong())
+            ior: None,
+            transmission: 0.0,
+        })
     }
 
-    /// Metalness and roughness of a texture; 1 and 1 where it is missing, as without one.
-    fn mean_metal_roughness(&mut self, index: usize, pointer: &str) -> Result<(f32, f32)> {
-        let Some(image) = self.image_of(index, pointer)? else { return Ok((1.0, 1.0)) };
+    /// The mean of a texture of numbers; none where it is missing.
+    fn means(&mut self, index: usize, pointer: &str) -> Result<Option<Vec3>> {
+        let Some(image) = self.image_of(index, pointer)? else { return Ok(None) };
         let means = match self.known_means.get(&image) {
             Some(known) => *known,
             None => {
-                let means = self.image(image)?.map(|picture| phong::mean_metal_roughness(&picture));
+                let means = self.image(image)?.map(|picture| phong::mean_number(&picture));
                 self.known_means.insert(image, means);
                 means
             }
         };
-        Ok(means.unwrap_or((1.0, 1.0)))
+        Ok(means)
+    }
+
+    /// The texture of a slot beside the base colour's. None, and a warning, where its coordinates are others than the mesh has.
+    fn slot(&mut self, source: &schema::Material, info: Option<&TextureInfo>, pointer: &str) -> Result<Option<u32>> {
+        let Some(info) = info else { return Ok(None) };
+        let set = coordinate_set(source).unwrap_or(info.tex_coord);
+        if info.tex_coord != set {
+            let message = format!(
+                "the texture wants coordinates of set {}, but set {set} is read; rendered without it",
+                info.tex_coord
+            );
+            self.warnings.push(self.document.warning(pointer, message));
+            return Ok(None);
+        }
+        self.texture(info.index, &format!("{pointer}/index"))
     }
 
     fn texture(&mut self, index: usize, pointer: &str) -> Result<Option<u32>> {
@@ -235,4 +289,11 @@ impl<'a> Materials<'a> {
             other => other,
         }
     }
+}
+
+/// Which texture coordinates a mesh of this material needs: it has one set, that of the first texture here.
+fn coordinate_set(source: &schema::Material) -> Option<u32> {
+    let base = source.pbr_metallic_roughness.base_color_texture.as_ref();
+    let first = base.or(source.emissive_texture.as_ref()).or(source.normal_texture.as_ref());
+    first.map(|info| info.tex_coord)
 }

@@ -5,11 +5,11 @@
 //! unused is refused. A mesh becomes a group, each primitive with area a geometry of it, each node with a mesh an
 //! instance.
 //!
-//! Not rendered, and told in warnings: animation poses other than the rest pose, transparency,
-//! points and lines.
+//! Not rendered, and told in warnings: animation poses other than the rest pose, points and lines.
 
 mod accessor;
 mod container;
+mod extension;
 mod material;
 mod mesh;
 mod node;
@@ -27,8 +27,15 @@ use crate::memory::Mapped;
 use crate::scene::Scene;
 
 /// The extensions that are honoured; a file that requires another is refused.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 3] =
-    ["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization"];
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 7] = [
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+];
 
 /// A parsed file with its buffers.
 struct Document<'a> {

@@ -146,7 +146,10 @@ pub(super) struct Material {
     pub(super) pbr_metallic_roughness: MetallicRoughness,
     #[serde(default)]
     pub(super) emissive_factor: [f32; 3],
+    pub(super) emissive_texture: Option<TextureInfo>,
+    pub(super) normal_texture: Option<TextureInfo>,
     pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f32>,
     #[serde(default)]
     pub(super) extensions: Extensions,
 }
@@ -179,6 +182,8 @@ pub(super) struct TextureInfo {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: u32,
+    /// Of a normal texture.
+    pub(super) scale: Option<f32>,
 }
 
 #[derive(Deserialize)]

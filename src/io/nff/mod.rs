@@ -26,7 +26,7 @@ use super::text::quoted;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Light, Material, Scene, Specular, Unlit};
+use crate::scene::{Attenuation, Integrator, Light, Material, Scene, Specular, Unlit};
 use crate::shape::{Cone, Cylinder, Polygon, Shape, Sphere};
 
 /// What sets the material.
@@ -291,6 +291,7 @@ impl Reader {
         let Scene { materials, cameras, background, request, .. } = self.scene;
         let mut scene = Scene::from_geometries(self.parts.into_geometries(), materials);
         (scene.cameras, scene.request) = (cameras, request);
+        scene.request.integrator = Some(Integrator::Whitted);
         // A picture of this format is opaque.
         scene.background = background.or(Some(Vec3::ZERO));
         let share = 1.0 / (self.lights.len() as f32).sqrt();

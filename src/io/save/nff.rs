@@ -4,7 +4,9 @@ use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, Vec3};
-use crate::scene::{Attenuation, Camera, Fov, Geometry, Light, Material, Mesh, Projection, Scene, Specular, Unlit};
+use crate::scene::{
+    Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
+};
 use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
@@ -27,16 +29,25 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     if scene.instances.iter().any(|instance| instance.transform_end.is_some()) {
         return elsewhere("motion".to_owned());
     }
+    if scene.environment.is_some() {
+        return elsewhere("environments".to_owned());
+    }
     let is_grey = |color: Vec3| color.x == color.y && color.y == color.z;
     for material in &scene.materials {
         let Material { ambient, specular, reflection, transmission, emission, .. } = *material;
         let sayable = specular == reflection && is_grey(specular) && is_grey(transmission);
         let has_more = ambient != Vec3::ZERO && scene.ambient != Vec3::ZERO
             || emission != Vec3::ZERO
-            || material.diffuse_texture.is_some()
+            || material.textures().next().is_some()
+            || material.alpha != Alpha::Opaque
+            || material.interface != Interface::Shares
+            || material.gloss.is_some()
+            || material.absorption.is_some()
+            || material.unlit
+            || material.energy_conserving
             || material.model != Specular::Phong && specular != Vec3::ZERO;
         if !sayable || has_more {
-            let what = "ambient light, emission, textures, Blinn's highlights, or highlights that are not as mirrors";
+            let what = "ambient light, emission, textures, Blinn's highlights, highlights that are not as mirrors, or glass by Fresnel";
             return elsewhere(format!("{what} (material {:?})", material.name));
         }
     }

@@ -6,14 +6,17 @@ use std::io::{self, Write};
 use super::Unsayable;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Light, Material, Mesh, Projection, Request,
-    Resolution, Scene, Specular, ThinLens, Unlit,
+    Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Interface, Light, Material,
+    Mesh, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
 };
 use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     let is_coloured = |geometry: &Geometry| matches!(geometry, Geometry::Mesh(mesh) if !mesh.colors.is_empty());
+    if scene.environment.is_some() {
+        return Err("environments are not written; name the picture's file in [environment]".to_owned());
+    }
     if !scene.textures.is_empty() || scene.geometries.iter().any(is_coloured) {
         return Err("textures and colours of vertices are not written; include the file they are in".to_owned());
     }
@@ -100,7 +103,7 @@ fn lists<T>(items: &[T], list: impl Fn(&T) -> String) -> String {
 }
 
 fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
-    let Request { size, spp, seed, max_depth, output, search } = &scene.request;
+    let Request { size, spp, seed, integrator, max_depth, output, search } = &scene.request;
     writeln!(out, "[render]")?;
     if let Some([width, height]) = size {
         writeln!(out, "size = [{width}, {height}]")?;
@@ -108,6 +111,9 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     let numbers = [("spp", spp.map(u64::from)), ("seed", *seed), ("max_depth", max_depth.map(u64::from))];
     for (key, number) in numbers.into_iter().filter_map(|(key, number)| Some((key, number?))) {
         writeln!(out, "{key} = {number}")?;
+    }
+    if let Some(integrator) = integrator {
+        writeln!(out, "integrator = \"{integrator}\"")?;
     }
     if let Some(output) = output {
         writeln!(out, "output = {}", quoted(output))?;
@@ -216,7 +222,27 @@ fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::R
         Specular::BlinnPhong => "blinn-phong",
     };
     writeln!(out, "model = \"{model}\"\nreflection = {}", list(*reflection))?;
-    writeln!(out, "transmission = {}\nior = {ior}\nemission = {}\n", list(*transmission), list(*emission))
+    writeln!(out, "transmission = {}\nior = {ior}\nemission = {}", list(*transmission), list(*emission))?;
+    match material.interface {
+        Interface::Shares if material.unlit => writeln!(out, "type = \"unlit\"")?,
+        Interface::Shares => {}
+        Interface::Fresnel => writeln!(out, "type = \"glass\"")?,
+        Interface::Thin => writeln!(out, "type = \"glass\"\nthin = true")?,
+    }
+    if let Some(Absorption { color, distance }) = material.absorption {
+        writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
+    }
+    if let Some(gloss) = material.gloss {
+        writeln!(out, "gloss = {gloss}")?;
+    }
+    match material.alpha {
+        Alpha::Opaque => {}
+        Alpha::Mask { cutoff } => {
+            writeln!(out, "alpha = \"mask\"\nalpha_cutoff = {cutoff}\nopacity = {}", material.opacity)?
+        }
+        Alpha::Blend => writeln!(out, "alpha = \"blend\"\nopacity = {}", material.opacity)?,
+    }
+    writeln!(out, "energy_conserving = {}\n", material.energy_conserving)
 }
 
 fn write_mesh(mesh: &Mesh, prefix: &str, out: &mut dyn Write) -> io::Result<()> {

@@ -88,7 +88,11 @@ impl Includes {
             let (Geometry::Mesh(crate::scene::Mesh { material, .. }) | Geometry::Shapes { material, .. }) = geometry;
             *material = include.material.unwrap_or(*material + materials);
         }
-        for texture in file.materials.iter_mut().filter_map(|material| material.diffuse_texture.as_mut()) {
+        let slots = file
+            .materials
+            .iter_mut()
+            .flat_map(|m| [&mut m.diffuse_texture, &mut m.emission_texture, &mut m.normal_texture]);
+        for texture in slots.flatten() {
             *texture += textures;
         }
         for group in &mut file.groups {

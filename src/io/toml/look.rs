@@ -1,10 +1,10 @@
-//! What is seen of shapes, and from where: materials, lights, cameras, and what the file asks of a render.
+//! What is seen, and from where: lights, cameras, and what the file asks of a render.
 
 use super::table::{Read, Table, Value};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Light, Material, Projection, Request, Resolution, Search,
-    Specular, ThinLens,
+    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, Light, Projection, Request, Resolution, Search,
+    ThinLens,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
@@ -53,6 +53,7 @@ impl Render {
             })?,
             spp: table.optional("spp", |value| value.whole(1..=65_536))?.map(|spp| spp as u32),
             seed: table.optional("seed", |value| value.whole(0..=u64::MAX))?,
+            integrator: table.optional("integrator", |value| value.choice(&integrators()))?.flatten(),
             max_depth: table.optional("max_depth", |value| value.whole(0..=u32::MAX.into()))?.map(|depth| depth as u32),
             output: table.optional("output", |value| value.text())?.map(str::to_owned),
             search: search(&mut table)?,
@@ -104,35 +105,10 @@ fn search(table: &mut Table<'_>) -> Read<Search> {
     Ok(search)
 }
 
-/// `[material.NAME]`. A texture is left to the caller.
-pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
-    let plain = Material::default();
-    let mut color = |key| table.optional(key, |value| value.color());
-    let diffuse = color("diffuse")?.unwrap_or(plain.diffuse);
-    let (ambient, specular) = (color("ambient")?.unwrap_or(diffuse), color("specular")?.unwrap_or(plain.specular));
-    let (reflection, transmission) =
-        (color("reflection")?.unwrap_or_default(), color("transmission")?.unwrap_or_default());
-    let emission = color("emission")?.unwrap_or_default();
-    let models = [("phong", Specular::Phong), ("blinn-phong", Specular::BlinnPhong)];
-    Ok(Material {
-        name: name.to_owned(),
-        ambient,
-        diffuse,
-        specular,
-        shininess: table.optional("shininess", |value| value.share())?.unwrap_or(plain.shininess),
-        reflection,
-        transmission,
-        ior: match table.get("ior") {
-            None => plain.ior,
-            Some(value) => {
-                let ior = value.share()?;
-                if ior > 0.0 { ior } else { return Err(value.fault("\"ior\" wants a number above 0")) }
-            }
-        },
-        emission,
-        model: table.optional("model", |value| value.choice(&models))?.unwrap_or(plain.model),
-        ..plain
-    })
+/// Integrators by name; "auto" is none.
+fn integrators() -> [(&'static str, Option<Integrator>); 4] {
+    let [a, b, c] = Integrator::ALL.map(|integrator| (integrator.name(), Some(integrator)));
+    [("auto", None), a, b, c]
 }
 
 #[derive(Clone, Copy)]

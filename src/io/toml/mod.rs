@@ -6,9 +6,11 @@
 //! ([`group`]); where there are very many, they are read in [`pieces`]. What is seen of it all, and from where, is in [`look`]. A key that
 //! nobody reads is refused.
 
+mod environment;
 mod group;
 mod include;
 mod look;
+mod material;
 mod pieces;
 mod primitives;
 mod table;
@@ -155,6 +157,9 @@ impl Reader<'_> {
         for table in top.tables("light")? {
             self.scene.lights.push(look::light(table)?);
         }
+        if let Some(value) = top.get("environment") {
+            self.scene.environment = Some(environment::environment(value, self.folder)?);
+        }
         for (name, table) in top.named_tables("material")? {
             self.material(name, table)?;
         }
@@ -179,18 +184,24 @@ impl Reader<'_> {
     }
 
     fn material(&mut self, name: &str, mut table: Table<'_>) -> std::result::Result<(), Stop> {
-        let mut material = look::material(name, &mut table)?;
-        if let Some(value) = table.get("texture") {
-            let path = self.folder.join(value.text()?);
-            let picture: Option<Texture> = texture::open(&path).map_err(Stop::Elsewhere)?;
-            let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
-            material.diffuse_texture = Some(self.scene.textures.len() as u32);
-            self.scene.textures.push(picture);
-        }
+        let mut material = material::material(name, &mut table)?;
+        material.diffuse_texture = self.texture(table.get("texture"))?;
+        material.emission_texture = self.texture(table.get("emission_texture"))?;
+        material.normal_texture = self.texture(table.get("normal_texture"))?;
         table.finish()?;
         self.materials.insert(name.to_owned(), self.scene.materials.len() as u32);
         self.scene.materials.push(material);
         Ok(())
+    }
+
+    /// The index of a picture that a value names.
+    fn texture(&mut self, value: Option<Value<'_>>) -> std::result::Result<Option<u32>, Stop> {
+        let Some(value) = value else { return Ok(None) };
+        let path = self.folder.join(value.text()?);
+        let picture: Option<Texture> = texture::open(&path).map_err(Stop::Elsewhere)?;
+        let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
+        self.scene.textures.push(picture);
+        Ok(Some(self.scene.textures.len() as u32 - 1))
     }
 
     /// What stands in a group, or at the top of the file.

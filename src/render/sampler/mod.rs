@@ -62,6 +62,21 @@ impl fmt::Display for Sampling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Dimension(u32);
 
+/// What a path chooses where it meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Choice {
+    /// Which light is asked, and which lobe is followed.
+    Which,
+    /// The point on the light.
+    Light,
+    /// The direction to go on in.
+    Direction,
+    /// Whether it ends.
+    End,
+    /// What its ray passes through.
+    Alpha,
+}
+
 impl Dimension {
     /// The point on the pixel.
     pub(super) const FILM: Self = Self(0);
@@ -73,6 +88,22 @@ impl Dimension {
     /// The point on a light, as asked by the ray of a pixel's tree of rays that has the number `branch`.
     pub(super) const fn light(light: u32, branch: u32) -> Self {
         Self(branch.wrapping_mul(0x9e37_79b9).wrapping_add(2).wrapping_add(light))
+    }
+
+    /// How a glossy surface spreads the ray that has the number `branch`.
+    pub(super) const fn gloss(branch: u32) -> Self {
+        Self(branch.wrapping_mul(0x85eb_ca6b).wrapping_add(0x4000_0000))
+    }
+
+    /// What the ray that has the number `branch` passes through.
+    pub(super) const fn alpha(branch: u32) -> Self {
+        Self(branch.wrapping_mul(0xc2b2_ae35).wrapping_add(0x2000_0000))
+    }
+
+    /// One of the choices where a path was scattered `depth` times.
+    pub(super) const fn bounce(depth: u32, choice: Choice) -> Self {
+        // Below 2^31, for streams are twice the number.
+        Self(0x6000_0000 + depth * 8 + choice as u32)
     }
 }
 
@@ -191,7 +222,20 @@ mod tests {
             assert_eq!(film(1, 9, 3, 4, 0), DVec2::splat(0.5), "{sampling}");
             let sampler = Sampler::new(sampling, 4, 0);
             let pixel = sampler.pattern(3, 4);
-            assert_ne!(sampler.pair(&pixel, 0, Dimension::LENS), sampler.film(&pixel, 0));
+            let dimensions = [
+                Dimension::FILM,
+                Dimension::LENS,
+                Dimension::light(0, 0),
+                Dimension::gloss(0),
+                Dimension::alpha(0),
+                Dimension::bounce(0, Choice::Which),
+                Dimension::bounce(0, Choice::Light),
+                Dimension::bounce(1, Choice::Which),
+            ];
+            let pairs = dimensions.map(|dimension| sampler.pair(&pixel, 0, dimension));
+            for (i, pair) in pairs.iter().enumerate() {
+                assert!(!pairs[..i].contains(pair), "{sampling}: {:?}", dimensions[i]);
+            }
         }
     }
 

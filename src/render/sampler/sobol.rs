@@ -14,17 +14,29 @@ pub(super) fn point(sample: u32, key: [u32; 4]) -> DVec2 {
 }
 
 /// The second dimension: Pascal's triangle modulo 2 as its matrix. The first 32 binary digits.
-pub(super) fn second(mut index: u64) -> u32 {
-    let (mut digits, mut column) = (0u64, 1u64 << 63);
-    while index != 0 {
-        if index & 1 != 0 {
-            digits ^= column;
+pub(super) fn second(index: u64) -> u32 {
+    // Byte by byte: a shuffled index has many digits, and each would be a step.
+    let bytes = index.to_le_bytes().into_iter().zip(&COLUMNS);
+    bytes.fold(0, |digits, (byte, columns)| digits ^ columns[usize::from(byte)])
+}
+
+/// The sums of the matrix's columns that each byte of an index selects.
+static COLUMNS: [[u32; 256]; 8] = {
+    let mut sums = [[0; 256]; 8];
+    let (mut bit, mut column) = (0, 1u64 << 63);
+    while bit < 64 {
+        let (byte, low) = (bit / 8, 1 << (bit % 8));
+        let mut value = low;
+        while value < 2 * low {
+            // With this digit as the highest: what the lower ones give, and its own column.
+            sums[byte][value] = sums[byte][value - low] ^ (column >> 32) as u32;
+            value += 1;
         }
         column ^= column >> 1;
-        index >>= 1;
+        bit += 1;
     }
-    (digits >> 32) as u32
-}
+    sums
+};
 
 /// Owen's scrambling of 32 binary digits: each is turned by a bit that depends on all before it.
 pub(super) const fn scramble(digits: u32, key: u32) -> u32 {

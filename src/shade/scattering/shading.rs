@@ -1,24 +1,23 @@
-//! The reflection models of Phong (1975, *Illumination for computer generated pictures*) and Blinn (1977, *Models of
-//! light reflection for computer synthesized pictures*).
+//! The part of a surface that has a value for every direction: what it gives off, Lambert's lobe and the highlight.
 //!
 //! I = emission + ambient * La + sum over lights of (diffuse * max(n . l, 0) + specular * highlight) * light. What the
 //! lights of a picture share is in [`Shading`]; each light then adds [`Shading::reflect`].
 
-use super::{SurfacePoint, light::Illumination, texture};
+use super::highlight::Highlight;
+use super::ways;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Material, Specular, Texture};
+use crate::scene::{Interface, Material, Texture};
+use crate::shade::{SurfacePoint, light::Illumination, texture};
 
 /// A surface with its colours looked up, ready for any number of lights.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading {
     /// Unit vector towards the viewer.
-    to_viewer: DVec3,
-    normal: DVec3,
-    geometric: DVec3,
-    diffuse: Vec3,
-    specular: Vec3,
-    shininess: f32,
-    model: Specular,
+    pub(super) to_viewer: DVec3,
+    pub(super) normal: DVec3,
+    pub(super) geometric: DVec3,
+    pub(super) diffuse: Vec3,
+    pub(super) highlight: Highlight,
     /// Light the point sends out without any light source: emission and ambient.
     pub base: Vec3,
 }
@@ -32,19 +31,45 @@ impl Shading {
         textures: &[Texture],
         ambient: Vec3,
     ) -> Self {
-        let texture = material.diffuse_texture.and_then(|i| textures.get(i as usize));
-        let texel = texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv).truncate());
-        let tint = texel * point.color.truncate();
-        Self {
+        let texel = |texture: Option<u32>| {
+            let texture = texture.and_then(|i| textures.get(i as usize));
+            texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv).truncate())
+        };
+        let tint = texel(material.diffuse_texture) * point.color.truncate();
+        let emission = match material.emission_texture {
+            None => material.emission,
+            texture => material.emission * texel(texture),
+        };
+        let mut shading = Self {
             to_viewer: -direction.as_dvec3().normalize(),
             normal: point.shading_normal,
             geometric: point.normal,
             diffuse: material.diffuse * tint,
-            specular: material.specular,
-            shininess: material.shininess,
-            model: material.model,
-            base: material.emission + material.ambient * tint * ambient,
+            highlight: Highlight::new(material),
+            base: emission + material.ambient * tint * ambient,
+        };
+        if material.unlit {
+            shading.base = emission + shading.diffuse;
+            shading.scale(0.0);
         }
+        if material.energy_conserving {
+            shading.scale(material.conserving_scale());
+        }
+        match material.interface {
+            Interface::Shares => {}
+            // What is diffuse lies below, and gets what is not mirrored.
+            Interface::Fresnel | Interface::Thin => {
+                if material.is_lit() {
+                    shading.scale(1.0 - ways::mirrored_share(material, point, -shading.to_viewer) as f32);
+                }
+            }
+        }
+        shading
+    }
+
+    fn scale(&mut self, factor: f32) {
+        self.diffuse *= factor;
+        self.highlight.color *= factor;
     }
 
     /// Whether light along `to_light` can be seen at all: it must come from the viewer's side, by the shading normal
@@ -55,44 +80,40 @@ impl Shading {
 
     /// What of the arriving light goes to the viewer, linear RGB.
     pub fn reflect(&self, arriving: &Illumination) -> Vec3 {
-        let l = arriving.to_light;
-        let cosine = self.normal.dot(l);
-        let mut reflected = self.diffuse * cosine.max(0.0) as f32;
-        if self.specular != Vec3::ZERO && cosine > 0.0 {
-            reflected += self.specular * self.highlight(l, cosine);
-        }
-        reflected * arriving.color
+        self.value(arriving.to_light) * arriving.color
     }
 
-    fn highlight(&self, l: DVec3, cosine: f64) -> f32 {
-        let base = match self.model {
-            Specular::Phong => (self.normal * (2.0 * cosine) - l).dot(self.to_viewer),
-            Specular::BlinnPhong => (l + self.to_viewer).normalize_or_zero().dot(self.normal),
-        };
-        libm::powf(base.clamp(0.0, 1.0) as f32, self.shininess)
+    /// pi f cos for light along `to_light`.
+    pub(super) fn value(&self, to_light: DVec3) -> Vec3 {
+        let cosine = self.normal.dot(to_light);
+        let mut value = self.diffuse * cosine.max(0.0) as f32;
+        if self.highlight.color != Vec3::ZERO && cosine > 0.0 {
+            value += self.highlight.value(self.normal, self.to_viewer, to_light, cosine);
+        }
+        value
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Specular;
 
     fn shading(model: Specular, to_viewer: DVec3) -> Shading {
+        let material = Material { specular: Vec3::splat(0.5), shininess: 10.0, model, ..Material::default() };
         Shading {
             to_viewer,
             normal: DVec3::Y,
             geometric: DVec3::Y,
             diffuse: Vec3::new(0.5, 0.25, 0.0),
-            specular: Vec3::splat(0.5),
-            shininess: 10.0,
-            model,
+            highlight: Highlight::new(&material),
             base: Vec3::ZERO,
         }
     }
 
     fn from(degrees: f64) -> Illumination {
         let to_light = DVec3::new(-degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
-        Illumination { to_light, color: Vec3::splat(2.0), end: None }
+        Illumination { to_light, color: Vec3::splat(2.0), end: None, density: None }
     }
 
     /// Viewer and light 30 and 50 degrees from the normal, on opposite sides: the mirrored light is 20 degrees off the

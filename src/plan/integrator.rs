@@ -1,0 +1,32 @@
+//! Which integrator renders a scene: the cheapest that shows everything in it.
+//!
+//! Indirect light is in every scene that is not black, so it is no reason to trace paths: light that comes from nothing but surfaces
+//! that glow is, for without paths the picture would be dark.
+
+use crate::scene::Integrator;
+
+/// What the choice depends on.
+pub(super) struct Census<'a> {
+    /// Whether anything mirrors or refracts.
+    pub(super) sends_on: bool,
+    /// Whether anything is matte or has highlights.
+    pub(super) is_lit: bool,
+    /// Whether the scene has no light but what glows, and no headlight is added.
+    pub(super) is_dark: bool,
+    /// Whether anything glows that is no light's body. Asked only where it matters.
+    pub(super) emitters: &'a dyn Fn() -> bool,
+}
+
+/// The integrator, and why.
+pub(super) fn choose(wish: Option<Integrator>, census: &Census<'_>) -> (Integrator, &'static str) {
+    if let Some(wish) = wish {
+        return (wish, "asked for");
+    }
+    if census.is_dark && census.is_lit && (census.emitters)() {
+        (Integrator::Path, "only surfaces that glow light the scene")
+    } else if census.sends_on {
+        (Integrator::Whitted, "mirrors or glass send rays on")
+    } else {
+        (Integrator::RayCast, "nothing sends rays on")
+    }
+}

@@ -1,0 +1,89 @@
+//! Rays through surfaces that are not all there.
+//!
+//! What is seen through a surface is chosen ray by ray: it is met as often as it covers (Enderton, Sintorn, Shirley and Luebke 2010,
+//! *Stochastic transparency*), so that no ray becomes two and every integrator sees the same. Shadow rays lose the share that is
+//! covered, and need no chance. Masks are exact in both.
+//!
+//! A ray that passes goes on from beyond the hit by its range alone: its origin stays, and so does every density that
+//! refers to it. Scenes without such surfaces pay for none of this.
+
+use crate::math::{DVec2, Vec3};
+use crate::ray::{Hit, Ray};
+use crate::scene::Alpha;
+use crate::shade::SurfacePoint;
+use crate::shade::coverage::coverage;
+use crate::trace::{Batch, Tracer};
+
+use super::Renderer;
+use super::wavefront::Buffers;
+
+impl Renderer<'_> {
+    /// The nearest hits of rays that pass through what does not cover; `even` gives each ray its chance.
+    pub(super) fn closest<T: Tracer + ?Sized>(
+        &self,
+        tracer: &T,
+        rays: &mut [Ray],
+        hits: &mut [Option<Hit>],
+        batch: Batch,
+        even: impl Fn(usize) -> DVec2,
+    ) {
+        tracer.closest_batch(rays, hits, batch);
+        if !self.plan.alpha {
+            return;
+        }
+        // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it was.
+        let mut pending: Vec<(usize, f32)> = (0..rays.len()).map(|i| (i, even(i).x as f32)).collect();
+        loop {
+            pending.retain_mut(|(i, chance)| {
+                let (ray, hit) = (&mut rays[*i], &hits[*i]);
+                let Some((hit, covered)) = hit.as_ref().zip(self.covered(ray, hit.as_ref())) else { return false };
+                if *chance < covered {
+                    return false;
+                }
+                *chance = (*chance - covered) / (1.0 - covered);
+                ray.tmin = hit.t.next_up();
+                true
+            });
+            if pending.is_empty() {
+                return;
+            }
+            let again: Vec<Ray> = pending.iter().map(|(i, _)| rays[*i]).collect();
+            let mut found = vec![None; again.len()];
+            tracer.closest_batch(&again, &mut found, self.incoherent());
+            pending.iter().zip(found).for_each(|((i, _), hit)| hits[*i] = hit);
+        }
+    }
+
+    /// Adds what is worth each shadow ray, less what is covered on its way.
+    pub(super) fn add_through<T: Tracer>(&self, tracer: &T, buffers: &mut Buffers) {
+        let Buffers { radiance, shadow_rays, shadow_light, .. } = buffers;
+        let mut left = vec![1.0f32; shadow_rays.len()];
+        let mut pending: Vec<usize> = (0..shadow_rays.len()).collect();
+        while !pending.is_empty() {
+            let rays: Vec<Ray> = pending.iter().map(|&i| shadow_rays[i]).collect();
+            let mut hits = vec![None; rays.len()];
+            tracer.closest_batch(&rays, &mut hits, self.incoherent());
+            let mut hits = hits.iter();
+            pending.retain(|&i| {
+                let Some(hit) = hits.next().and_then(Option::as_ref) else { return false };
+                let covered = self.covered(&shadow_rays[i], Some(hit)).unwrap_or(1.0);
+                left[i] *= 1.0 - covered;
+                shadow_rays[i].tmin = hit.t.next_up();
+                left[i] > 0.0
+            });
+        }
+        for ((pixel, worth), left) in shadow_light.iter().zip(left) {
+            let worth: Vec3 = *worth * left;
+            radiance[*pixel as usize] += worth.extend(0.0);
+        }
+    }
+
+    /// How much of the surface is there that was hit; none where it is opaque.
+    fn covered(&self, ray: &Ray, hit: Option<&Hit>) -> Option<f32> {
+        let hit = hit?;
+        let material = self.scene.geometries[hit.geometry as usize].material();
+        let material = self.scene.materials.get(material as usize).filter(|m| m.alpha != Alpha::Opaque)?;
+        let point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
+        Some(coverage(&point, material, &self.scene.textures))
+    }
+}

@@ -1,0 +1,207 @@
+//! Path tracing (Kajiya 1986, *The rendering equation*): from each surface a ray goes on in one direction that is chosen at random, so
+//! that light is found however often it was scattered.
+//!
+//! At each surface one light is asked directly, and what the ray that goes on finds glowing is weighed against that question by
+//! the power heuristic (Veach and Guibas 1995, *Optimally combining sampling techniques for Monte Carlo rendering*). Paths
+//! that matter little end by chance, and those that go on count for them (Arvo and Kirk 1990, *Particle transport and image
+//! synthesis*), so that nothing is lost on average.
+//!
+//! Every ray sends on one at most: a wave is never larger than the tile, and two are enough. Each depth has its own dimensions
+//! of the sampler, so that every choice is well spread over the samples of a pixel.
+
+use std::mem;
+
+use crate::math::{DVec2, Vec3};
+use crate::ray::{Hit, Ray};
+use crate::scene::Material;
+use crate::shade::SurfacePoint;
+use crate::shade::light::LightSource;
+use crate::shade::lights::Found;
+use crate::shade::scattering::{Lobes, Shading, Ways};
+use crate::trace::Tracer;
+
+use super::Renderer;
+use super::sampler::{Choice, Dimension, Pattern};
+use super::wavefront::{Buffers, Path, Wave};
+
+/// How often a path is scattered before it may end by chance.
+const SAFE_DEPTH: u32 = 3;
+/// The highest chance to go on.
+const HIGHEST_CHANCE: f32 = 0.95;
+
+/// The surface that a path has come to.
+struct Vertex<'a> {
+    path: Path,
+    point: SurfacePoint,
+    lobes: Lobes<'a>,
+    pattern: &'a Pattern,
+    sample: u32,
+    depth: u32,
+}
+
+impl Renderer<'_> {
+    /// One sample of each pixel, whose camera rays are traced.
+    pub(super) fn paths<T: Tracer>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
+        buffers.waves.resize_with(3, Wave::default);
+        for depth in 0..=self.plan.depth {
+            // The camera's, then two in turn.
+            let current = if depth == 0 { 0 } else { 2 - depth as usize % 2 };
+            let next = 1 + depth as usize % 2;
+            let batch = if depth == 0 { self.settings.batch } else { self.incoherent() };
+            self.scatter(depth, sample, current, next, buffers);
+            self.add_unshadowed(tracer, batch, buffers);
+            let Buffers { patterns, waves, hits, .. } = &mut *buffers;
+            let Wave { rays, paths } = &mut waves[next];
+            if rays.is_empty() {
+                return;
+            }
+            hits.clear();
+            hits.resize(rays.len(), None);
+            self.closest(tracer, rays, hits, self.incoherent(), |i| {
+                let pattern = &patterns[paths[i].pixel as usize];
+                self.sampler.pair(pattern, sample, Dimension::bounce(depth, Choice::Alpha))
+            });
+        }
+    }
+
+    /// Adds what the traced rays of a wave see, and makes the shadow rays and the rays that go on.
+    fn scatter(&self, depth: u32, sample: u32, current: usize, next: usize, buffers: &mut Buffers) {
+        let (wave, mut onwards) = (mem::take(&mut buffers.waves[current]), mem::take(&mut buffers.waves[next]));
+        onwards.rays.clear();
+        onwards.paths.clear();
+        buffers.shadow_rays.clear();
+        buffers.shadow_light.clear();
+        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, .. } = &mut *buffers;
+        let coverage = if depth == 0 { 1.0 } else { 0.0 };
+        for ((ray, &path), hit) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()) {
+            let pixel = &mut radiance[path.pixel as usize];
+            let Some(hit) = hit else {
+                let share = path.weight * self.share_of_environment(&path, ray);
+                *pixel += share.extend(1.0) * self.behind(ray.direction, depth == 0);
+                continue;
+            };
+            let point = self.surface(ray, hit);
+            let material = self.material(&point);
+            let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
+            let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
+            let glow = self.glow(&path, ray, hit, &point, material, shading.base);
+            *pixel += (path.weight * glow).extend(coverage);
+            let ways = Ways::new(material, &point, ray.direction.as_dvec3().normalize());
+            let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
+            let pattern = &patterns[path.pixel as usize];
+            let vertex = Vertex { path, point, lobes, pattern, sample, depth };
+            let DVec2 { x: light, y: lobe } = self.choice(&vertex, Choice::Which);
+            if let Some((source, arriving, worth)) = self.ask(&vertex, light) {
+                if source.casts_shadows {
+                    shadow_rays.push(LightSource::shadow_ray(&vertex.point, &arriving));
+                    shadow_light.push((path.pixel, worth));
+                } else {
+                    *pixel += worth.extend(0.0);
+                }
+            }
+            if let (true, Some((ray, path))) = (depth < self.plan.depth, self.go_on(&vertex, lobe)) {
+                onwards.rays.push(ray);
+                onwards.paths.push(path);
+            }
+        }
+        buffers.waves[current] = wave;
+        buffers.waves[next] = onwards;
+    }
+
+    fn choice(&self, vertex: &Vertex<'_>, choice: Choice) -> DVec2 {
+        self.sampler.pair(vertex.pattern, vertex.sample, Dimension::bounce(vertex.depth, choice))
+    }
+
+    /// What share of the light from around the scene counts that a ray finds which hits nothing.
+    fn share_of_environment(&self, path: &Path, ray: &Ray) -> f32 {
+        match &self.environment {
+            Some(environment) if path.density > 0.0 => {
+                let asked = self.lights.environment_density(environment, ray.direction.as_dvec3());
+                power_heuristic(f64::from(path.density), asked)
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// What counts of what a surface gives off.
+    fn glow(
+        &self,
+        path: &Path,
+        ray: &Ray,
+        hit: &Hit,
+        point: &SurfacePoint,
+        material: &Material,
+        emission: Vec3,
+    ) -> Vec3 {
+        if path.density == 0.0 || emission == Vec3::ZERO || material.unlit {
+            return emission;
+        }
+        match self.lights.found(hit, point, ray.origin.as_dvec3(), emission) {
+            Found::Alone => emission,
+            Found::Shared { radiance, density } => radiance * power_heuristic(f64::from(path.density), density),
+            Found::Dark => Vec3::ZERO,
+        }
+    }
+
+    /// Light from one of the lights, and what it is worth if nothing is in between.
+    fn ask(&self, vertex: &Vertex<'_>, choice: f64) -> Option<(&LightSource, crate::shade::light::Illumination, Vec3)> {
+        if !vertex.lobes.has_values() {
+            return None;
+        }
+        let chosen = self.lights.choose(choice)?;
+        let even = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
+        let arriving = chosen.source.illuminate(vertex.point.position, even)?;
+        let value = vertex.lobes.evaluate(arriving.to_light);
+        let share = match arriving.density {
+            // Where the path ends, nothing else finds the light.
+            Some(density) if chosen.can_be_found && vertex.depth < self.plan.depth => {
+                power_heuristic(density * chosen.chance, value.density)
+            }
+            _ => 1.0,
+        };
+        let worth = vertex.path.weight * value.share * arriving.color * (share / chosen.chance as f32);
+        (worth != Vec3::ZERO && worth.is_finite()).then_some((chosen.source, arriving, worth))
+    }
+
+    /// The ray that goes on from a surface, if any does.
+    fn go_on(&self, vertex: &Vertex<'_>, choice: f64) -> Option<(Ray, Path)> {
+        let Vertex { path, point, lobes, depth, .. } = vertex;
+        let scattered = lobes.sample(choice, self.choice(vertex, Choice::Direction))?;
+        let mut weight = path.weight * scattered.weight;
+        let scale = path.scale * scattered.scale;
+        if *depth >= SAFE_DEPTH {
+            // What radiance lost on its way into glass it gains on the way out.
+            let chance = (weight.max_element() / scale).min(HIGHEST_CHANCE);
+            if self.choice(vertex, Choice::End).x >= f64::from(chance) {
+                return None;
+            }
+            weight /= chance;
+        }
+        let goes_through = scattered.direction.dot(point.normal) < 0.0;
+        let medium = if goes_through { self.medium_behind(point) } else { path.medium };
+        let density = scattered.density.map_or(0.0, |density| density as f32);
+        let ray = point.spawn(scattered.direction.as_vec3(), f32::INFINITY);
+        Some((ray, Path { weight, medium, density, scale, ..*path }))
+    }
+}
+
+/// What share of an estimate counts that was chosen with density `own`, beside one with `other`.
+fn power_heuristic(own: f64, other: f64) -> f32 {
+    if own.is_infinite() {
+        return 1.0;
+    }
+    (own * own / (own * own + other * other)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_sum_up_to_one() {
+        for (a, b) in [(1.0, 1.0), (0.1, 30.0), (5.0, 0.0), (1e-9, 1e9)] {
+            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6 || b == 0.0);
+        }
+        assert_eq!((power_heuristic(2.0, 0.0), power_heuristic(1.0, f64::INFINITY)), (1.0, 0.0));
+    }
+}

@@ -1,0 +1,201 @@
+//! Ray casting, and Whitted's recursion (1980, *An improved illumination model for shaded display*): at each surface every
+//! light is asked, then all rays that mirrors and glass send on are followed.
+//!
+//! A pixel adds up camera ray by sample, then lights in the scene's order, then the rays sent on, depth by depth.
+//!
+//! Every ray may send on two, so that their number may double with each depth. They are followed in batches: breadth
+//! first within a batch, so that packets stay full; one batch to its end before the next, so that memory grows with
+//! the depth and not with the number of rays. A pixel's rays are divided by their own count alone, never by what its
+//! neighbours add to the batch.
+
+use std::ops::Range;
+
+use crate::math::{DVec2, Vec3};
+use crate::scene::Integrator;
+use crate::shade::SurfacePoint;
+use crate::shade::light::LightSource;
+use crate::shade::scattering::{Shading, Ways};
+use crate::trace::{Batch, Tracer};
+
+use super::Renderer;
+use super::sampler::Dimension;
+use super::wavefront::{Buffers, Path, Wave};
+
+/// Most rays that are followed at once below the camera's.
+const BATCH: usize = 4096;
+
+/// A share of the picture, in each channel, that is not worth a ray: far below what 8 bits show.
+const FAINT: f32 = 1e-4;
+
+/// Which rays are followed.
+#[derive(Clone, Copy)]
+struct Stage {
+    /// Of each pixel's samples.
+    sample: u32,
+    /// How often they were sent on.
+    depth: u32,
+}
+
+/// A ray that hit something.
+pub(super) struct Lit {
+    path: Path,
+    direction: Vec3,
+    point: SurfacePoint,
+    shading: Shading,
+}
+
+impl Renderer<'_> {
+    /// One sample of each pixel, whose camera rays are traced.
+    pub(super) fn whitted<T: Tracer>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
+        self.radiance(tracer, Stage { sample, depth: 0 }, 0, buffers);
+    }
+
+    /// Adds what the rays that `buffers.hits` belongs to see, those of `waves[depth]` from `first` on, and follows what is
+    /// sent on from there.
+    fn radiance<T: Tracer>(&self, tracer: &T, stage: Stage, first: usize, buffers: &mut Buffers) {
+        let Stage { sample, depth } = stage;
+        self.shade(depth, first, buffers);
+        let batch = if depth == 0 { self.settings.batch } else { self.incoherent() };
+        for light in 0..self.lights.sources().len() {
+            self.add_light(tracer, light, sample, batch, buffers);
+        }
+        if depth == self.plan.depth {
+            self.fake_reflections(buffers);
+            return;
+        }
+        self.send_on(stage, buffers);
+        let mut begin = 0;
+        while let Some(range) = buffers.waves[depth as usize + 1].batch(begin) {
+            begin = range.end;
+            let Buffers { patterns, waves, hits, .. } = &mut *buffers;
+            let Wave { rays, paths } = &mut waves[depth as usize + 1];
+            let (rays, paths) = (&mut rays[range.clone()], &paths[range.clone()]);
+            hits.clear();
+            hits.resize(rays.len(), None);
+            self.closest(tracer, rays, hits, self.incoherent(), |i| {
+                let Path { pixel, branch, .. } = paths[i];
+                self.sampler.pair(&patterns[pixel as usize], sample, Dimension::alpha(branch))
+            });
+            self.radiance(tracer, Stage { sample, depth: depth + 1 }, range.start, buffers);
+        }
+    }
+
+    /// What surfaces are where the rays hit, with what they give off without any light.
+    fn shade(&self, depth: u32, first: usize, buffers: &mut Buffers) {
+        let Buffers { waves, hits, radiance, lit, .. } = buffers;
+        let Wave { rays, paths } = &waves[depth as usize];
+        let coverage = if depth == 0 { 1.0 } else { 0.0 };
+        lit.clear();
+        for ((ray, &path), hit) in rays[first..].iter().zip(&paths[first..]).zip(hits) {
+            let pixel = &mut radiance[path.pixel as usize];
+            let Some(hit) = hit else {
+                *pixel += path.weight.extend(1.0) * self.behind(ray.direction, depth == 0);
+                continue;
+            };
+            let point = self.surface(ray, hit);
+            let material = self.material(&point);
+            let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
+            let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
+            *pixel += (path.weight * shading.base).extend(coverage);
+            lit.push(Lit { path, direction: ray.direction, point, shading });
+        }
+    }
+
+    /// The mirrored and refracted rays of all surfaces that were hit at a depth, into the wave below.
+    fn send_on(&self, Stage { sample, depth }: Stage, buffers: &mut Buffers) {
+        let Buffers { patterns, waves, lit, .. } = buffers;
+        let below = depth as usize + 1;
+        waves.resize_with(waves.len().max(below + 1), Wave::default);
+        let wave = &mut waves[below];
+        wave.rays.clear();
+        wave.paths.clear();
+        for Lit { path, direction, point, shading } in lit {
+            let material = self.material(point);
+            let ways = Ways::new(material, point, direction.as_dvec3().normalize());
+            for (which, way) in [(1, ways.mirrored), (2, ways.refracted)] {
+                let Some(way) = way else { continue };
+                let weight = path.weight * way.share * way.scale;
+                if weight.max_element() <= FAINT {
+                    continue;
+                }
+                let branch = path.branch.wrapping_mul(2).wrapping_add(which);
+                let direction = match material.gloss {
+                    None => Some(way.direction),
+                    Some(gloss) => {
+                        let pattern = &patterns[path.pixel as usize];
+                        way.spread(gloss, self.sampler.pair(pattern, sample, Dimension::gloss(branch)), shading)
+                    }
+                };
+                let Some(direction) = direction else { continue };
+                wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
+                let medium = if which == 2 { self.medium_behind(point) } else { path.medium };
+                wave.paths.push(Path { weight, branch, medium, ..*path });
+            }
+        }
+    }
+
+    /// In place of rays that ray casting does not send on: what they would see if nothing but the environment were there
+    /// (Blinn and Newell 1976, *Texture and reflection in computer generated images*).
+    fn fake_reflections(&self, buffers: &mut Buffers) {
+        let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
+        let Buffers { radiance, lit, .. } = buffers;
+        for Lit { path, direction, point, .. } in lit.iter() {
+            let ways = Ways::new(self.material(point), point, direction.as_dvec3().normalize());
+            for way in [ways.mirrored, ways.refracted].into_iter().flatten() {
+                let seen = path.weight * way.share * environment.radiance(way.direction);
+                radiance[path.pixel as usize] += seen.extend(0.0);
+            }
+        }
+    }
+
+    /// Adds what of a light reaches what was hit.
+    fn add_light<T: Tracer>(&self, tracer: &T, light: usize, sample: u32, batch: Batch, buffers: &mut Buffers) {
+        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, .. } = &mut *buffers;
+        let (index, light) = (light as u32, &self.lights.sources()[light]);
+        let count = if light.is_extended() { self.settings.light_samples } else { 1 };
+        shadow_rays.clear();
+        shadow_light.clear();
+        for Lit { path, point, shading, .. } in lit.iter() {
+            let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
+            for k in 0..count {
+                let even = if light.is_extended() {
+                    let dimension = Dimension::light(index, path.branch);
+                    self.light_sampler.pair(&patterns[path.pixel as usize], sample * count + k, dimension)
+                } else {
+                    DVec2::ZERO
+                };
+                let Some(arriving) = light.illuminate(point.position, even) else { continue };
+                if !shading.faces(arriving.to_light) {
+                    continue;
+                }
+                let reflected = weight * shading.reflect(&arriving);
+                if light.casts_shadows {
+                    shadow_rays.push(LightSource::shadow_ray(point, &arriving));
+                    shadow_light.push((path.pixel, reflected));
+                } else {
+                    radiance[path.pixel as usize] += reflected.extend(0.0);
+                }
+            }
+        }
+        self.add_unshadowed(tracer, batch, buffers);
+    }
+}
+
+impl Wave {
+    /// The rays from `begin` on that are followed next: those of whole pixels, as many as make a batch; of a pixel that
+    /// has more than a batch, that many. None at the end.
+    fn batch(&self, begin: usize) -> Option<Range<usize>> {
+        let rest = &self.paths[begin..];
+        let mut length = 0;
+        for pixel in rest.chunk_by(|a, b| a.pixel == b.pixel) {
+            if length + pixel.len() > BATCH {
+                // A pixel of more than a batch is cut after as many as if it stood alone.
+                let alone = length == 0;
+                length += if alone { BATCH } else { 0 };
+                break;
+            }
+            length += pixel.len();
+        }
+        (length > 0).then(|| begin..begin + length)
+    }
+}

@@ -1,0 +1,297 @@
+//! Surfaces that glow, as lights.
+//!
+//! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area. Spheres are lights of
+//! their own, sampled by the cone they fill. What stands in a light's place is that light's body. Of
+//! all other shapes, of what moves, and of what a texture lights or cuts out, no points are chosen: rays find them by chance, which is as right, and
+//! noisier.
+
+use std::collections::HashMap;
+use std::f64::consts::{PI, TAU};
+
+use super::area::short_of;
+use super::bodies;
+use super::light::{Illumination, LightSource};
+use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, tangents};
+use crate::ray::Hit;
+use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
+use crate::shape::Shape;
+use crate::trace::{Primitives, World};
+
+/// Flat pieces of surfaces that glow to both sides, in world coordinates.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Patches {
+    patches: Vec<Patch>,
+    /// Sums of the patches' areas times their brightness.
+    cumulative: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Patch {
+    corner: Vec3,
+    /// Two sides of a triangle, or two radii of a disk that are perpendicular.
+    sides: [Vec3; 2],
+    is_disk: bool,
+    emission: Vec3,
+}
+
+/// What of what glows is a light, by (instance, geometry).
+pub(super) type Glowing = HashMap<(u32, u32), Seats>;
+
+/// How the primitives of a geometry glow.
+#[derive(Clone, Debug)]
+pub(super) enum Seats {
+    /// All alike.
+    All(Seat),
+    /// Each in its own way.
+    Each(Vec<Seat>),
+}
+
+/// How a primitive glows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Seat {
+    /// No light stands for it.
+    Alone,
+    /// As one of the patches, of this brightness.
+    Patch(f64),
+    /// It is the body of the light with this number.
+    Body(u32),
+}
+
+impl Seats {
+    pub(super) fn of(&self, primitive: u32) -> Seat {
+        match self {
+            Self::All(seat) => *seat,
+            Self::Each(seats) => seats[primitive as usize],
+        }
+    }
+
+    /// The lights that have a body among them.
+    pub(super) fn bodies(&self) -> impl Iterator<Item = u32> {
+        let seats = match self {
+            Self::All(seat) => std::slice::from_ref(seat),
+            Self::Each(seats) => seats,
+        };
+        seats.iter().filter_map(|seat| match seat {
+            Seat::Body(light) => Some(*light),
+            Seat::Alone | Seat::Patch(_) => None,
+        })
+    }
+}
+
+/// Finds what glows. Spheres are added to `lights`, which may have bodies among what is found.
+pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) -> (Patches, Glowing) {
+    let (mut patches, mut glowing) = (Patches::default(), Glowing::new());
+    let own = lights.len();
+    for (instance, geometry) in placed(scene, is_emitter) {
+        let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
+        let emission = material.emission;
+        let moves = scene.instances[instance as usize].transform_end.is_some();
+        // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the time.
+        if material.emission_texture.is_some() || material.alpha != Alpha::Opaque || moves {
+            glowing.insert((instance, geometry), Seats::All(Seat::Alone));
+            continue;
+        }
+        let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0, geometry, instance };
+        let (part, placement) = world.locate(&hit);
+        let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
+        let seats = match &part.primitives {
+            Primitives::Triangles { positions, triangles } => {
+                let corners = |t: &[u32; 3]| t.map(|i| to_world.transform_point3(positions[i as usize].as_dvec3()));
+                let is_body = |light: &LightSource| {
+                    light.light().is_some_and(|l| triangles.iter().all(|t| bodies::has_triangle(l, corners(t))))
+                };
+                match lights[..own].iter().position(is_body) {
+                    Some(light) => Seats::All(Seat::Body(light as u32)),
+                    None => {
+                        triangles.iter().for_each(|t| patches.add_triangle(corners(t), emission));
+                        Seats::All(Seat::Patch(brightness(emission)))
+                    }
+                }
+            }
+            Primitives::Shapes(shapes) => {
+                let seat = |shape| seat(shape, &to_world, emission, own, lights, &mut patches);
+                Seats::Each(shapes.iter().map(seat).collect())
+            }
+        };
+        glowing.insert((instance, geometry), seats);
+    }
+    (patches, glowing)
+}
+
+/// Whether anything glows that is no body of `lights`.
+pub(super) fn any(scene: &Scene, world: &World, lights: &[LightSource]) -> bool {
+    let mut all = lights.to_vec();
+    let (patches, glowing) = find(scene, world, &mut all);
+    let is_alone = |seats: &Seats| match seats {
+        Seats::All(seat) => *seat == Seat::Alone,
+        Seats::Each(seats) => seats.contains(&Seat::Alone),
+    };
+    patches.total() > 0.0 || all.len() > lights.len() || glowing.values().any(is_alone)
+}
+
+/// Whether a material lights others.
+pub(super) fn is_emitter(material: &Material) -> bool {
+    material.emission != Vec3::ZERO && !material.unlit
+}
+
+/// Instance and geometry of everything of certain materials.
+fn placed(scene: &Scene, wanted: impl Fn(&Material) -> bool) -> Vec<(u32, u32)> {
+    let wanted: Vec<bool> = scene.materials.iter().map(wanted).collect();
+    if !wanted.contains(&true) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for (instance, i) in scene.instances.iter().zip(0..) {
+        let geometries = scene.group_geometries(instance.group);
+        let glow = geometries.filter(|(_, g)| wanted.get(g.material() as usize) == Some(&true));
+        found.extend(glow.map(|(g, _)| (i, g)));
+    }
+    found
+}
+
+/// Makes a light or patches of a shape. `own` is how many of the lights are not of shapes.
+fn seat(
+    shape: &Shape,
+    to_world: &DAffine3,
+    emission: Vec3,
+    own: usize,
+    lights: &mut Vec<LightSource>,
+    patches: &mut Patches,
+) -> Seat {
+    let body = |lights: &[LightSource], is_body: &dyn Fn(&Light) -> bool| {
+        lights[..own].iter().position(|light| light.light().is_some_and(is_body)).map(|i| Seat::Body(i as u32))
+    };
+    let at = |p: Vec3| to_world.transform_point3(p.as_dvec3());
+    match shape {
+        Shape::Sphere(sphere) => {
+            let Some(scale) = similarity(&to_world.matrix3) else { return Seat::Alone };
+            let (centre, radius) = (at(sphere.centre), f64::from(sphere.radius) * scale);
+            body(lights, &|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
+                let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance: emission };
+                lights.push(LightSource::new(&light, DVec3::ZERO));
+                Seat::Body(lights.len() as u32 - 1)
+            })
+        }
+        Shape::Disk(disk) => {
+            if similarity(&to_world.matrix3).is_none() {
+                return Seat::Alone;
+            }
+            let across = tangents(disk.normal.as_dvec3().normalize())
+                .map(|axis| to_world.matrix3 * axis * f64::from(disk.radius));
+            let centre = at(disk.centre);
+            body(lights, &|light| bodies::has_disk(light, centre, across))
+                .unwrap_or_else(|| patches.add_disk(centre, across, emission))
+        }
+        Shape::Cuboid(cuboid) => {
+            let corner = |i: usize| {
+                let pick = |axis: usize| if i >> axis & 1 == 0 { cuboid.min[axis] } else { cuboid.max[axis] };
+                at(Vec3::new(pick(0), pick(1), pick(2)))
+            };
+            for [a, b, c, d] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]] {
+                patches.add_triangle([a, b, c].map(corner), emission);
+                patches.add_triangle([a, c, d].map(corner), emission);
+            }
+            Seat::Patch(brightness(emission))
+        }
+        Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Ellipsoid(_) | Shape::Polygon(_) => Seat::Alone,
+    }
+}
+
+impl Patches {
+    fn add_triangle(&mut self, [a, b, c]: [DVec3; 3], emission: Vec3) {
+        let area = (b - a).cross(c - a).length() / 2.0;
+        self.add(a, [b - a, c - a], area, false, emission);
+    }
+
+    fn add_disk(&mut self, centre: DVec3, [x, y]: [DVec3; 2], emission: Vec3) -> Seat {
+        self.add(centre, [x, y], x.cross(y).length() * PI, true, emission);
+        Seat::Patch(brightness(emission))
+    }
+
+    fn add(&mut self, corner: DVec3, sides: [DVec3; 2], area: f64, is_disk: bool, emission: Vec3) {
+        if area > 0.0 && area.is_finite() {
+            self.cumulative.push(self.total() + area * brightness(emission));
+            let sides = sides.map(|side| side.as_vec3());
+            self.patches.push(Patch { corner: corner.as_vec3(), sides, is_disk, emission });
+        }
+    }
+
+    /// All areas times their brightness.
+    pub(super) fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// What arrives at `point` from a place on a patch that `even` chooses.
+    pub(super) fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
+        let wanted = even.x * self.total();
+        let index = self.cumulative.partition_point(|&sum| sum <= wanted).min(self.patches.len().checked_sub(1)?);
+        let before = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
+        let within = ((wanted - before) / (self.cumulative[index] - before)).clamp(0.0, 1.0);
+        let Patch { corner, sides, is_disk, emission } = self.patches[index];
+        let [a, b] = sides.map(|side| side.as_dvec3());
+        let (x, y) = if is_disk {
+            let (radius, angle) = (within.sqrt(), even.y * TAU);
+            (radius * libm::cos(angle), radius * libm::sin(angle))
+        } else {
+            // Evenly over a triangle (Turk 1990, *Generating random points in triangles*).
+            let root = within.sqrt();
+            (root * (1.0 - even.y), root * even.y)
+        };
+        let at = corner.as_dvec3() + a * x + b * y;
+        let offset = at - point;
+        let to_light = offset.try_normalize()?;
+        let cosine = a.cross(b).normalize_or_zero().dot(to_light).abs();
+        let density = brightness(emission) / self.total() * offset.length_squared() / cosine;
+        let color = emission * (1.0 / (PI * density)) as f32;
+        let end = Some(short_of(at, to_light, point));
+        (density.is_finite() && color.is_finite()).then_some(Illumination {
+            to_light,
+            color,
+            end,
+            density: Some(density),
+        })
+    }
+}
+
+/// What patches are chosen by, beside their area.
+fn brightness(emission: Vec3) -> f64 {
+    f64::from(emission.max_element())
+}
+
+/// How much longer a map makes lengths, where it does so alike in all directions.
+fn similarity(m: &DMat3) -> Option<f64> {
+    let product = m.transpose() * *m;
+    let squared = product.x_axis.x;
+    let off = (product - DMat3::from_diagonal(DVec3::splat(squared))).to_cols_array();
+    (off.iter().all(|x| x.abs() <= 1e-5 * squared)).then(|| squared.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The irradiance of two triangles against that of the rectangle they make.
+    #[test]
+    fn patches_light_like_the_surface_they_make() {
+        let corner = |x: f64, z: f64| DVec3::new(x, 2.0, z);
+        let mut patches = Patches::default();
+        let bright = Vec3::new(1.0, 2.0, 0.5);
+        patches.add_triangle([corner(0.0, 0.0), corner(1.5, 0.0), corner(1.5, 0.8)], bright);
+        patches.add_triangle([corner(0.0, 0.0), corner(1.5, 0.8), corner(0.0, 0.8)], bright);
+        let side = 300;
+        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let each = (0..side * side).filter_map(|k| patches.illuminate(DVec3::ZERO, even(k)));
+        let mean = each.map(|l| f64::from(l.color.y) * l.to_light.y).sum::<f64>() / f64::from(side * side);
+        // Howell's B-3: a parallel rectangle with a corner over the element.
+        let (x, y) = (0.75f64, 0.4f64);
+        let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
+        let expected = 2.0 * (x / p * (y / p).atan() + y / q * (x / q).atan()) / TAU;
+        assert!((mean / expected - 1.0).abs() < 1e-3, "{mean} {expected}");
+    }
+
+    #[test]
+    fn similarities_are_told() {
+        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::splat(-3.0))), Some(3.0));
+        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 2.0))), None);
+    }
+}

@@ -1,0 +1,77 @@
+//! The highlights of Phong (1975, *Illumination for computer generated pictures*) and Blinn (1977, *Models of light
+//! reflection for computer synthesized pictures*), classic and energy-conserving.
+//!
+//! The classic highlight is ks cos^n: no cosine of the light, and no scale, so that wide ones send on more than they get. The
+//! energy-conserving one is pi f cos with f scaled so that straight on exactly ks is sent on, and nowhere more: (n + 2) / (2 pi)
+//! for Phong's (Lafortune and Willems 1994), (n + 2) (n + 4) / (8 pi (2^(-n/2) + n)) for Blinn's (Giesen 2009, *Derivation of the Phong and
+//! Blinn-Phong normalization factors*).
+
+use super::warp;
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::scene::{Material, Specular};
+
+/// The highlight of a material.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Highlight {
+    pub(super) color: Vec3,
+    shininess: f32,
+    model: Specular,
+    /// Of an energy-conserving one, pi times the factor of f; none for the classic.
+    scale: Option<f32>,
+}
+
+impl Highlight {
+    pub(super) fn new(material: &Material) -> Self {
+        let n = material.shininess;
+        let scale = material.energy_conserving.then(|| match material.model {
+            Specular::Phong => (n + 2.0) / 2.0,
+            Specular::BlinnPhong => (n + 2.0) * (n + 4.0) / (8.0 * (libm::exp2f(-n / 2.0) + n)),
+        });
+        Self { color: material.specular, shininess: n, model: material.model, scale }
+    }
+
+    /// pi f cos, for light at `cosine` to the normal.
+    pub(super) fn value(&self, normal: DVec3, to_viewer: DVec3, l: DVec3, cosine: f64) -> Vec3 {
+        let base = match self.model {
+            Specular::Phong => (normal * (2.0 * cosine) - l).dot(to_viewer),
+            Specular::BlinnPhong => (l + to_viewer).normalize_or_zero().dot(normal),
+        };
+        let height = libm::powf(base.clamp(0.0, 1.0) as f32, self.shininess);
+        self.color * self.scale.map_or(height, |scale| scale * height * cosine as f32)
+    }
+
+    /// About how much of all light it sends on: what samples are divided by.
+    pub(super) fn albedo(&self) -> f32 {
+        let share = match (self.scale, self.model) {
+            (Some(_), _) => 1.0,
+            (None, Specular::Phong) => 2.0 / (self.shininess + 1.0),
+            (None, Specular::BlinnPhong) => (8.0 / (self.shininess + 1.0)).min(2.0),
+        };
+        self.color.max_element() * share
+    }
+
+    /// A direction that is likely where the highlight is high; may lie below the surface.
+    pub(super) fn sample(&self, normal: DVec3, to_viewer: DVec3, even: DVec2) -> DVec3 {
+        let n = f64::from(self.shininess);
+        match self.model {
+            Specular::Phong => warp::power(normal * (2.0 * normal.dot(to_viewer)) - to_viewer, n, even),
+            Specular::BlinnPhong => {
+                let half = warp::power(normal, n, even);
+                half * (2.0 * half.dot(to_viewer)) - to_viewer
+            }
+        }
+    }
+
+    /// The density of [`Highlight::sample`].
+    pub(super) fn density(&self, normal: DVec3, to_viewer: DVec3, l: DVec3) -> f64 {
+        let n = f64::from(self.shininess);
+        match self.model {
+            Specular::Phong => warp::power_density((normal * (2.0 * normal.dot(l)) - l).dot(to_viewer), n),
+            Specular::BlinnPhong => {
+                let half = (l + to_viewer).normalize_or_zero();
+                let cosine = half.dot(to_viewer);
+                if cosine > 0.0 { warp::power_density(half.dot(normal), n) / (4.0 * cosine) } else { 0.0 }
+            }
+        }
+    }
+}

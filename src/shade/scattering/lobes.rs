@@ -1,0 +1,129 @@
+//! All lobes of a surface together, for integrators that follow one of them at random.
+//!
+//! A lobe is chosen by about how much light it sends on, a direction by the lobe's own density; the density of the
+//! result is the sum over all lobes, so that directions that several lobes can give are not noisier than others (Veach and
+//! Guibas 1995, *Optimally combining sampling techniques for Monte Carlo rendering*: the balance heuristic).
+
+use std::f64::consts::PI;
+
+use super::{Shading, Way, Ways, warp};
+use crate::math::{DVec2, DVec3, Vec3};
+
+/// What of the light from a direction goes to the viewer, and how likely that direction is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Value {
+    /// pi f cos, linear RGB.
+    pub share: Vec3,
+    /// Of [`Lobes::sample`], per steradian.
+    pub density: f64,
+}
+
+/// Where a path goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scattered {
+    /// Unit vector away from the surface.
+    pub direction: DVec3,
+    /// f cos over the density: what the radiance from there is multiplied by.
+    pub weight: Vec3,
+    /// Per steradian; none for a direction that no other could have been.
+    pub density: Option<f64>,
+    /// See [`Way::scale`].
+    pub scale: f32,
+}
+
+/// A surface with everything it does with light.
+pub struct Lobes<'a> {
+    shading: &'a Shading,
+    ways: Ways,
+    gloss: Option<f64>,
+    /// How likely each is chosen: Lambert's, the highlight, mirrored, refracted. They sum up to 1.
+    chances: [f64; 4],
+}
+
+impl<'a> Lobes<'a> {
+    /// None where nothing is sent on.
+    pub fn new(shading: &'a Shading, ways: Ways, gloss: Option<f32>) -> Option<Self> {
+        let share = |way: &Option<Way>| way.map_or(0.0, |way| way.share.max_element());
+        let albedo =
+            [shading.diffuse.max_element(), shading.highlight.albedo(), share(&ways.mirrored), share(&ways.refracted)];
+        let sum: f32 = albedo.iter().sum();
+        let chances = albedo.map(|albedo| f64::from(albedo) / f64::from(sum));
+        (sum > 0.0).then_some(Self { shading, ways, gloss: gloss.map(f64::from), chances })
+    }
+
+    /// Whether any direction at all has a value; else only exact ways lead on.
+    pub fn has_values(&self) -> bool {
+        self.chances[0] + self.chances[1] > 0.0 || self.gloss.is_some()
+    }
+
+    /// For light along `to_light`.
+    pub fn evaluate(&self, to_light: DVec3) -> Value {
+        let Shading { normal, geometric, to_viewer, highlight, .. } = self.shading;
+        let [diffuse, shiny, mirrored, refracted] = self.chances;
+        let mut value = Value { share: Vec3::ZERO, density: 0.0 };
+        let front = self.shading.faces(to_light);
+        if front {
+            value.share = self.shading.value(to_light);
+            value.density = diffuse * warp::cosine_density(normal.dot(to_light));
+            if shiny > 0.0 {
+                value.density += shiny * highlight.density(*normal, *to_viewer, to_light);
+            }
+        }
+        let Some(gloss) = self.gloss else { return value };
+        let behind = normal.dot(to_light) < 0.0 && geometric.dot(to_light) < 0.0;
+        for (way, chance, on_its_side) in
+            [(&self.ways.mirrored, mirrored, front), (&self.ways.refracted, refracted, behind)]
+        {
+            if let (Some(way), true) = (way, on_its_side) {
+                let density = warp::power_density(way.direction.dot(to_light), gloss);
+                value.share += way.share * (way.scale * (PI * density) as f32);
+                value.density += chance * density;
+            }
+        }
+        value
+    }
+
+    /// A direction to go on in: `choice` (from 0 to below 1) chooses the lobe, `even` (in the unit square) the
+    /// direction. None where that leads nowhere.
+    pub fn sample(&self, choice: f64, even: DVec2) -> Option<Scattered> {
+        let Shading { normal, to_viewer, highlight, .. } = self.shading;
+        let mut rest = choice;
+        let last = self.chances.iter().rposition(|&chance| chance > 0.0)?;
+        let lobe = self.chances.iter().position(|&chance| {
+            rest -= chance;
+            rest < 0.0
+        });
+        let lobe = lobe.map_or(last, |lobe| lobe.min(last));
+        let (direction, scale) = match lobe {
+            0 => (warp::cosine(*normal, even), 1.0),
+            1 => (highlight.sample(*normal, *to_viewer, even), 1.0),
+            _ => {
+                let way = if lobe == 2 { self.ways.mirrored? } else { self.ways.refracted? };
+                let Some(gloss) = self.gloss else {
+                    let weight = way.share * (way.scale / self.chances[lobe] as f32);
+                    return Some(Scattered { direction: way.direction, weight, density: None, scale: way.scale });
+                };
+                (warp::power(way.direction, gloss, even), way.scale)
+            }
+        };
+        let Value { share, density } = self.evaluate(direction);
+        if density <= 0.0 || share == Vec3::ZERO {
+            return None;
+        }
+        let weight = share * (1.0 / (PI * density)) as f32;
+        Some(Scattered { direction, weight, density: Some(density), scale })
+    }
+}
+
+impl Way {
+    /// A direction near this one, spread by `gloss` as `even` chooses; none where it would be on the other side of the
+    /// surface. The share stays: all that is lost is what goes there.
+    pub fn spread(&self, gloss: f32, even: DVec2, shading: &Shading) -> Option<DVec3> {
+        let side = |direction: DVec3| (shading.normal.dot(direction), shading.geometric.dot(direction));
+        let spread = warp::power(self.direction, f64::from(gloss), even);
+        let crosses = shading.geometric.dot(self.direction) < 0.0;
+        let (a, b) = side(spread);
+        let stays = if crosses { a < 0.0 && b < 0.0 } else { a > 0.0 && b > 0.0 };
+        stays.then_some(spread)
+    }
+}

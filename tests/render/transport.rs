@@ -1,0 +1,276 @@
+//! How light goes round: furnaces, form factors, a caustic, and integrators against each other.
+
+use twincast::math::{DVec3, Mat3, Vec3, Vec4};
+use twincast::render::Control;
+use twincast::scene::{AreaShape, Camera, Environment, Geometry, Integrator, Interface, Light, Material, Specular};
+use twincast::{Disk, Image, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
+
+use super::{Engine, engines, floor, matte, render, settings};
+
+fn sphere(centre: Vec3, radius: f32) -> Shape {
+    Shape::Sphere(Sphere { centre, radius })
+}
+
+fn scene(parts: Vec<(Shape, Material)>) -> Scene {
+    let (shapes, materials): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    let geometry = |(shape, material)| Geometry::Shapes { shapes: vec![shape], material };
+    let mut scene = Scene::from_geometries(shapes.into_iter().zip(0..).map(geometry).collect(), materials);
+    // No headlight.
+    scene.lights = vec![Light::Directional { direction: DVec3::X, color: Vec3::ZERO }];
+    scene
+}
+
+fn black() -> Material {
+    Material { ambient: Vec3::ZERO, ..matte(0.0) }
+}
+
+fn glowing(radiance: f32) -> Material {
+    Material { emission: Vec3::splat(radiance), ..black() }
+}
+
+fn paths(width: u32, spp: u32) -> Settings {
+    Settings { integrator: Some(Integrator::Path), ..settings(width, width, spp) }
+}
+
+fn mean(image: &Image) -> Vec3 {
+    let sum = image.pixels.iter().fold(Vec4::ZERO, |sum, pixel| sum + *pixel);
+    (sum / image.pixels.len() as f32).truncate()
+}
+
+/// The mean of the picture, by the native engine and by Embree.
+fn means(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<(&'static str, Vec3)> {
+    let world = World::new(scene).unwrap();
+    let fast = |engine: &&Engine| ["native", "embree"].contains(&engine.name);
+    engines(&world).iter().filter(fast).map(|e| (e.name, mean(&render(scene, camera, settings, e)))).collect()
+}
+
+/// Inside a closed surface that gives off e and sends on a of what arrives, radiance is e / (1 - a) everywhere.
+#[test]
+fn a_furnace_glows_evenly() {
+    let wall = Material { emission: Vec3::splat(0.5), ..matte(0.5) };
+    let camera = Camera::look_at(DVec3::new(0.3, 0.2, 0.1), DVec3::X, DVec3::Y, 1.5).unwrap();
+    let ball = scene(vec![(sphere(Vec3::ZERO, 2.0), wall.clone())]);
+    let cuboid = twincast::Cuboid::new(Vec3::new(-1.0, -2.0, -3.0), Vec3::new(2.0, 1.0, 1.0)).unwrap();
+    let boxed = scene(vec![(Shape::Cuboid(cuboid), wall.clone())]);
+    // Points of an ellipsoid are not chosen: its light is found by chance alone.
+    let axes = Mat3::from_diagonal(Vec3::new(2.0, 1.0, 3.0));
+    let round = Shape::Ellipsoid(twincast::Ellipsoid::new(Vec3::ZERO, axes).unwrap());
+    let by_chance = scene(vec![(round, wall)]);
+    for (name, furnace) in [("ball", ball), ("box", boxed), ("ellipsoid", by_chance)] {
+        for (engine, got) in means(&furnace, &camera, &paths(24, 64)) {
+            assert!((got - 1.0).abs().max_element() < 0.005, "{name}, {engine}: {got}");
+        }
+    }
+}
+
+/// What surrounds everything with 1 shows 1 in whatever loses nothing, and never more.
+#[test]
+fn a_white_world_shows_what_materials_lose() {
+    let plain = |diffuse: f32, specular: f32, shininess: f32, model| Material {
+        specular: Vec3::splat(specular),
+        shininess,
+        model,
+        energy_conserving: true,
+        ..matte(diffuse)
+    };
+    let mirror = Material { reflection: Vec3::ONE, ..black() };
+    let pane = Material { interface: Interface::Thin, ..Material::glass(1.5) };
+    let lossless = [
+        ("mirror", mirror.clone()),
+        ("glass", Material::glass(1.5)),
+        ("bubble", Material::glass(0.75)),
+        ("pane", pane),
+        ("white", matte(1.0)),
+        ("varnished white", Material { diffuse: Vec3::ONE, transmission: Vec3::ZERO, ..Material::glass(1.5) }),
+    ];
+    let others = [
+        ("grey", matte(0.5)),
+        ("phong 0", plain(0.5, 0.5, 0.0, Specular::Phong)),
+        ("phong 3", plain(0.0, 1.0, 3.0, Specular::Phong)),
+        ("phong 100", plain(0.2, 0.8, 100.0, Specular::Phong)),
+        ("blinn 0", plain(0.5, 0.5, 0.0, Specular::BlinnPhong)),
+        ("blinn 3", plain(0.0, 1.0, 3.0, Specular::BlinnPhong)),
+        ("blinn 100", plain(0.2, 0.8, 100.0, Specular::BlinnPhong)),
+        ("more than all", plain(1.0, 1.0, 10.0, Specular::Phong)),
+        ("satin", Material { gloss: Some(5.0), ..mirror }),
+        ("frosted", Material { gloss: Some(50.0), ..Material::glass(1.5) }),
+        ("classic", Material { energy_conserving: false, ..plain(0.5, 0.5, 9.0, Specular::Phong) }),
+    ];
+    let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 2.0 * 0.19f64.asin()).unwrap();
+    let white = Environment::new(Image { width: 8, height: 4, pixels: vec![Vec4::ONE; 32] });
+    let is_lossless = lossless.len();
+    for (i, (name, material)) in lossless.into_iter().chain(others).enumerate() {
+        let mut world = scene(vec![(sphere(Vec3::ZERO, 1.0), material)]);
+        world.background = Some(Vec3::ONE);
+        let constant = means(&world, &camera, &paths(16, 64));
+        (world.background, world.environment) = (None, Some(white.clone()));
+        let around = means(&world, &camera, &paths(16, 64));
+        for (engine, got) in constant.into_iter().chain(around) {
+            if i < is_lossless {
+                assert!((got - 1.0).abs().max_element() < 0.005, "{name}, {engine}: {got}");
+            } else {
+                assert!(got.max_element() < 1.003 && got.min_element() > 0.3, "{name}, {engine}: {got}");
+            }
+        }
+    }
+}
+
+/// A ball of radiance L and radius r, d above a floor of reflectance a, shows a L (r / d)^2 below it (Howell, B-17): the
+/// inverse square law, exact even close by.
+#[test]
+fn a_ball_of_light_has_its_form_factor() {
+    let below = Camera::look_at(DVec3::new(4.0, 1.0, 0.0), DVec3::ZERO, DVec3::Y, 1e-3).unwrap();
+    for (radius, height) in [(0.5f32, 1.0f32), (0.5, 2.0), (0.5, 4.0), (2.0, 4.0)] {
+        let ball = sphere(Vec3::Y * height, radius);
+        let mut lit = scene(vec![(ball, glowing(3.0))]);
+        lit.geometries.push(floor(50.0, 1));
+        lit.groups[0].geometries = 0..2;
+        lit.materials.push(matte(0.5));
+        let expected = 0.5 * 3.0 * (radius / height).powi(2);
+        for (engine, got) in means(&lit, &below, &paths(1, 256)) {
+            assert!((got.x / expected - 1.0).abs() < 0.01, "{engine}: {got} {expected}");
+        }
+    }
+}
+
+/// A ball of glass brings light from far away together at n R / (2 (n - 1)) from its middle. There, through a hole of radius h, a source
+/// that fills its image shows T L sin^2 a, sin a = h / f; beside the image it is dark.
+#[test]
+fn a_ball_of_glass_has_its_focus() {
+    let (n, hole, focus) = (1.5f32, 0.25f32, 1.5f32);
+    let far = 1000.0;
+    // 2 degrees to each side.
+    let source = Disk::new(Vec3::Y * far, Vec3::NEG_Y, far * 2f32.to_radians().tan()).unwrap();
+    let mut lens = scene(vec![
+        (sphere(Vec3::ZERO, 1.0), Material::glass(n)),
+        (Shape::Disk(source), glowing(100.0)),
+        (Shape::Plane(Plane::new(Vec3::Y * -focus, Vec3::Y).unwrap()), matte(1.0)),
+    ]);
+    // A black board with a hole: a ring of triangles.
+    let ring = |i: u32, r: f32| {
+        let angle = i as f32 / 64.0 * std::f32::consts::TAU;
+        Vec3::new(r * angle.cos(), 1.01, r * angle.sin())
+    };
+    let corners = (0..64).flat_map(|i| [ring(i, hole), ring(i, 20.0)]).collect();
+    let quad = |i: u32| [[2 * i, 2 * i + 1, (2 * i + 3) % 128], [2 * i, (2 * i + 3) % 128, (2 * i + 2) % 128]];
+    let board =
+        twincast::scene::Mesh { material: 3, ..twincast::scene::Mesh::new(corners, (0..64).flat_map(quad).collect()) };
+    lens.geometries.push(Geometry::Mesh(board));
+    lens.groups[0].geometries = 0..4;
+    lens.materials.push(black());
+    let at = |x: f64| {
+        let target = DVec3::new(x, -f64::from(focus), 0.0);
+        let camera = Camera::look_at(target + DVec3::new(0.9, 0.4, 0.0), target, DVec3::Y, 1e-3).unwrap();
+        means(&lens, &camera, &paths(8, 1024))
+    };
+    let through = (1.0 - ((n - 1.0) / (n + 1.0)).powi(2)).powi(2);
+    let expected = 100.0 * through * (hole / focus).powi(2);
+    for (engine, got) in at(0.0) {
+        assert!((got.x / expected - 1.0).abs() < 0.06, "{engine}: {got} {expected}");
+    }
+    for (engine, got) in at(1.5 * f64::from(focus) * 2f64.to_radians().tan() + 0.03) {
+        assert!(got.x < 0.02 * expected, "beside the image, {engine}: {got}");
+    }
+}
+
+/// Scenes of which Whitted's recursion and the path tracer see the same.
+fn both_see() -> Vec<(&'static str, Scene, Camera)> {
+    let with_floor = |mut scene: Scene, material: Material| {
+        let count = scene.geometries.len() as u32;
+        scene.geometries.push(floor(20.0, count));
+        scene.groups[0].geometries = 0..count + 1;
+        scene.materials.push(material);
+        scene
+    };
+    let aside = Camera::look_at(DVec3::new(3.0, 4.0, 6.0), DVec3::Y, DVec3::Y, 0.8).unwrap();
+    let shiny = Material { specular: Vec3::splat(0.4), shininess: 20.0, ..matte(0.5) };
+    // A light that has a body, which must not count twice, and one that has none.
+    let ball = sphere(Vec3::new(0.0, 3.0, 0.0), 1.0);
+    let mut lamps = with_floor(scene(vec![(ball, glowing(4.0))]), shiny.clone());
+    let shape = AreaShape::Sphere { centre: DVec3::Y * 3.0, radius: 1.0 };
+    let panel = AreaShape::Rectangle { centre: DVec3::new(-3.0, 2.0, 0.0), half_edges: [DVec3::Y, DVec3::Z * 0.5] };
+    lamps.lights = vec![
+        Light::Area { shape, radiance: Vec3::splat(4.0) },
+        Light::Area { shape: panel, radiance: Vec3::new(5.0, 3.0, 1.0) },
+    ];
+    // Glossy ground that mirrors what glows, and lights nothing.
+    let satin = Material { gloss: Some(30.0), reflection: Vec3::splat(0.8), ..black() };
+    let glossy = with_floor(scene(vec![(sphere(Vec3::Y * 1.5, 1.0), glowing(2.0))]), satin);
+    // A sky with a sun, and glass in the sun.
+    let sky =
+        |i: u32| if i == 16 * 9 + 20 { Vec4::splat(60.0) } else { Vec4::new(0.2, 0.3, 0.6, 1.0) * (i % 7) as f32 };
+    let image = Image { width: 32, height: 16, pixels: (0..512).map(sky).collect() };
+    let around = |material| {
+        let mut scene = scene(vec![(sphere(Vec3::Y, 1.5), material)]);
+        scene.environment = Some(Environment { rotation: 0.5, ..Environment::new(image.clone()) });
+        scene
+    };
+    vec![
+        ("lamps", lamps, aside.clone()),
+        ("glossy", glossy, aside.clone()),
+        ("sky on matte and shiny", around(shiny), aside.clone()),
+        ("sky through glass", around(Material::glass(1.5)), aside),
+    ]
+}
+
+#[test]
+fn integrators_agree_where_they_see_the_same() {
+    let runs = 12;
+    for (name, scene, camera) in both_see() {
+        let world = World::new(&scene).unwrap();
+        let engine = &engines(&world)[1];
+        let pictures = |integrator| -> Vec<Vec<Vec4>> {
+            let one = |seed| {
+                let integrator = Some(integrator);
+                let settings = Settings { integrator, seed, light_samples: 4, ..settings(8, 8, 64) };
+                render(&scene, &camera, &settings, engine).pixels
+            };
+            (0..runs).map(one).collect()
+        };
+        let statistics = |pictures: &[Vec<Vec4>], i: usize| {
+            let values: Vec<f64> = pictures.iter().map(|picture| f64::from(picture[i].y)).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            (mean, squares / (values.len() * (values.len() - 1)) as f64)
+        };
+        let [whitted, path] = [Integrator::Whitted, Integrator::Path].map(pictures);
+        // Over all pixels: the sum of differences is within three standard errors; no pixel is far beyond.
+        let (mut difference, mut variance, mut bright) = (0.0, 0.0, 0.0);
+        for i in 0..64 {
+            let ((a, va), (b, vb)) = (statistics(&whitted, i), statistics(&path, i));
+            difference += a - b;
+            variance += va + vb;
+            bright += a;
+            assert!(
+                (a - b).abs() <= 6.0 * (va + vb).sqrt() + 1e-3 * a + 5e-4,
+                "{name}: pixel {i}: {a} {b} {}",
+                (va + vb).sqrt()
+            );
+        }
+        let error = variance.sqrt();
+        assert!(difference.abs() < 3.0 * error + 1e-4 * bright, "{name}: {difference} of {bright}, error {error}");
+        assert!(error < 0.01 * bright && bright > 1.0, "{name}: {error} of {bright} says something");
+    }
+}
+
+/// A light round the corner: nothing but paths shows it.
+#[test]
+fn auto_traces_paths_where_nothing_else_shows_anything() {
+    let ball = sphere(Vec3::Y * 3.0, 1.0);
+    let mut lit = scene(vec![(ball, glowing(4.0))]);
+    lit.geometries.push(floor(20.0, 1));
+    lit.groups[0].geometries = 0..2;
+    lit.materials.push(matte(0.5));
+    let world = World::new(&lit).unwrap();
+    let of = |integrator| {
+        let settings = Settings { integrator, ..settings(16, 16, 16) };
+        let camera = Camera::look_at(DVec3::new(6.0, 1.0, 0.0), DVec3::X * 2.0, DVec3::Y, 0.1).unwrap();
+        let renderer = Renderer::new(&lit, &world, camera, settings).unwrap();
+        let image = renderer.render(&engines(&world)[1], Control::default()).unwrap();
+        (renderer.plan().integrator, renderer.plan().to_string(), image)
+    };
+    let (integrator, why, image) = of(None);
+    assert_eq!((integrator, &image), (Integrator::Path, &of(Some(Integrator::Path)).2));
+    assert!(why.starts_with("path (only surfaces that glow light the scene)"), "{why}");
+    assert_eq!(of(Some(Integrator::Whitted)).2.pixels[0].truncate(), Vec3::ZERO);
+}
