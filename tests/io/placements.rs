@@ -61,7 +61,7 @@ fn faults_are_told_with_their_line() {
     ] {
         let text = placements("instance", |i| (i == at).then_some(third));
         let first = 1 + GROUPS.lines().count() + 4 * at;
-        refused(&Files::one("a.toml", &format!("{GROUPS}{text}")), "a.toml", &format!("line {}", first + shift), words);
+        refused(&Files::one("a.toml", format!("{GROUPS}{text}")), "a.toml", &format!("line {}", first + shift), words);
     }
     // Said in two ways, which TOML does not allow.
     let twice = format!("instance = []\n{}{GROUPS}", placements("instance", |_| None));
