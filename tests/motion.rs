@@ -2,7 +2,6 @@
 
 use twincast::io::{LoadOptions, load};
 use twincast::math::{DAffine3, DQuat, DVec3, Vec3, Vec4};
-use twincast::render::Control;
 use twincast::scene::{Camera, Geometry, Group, Instance, Material, Projection};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
@@ -132,6 +131,7 @@ fn all_hits_and_closest_points() {
 fn embree_agrees_but_for_ties_and_boundary_rays() {
     use twincast::lab::compare::shoot;
     use twincast::lab::{Paired, PixelReport, Report};
+    use twincast::render::Control;
     use twincast::trace::embree::Embree;
     let world = World::new(&scene(7)).expect("sound");
     let (native, embree) = (Bvh::build(&world), Embree::new(&world, &Default::default()).expect("built"));
