@@ -114,13 +114,17 @@ impl BuildRequest {
         } else if preset != unlimited {
             format!("{} would take more memory than there may be", unlimited.name())
         } else {
-            let rays = self.rays as f64 / self.triangles.max(1) as f64;
+            let rays = self.rays as f64 / self.triangles as f64;
             let judged = match preset {
                 Preset::Fast | Preset::Compact => "too few to pay for a better tree",
                 Preset::Default => "enough for a good tree, too few for the best",
                 Preset::High => "enough to pay for the best tree",
             };
-            format!("{rays:.1} rays a triangle are {judged}")
+            if self.triangles > 0 {
+                format!("{rays:.1} rays a triangle are {judged}")
+            } else {
+                "no triangles".to_owned()
+            }
         };
         Ok(BuildChoice { preset, memory: self.memory(preset), why })
     }

@@ -197,11 +197,13 @@ impl fmt::Display for Plan {
         };
         let lights = match &self.lighting {
             Lighting::None => "no light".to_owned(),
+            Lighting::Lights(lights) if lights.is_empty() && self.integrator == Integrator::Path => {
+                "light of what glows".to_owned()
+            }
             Lighting::Lights(lights) if lights.is_empty() => "no light".to_owned(),
             Lighting::Headlight => "a headlight without shadows".to_owned(),
-            Lighting::Lights(lights) if lights.is_empty() => "no lights".to_owned(),
-            Lighting::Lights(lights) if lights.len() == 1 => "1 light with hard shadows".to_owned(),
-            Lighting::Lights(lights) => format!("{} lights with hard shadows", lights.len()),
+            Lighting::Lights(lights) if lights.len() == 1 => "1 light with shadows".to_owned(),
+            Lighting::Lights(lights) => format!("{} lights with shadows", lights.len()),
         };
         write!(f, "{} ({}): {} primitives on {levels}, {lights}", self.integrator, self.why, self.primitives)?;
         let Attributes { normals, uvs, colors } = self.attributes;
