@@ -16,7 +16,8 @@ pub struct Ray {
     pub tmin: f32,
     /// Farthest valid t; may be infinite. A ray with `tmax < tmin` hits nothing.
     pub tmax: f32,
-    /// When it looks: from 0, where the shutter opens, to 1, where it closes. For scenes in which something moves.
+    /// When it looks: from 0, where things start to move, to 1, where they end; a camera's shutter is open for a part of
+    /// it. Only scenes in which something moves heed it.
     pub time: f32,
 }
 

@@ -2,6 +2,7 @@
 
 use twincast::io::{LoadOptions, load};
 use twincast::math::{DAffine3, DQuat, DVec3, Vec3, Vec4};
+use twincast::render::Control;
 use twincast::scene::{Camera, Geometry, Group, Instance, Material, Projection};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
@@ -131,7 +132,6 @@ fn all_hits_and_closest_points() {
 fn embree_agrees_but_for_ties_and_boundary_rays() {
     use twincast::lab::compare::shoot;
     use twincast::lab::{Paired, PixelReport, Report};
-    use twincast::render::Control;
     use twincast::trace::embree::Embree;
     let world = World::new(&scene(7)).expect("sound");
     let (native, embree) = (Bvh::build(&world), Embree::new(&world, &Default::default()).expect("built"));
@@ -169,6 +169,42 @@ fn what_passes_is_as_bright_as_it_stays() {
     assert_eq!(bright([0.5, 0.5]), 1.0, "an instant");
     let refused = Renderer::new(&scene, &world, Camera { shutter: [0.6, 0.4], ..camera }, Settings::default());
     assert!(refused.err().expect("it closes before it opens").to_string().contains("shutter from 0.6 to 0.4"));
+}
+
+/// Bumps turn along with what they are on: at one instant all is as if it stood still.
+#[test]
+fn maps_of_normals_move_along() {
+    use twincast::scene::{Mesh, Texture};
+    let pixels = (0..64u32).map(|i| [40 + (i * 37 % 170) as u8, 60 + (i * 53 % 150) as u8, 220, 255]).collect();
+    let map = Texture { width: 8, height: 8, pixels, scale: glam::Vec2::ONE, ..Texture::default() };
+    let mesh = Mesh::new(
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
+        vec![[0, 1, 2], [0, 2, 3]],
+    );
+    let mesh = Mesh { uvs: mesh.positions.iter().map(|p| p.truncate()).collect(), ..mesh };
+    let material = Material { normal_texture: Some(0), ..Material::default() };
+    let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]);
+    scene.textures = vec![map];
+    let turn = DAffine3::from_quat(DQuat::from_xyzw(0.0, 0.0, 1.0, 1.0).normalize());
+    scene.instances[0].transform_end = Some(turn);
+    let still = Scene {
+        instances: vec![Instance { transform: turn, transform_end: None, ..scene.instances[0].clone() }],
+        ..scene.clone()
+    };
+    let camera = Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, 1.0).expect("a view");
+    let camera = Camera { shutter: [1.0, 1.0], ..camera };
+    let picture = |scene: &Scene| {
+        let world = World::new(scene).expect("sound");
+        let settings = Settings { width: 24, height: 24, spp: 1, ..Settings::default() };
+        let renderer = Renderer::new(scene, &world, camera.clone(), settings).expect("sound");
+        renderer.render(&Bvh::build(&world), Control::default()).expect("nobody interrupts").pixels
+    };
+    let (moved, expected) = (picture(&scene), picture(&still));
+    let apart = moved.iter().zip(&expected).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    assert!(apart < 1e-3, "{apart}");
+    let at_start =
+        picture(&Scene { instances: vec![Instance { transform_end: None, ..scene.instances[0].clone() }], ..scene });
+    assert!(at_start.iter().zip(&expected).any(|(a, b)| (*a - *b).abs().max_element() > 0.05), "it shows");
 }
 
 /// A mirror and a shadow see the time of the ray that came there.
@@ -219,6 +255,11 @@ fn files_say_what_moves_and_are_refused_what_cannot() {
     let moved = DAffine3::from_translation(DVec3::Z * 3.0) * scale(4.0);
     let (left, up) = (DAffine3::from_translation(DVec3::X * -2.0), DAffine3::from_translation(DVec3::Y));
     assert_eq!(places, [(scale(2.0) * left, Some(moved * left)), (scale(2.0), Some(moved * up))]);
+
+    let backwards = text("{ scale = 4 }").replace("[0.25, 0.5]", "[0.5, 0.25]");
+    std::fs::write(&path, backwards).expect("written");
+    let error = load(&path, &LoadOptions::default()).expect_err("it closes before it opens");
+    assert!(error.exit_code() == 3 && error.to_string().contains("motion.toml: line 4"), "{error}");
 
     std::fs::write(&path, text("{ rotate = [0, 1, 0, 180] }")).expect("written");
     let (scene, _) = load(&path, &LoadOptions::default()).expect("both ends are sound");

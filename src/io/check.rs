@@ -48,7 +48,11 @@ pub(super) fn check(scene: &Scene) -> Placeless<()> {
             return Err(format!("texture {:?} has {} of {pixels} pixels", texture.name, texture.pixels.len()));
         }
     }
-    match scene.instances.iter().find(|instance| !instance.transform.is_finite()) {
+    match scene
+        .instances
+        .iter()
+        .find(|instance| !instance.transform.is_finite() || instance.transform_end.is_some_and(|end| !end.is_finite()))
+    {
         Some(instance) => Err(format!("instance {:?} has a transform that is not finite", instance.name)),
         None => Ok(()),
     }

@@ -5,7 +5,8 @@
 //! covered, and need no chance. Masks are exact in both.
 //!
 //! A ray that passes goes on from beyond the hit by its range alone: its origin stays, and so does every density that
-//! refers to it. Scenes without such surfaces pay for none of this.
+//! refers to it. What rounds to the same t, a decal in the plane of its wall, is passed with it; a gap keeps them apart. Scenes
+//! without such surfaces pay for none of this.
 
 use crate::math::{DVec2, Vec3};
 use crate::ray::{Hit, Ray};

@@ -152,6 +152,10 @@ impl<'a> Renderer<'a> {
         let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
         let Settings { integrator, background, max_depth, .. } = settings;
         let plan = Plan::new(scene, world, &Wishes { integrator, background, max_depth });
+        if plan.integrator == Integrator::Path && sampling == Sampling::Grid {
+            let why = "its numbers are the same for every choice of a path, which makes a wrong picture";
+            return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));
+        }
         let mut renderer = Self {
             scene,
             world,

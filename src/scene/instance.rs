@@ -20,8 +20,8 @@ pub struct Instance {
     pub name: String,
     /// Index into [`Scene::groups`](crate::Scene::groups).
     pub group: u32,
-    /// From the group's coordinates to the scene's; of what moves, when the shutter opens.
+    /// From the group's coordinates to the scene's; of what moves, at time 0.
     pub transform: DAffine3,
-    /// Of what moves, the transform when the shutter closes. In between the entries of the matrices are interpolated.
+    /// Of what moves, the transform at time 1. In between the entries of the matrices are interpolated.
     pub transform_end: Option<DAffine3>,
 }

@@ -165,6 +165,10 @@ impl Scene {
         for light in &mut self.lights {
             light.transform(transform);
         }
+        let scale = transform.matrix3.determinant().abs().cbrt() as f32;
+        for absorption in self.materials.iter_mut().filter_map(|material| material.absorption.as_mut()) {
+            absorption.distance *= scale;
+        }
         for camera in &mut self.cameras {
             camera.transform(transform);
         }

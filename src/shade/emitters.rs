@@ -86,11 +86,9 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
         let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
         let emission = material.emission;
         let moves = scene.instances[instance as usize].transform_end.is_some();
-        // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the time.
-        if material.emission_texture.is_some() || material.alpha != Alpha::Opaque || moves {
-            glowing.insert((instance, geometry), Seats::All(Seat::Alone));
-            continue;
-        }
+        // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the time: such
+        // a surface may be a light's body, but is no light of its own.
+        let is_known = material.emission_texture.is_none() && material.alpha == Alpha::Opaque && !moves;
         let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0, geometry, instance };
         let (part, placement) = world.locate(&hit);
         let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
@@ -102,11 +100,20 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
                 };
                 match lights[..own].iter().position(is_body) {
                     Some(light) => Seats::All(Seat::Body(light as u32)),
+                    None if !is_known => Seats::All(Seat::Alone),
                     None => {
                         triangles.iter().for_each(|t| patches.add_triangle(corners(t), emission));
                         Seats::All(Seat::Patch(brightness(emission)))
                     }
                 }
+            }
+            Primitives::Shapes(shapes) if !is_known => {
+                let (mut lights, mut patches) = (lights.clone(), Patches::default());
+                let seat = |shape| match seat(shape, &to_world, emission, own, &mut lights, &mut patches) {
+                    Seat::Body(light) if (light as usize) < own => Seat::Body(light),
+                    Seat::Body(_) | Seat::Patch(_) | Seat::Alone => Seat::Alone,
+                };
+                Seats::Each(shapes.iter().map(seat).collect())
             }
             Primitives::Shapes(shapes) => {
                 let seat = |shape| seat(shape, &to_world, emission, own, lights, &mut patches);

@@ -13,7 +13,7 @@ use crate::trace::{Primitives, World};
 /// coordinates, and shapes, keep theirs.
 pub fn bend(point: &mut SurfacePoint, scene: &Scene, world: &World, hit: &Hit, material: &Material) {
     let map = material.normal_texture.and_then(|i| scene.textures.get(i as usize));
-    let (Some(map), Some([u, v])) = (map, directions(scene, world, hit)) else { return };
+    let (Some(map), Some([u, v])) = (map, directions(scene, world, hit, point.time)) else { return };
     // The map is for who sees the front.
     let side = if point.front { 1.0 } else { -1.0 };
     let normal = point.shading_normal * side;
@@ -26,13 +26,13 @@ pub fn bend(point: &mut SurfacePoint, scene: &Scene, world: &World, hit: &Hit, m
     }
 }
 
-/// The directions along a triangle in which u and v grow, of any length.
-fn directions(scene: &Scene, world: &World, hit: &Hit) -> Option<[DVec3; 2]> {
+/// The directions along a triangle, where it is at a time, in which u and v grow, of any length.
+fn directions(scene: &Scene, world: &World, hit: &Hit, time: f32) -> Option<[DVec3; 2]> {
     let Geometry::Mesh(mesh) = &scene.geometries[hit.geometry as usize] else { return None };
     let (part, placement) = world.locate(hit);
     let Primitives::Triangles { positions, triangles } = &part.primitives else { return None };
     let corners = triangles[hit.primitive as usize].map(|i| i as usize);
-    let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
+    let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.at(time).to_world.as_daffine3());
     let [a, b, c] = corners.map(|i| to_world.transform_point3(positions[i].as_dvec3()));
     let uv = |k: usize| mesh.uvs.get(corners[k]).map(|uv| uv.as_dvec2());
     let (first, second) = (uv(1)? - uv(0)?, uv(2)? - uv(0)?);

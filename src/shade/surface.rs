@@ -106,7 +106,7 @@ impl SurfacePoint {
             uv: Vec2::ZERO,
             color: Vec4::ONE,
             material: 0,
-            time: ray.time,
+            time: ray.moment(),
         }
     }
 

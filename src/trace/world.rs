@@ -2,8 +2,8 @@
 //!
 //! A [`Scene`] keeps f64 positions; tracers work in f32. So everything is moved by [`World::centre`] first, which keeps
 //! the shape of a mesh that lies far from zero. Groups that are placed once are baked into world coordinates and
-//! traced as one level; groups that are placed several times are kept once, with a transform for each placement.
-//! Baking all of them would make one level of every scene, and a million instances would cost a million meshes.
+//! traced as one level; groups that are placed several times, that move, or whose shapes are scaled are kept once, with a
+//! transform for each placement. Baking all of them would make one level of every scene, and a million instances would cost a million meshes.
 //!
 //! What stands here in f32 is *the* scene: exactness is judged against it, and an instanced triangle's corners are
 //! `to_world` times its f32 positions, in exact arithmetic.
@@ -127,7 +127,7 @@ impl World {
             world.lookup[i] = world.add_group(scene, instance.group, i as u32, &transform);
         }
         world.fixed = 0..world.parts.len();
-        limits::check(&world.parts, "the scene, without what is placed several times,")?;
+        limits::check(&world.parts, "the scene, without what is placed by transforms,")?;
 
         let mut added: Vec<Option<(u32, Lookup, DVec3)>> = vec![None; scene.groups.len()];
         for (i, instance) in placed {
@@ -157,7 +157,7 @@ impl World {
             world.placements.push(Placement { instance: i as u32, object, to_world: start, to_object, motion });
         }
         for object in &world.objects {
-            limits::check(&world.parts[object.clone()], "an object that is placed several times")?;
+            limits::check(&world.parts[object.clone()], "an object that is placed by transforms")?;
         }
         Ok(world)
     }

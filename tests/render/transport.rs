@@ -274,3 +274,26 @@ fn auto_traces_paths_where_nothing_else_shows_anything() {
     assert!(why.starts_with("path (only surfaces that glow light the scene)"), "{why}");
     assert_eq!(of(Some(Integrator::Whitted)).2.pixels[0].truncate(), Vec3::ZERO);
 }
+
+/// What would be wrong without a word is refused.
+#[test]
+fn a_grid_of_samples_is_no_choice_for_paths() {
+    let scene = scene(vec![(sphere(Vec3::ZERO, 1.0), glowing(1.0))]);
+    let world = World::new(&scene).unwrap();
+    let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 0.5).unwrap();
+    let settings = Settings { sampling: twincast::render::Sampling::Grid, ..paths(4, 4) };
+    let error = Renderer::new(&scene, &world, camera, settings).err().expect("refused");
+    assert!(error.exit_code() == 2 && error.to_string().contains("grid"), "{error}");
+}
+
+/// Glass of another unit is as dark as before.
+#[test]
+fn absorption_is_scaled_with_the_scene() {
+    let glass = Material {
+        absorption: Some(twincast::scene::Absorption { color: Vec3::splat(0.5), distance: 2.0 }),
+        ..Material::glass(1.5)
+    };
+    let mut scene = scene(vec![(sphere(Vec3::ZERO, 1.0), glass)]);
+    scene.transform(&twincast::math::DAffine3::from_scale(DVec3::splat(0.25)));
+    assert_eq!(scene.materials[0].absorption.map(|absorption| absorption.distance), Some(0.5));
+}

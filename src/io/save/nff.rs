@@ -63,11 +63,11 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     if scene.lights.is_empty() && scene.unlit == Unlit::Headlight {
         return elsewhere("light from the viewer, which scenes without lights have elsewhere".to_owned());
     }
-    let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, .. } if range.is_infinite());
+    let is_bare = |light: &Light| matches!(light, Light::Point { attenuation: Attenuation::NONE, range, radius, .. } if range.is_infinite() && *radius == 0.0);
     if scene.lights.iter().all(is_bare) {
         Ok(())
     } else {
-        elsewhere("lights but points without attenuation".to_owned())
+        elsewhere("lights but points without attenuation and size".to_owned())
     }
 }
 

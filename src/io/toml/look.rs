@@ -227,8 +227,12 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
         })
         .transpose()?;
     camera.name = table.optional("name", |value| value.text())?.unwrap_or_default().to_owned();
-    if let Some(shutter) = table.optional("shutter", |value| value.numbers())? {
-        camera.shutter = shutter.map(|time| time as f32);
+    if let Some(value) = table.get("shutter") {
+        camera.shutter = value.numbers()?.map(|time| time as f32);
+        let [open, close] = camera.shutter;
+        if !(0.0 <= open && open <= close && close <= 1.0) {
+            return Err(value.fault("\"shutter\" wants two times from 0 to 1, the earlier first"));
+        }
     }
     camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
     table.finish()?;

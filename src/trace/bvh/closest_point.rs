@@ -50,7 +50,7 @@ impl Bvh {
     /// (instance, geometry, primitive) wins. Triangles without an area count too, unlike for rays.
     ///
     /// None where there is none as near, and for a point that is not finite or a `max_distance` that is negative or NaN.
-    /// Shapes are left out: a placed sphere may be an ellipsoid, whose nearest point has no closed form.
+    /// What moves is where it stands at time 0. Shapes are left out: a placed sphere may be an ellipsoid, whose nearest point has no closed form.
     pub fn closest_point(&self, point: Vec3, max_distance: f32) -> Option<ClosestPoint> {
         if !(point.is_finite() && max_distance >= 0.0) {
             return None;
