@@ -56,7 +56,7 @@ impl Renderer<'_> {
     }
 
     /// Adds what is worth each shadow ray, less what is covered on its way.
-    pub(super) fn add_through<T: Tracer>(&self, tracer: &T, buffers: &mut Buffers) {
+    pub(super) fn add_through<T: Tracer + ?Sized>(&self, tracer: &T, buffers: &mut Buffers) {
         let Buffers { radiance, shadow_rays, shadow_light, .. } = buffers;
         let mut left = vec![1.0f32; shadow_rays.len()];
         let mut pending: Vec<usize> = (0..shadow_rays.len()).collect();

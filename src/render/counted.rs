@@ -6,13 +6,13 @@ use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Tracer};
 
 /// A tracer that passes everything on and counts it; a batch costs one atomic addition.
-pub struct Counted<'a, T> {
+pub struct Counted<'a, T: ?Sized> {
     tracer: &'a T,
     closest: AtomicU64,
     occluded: AtomicU64,
 }
 
-impl<'a, T> Counted<'a, T> {
+impl<'a, T: ?Sized> Counted<'a, T> {
     /// Counts from zero.
     pub const fn new(tracer: &'a T) -> Self {
         Self { tracer, closest: AtomicU64::new(0), occluded: AtomicU64::new(0) }
@@ -29,7 +29,7 @@ impl<'a, T> Counted<'a, T> {
     }
 }
 
-impl<T: Tracer> Tracer for Counted<'_, T> {
+impl<T: Tracer + ?Sized> Tracer for Counted<'_, T> {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.closest.fetch_add(1, Ordering::Relaxed);
         self.tracer.closest(ray)

@@ -191,7 +191,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
     /// [`Error::Usage`] for a picture that does not fit into memory.
-    pub fn render<T: Tracer>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
+    pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let film = Film::new(self.settings.width, self.settings.height)?;
         self.each_tile(|tile, buffers| {
@@ -238,7 +238,7 @@ impl<'a> Renderer<'a> {
     ///
     /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the
     /// native ones, and Embree with [`Width::One`](crate::Width).
-    pub fn pixel<T: Tracer>(&self, tracer: &T, x: u32, y: u32) -> Vec4 {
+    pub fn pixel<T: Tracer + ?Sized>(&self, tracer: &T, x: u32, y: u32) -> Vec4 {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 

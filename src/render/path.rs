@@ -41,7 +41,7 @@ struct Vertex<'a> {
 
 impl Renderer<'_> {
     /// One sample of each pixel, whose camera rays are traced.
-    pub(super) fn paths<T: Tracer>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
+    pub(super) fn paths<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         buffers.waves.resize_with(3, Wave::default);
         for depth in 0..=self.plan.depth {
             // The camera's, then two in turn.

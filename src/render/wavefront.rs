@@ -75,7 +75,7 @@ impl Path {
 
 impl Renderer<'_> {
     /// The pixels of a tile, in the order of [`Tile::pixels`].
-    pub(super) fn tile<'b, T: Tracer>(&self, tracer: &T, tile: &Tile, buffers: &'b mut Buffers) -> &'b [Vec4] {
+    pub(super) fn tile<'b, T: Tracer + ?Sized>(&self, tracer: &T, tile: &Tile, buffers: &'b mut Buffers) -> &'b [Vec4] {
         self.begin(tile, buffers);
         buffers.sums.clear();
         buffers.sums.resize(tile.len(), Vec4::ZERO);
@@ -155,7 +155,7 @@ impl Renderer<'_> {
     }
 
     /// Traces the shadow rays, and adds what is worth those that are free.
-    pub(super) fn add_unshadowed<T: Tracer>(&self, tracer: &T, batch: Batch, buffers: &mut Buffers) {
+    pub(super) fn add_unshadowed<T: Tracer + ?Sized>(&self, tracer: &T, batch: Batch, buffers: &mut Buffers) {
         if buffers.shadow_rays.is_empty() {
             return;
         }

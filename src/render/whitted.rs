@@ -46,13 +46,13 @@ pub(super) struct Lit {
 
 impl Renderer<'_> {
     /// One sample of each pixel, whose camera rays are traced.
-    pub(super) fn whitted<T: Tracer>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
+    pub(super) fn whitted<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         self.radiance(tracer, Stage { sample, depth: 0 }, 0, buffers);
     }
 
     /// Adds what the rays that `buffers.hits` belongs to see, those of `waves[depth]` from `first` on, and follows what is
     /// sent on from there.
-    fn radiance<T: Tracer>(&self, tracer: &T, stage: Stage, first: usize, buffers: &mut Buffers) {
+    fn radiance<T: Tracer + ?Sized>(&self, tracer: &T, stage: Stage, first: usize, buffers: &mut Buffers) {
         let Stage { sample, depth } = stage;
         self.shade(depth, first, buffers);
         let batch = if depth == 0 { self.settings.batch } else { self.incoherent() };
@@ -149,7 +149,14 @@ impl Renderer<'_> {
     }
 
     /// Adds what of a light reaches what was hit.
-    fn add_light<T: Tracer>(&self, tracer: &T, light: usize, sample: u32, batch: Batch, buffers: &mut Buffers) {
+    fn add_light<T: Tracer + ?Sized>(
+        &self,
+        tracer: &T,
+        light: usize,
+        sample: u32,
+        batch: Batch,
+        buffers: &mut Buffers,
+    ) {
         let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, .. } = &mut *buffers;
         let (index, light) = (light as u32, &self.lights.sources()[light]);
         let count = if light.is_extended() { self.settings.light_samples } else { 1 };

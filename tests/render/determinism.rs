@@ -107,9 +107,9 @@ fn a_pixel_alone_is_the_pixel_in_the_picture() {
 fn check_pixels(scene: &Scene, world: &World, settings: Settings) {
     let renderer = Renderer::new(scene, world, scene.cameras[0].clone(), settings).unwrap();
     for engine in engines(world) {
-        let image = renderer.render(&engine, Control::default()).unwrap();
+        let image = renderer.render(&*engine.tracer, Control::default()).unwrap();
         for (x, y) in (0..40).step_by(3).zip((0..35).cycle().step_by(4)) {
-            let alone = renderer.pixel(&engine, x, y);
+            let alone = renderer.pixel(&*engine.tracer, x, y);
             assert_eq!(bits(&[alone]), bits(&[image.pixels[(y * 40 + x) as usize]]), "{} {x},{y}", engine.name);
         }
     }
@@ -162,7 +162,7 @@ fn only_planned_rays_are_traced() {
         let world = World::new(scene).unwrap();
         let renderer = Renderer::new(scene, &world, scene.cameras[0].clone(), settings(20, 10, 2)).unwrap();
         for engine in engines(&world) {
-            let counted = Counted::new(&engine);
+            let counted = Counted::new(&*engine.tracer);
             renderer.render(&counted, Control::default()).unwrap();
             assert_eq!(counted.closest_rays() > 400, sends_on, "{}", engine.name);
             assert_eq!(counted.occluded_rays() > 0, shadows, "{}", engine.name);
@@ -176,7 +176,7 @@ fn a_render_reports_its_tiles_and_stops_when_told() {
     let scene = busy_scene(DVec3::ZERO);
     let world = World::new(&scene).unwrap();
     let renderer = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings(100, 50, 1)).unwrap();
-    let engine = &engines(&world)[0];
+    let engine = &*engines(&world)[0].tracer;
     let (done, cancel) = (AtomicU64::new(0), AtomicBool::new(false));
     let count = |pixels| {
         done.fetch_add(pixels, Ordering::Relaxed);

@@ -13,30 +13,12 @@ use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Camera, Geometry, Material, Mesh};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
-use twincast::{Batch, Hit, Image, Ray, Renderer, Scene, Settings, Tracer, World};
+use twincast::{Image, Renderer, Scene, Settings, Tracer, World};
 
-/// Any engine behind one type.
+/// Any engine, and what it is called.
 struct Engine<'a> {
     name: &'static str,
     tracer: Box<dyn Tracer + 'a>,
-}
-
-impl Tracer for Engine<'_> {
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.tracer.closest(ray)
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.tracer.occluded(ray)
-    }
-
-    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], batch: Batch) {
-        self.tracer.closest_batch(rays, hits, batch);
-    }
-
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
-        self.tracer.occluded_batch(rays, occluded, batch);
-    }
 }
 
 /// Every engine of this build, for `world`.
@@ -59,7 +41,7 @@ fn engines(world: &World) -> Vec<Engine<'_>> {
 fn render(scene: &Scene, camera: &Camera, settings: &Settings, engine: &Engine) -> Image {
     let world = World::new(scene).expect("a valid scene");
     let renderer = Renderer::new(scene, &world, camera.clone(), settings.clone()).expect("valid settings");
-    renderer.render(engine, twincast::render::Control::default()).expect("nobody interrupts")
+    renderer.render(&*engine.tracer, twincast::render::Control::default()).expect("nobody interrupts")
 }
 
 /// A square in the plane y = 0 with sides of 2 `half`, facing up, with uv from (0, 0) at -x, +z to (1, 1) at +x, -z.

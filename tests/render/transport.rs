@@ -266,7 +266,7 @@ fn auto_traces_paths_where_nothing_else_shows_anything() {
         let settings = Settings { integrator, ..settings(16, 16, 16) };
         let camera = Camera::look_at(DVec3::new(6.0, 1.0, 0.0), DVec3::X * 2.0, DVec3::Y, 0.1).unwrap();
         let renderer = Renderer::new(&lit, &world, camera, settings).unwrap();
-        let image = renderer.render(&engines(&world)[1], Control::default()).unwrap();
+        let image = renderer.render(&*engines(&world)[1].tracer, Control::default()).unwrap();
         (renderer.plan().integrator, renderer.plan().to_string(), image)
     };
     let (integrator, why, image) = of(None);

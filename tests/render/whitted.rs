@@ -133,12 +133,12 @@ fn a_flood_of_rays_is_followed_to_its_end() {
     let settings = Settings { max_depth: Some(20), ..settings(3, 2, 1) };
     let renderer = Renderer::new(&scene, &world, from_above(), settings.clone()).unwrap();
     for engine in engines(&world) {
-        let counted = Counted::new(&engine);
+        let counted = Counted::new(&*engine.tracer);
         renderer.render(&counted, Control::default()).unwrap();
         assert!(counted.closest_rays() > 6 * 8192, "{} rays", counted.closest_rays());
         let picture = render(&scene, &from_above(), &settings, &engine);
         for (i, (x, y)) in (0..6).map(|i| (i, (i % 3, i / 3))) {
-            let alone = renderer.pixel(&engine, x, y);
+            let alone = renderer.pixel(&*engine.tracer, x, y);
             assert_eq!(alone, picture.pixels[i as usize], "{}: pixel {x},{y}", engine.name);
         }
     }
