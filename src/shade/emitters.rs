@@ -80,49 +80,37 @@ impl Seats {
 
 /// Finds what glows. Spheres are added to `lights`, which may have bodies among what is found.
 pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) -> (Patches, Glowing) {
-    let (mut patches, mut glowing) = (Patches::default(), Glowing::new());
     let own = lights.len();
+    let mut search = Search { own, lights, patches: Patches::default() };
+    let mut glowing = Glowing::new();
     for (instance, geometry) in placed(scene, is_emitter) {
         let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
-        let emission = material.emission;
         let moves = scene.instances[instance as usize].transform_end.is_some();
         // Where it is bright only its texture knows, whether it is there at all its alpha, and where it is only the time: such
         // a surface may be a light's body, but is no light of its own.
         let is_known = material.emission_texture.is_none() && material.alpha == Alpha::Opaque && !moves;
+        let emission = is_known.then_some(material.emission);
         let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: 0, geometry, instance };
         let (part, placement) = world.locate(&hit);
         let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
         let seats = match &part.primitives {
             Primitives::Triangles { positions, triangles } => {
                 let corners = |t: &[u32; 3]| t.map(|i| to_world.transform_point3(positions[i as usize].as_dvec3()));
-                let is_body = |light: &LightSource| {
-                    light.light().is_some_and(|l| triangles.iter().all(|t| bodies::has_triangle(l, corners(t))))
-                };
-                match lights[..own].iter().position(is_body) {
-                    Some(light) => Seats::All(Seat::Body(light as u32)),
-                    None if !is_known => Seats::All(Seat::Alone),
-                    None => {
+                let body = search.body(|light| triangles.iter().all(|t| bodies::has_triangle(light, corners(t))));
+                Seats::All(body.unwrap_or_else(|| {
+                    search.light(emission, |emission, Search { patches, .. }| {
                         triangles.iter().for_each(|t| patches.add_triangle(corners(t), emission));
-                        Seats::All(Seat::Patch(brightness(emission)))
-                    }
-                }
-            }
-            Primitives::Shapes(shapes) if !is_known => {
-                let (mut lights, mut patches) = (lights.clone(), Patches::default());
-                let seat = |shape| match seat(shape, &to_world, emission, own, &mut lights, &mut patches) {
-                    Seat::Body(light) if (light as usize) < own => Seat::Body(light),
-                    Seat::Body(_) | Seat::Patch(_) | Seat::Alone => Seat::Alone,
-                };
-                Seats::Each(shapes.iter().map(seat).collect())
+                        Seat::Patch(brightness(emission))
+                    })
+                }))
             }
             Primitives::Shapes(shapes) => {
-                let seat = |shape| seat(shape, &to_world, emission, own, lights, &mut patches);
-                Seats::Each(shapes.iter().map(seat).collect())
+                Seats::Each(shapes.iter().map(|shape| search.seat(shape, &to_world, emission)).collect())
             }
         };
         glowing.insert((instance, geometry), seats);
     }
-    (patches, glowing)
+    (search.patches, glowing)
 }
 
 /// Whether anything glows that is no body of `lights`.
@@ -156,51 +144,68 @@ fn placed(scene: &Scene, wanted: impl Fn(&Material) -> bool) -> Vec<(u32, u32)> 
     found
 }
 
-/// Makes a light or patches of a shape. `own` is how many of the lights are not of shapes.
-fn seat(
-    shape: &Shape,
-    to_world: &DAffine3,
-    emission: Vec3,
+/// What was found so far.
+struct Search<'a> {
+    /// The scene's own lights, of which there are `own`, and those of spheres that glow.
+    lights: &'a mut Vec<LightSource>,
     own: usize,
-    lights: &mut Vec<LightSource>,
-    patches: &mut Patches,
-) -> Seat {
-    let body = |lights: &[LightSource], is_body: &dyn Fn(&Light) -> bool| {
-        lights[..own].iter().position(|light| light.light().is_some_and(is_body)).map(|i| Seat::Body(i as u32))
-    };
-    let at = |p: Vec3| to_world.transform_point3(p.as_dvec3());
-    match shape {
-        Shape::Sphere(sphere) => {
-            let Some(scale) = similarity(&to_world.matrix3) else { return Seat::Alone };
-            let (centre, radius) = (at(sphere.centre), f64::from(sphere.radius) * scale);
-            body(lights, &|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
-                let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance: emission };
-                lights.push(LightSource::new(&light, DVec3::ZERO));
-                Seat::Body(lights.len() as u32 - 1)
-            })
-        }
-        Shape::Disk(disk) => {
-            if similarity(&to_world.matrix3).is_none() {
-                return Seat::Alone;
+    patches: Patches,
+}
+
+impl Search<'_> {
+    /// The scene's own light that something `is_body` of.
+    fn body(&self, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
+        let found = self.lights[..self.own].iter().position(|light| light.light().is_some_and(&is_body));
+        found.map(|light| Seat::Body(light as u32))
+    }
+
+    /// What `add` makes a light of, where it is known what it sends.
+    fn light(&mut self, emission: Option<Vec3>, add: impl FnOnce(Vec3, &mut Self) -> Seat) -> Seat {
+        emission.map_or(Seat::Alone, |emission| add(emission, self))
+    }
+
+    /// Makes a light or patches of a shape that is no body.
+    fn seat(&mut self, shape: &Shape, to_world: &DAffine3, emission: Option<Vec3>) -> Seat {
+        let at = |p: Vec3| to_world.transform_point3(p.as_dvec3());
+        match shape {
+            Shape::Sphere(sphere) => {
+                let Some(scale) = similarity(&to_world.matrix3) else { return Seat::Alone };
+                let (centre, radius) = (at(sphere.centre), f64::from(sphere.radius) * scale);
+                self.body(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
+                    self.light(emission, |radiance, Self { lights, .. }| {
+                        let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
+                        lights.push(LightSource::new(&light, DVec3::ZERO));
+                        Seat::Body(lights.len() as u32 - 1)
+                    })
+                })
             }
-            let across = tangents(disk.normal.as_dvec3().normalize())
-                .map(|axis| to_world.matrix3 * axis * f64::from(disk.radius));
-            let centre = at(disk.centre);
-            body(lights, &|light| bodies::has_disk(light, centre, across))
-                .unwrap_or_else(|| patches.add_disk(centre, across, emission))
-        }
-        Shape::Cuboid(cuboid) => {
-            let corner = |i: usize| {
-                let pick = |axis: usize| if i >> axis & 1 == 0 { cuboid.min[axis] } else { cuboid.max[axis] };
-                at(Vec3::new(pick(0), pick(1), pick(2)))
-            };
-            for [a, b, c, d] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]] {
-                patches.add_triangle([a, b, c].map(corner), emission);
-                patches.add_triangle([a, c, d].map(corner), emission);
+            Shape::Disk(disk) => {
+                if similarity(&to_world.matrix3).is_none() {
+                    return Seat::Alone;
+                }
+                let across = tangents(disk.normal.as_dvec3().normalize())
+                    .map(|axis| to_world.matrix3 * axis * f64::from(disk.radius));
+                let centre = at(disk.centre);
+                self.body(|light| bodies::has_disk(light, centre, across)).unwrap_or_else(|| {
+                    self.light(emission, |emission, search| search.patches.add_disk(centre, across, emission))
+                })
             }
-            Seat::Patch(brightness(emission))
+            Shape::Cuboid(cuboid) => self.light(emission, |emission, Self { patches, .. }| {
+                let corner = |i: usize| {
+                    let pick = |axis: usize| if i >> axis & 1 == 0 { cuboid.min[axis] } else { cuboid.max[axis] };
+                    at(Vec3::new(pick(0), pick(1), pick(2)))
+                };
+                for [a, b, c, d] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
+                {
+                    patches.add_triangle([a, b, c].map(corner), emission);
+                    patches.add_triangle([a, c, d].map(corner), emission);
+                }
+                Seat::Patch(brightness(emission))
+            }),
+            Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Ellipsoid(_) | Shape::Polygon(_) => {
+                Seat::Alone
+            }
         }
-        Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Ellipsoid(_) | Shape::Polygon(_) => Seat::Alone,
     }
 }
 
