@@ -13,6 +13,7 @@ use super::isa::{self, Kernel};
 use super::level::{Level, Through};
 use super::node::Child;
 use super::place::{Blur, Place};
+use super::placements::walk_over;
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -145,12 +146,10 @@ impl Kernel for Gather<'_> {
         if bvh.placements.is_empty() {
             return;
         }
-        let slab = SlabRay::new(ray, bvh.placements.reach(), Blur::NONE);
-        walk::single::<S, Closest>(&mut upper, bvh.placements.tree(), &slab, limit, |leaf| {
-            for place in leaf.blocks().map(|number| bvh.placements.at(number)) {
-                let object = &bvh.objects[place.placement.object as usize];
-                object.gather::<S>(ray, Some(place), &mut level, gathered);
-            }
+        walk_over::<S, Closest>(bvh.placements.tree(), ray, limit, &mut upper, |number| {
+            let place = bvh.placements.at(number);
+            let object = &bvh.objects[place.placement.object as usize];
+            object.gather::<S>(ray, Some(place), &mut level, gathered);
             Visit::Until(limit)
         });
     }

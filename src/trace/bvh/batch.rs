@@ -6,12 +6,10 @@ use std::cell::Cell;
 use super::flight::{self, Flight};
 use super::found::{Found, NONE};
 use super::noted::Rays;
-use super::place::Blur;
-use super::placements::FIXED;
+use super::placements::{FIXED, walk_over};
 use super::query::{Query, SOMETHING};
 use super::simd::Simd;
-use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::walk::{Stack, Visit};
 use super::{Bvh, bundle, isa, tile};
 use crate::ray::{Hit, Ray};
 use crate::trace::Batch;
@@ -61,22 +59,17 @@ impl Bvh {
         if !self.placements.has_shapes() || Q::ANY && nearest.hit().is_some() {
             return;
         }
-        let slab = SlabRay::new(ray, self.placements.reach(), Blur::NONE);
         let Stacks { upper, level: lower } = stacks;
-        walk::single::<S, Q>(
-            upper,
+        walk_over::<S, Q>(
             self.placements.tree(),
-            &slab,
+            ray,
             nearest.limit(),
+            upper,
             #[inline(always)]
-            |leaf| {
-                for place in leaf.blocks().map(|number| self.placements.at(number)) {
-                    let object_ray = place.placement.object_ray(ray);
-                    if object_ray.is_valid() {
-                        let level = &self.objects[place.placement.object as usize];
-                        level.trace_shapes::<S, Q>(&object_ray, Some(place.through()), lower, nearest);
-                    }
-                }
+            |number| {
+                let place = self.placements.at(number);
+                let level = &self.objects[place.placement.object as usize];
+                level.trace_placed_shapes::<S, Q>(ray, place, lower, nearest);
                 Visit::after::<Q>(nearest)
             },
         );
@@ -97,10 +90,7 @@ impl Bvh {
             #[inline(always)]
             |level, place| {
                 level.trace_triangles::<S, Q>(ray, place, lower, nearest);
-                let object_ray = place.placement.object_ray(ray);
-                if object_ray.is_valid() {
-                    level.trace_shapes::<S, Q>(&object_ray, Some(place.through()), lower, nearest);
-                }
+                level.trace_placed_shapes::<S, Q>(ray, place, lower, nearest);
                 Visit::after::<Q>(nearest)
             },
         );

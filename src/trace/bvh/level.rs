@@ -66,6 +66,21 @@ impl Level {
         );
     }
 
+    /// Shapes of an object in its place, for a ray of the world.
+    #[inline(always)]
+    pub fn trace_placed_shapes<S: Simd, Q: Query>(
+        &self,
+        ray: &Ray,
+        place: &Place,
+        stack: &mut Stack,
+        nearest: &mut Nearest,
+    ) {
+        let local = place.placement.object_ray(ray);
+        if local.is_valid() {
+            self.trace_shapes::<S, Q>(&local, Some(place.through()), stack, nearest);
+        }
+    }
+
     /// Offers the shapes that `local` hits in this level: the ray in this level's coordinates, whose rounding is part of it.
     #[inline(always)]
     pub fn trace_shapes<S: Simd, Q: Query>(

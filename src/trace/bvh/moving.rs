@@ -7,13 +7,12 @@
 
 use super::level::Level;
 use super::node::Tree;
-use super::place::{Blur, Place};
-use super::placements::tree_over;
+use super::place::Place;
+use super::placements::{tree_over, walk_over};
 use super::preset::Options;
 use super::query::Query;
 use super::simd::Simd;
-use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::walk::{Stack, Visit};
 use crate::ray::Ray;
 use crate::trace::Placement;
 
@@ -54,21 +53,17 @@ impl MovingTree {
         stack: &mut Stack,
         mut enter: impl FnMut(&Level, &Place) -> Visit,
     ) {
-        let slab = SlabRay::new(ray, self.tree.reach(), Blur::NONE);
-        walk::single::<S, Q>(
-            stack,
+        walk_over::<S, Q>(
             &self.tree,
-            &slab,
+            ray,
             limit,
+            stack,
             #[inline(always)]
-            |leaf| {
-                let mut visit = Visit::Until(limit);
-                for placement in leaf.blocks().map(|number| self.at(number)) {
-                    let level = &objects[placement.object as usize];
-                    let place = Place::new(placement.at(ray.moment()).into_owned(), level.triangles.tree().reach());
-                    visit = enter(level, &place);
-                }
-                visit
+            |number| {
+                let placement = self.at(number);
+                let level = &objects[placement.object as usize];
+                let reach = level.triangles.tree().reach();
+                enter(level, &Place::new(placement.at(ray.moment()).into_owned(), reach))
             },
         );
     }

@@ -3,9 +3,14 @@
 use super::build::{self, Record};
 use super::level::Level;
 use super::node::Tree;
-use super::place::Place;
+use super::place::{Blur, Place};
 use super::preset::Options;
+use super::query::Query;
+use super::simd::Simd;
+use super::slab::SlabRay;
+use super::walk::{self, Stack, Visit};
 use crate::math::{Aabb, Vec3};
+use crate::ray::Ray;
 use crate::trace::Placement;
 
 /// All that stand still, in the order of the tree's leaves.
@@ -33,6 +38,32 @@ pub(super) fn tree_over(
     let mut items: Vec<Record> = wanted.filter_map(item).collect();
     let tree = build::build(&mut items, 1, 1, options);
     (tree, items.iter().map(|item| item.primitive() as usize).collect())
+}
+
+/// Calls `enter` with the number of every placement whose box the ray enters; it says how far the ray still looks.
+#[inline(always)]
+pub(super) fn walk_over<S: Simd, Q: Query>(
+    tree: &Tree,
+    ray: &Ray,
+    limit: f32,
+    stack: &mut Stack,
+    mut enter: impl FnMut(u32) -> Visit,
+) {
+    let slab = SlabRay::new(ray, tree.reach(), Blur::NONE);
+    walk::single::<S, Q>(
+        stack,
+        tree,
+        &slab,
+        limit,
+        #[inline(always)]
+        |leaf| {
+            let mut visit = Visit::Until(limit);
+            for number in leaf.blocks() {
+                visit = enter(number);
+            }
+            visit
+        },
+    );
 }
 
 /// The place of what is not placed: the fixed triangles. No placement has this number, since a leaf could not name it.
