@@ -67,3 +67,26 @@ impl Block {
         ]
     }
 }
+
+/// One triangle of a block.
+#[derive(Clone, Copy)]
+pub(super) struct Lane<'a> {
+    pub block: &'a Block,
+    /// Less than [`LANES`].
+    pub lane: usize,
+}
+
+impl Lane<'_> {
+    /// Component `axis` of corner `k`.
+    #[inline(always)]
+    pub fn component(&self, axis: usize, k: usize) -> f32 {
+        self.block.corners[axis][k][self.lane % LANES]
+    }
+
+    /// The number of the part, and that of the triangle in it.
+    #[inline(always)]
+    pub fn number(&self) -> (u32, u32) {
+        let lane = self.lane % LANES;
+        (self.block.part[lane], self.block.primitive[lane])
+    }
+}

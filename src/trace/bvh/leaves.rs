@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::block::{Block, LANES};
+use super::block::{Block, LANES, Lane};
 use super::build::Record;
 use super::meshes::Meshes;
 use super::node::{Child, Node, Tree, WIDTH};
@@ -178,16 +178,13 @@ impl Leaves {
         }
     }
 
-    /// Part and index in it of a triangle: lane `id % 8` of block `id / 8`.
+    /// Triangle `id`: lane `id % 8` of block `id / 8`; `scratch` is where a block may be put together that has this one alone.
     #[inline(always)]
-    pub fn number(&self, id: u32) -> (u32, u32) {
-        let (block, lane) = ((id / LANES as u32) as usize, id as usize % LANES);
+    pub fn lane<'a>(&'a self, id: u32, scratch: &'a mut Option<Block>) -> Lane<'a> {
+        let (index, lane) = ((id / LANES as u32) as usize, id as usize % LANES);
         match self {
-            Self::Blocks(blocks) => (blocks[block].part[lane], blocks[block].primitive[lane]),
-            Self::Numbers(numbers) => {
-                let (mesh, primitive) = numbers.meshes.find(numbers.blocks[block][lane]);
-                (mesh.part, primitive)
-            }
+            Self::Blocks(blocks) => Lane { block: &blocks[index], lane },
+            Self::Numbers(numbers) => numbers.lane(index, lane, scratch),
         }
     }
 
@@ -225,5 +222,13 @@ impl Numbers {
             self.meshes.push(&mut block, number);
         }
         block
+    }
+
+    /// Not inlined: where there are blocks, scratch would be cleared for nothing.
+    #[inline(never)]
+    fn lane<'a>(&self, index: usize, lane: usize, scratch: &'a mut Option<Block>) -> Lane<'a> {
+        let block = scratch.insert(Block::EMPTY);
+        self.meshes.push(block, self.blocks[index][lane]);
+        Lane { block, lane: 0 }
     }
 }

@@ -2,6 +2,7 @@
 //! objects.
 
 use super::Bvh;
+use super::block::Lane;
 use super::level::Through;
 use super::placements::FIXED;
 use super::quad::{Numbers, Quad};
@@ -44,15 +45,21 @@ impl TriangleTree {
     /// answer.
     #[inline(always)]
     pub fn hits<S: Simd>(&self, rays: &Rays<S::D4>, ids: [u32; 4]) -> ([f64; 4], [Hit; 4]) {
-        let [a, b, c, d] = ids;
-        let corners = gather([self.corners(a), self.corners(b), self.corners(c), self.corners(d)]);
-        let corners = [corner::<S>(&corners, 0), corner::<S>(&corners, 1), corner::<S>(&corners, 2)];
+        let (mut a, mut b, mut c, mut d) = (None, None, None, None);
+        let leaves = self.leaves();
+        let triangles = [
+            leaves.lane(ids[0], &mut a),
+            leaves.lane(ids[1], &mut b),
+            leaves.lane(ids[2], &mut c),
+            leaves.lane(ids[3], &mut d),
+        ];
+        let corners = [corner::<S>(&triangles, 0), corner::<S>(&triangles, 1), corner::<S>(&triangles, 2)];
         let Numbers { t, t32, u, v } = Quad::new(rays.origin, rays.direction, corners).numbers();
         let hits = [
-            self.hit(a, t32[0], u[0], v[0]),
-            self.hit(b, t32[1], u[1], v[1]),
-            self.hit(c, t32[2], u[2], v[2]),
-            self.hit(d, t32[3], u[3], v[3]),
+            self.hit(&triangles[0], t32[0], u[0], v[0]),
+            self.hit(&triangles[1], t32[1], u[1], v[1]),
+            self.hit(&triangles[2], t32[2], u[2], v[2]),
+            self.hit(&triangles[3], t32[3], u[3], v[3]),
         ];
         (t, hits)
     }
@@ -82,12 +89,18 @@ impl Bvh {
     ) -> ([f64; 4], [Option<Hit>; 4]) {
         let [(a, la), (b, lb), (c, lc), (d, ld)] =
             [self.placed(places[0]), self.placed(places[1]), self.placed(places[2]), self.placed(places[3])];
-        let corners = gather([a.corners(ids[0]), b.corners(ids[1]), c.corners(ids[2]), d.corners(ids[3])]);
+        let (mut ba, mut bb, mut bc, mut bd) = (None, None, None, None);
+        let triangles = [
+            a.leaves().lane(ids[0], &mut ba),
+            b.leaves().lane(ids[1], &mut bb),
+            c.leaves().lane(ids[2], &mut bc),
+            d.leaves().lane(ids[3], &mut bd),
+        ];
         let columns = gather([la.columns, lb.columns, lc.columns, ld.columns]);
         let corners = [
-            world_corner::<S>(&corners, 0, &columns),
-            world_corner::<S>(&corners, 1, &columns),
-            world_corner::<S>(&corners, 2, &columns),
+            world_corner::<S>(&triangles, 0, &columns),
+            world_corner::<S>(&triangles, 1, &columns),
+            world_corner::<S>(&triangles, 2, &columns),
         ];
         let quad = Quad::new(rays.origin, rays.direction, corners);
         let slack = S::D4::load(&[la.slack, lb.slack, lc.slack, ld.slack]);
@@ -97,7 +110,7 @@ impl Bvh {
         let (trees, instances) = ([a, b, c, d], [la.instance, lb.instance, lc.instance, ld.instance]);
         for i in (0..4).filter(|i| lanes >> i & 1 != 0) {
             if certain >> i & 1 != 0 {
-                hits[i] = Some(Hit { instance: instances[i], ..trees[i].hit(ids[i], t32[i], u[i], v[i]) });
+                hits[i] = Some(Hit { instance: instances[i], ..trees[i].hit(&triangles[i], t32[i], u[i], v[i]) });
             } else {
                 let nearest = self.noted_hit(places[i], ids[i], each[i]);
                 (t[i], hits[i]) = (nearest.t(), nearest.hit());
@@ -146,16 +159,21 @@ fn gather<const N: usize>([a, b, c, d]: [[f32; N]; 4]) -> [[f32; 4]; N] {
     rows
 }
 
-/// Corner k of those that are ordered as in a block.
+/// Corner k of four triangles.
 #[inline(always)]
-fn corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize) -> [S::D4; 3] {
-    [widen::<S>(&corners[k]), widen::<S>(&corners[3 + k]), widen::<S>(&corners[6 + k])]
+fn corner<S: Simd>(triangles: &[Lane<'_>; 4], k: usize) -> [S::D4; 3] {
+    [row::<S>(triangles, 0, k), row::<S>(triangles, 1, k), row::<S>(triangles, 2, k)]
+}
+
+#[inline(always)]
+fn row<S: Simd>([a, b, c, d]: &[Lane<'_>; 4], axis: usize, k: usize) -> S::D4 {
+    widen::<S>(&[a.component(axis, k), b.component(axis, k), c.component(axis, k), d.component(axis, k)])
 }
 
 /// The same in the world, with the bits of [`DAffine3::transform_point3`](crate::math::DAffine3::transform_point3).
 #[inline(always)]
-fn world_corner<S: Simd>(corners: &[[f32; 4]; 9], k: usize, columns: &[[f32; 4]; 12]) -> [S::D4; 3] {
-    let p = corner::<S>(corners, k);
+fn world_corner<S: Simd>(triangles: &[Lane<'_>; 4], k: usize, columns: &[[f32; 4]; 12]) -> [S::D4; 3] {
+    let p = corner::<S>(triangles, k);
     [component::<S>(columns, 0, p), component::<S>(columns, 1, p), component::<S>(columns, 2, p)]
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::block::{Block, LANES};
+use super::block::{Block, LANES, Lane};
 use super::build::{self, presplit};
 use super::clusters;
 use super::filter::Filter;
@@ -162,25 +162,14 @@ impl TriangleTree {
     #[inline]
     pub fn offer_one(&self, id: u32, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         let mut scratch = None;
-        self.offer(self.block(id / LANES as u32, &mut scratch), id as usize % LANES, ray, through, nearest);
+        let Lane { block, lane } = self.leaves.lane(id, &mut scratch);
+        self.offer(block, lane, ray, through, nearest);
     }
 
-    /// The corners of a triangle, numbered as in [`Self::offer_one`], in the order of a block.
+    /// A hit with one of its triangles.
     #[inline(always)]
-    pub fn corners(&self, id: u32) -> [f32; 9] {
-        let mut scratch = None;
-        let (block, lane) = (self.block(id / LANES as u32, &mut scratch), id as usize % LANES);
-        let mut corners = [0.0; 9];
-        for (corner, component) in corners.iter_mut().zip(block.corners.as_flattened()) {
-            *corner = component[lane];
-        }
-        corners
-    }
-
-    /// A hit with a triangle, numbered as in [`Self::offer_one`].
-    #[inline(always)]
-    pub fn hit(&self, id: u32, t: f32, u: f32, v: f32) -> Hit {
-        let (part, primitive) = self.leaves.number(id);
+    pub fn hit(&self, triangle: &Lane<'_>, t: f32, u: f32, v: f32) -> Hit {
+        let (part, primitive) = triangle.number();
         let PartId { geometry, instance } = self.parts[part as usize];
         Hit { t, u, v, primitive, geometry, instance }
     }

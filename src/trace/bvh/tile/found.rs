@@ -87,13 +87,20 @@ impl Found {
             let [pa, pb, pc, pd] = places;
             // NONE and FIXED are the largest numbers.
             let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-            if all != NONE && pa.min(pb).min(pc.min(pd)) == FIXED {
-                let (exact, [a, b, c, d]) = bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), ids);
-                *t = exact;
-                *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
-                continue;
-            }
-            if some != NONE {
+            if some != NONE && pa.min(pb).min(pc.min(pd)) == FIXED {
+                let noted = named(&ids);
+                let ids = if all == NONE { repeated(&ids, noted) } else { ids };
+                let (exact, hits) = bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), ids);
+                if all != NONE {
+                    let [a, b, c, d] = hits;
+                    *t = exact;
+                    *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
+                    continue;
+                }
+                for lane in (0..4).filter(|lane| noted >> lane & 1 != 0) {
+                    (t[lane], answers[lane]) = (exact[lane], Q::answer(Some(hits[lane])));
+                }
+            } else if some != NONE {
                 answer_some::<S, Q>(bvh, bundle, rays, chunk, &ids, &places, t, answers);
             }
             for lane in 0..4 {
@@ -147,6 +154,13 @@ fn answer_some<S: Simd, Q: Query>(
             (t[lane], answers[lane]) = (exact[lane], Q::answer(hits[lane]));
         }
     }
+}
+
+/// A bit for each lane with a triangle.
+#[inline(always)]
+fn named(ids: &[u32; 4]) -> u32 {
+    let [a, b, c, d] = ids.map(|id| u32::from(id != NONE));
+    a | b << 1 | c << 2 | d << 3
 }
 
 /// The values of the lanes that are named; in the others the first of these.
