@@ -125,6 +125,14 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
 
     const std::string name = text(path);
     auto file              = writer(name);
+    if (attributes.window.size() == 4 && file->supports("displaywindow")) {
+        spec.x           = attributes.window[0];
+        spec.y           = attributes.window[1];
+        spec.full_x      = 0;
+        spec.full_y      = 0;
+        spec.full_width  = attributes.window[2];
+        spec.full_height = attributes.window[3];
+    }
     // These writers get memory, and the file is written here. On a full disk OpenImageIO's EXR writer hangs and its JPEG
     // writer ends the process. Not all writers: that of TIFF takes memory, too, but leaves its directory out.
     OIIO::Filesystem::IOVecOutput memory;
@@ -202,6 +210,10 @@ Attributes Input::attributes() const
     number("renderTimeSeconds", found.render_time_seconds);
     if (spec.find_attribute("samplesPerPixel", OIIO::TypeInt))
         found.samples_per_pixel.push_back(spec.get_int_attribute("samplesPerPixel"));
+    const bool whole = spec.x == 0 && spec.y == 0 && spec.full_width == spec.width && spec.full_height == spec.height;
+    if (!whole && spec.full_x == 0 && spec.full_y == 0)
+        for (int number : { spec.x, spec.y, spec.full_width, spec.full_height })
+            found.window.push_back(number);
     return found;
 }
 

@@ -92,6 +92,26 @@ fn png_holds_srgb() {
     assert_eq!(back.pixels[table.len() + 5], Vec4::new(quarter, 0.0, quarter, quarter));
 }
 
+/// Codes go through the response, floating values do not.
+#[test]
+fn only_codes_are_developed() {
+    use twincast::image::{Curve, Response};
+    let folder = tempfile::tempdir().unwrap();
+    let response = Response { exposure: 1.0, curve: Curve::Linear, ..Response::default() };
+    let options = WriteOptions { depth: Depth::Float, response, ..Default::default() };
+    let mut image = Image::new(1, 1);
+    image.pixels[0] = Vec4::new(0.1, 0.05, 0.2, 0.5);
+    let [png, exr, jpg] = ["a.png", "a.exr", "a.jpg"].map(|name| folder.path().join(name));
+    for path in [&png, &exr, &jpg] {
+        image::write(path, &image, &Metadata::default(), &options).unwrap();
+    }
+    assert_eq!(image::read(&exr).unwrap(), image);
+    // Straight and twice as bright: 0.4, 0.2, 0.8 of 255. Over black where there is no alpha.
+    assert_eq!(::image::open(&png).unwrap().into_rgba8().get_pixel(0, 0).0, [102, 51, 204, 128]);
+    let over_black = ::image::open(&jpg).unwrap().into_rgb8().get_pixel(0, 0).0;
+    assert!(over_black.iter().zip([51, 26, 102]).all(|(&a, b): (&u8, u8)| a.abs_diff(b) <= 3), "{over_black:?}");
+}
+
 #[test]
 fn metadata_comes_back() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,6 +122,7 @@ fn metadata_comes_back() {
         fovcot: Some(1.75),
         samples_per_pixel: Some(16),
         render_time_seconds: Some(2.25),
+        window: Some(image::Window { x: 7, y: 0, full: [64, 32] }),
         ..Default::default()
     };
     assert!(metadata.software.starts_with("twincast "));

@@ -4,6 +4,7 @@ mod accelerators;
 mod allocation;
 mod bench;
 mod cache;
+mod camera_flags;
 mod cli;
 mod compare;
 #[cfg(feature = "embree")]

@@ -234,6 +234,104 @@ fn rays_that_go_on_keep_their_time() {
     assert!((pixel - Vec4::new(0.25, 0.25, 0.25, 1.0)).abs().max_element() < 2e-3, "{pixel}");
 }
 
+/// A camera that moves one way sees what one that stands sees of a thing that moves the other way.
+#[test]
+fn a_moving_camera_is_as_things_that_move_the_other_way() {
+    let away = DVec3::new(0.75, -0.25, 0.5);
+    let still = {
+        let mut scene = scene(11);
+        scene.instances.iter_mut().for_each(|instance| instance.transform_end = None);
+        // The plane without end would not be as far from the camera.
+        scene.instances.retain(|instance| instance.group != 3);
+        scene
+    };
+    let mut moving = still.clone();
+    for instance in &mut moving.instances {
+        instance.transform_end = Some(DAffine3::from_translation(-away) * instance.transform);
+    }
+    let camera = Camera::look_at(DVec3::new(1.0, 2.0, 9.0), DVec3::ZERO, DVec3::Y, 0.9).expect("a view");
+    let lens = Some(twincast::scene::ThinLens { radius: 0.05, focus: 8.0, blades: 0 });
+    let wide = Projection::Orthographic(7.0);
+    for camera in [camera.clone(), Camera { lens, ..camera.clone() }, Camera { projection: wide, ..camera }] {
+        let end = Some(twincast::scene::Pose { eye: camera.eye + away, frame: camera.frame });
+        let picture = |scene: &Scene, camera: Camera, shutter| {
+            let world = World::new(scene).expect("sound");
+            let settings = Settings { width: 40, height: 30, spp: 8, ..Settings::default() };
+            let sun = twincast::scene::Light::Directional {
+                direction: DVec3::new(-1.0, -2.0, -1.0).normalize(),
+                color: Vec3::ONE,
+            };
+            let scene = Scene { lights: vec![sun], ..scene.clone() };
+            let renderer = Renderer::new(&scene, &world, Camera { shutter, ..camera }, settings).expect("sound");
+            renderer.render(&Bvh::build(&world), Control::default()).expect("nobody interrupts").pixels
+        };
+        for shutter in [[0.0, 1.0], [0.25, 0.5]] {
+            let expected = picture(&moving, camera.clone(), shutter);
+            let got = picture(&still, Camera { end, ..camera.clone() }, shutter);
+            let differs = |(a, b): &(&Vec4, &Vec4)| (**a - **b).abs().max_element() > 1e-3;
+            // Both round their coordinates, each in its own way: rays by an edge may part.
+            let differing = expected.iter().zip(&got).filter(differs).count();
+            assert!(differing <= 12, "{differing} of 1200 pixels");
+            let resting = picture(&still, camera.clone(), shutter);
+            let moved = resting.iter().zip(&got).filter(differs).count();
+            assert!(moved > 300, "it shows: {moved}");
+        }
+    }
+}
+
+/// At one instant it is a camera that stands where the journey is then: half-way round an axis, half-way along a line.
+#[test]
+fn at_each_instant_a_moving_camera_stands_somewhere() {
+    let up = DVec3::Y;
+    let from = |degrees: f64, eye: DVec3| {
+        let angle = degrees.to_radians();
+        Camera::look_at(eye, eye + DVec3::new(angle.sin(), 0.0, -angle.cos()), up, 0.8).expect("a view")
+    };
+    let eye = DVec3::new(1e6, 2.0, -3.0);
+    let mut world = World::default();
+    world.centre.x = 1e6;
+    let scene = Scene::default();
+    let settings = Settings { width: 16, height: 16, spp: 2, ..Settings::default() };
+    let moving = Camera { end: Some(from(90.0, eye + DVec3::Z * 4.0).pose(0.0)), ..from(0.0, eye) };
+    let ray = |camera: &Camera, x, y| {
+        let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone()).expect("sound");
+        renderer.camera_ray(x, y, 1)
+    };
+    for time in [0.0f32, 1.0 / 3.0, 0.75, 1.0] {
+        let standing = from(90.0 * f64::from(time), eye + DVec3::Z * (4.0 * f64::from(time)));
+        let moving = Camera { shutter: [time, time], ..moving.clone() };
+        for (x, y) in [(0, 0), (15, 3), (8, 15)] {
+            let (got, expected) = (ray(&moving, x, y), ray(&standing, x, y));
+            assert_eq!(got.time, time);
+            assert!((got.origin - expected.origin).length() < 1e-6, "{time}: {got:?} {expected:?}");
+            assert!((got.direction - expected.direction).length() < 1e-6, "{time}: {got:?} {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn files_say_where_cameras_go() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("camera.toml");
+    let load_with = |keys: &str| {
+        let text = format!(
+            "[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\n{keys}\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n"
+        );
+        std::fs::write(&path, text).expect("written");
+        load(&path, &LoadOptions::default())
+    };
+    let (scene, _) = load_with("").expect("sound");
+    assert_eq!(scene.cameras[0].end, None);
+    let (scene, _) = load_with("eye_end = [5, 0, 0]").expect("sound");
+    let end = scene.cameras[0].end.expect("it moves");
+    assert!(end.eye == DVec3::X * 5.0 && (end.frame.z_axis - DVec3::X).length() < 1e-15, "{end:?}");
+    let (scene, _) = load_with("up_end = [1, 0, 0]").expect("sound");
+    let end = scene.cameras[0].end.expect("it rolls");
+    assert!(end.eye == DVec3::Z * 5.0 && (end.frame.y_axis - DVec3::X).length() < 1e-15, "{end:?}");
+    let error = load_with("look_at_end = [0, 0, 5]").expect_err("nowhere to look").to_string();
+    assert!(error.contains("camera.toml: line 4") && error.contains("at time 1"), "{error}");
+}
+
 #[test]
 fn files_say_what_moves_and_are_refused_what_cannot() {
     let folder = tempfile::tempdir().expect("a folder");

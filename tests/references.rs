@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+use twincast::image::WriteOptions;
 use twincast::io::{LoadOptions, load};
 use twincast::render::Control;
 use twincast::trace::bvh::Bvh;
@@ -26,7 +27,7 @@ fn pairs() -> Vec<(PathBuf, PathBuf)> {
     folders.map(|folder| (scene(&folder), folder.join("reference.png"))).collect()
 }
 
-fn pictures(path: &Path) -> Vec<(&'static str, Image)> {
+fn pictures(path: &Path) -> (WriteOptions, Vec<(&'static str, Image)>) {
     let (scene, warnings) = load(path, &LoadOptions::default()).expect("the project's scenes load");
     assert_eq!(warnings, []);
     let world = World::new(&scene).expect("sound");
@@ -38,14 +39,15 @@ fn pictures(path: &Path) -> Vec<(&'static str, Image)> {
     let settings = Settings { width, height, spp: request.spp.unwrap_or(usual.spp), integrator, max_depth, ..usual };
     let renderer = Renderer::new(&scene, &world, camera, settings).expect("sound settings");
     let control = Control::default();
+    let options = WriteOptions { response: request.camera_response(), ..WriteOptions::default() };
     let native = renderer.render(&Bvh::build(&world), control).expect("rendered");
     #[cfg(feature = "embree")]
     {
         let embree = twincast::trace::embree::Embree::new(&world, &Default::default()).expect("built");
-        vec![("native", native), ("embree", renderer.render(&embree, control).expect("rendered"))]
+        (options, vec![("native", native), ("embree", renderer.render(&embree, control).expect("rendered"))])
     }
     #[cfg(not(feature = "embree"))]
-    vec![("native", native)]
+    (options, vec![("native", native)])
 }
 
 #[test]
@@ -56,9 +58,10 @@ fn scenes_look_like_their_references() {
     std::fs::create_dir_all(&folder).expect("writable");
     for (scene, reference) in pairs {
         let name = reference.parent().and_then(Path::file_name).expect("a folder").to_string_lossy().into_owned();
-        for (engine, picture) in pictures(&scene) {
+        let (options, pictures) = pictures(&scene);
+        for (engine, picture) in pictures {
             let written = folder.join(format!("{name}-{engine}.png"));
-            image::write(&written, &picture, &Default::default(), &Default::default()).expect("written");
+            image::write(&written, &picture, &Default::default(), &options).expect("written");
             if engine == "native" && std::env::var_os("TWINCAST_REFRESH").is_some() {
                 std::fs::copy(&written, &reference).expect("copied");
             }

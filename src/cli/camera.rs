@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use super::common::parse_vector;
 use crate::error::{Error, Result};
 use crate::math::{DAabb, DVec2, DVec3};
-use crate::scene::{Camera, Distortion, Fov, Projection, Scene, ThinLens};
+use crate::scene::{Camera, Distortion, Fov, Pose, Projection, Scene, ThinLens};
 
 /// Vertical angle of view where none is given, degrees.
 const DEFAULT_FOV: f64 = 40.0;
@@ -16,7 +16,7 @@ const DEFAULT_FOV: f64 = 40.0;
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
     /// Camera of the file, by name (default: its first; without any, a view of the whole scene)
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "fov", "fov_x", "shift",
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "eye_end", "look_at_end", "up_end", "fov", "fov_x", "shift",
         "projection", "height"])]
     camera: Option<String>,
 
@@ -31,6 +31,18 @@ pub(crate) struct CameraArgs {
     /// Direction that points up in the picture (default: 0,1,0)
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
     up: Option<DVec3>,
+
+    /// Position at time 1 of a camera that moves while the shutter is open (default: as --eye)
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    eye_end: Option<DVec3>,
+
+    /// Point in the middle of the picture at time 1 (default: as --look-at)
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    look_at_end: Option<DVec3>,
+
+    /// Direction that points up in the picture at time 1 (default: as --up)
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    up_end: Option<DVec3>,
 
     /// Vertical angle of view, degrees (default: 40, or what --fov-x leaves)
     #[arg(long, value_name = "DEG", value_parser = parse_fov, requires = "eye")]
@@ -129,15 +141,15 @@ impl CameraArgs {
                 Fov::Both { horizontal: horizontal.to_radians(), vertical: vertical.to_radians() }
             }
         };
-        let camera = Camera::look_at(eye, target, up, 1.0).ok_or_else(|| {
-            Error::Usage(if eye == target {
-                format!("--eye {} and --look-at {} are one point", list(eye), list(target))
-            } else if up == DVec3::ZERO {
-                "--up 0,0,0 is no direction".to_owned()
-            } else {
-                format!("--eye {} and --look-at {} are too far apart", list(eye), list(target))
-            })
-        })?;
+        let camera = looking([eye, target, up], ["--eye", "--look-at", "--up"])?;
+        let ends = [self.eye_end, self.look_at_end, self.up_end];
+        let end = if ends.iter().any(Option::is_some) {
+            let [eye, target, up] = [0, 1, 2].map(|i| ends[i].unwrap_or([eye, target, up][i]));
+            let end = looking([eye, target, up], ["--eye-end", "--look-at-end", "--up-end"])?;
+            Some(Pose { eye: end.eye, frame: end.frame })
+        } else {
+            None
+        };
         let projection = match self.projection {
             ProjectionArg::Perspective => Projection::Perspective(fov),
             ProjectionArg::Orthographic => {
@@ -146,8 +158,22 @@ impl CameraArgs {
             }
             ProjectionArg::Equirectangular => Projection::Equirectangular,
         };
-        Ok(Camera { projection, shift: self.shift.unwrap_or(DVec2::ZERO), ..camera })
+        Ok(Camera { projection, end, shift: self.shift.unwrap_or(DVec2::ZERO), ..camera })
     }
+}
+
+/// A camera at a point that looks at another; `flags` are where the three are from.
+fn looking([eye, target, up]: [DVec3; 3], flags: [&str; 3]) -> Result<Camera> {
+    let [eye_flag, target_flag, up_flag] = flags;
+    Camera::look_at(eye, target, up, 1.0).ok_or_else(|| {
+        Error::Usage(if eye == target {
+            format!("{eye_flag} {} and {target_flag} {} are one point", list(eye), list(target))
+        } else if up == DVec3::ZERO {
+            format!("{up_flag} 0,0,0 is no direction")
+        } else {
+            format!("{eye_flag} {} and {target_flag} {} are too far apart", list(eye), list(target))
+        })
+    })
 }
 
 fn unknown_camera(name: &str, cameras: &[Camera]) -> String {
@@ -158,12 +184,18 @@ fn unknown_camera(name: &str, cameras: &[Camera]) -> String {
 
 /// The camera as flags that give it again.
 pub(crate) fn camera_flags(camera: &Camera, bounds: &DAabb) -> String {
-    let forward = -camera.frame.z_axis;
-    // Any point ahead would do; one as far as the middle of the scene reads well.
-    let ahead = (bounds.centre() - camera.eye).dot(forward);
-    let target = camera.eye + forward * if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
-    let (eye, target, up) = (list(camera.eye), list(target), list(camera.frame.y_axis));
-    let mut flags = format!("--eye {eye} --look-at {target} --up {up}");
+    let pose = |Pose { eye, frame }: Pose, suffix: &str| {
+        let forward = -frame.z_axis;
+        // Any point ahead would do; one as far as the middle of the scene reads well.
+        let ahead = (bounds.centre() - eye).dot(forward);
+        let target = eye + forward * if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
+        let (eye, target, up) = (list(eye), list(target), list(frame.y_axis));
+        format!("--eye{suffix} {eye} --look-at{suffix} {target} --up{suffix} {up}")
+    };
+    let mut flags = pose(camera.pose(0.0), "");
+    if let Some(end) = camera.end {
+        flags += &format!(" {}", pose(end, "-end"));
+    }
     flags += &match camera.projection {
         Projection::Perspective(Fov::Vertical(angle)) => format!(" --fov {}", angle.to_degrees()),
         Projection::Perspective(Fov::Horizontal(angle)) => format!(" --fov-x {}", angle.to_degrees()),
@@ -282,6 +314,7 @@ mod tests {
             Camera { projection: Projection::Orthographic(4.5), shift: DVec2::new(-0.5, 0.25), ..framed.clone() },
             Camera { projection: Projection::Equirectangular, ..framed.clone() },
             Camera { lens: Some(lens), distortion: Some(distortion), ..framed.clone() },
+            Camera { end: Some(Camera::framing(&bounds, 0.3).pose(0.0)), ..framed.clone() },
             Camera { lens: Some(ThinLens { blades: 0, ..lens }), ..framed },
         ] {
             let flags = camera_flags(&camera, &bounds);
@@ -293,6 +326,7 @@ mod tests {
             assert!((extents[0] - extents[1]).length() < 1e-12, "{flags}");
             let turned = [again.frame.x_axis - camera.frame.x_axis, again.frame.z_axis - camera.frame.z_axis];
             assert!(turned.iter().all(|d| d.length() < 1e-8), "{turned:?}");
+            assert_eq!(again.end.map(|end| end.eye), camera.end.map(|end| end.eye), "{flags}");
         }
     }
 

@@ -120,7 +120,7 @@ fn compare(_: &CompareArgs) -> Result<()> {
 #[cfg(feature = "embree")]
 fn compare(args: &CompareArgs) -> Result<()> {
     use super::{cache, outputs, progress};
-    use crate::image::Metadata;
+    use crate::image::{Metadata, WriteOptions};
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer};
@@ -162,12 +162,12 @@ fn compare(args: &CompareArgs) -> Result<()> {
     // The picture is traced three times: by each engine, and by both.
     let bar = progress::bar(3 * u64::from(width) * u64::from(height), "comparing", args.json);
     let on_tile = |pixels| bar.inc(pixels);
-    let comparison = setup.run(Control { cancel: Some(cancel), on_tile: Some(&on_tile) })?;
+    let comparison = setup.run(Control { cancel: Some(cancel), on_tile: Some(&on_tile), ..Control::default() })?;
     bar.finish_and_clear();
 
     let (a, b) = (&comparison.native_image, &comparison.embree_image);
     if !diff.is_empty() {
-        outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default())?;
+        outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default(), &WriteOptions::default())?;
     }
     let report = &comparison.report;
     args.print(report)?;
@@ -199,7 +199,8 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
         longest: std::time::Duration::from_secs(args.seconds),
         options: &options,
     };
-    let report = setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)) });
+    let report =
+        setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)), ..Control::default() });
     bar.finish_and_clear();
     let report = report?;
     args.print(&report)?;

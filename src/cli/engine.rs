@@ -6,10 +6,11 @@ use std::time::Instant;
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 
+use super::display::Display;
 use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::render::{Control, Counted, Renderer};
+use crate::render::{Control, Counted, Finished, Renderer};
 use crate::trace::accel::{Accel, Built, Options as AccelOptions};
 use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
 use crate::trace::{Tracer, Width, World};
@@ -76,6 +77,8 @@ pub(super) struct Job<'a> {
     pub(super) accel: &'a (Accel, AccelOptions),
     /// Where native trees are kept.
     pub(super) cache: Option<&'a Cache>,
+    /// Where the picture is shown while it is made.
+    pub(super) display: Option<&'a Display>,
 }
 
 /// What came of it.
@@ -178,7 +181,14 @@ impl Job<'_> {
         let counted = Counted::new(&tracer);
         let on_tile = |pixels| bar.inc(pixels);
         let start = Instant::now();
-        let image = self.renderer.render(&counted, Control { cancel: Some(self.cancel), on_tile: Some(&on_tile) });
+        let show = self.display.map(|display| {
+            let window = self.renderer.window();
+            display.begin(&engine, [window.width, window.height]);
+            move |finished: Finished| display.show(&finished)
+        });
+        let on_pixels = show.as_ref().map(|show| show as &(dyn Fn(Finished) + Sync));
+        let control = Control { cancel: Some(self.cancel), on_tile: Some(&on_tile), on_pixels };
+        let image = self.renderer.render(&counted, control);
         let render_seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
 

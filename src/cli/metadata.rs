@@ -1,9 +1,9 @@
 //! What a picture's file says about its camera.
 
-use crate::image::Metadata;
+use crate::image::{Metadata, Window};
 use crate::math::{DAffine3, DMat4, DVec2};
-use crate::render::Settings;
-use crate::scene::{Camera, Projection};
+use crate::render::{Crop, Settings};
+use crate::scene::{Camera, Pose, Projection};
 
 /// Nearest distance of the depth range that `worldToScreen` maps to -1..1; the far end is infinite. Rays know neither.
 const NEAR: f64 = 0.01;
@@ -11,7 +11,9 @@ const NEAR: f64 = 0.01;
 /// What there is to say about a picture that took `seconds` to render.
 pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Metadata {
     let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let world_to_camera = DMat4::from(DAffine3::from_mat3_translation(camera.frame, camera.eye).inverse());
+    // Of a camera that moves, as it is when the shutter opens.
+    let Pose { eye, frame } = camera.pose(camera.shutter[0].into());
+    let world_to_camera = DMat4::from(DAffine3::from_mat3_translation(frame, eye).inverse());
     let half = camera.projection.half_extent(aspect).unwrap_or(DVec2::ONE);
     let to_screen = match camera.projection {
         Projection::Perspective(_) => Some(perspective(half, camera.shift)),
@@ -25,6 +27,7 @@ pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Me
         fovcot: Some(aspect),
         samples_per_pixel: Some(settings.spp),
         render_time_seconds: Some(seconds),
+        window: settings.crop.map(|Crop { x, y, .. }| Window { x, y, full: [settings.width, settings.height] }),
         ..Metadata::default()
     }
 }

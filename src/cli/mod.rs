@@ -11,7 +11,9 @@ mod camera;
 mod common;
 mod compare;
 mod completions;
+mod display;
 mod engine;
+mod explain;
 mod info;
 mod interrupt;
 mod make;
@@ -22,6 +24,7 @@ mod picture;
 mod progress;
 mod render;
 mod report;
+mod response;
 mod scaling;
 mod summary;
 

@@ -38,8 +38,13 @@ pub(super) fn check<'a>(
 }
 
 /// Writes one picture to each path, in the format its suffix says.
-pub(super) fn write_pictures(paths: &[PathBuf], picture: &Image, metadata: &Metadata) -> Result<()> {
-    paths.iter().try_for_each(|path| image::write(path, picture, metadata, &WriteOptions::default()))
+pub(super) fn write_pictures(
+    paths: &[PathBuf],
+    picture: &Image,
+    metadata: &Metadata,
+    options: &WriteOptions,
+) -> Result<()> {
+    paths.iter().try_for_each(|path| image::write(path, picture, metadata, options))
 }
 
 /// Writes a JSON document.

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::common::{Size, by_name, parse_vector};
 use crate::math::Vec3;
-use crate::render::{Filter, Sampling, Settings, TileOrder};
+use crate::render::{Crop, Filter, Sampling, Settings, TileOrder};
 use crate::scene::{Integrator, Request};
 use crate::trace::{Batch, Width};
 
@@ -14,6 +14,10 @@ pub(super) struct PictureArgs {
     /// Pixels (default: the scene's, else 1280x720)
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
+
+    /// Render this part alone: columns and rows to its left and above it, and its size; the same pixels as in the whole picture
+    #[arg(long, value_name = "X,Y,WxH", value_parser = parse_crop)]
+    crop: Option<Crop>,
 
     /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
@@ -110,6 +114,7 @@ impl PictureArgs {
                 Order::Spiral => TileOrder::Spiral,
             },
             background: self.background,
+            crop: self.crop,
         }
     }
 }
@@ -124,6 +129,17 @@ fn parse_integrator(name: &str) -> std::result::Result<Wish, String> {
     }
     let found = by_name(Integrator::ALL, Integrator::name, name).map(|integrator| Wish(Some(integrator)));
     found.map_err(|expected| format!("{expected}, auto"))
+}
+
+/// `X,Y,WxH`.
+fn parse_crop(text: &str) -> std::result::Result<Crop, String> {
+    let crop = || {
+        let (x, rest) = text.split_once(',')?;
+        let (y, size) = rest.split_once(',')?;
+        let Size { width, height } = size.trim().parse().ok()?;
+        Some(Crop { x: x.trim().parse().ok()?, y: y.trim().parse().ok()?, width, height })
+    };
+    crop().ok_or_else(|| "expected X,Y,WIDTHxHEIGHT, as in 600,300,200x100".to_owned())
 }
 
 fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {

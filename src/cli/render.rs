@@ -10,14 +10,17 @@ use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
 use super::common::{SceneArgs, parse_vector};
+use super::display::{Display, parse_address};
 use super::engine::{BackendArg, Job, Outcome};
+use super::explain::ExplainArgs;
 use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
+use super::response::ResponseArgs;
 use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
-use crate::image::{self, Image};
+use crate::image::{self, Image, WriteOptions};
 use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::memory::process;
@@ -91,6 +94,10 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     environment: Option<PathBuf>,
 
+    /// Viewer that shows the picture while it is made: where tev listens
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse_address)]
+    display_server: Option<String>,
+
     /// Say more: plan, rays, memory
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
@@ -102,18 +109,27 @@ pub(super) struct RenderArgs {
     // Last, for clap puts what follows a heading under it.
     #[command(flatten)]
     camera: CameraArgs,
+
+    #[command(flatten)]
+    response: ResponseArgs,
+
+    #[command(flatten)]
+    explain: ExplainArgs,
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     args.accel.check(args.backend, Some(&args.build), &args.cache)?;
     let cancel = interrupt::install()?;
-    if args.output.is_empty() && !args.print_camera && !io::may_name_a_picture(&args.scene.scene) {
+    let may_be_without = args.print_camera || args.explain.is_wanted();
+    if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
     }
     outputs::check(&args.output, &args.stats, args.inputs())?;
     let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(image::read).transpose()?;
+    let title = || args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let display = args.display_server.as_deref().map(|address| Display::connect(address, title())).transpose()?;
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
@@ -132,10 +148,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 
         let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
         let settings = args.picture.settings(&scene.request, args.backend.best_width());
-        let (width, height) = (settings.width, settings.height);
+        let (width, height) = settings.crop.map_or((settings.width, settings.height), |crop| (crop.width, crop.height));
         args.check_reference(reference.as_ref(), width, height)?;
         let pictures = args.pictures(&scene.request)?;
-        let aspect = f64::from(width) / f64::from(height);
+        let aspect = f64::from(settings.width) / f64::from(settings.height);
         let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
         if args.print_camera {
             say(camera_flags(&camera, &scene.bounds()))?;
@@ -149,6 +165,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
         let prepare_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
+        if args.explain.is_wanted() {
+            return args.explain.run(&world, &renderer, args.backend, &accel);
+        }
 
         let pixels = u64::from(width) * u64::from(height);
         let stored = stored_triangles(&world);
@@ -169,13 +188,17 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
             accel: &accel,
             cache: cache.as_ref(),
+            display: display.as_ref(),
         };
-        let outcome = job.run(args.backend)?;
+        let outcome = job.run(args.backend);
+        warn(display.and_then(Display::finish).as_slice());
+        let outcome = outcome?;
         let picture = &outcome.passes[0];
 
         let start = Instant::now();
         let metadata = metadata(&camera, &settings, picture.render_seconds);
-        outputs::write_pictures(&pictures, &picture.image, &metadata)?;
+        let options = WriteOptions { response: args.response.choose(&scene.request), ..WriteOptions::default() };
+        outputs::write_pictures(&pictures, &picture.image, &metadata, &options)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
         let stats = Stats {
@@ -217,7 +240,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 impl RenderArgs {
     /// The pictures to write: those of the flags, else the one that the scene names.
     fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
-        if !self.output.is_empty() || self.print_camera {
+        if !self.output.is_empty() || self.print_camera || self.explain.is_wanted() {
             return Ok(self.output.clone());
         }
         // Of what a scene names the folder is left out: a scene must not choose whose files are replaced.

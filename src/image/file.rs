@@ -6,18 +6,21 @@ use std::path::Path;
 use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
 use super::pure as backend;
+use super::response::Response;
 use super::samples::{self, Type};
 use super::{Image, Metadata};
 use crate::error::{Error, Result};
 use crate::output;
 
 /// How an image is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WriteOptions {
     /// The samples of OpenEXR files.
     pub depth: Depth,
     /// Edge of the tiles of OpenEXR files, in pixels. Not 0.
     pub tile: u32,
+    /// What becomes of radiance where the format holds codes; formats that hold floating values keep it.
+    pub response: Response,
 }
 
 /// The samples of OpenEXR files.
@@ -32,7 +35,7 @@ pub enum Depth {
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { depth: Depth::Half, tile: 64 }
+        Self { depth: Depth::Half, tile: 64, response: Response::default() }
     }
 }
 
@@ -68,7 +71,7 @@ const UNSUSPICIOUS_PIXELS: u64 = 1 << 24;
 const PIXELS_PER_BYTE: u64 = 1 << 14;
 
 /// Writes an image. The suffix decides the format: linear for OpenEXR (tiled, zip, channels R, G, B, A) and Radiance;
-/// else 8-bit sRGB, with straight alpha in PNG, TIFF and Targa, over black in all others.
+/// else 8-bit codes as `options.response` has it, with straight alpha in PNG, TIFF and Targa, over black in all others.
 ///
 /// The file appears when it is whole, and on failure the old one stays; see
 /// [`write_atomically`](crate::output::write_atomically).
@@ -91,7 +94,7 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
         return Err(Error::output(path, message));
     }
     let encoding = encoding(&suffix, options);
-    output::write_atomically(path, |part| write_part(path, part, image, encoding, metadata))
+    output::write_atomically(path, |part| write_part(path, part, image, (encoding, &options.response), metadata))
 }
 
 /// Checks, before a long render, that an image can be written to `path`: by writing a small one beside it.
@@ -101,9 +104,11 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
 /// not exist or takes no file, and for a path that is itself a folder.
 pub fn check_writable(path: &Path) -> Result<()> {
     let suffix = writable_suffix(path)?;
-    let encoding = encoding(&suffix, &WriteOptions::default());
+    let options = WriteOptions::default();
+    let encoding = encoding(&suffix, &options);
     output::check_writable(path)?;
-    output::probe(path, |part| write_part(path, part, &Image::new(16, 16), encoding, &Metadata::default()))
+    let (image, metadata) = (Image::new(16, 16), Metadata::default());
+    output::probe(path, |part| write_part(path, part, &image, (encoding, &options.response), &metadata))
 }
 
 /// Reads an image. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
@@ -127,8 +132,14 @@ pub fn read_metadata(path: &Path) -> Result<Metadata> {
     backend::read_metadata(path).map_err(|message| Error::input(path, "", message))
 }
 
-fn write_part(path: &Path, part: &Path, image: &Image, encoding: Encoding, metadata: &Metadata) -> Result<()> {
-    let samples = samples::encode(image, encoding.kind, encoding.alpha);
+fn write_part(
+    path: &Path,
+    part: &Path,
+    image: &Image,
+    (encoding, response): (Encoding, &Response),
+    metadata: &Metadata,
+) -> Result<()> {
+    let samples = samples::encode(image, encoding.kind, encoding.alpha, response);
     let written = backend::write(part, &samples, encoding, metadata);
     // Libraries put the name that they were given into their messages.
     written.map_err(|message| {
@@ -202,7 +213,7 @@ mod tests {
 
     #[test]
     fn suffixes_choose_the_encoding() {
-        let options = WriteOptions { depth: Depth::Float, tile: 32 };
+        let options = WriteOptions { depth: Depth::Float, tile: 32, ..WriteOptions::default() };
         let of = |suffix| {
             let e = encoding(suffix, &options);
             (e.kind, e.alpha, e.tile)

@@ -19,6 +19,19 @@ pub struct Metadata {
     pub samples_per_pixel: Option<u32>,
     /// Wall clock time of the render (`renderTimeSeconds`).
     pub render_time_seconds: Option<f64>,
+    /// Of which larger picture this is a part; none for a whole one. OpenEXR's data window in its display window.
+    pub window: Option<Window>,
+}
+
+/// Where a part of a picture belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Columns of the whole picture to the left of it.
+    pub x: u32,
+    /// Rows of the whole picture above it.
+    pub y: u32,
+    /// Width and height of the whole picture.
+    pub full: [u32; 2],
 }
 
 impl Default for Metadata {
@@ -31,7 +44,16 @@ impl Default for Metadata {
             fovcot: None,
             samples_per_pixel: None,
             render_time_seconds: None,
+            window: None,
         }
+    }
+}
+
+impl Window {
+    /// None for numbers that no picture of ours has.
+    pub(super) fn of_signed([x, y]: [i32; 2], [width, height]: [i32; 2]) -> Option<Self> {
+        let number = |n: i32| u32::try_from(n).ok();
+        Some(Self { x: number(x)?, y: number(y)?, full: [number(width)?, number(height)?] })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Pixels, and the files they are kept in.
 //!
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
-//! (OpenEXR, Radiance), 8-bit sRGB everywhere else, TIFF included. `samples.rs` turns pixels into a file's samples, and a
+//! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light (`response`). `samples.rs` turns pixels into a file's samples, and a
 //! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
 //! same pixels.
 
@@ -14,12 +14,14 @@ mod oiio;
 mod parity;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure;
+mod response;
 mod samples;
 pub mod srgb;
 
 pub use compare::Difference;
 pub use file::{Depth, WriteOptions, check_writable, read, read_metadata, write};
-pub use metadata::Metadata;
+pub use metadata::{Metadata, Window};
+pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 
 use crate::math::Vec4;
 

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::file::Encoding;
-use super::metadata::{Metadata, narrow, widen};
+use super::metadata::{Metadata, Window, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 
 #[cxx::bridge(namespace = "twincast::oiio")]
@@ -42,6 +42,8 @@ mod ffi {
         fovcot: Vec<f32>,
         samples_per_pixel: Vec<i32>,
         render_time_seconds: Vec<f32>,
+        /// x, y, and the width and height of the whole picture; or nothing.
+        window: Vec<i32>,
     }
 
     // SAFETY: the functions take references and slices and keep none of them; the shim checks that a slice is as long as
@@ -114,6 +116,9 @@ pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata
             .into_iter()
             .collect(),
         render_time_seconds: number(metadata.render_time_seconds),
+        window: metadata.window.map_or_else(Vec::new, |Window { x, y, full: [width, height] }| {
+            [x, y, width, height].map(|n| i32::try_from(n).unwrap_or(i32::MAX)).to_vec()
+        }),
     };
     ffi::write(bytes(path), &layout, &attributes, values).map_err(message)
 }
@@ -152,6 +157,10 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
         fovcot: number(&found.fovcot),
         samples_per_pixel: found.samples_per_pixel.first().and_then(|&n| n.try_into().ok()),
         render_time_seconds: number(&found.render_time_seconds),
+        window: match found.window[..] {
+            [x, y, width, height] => Window::of_signed([x, y], [width, height]),
+            _ => None,
+        },
         software: found.software,
     })
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::file::Encoding;
 use super::samples::{Type, decode, encode};
-use super::{Image, Metadata, oiio, pure};
+use super::{Image, Metadata, Response, Window, oiio, pure};
 use crate::math::Vec4;
 
 const HALF: Encoding = Encoding { kind: Type::Half, alpha: true, tile: 64 };
@@ -32,12 +32,13 @@ fn metadata() -> Metadata {
         fovcot: Some(1.5),
         samples_per_pixel: Some(64),
         render_time_seconds: Some(12.5),
+        window: Some(Window { x: 3, y: 50, full: [1000, 300] }),
     }
 }
 
 fn write_both(folder: &Path, suffix: &str, encoding: Encoding) -> [std::path::PathBuf; 2] {
     let [a, b] = ["oiio", "pure"].map(|name| folder.join(name).with_extension(suffix));
-    let samples = encode(&picture(), encoding.kind, encoding.alpha);
+    let samples = encode(&picture(), encoding.kind, encoding.alpha, &Response::default());
     oiio::write(&a, &samples, encoding, &metadata()).unwrap();
     pure::write(&b, &samples, encoding, &metadata()).unwrap();
     [a, b]
@@ -94,7 +95,7 @@ fn files_are_tiled_and_zipped() {
 fn jpeg_is_close() {
     let folder = tempfile::tempdir().unwrap();
     let encoding = Encoding { alpha: false, ..BYTES };
-    let written = decode(encode(&picture(), Type::U8, false));
+    let written = decode(encode(&picture(), Type::U8, false, &Response::default()));
     for file in write_both(folder.path(), "jpg", encoding) {
         for read in [oiio::read, pure::read] {
             let image = decode(read(&file, &|_, _| Ok(())).unwrap());

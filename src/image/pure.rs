@@ -10,7 +10,7 @@ use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 use openexr::{AttributeValue, FlatSamples, Text};
 
 use super::file::Encoding;
-use super::metadata::{Metadata, narrow, widen};
+use super::metadata::{Metadata, Window, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 
 type Result<T> = std::result::Result<T, String>;
@@ -78,12 +78,19 @@ fn write_exr<T: exr::image::IntoSample>(
         },
         openexr::SpecificChannels::rgba(pixel),
     );
-    openexr::Image::from_layer(layer).write().to_file(path)
+    let mut image = openexr::Image::from_layer(layer);
+    if let Some(Window { full: [width, height], .. }) = metadata.window {
+        let origin = openexr::Vec2(0, 0);
+        image.attributes.display_window =
+            exr::meta::attribute::IntegerBounds::new(origin, (width as usize, height as usize));
+    }
+    image.write().to_file(path)
 }
 
 fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
     let mut attributes = openexr::LayerAttributes {
         world_to_camera: metadata.world_to_camera.as_ref().map(narrow),
+        layer_position: metadata.window.map_or(openexr::Vec2(0, 0), |w| openexr::Vec2(w.x as i32, w.y as i32)),
         ..Default::default()
     };
     let mut put = |name: &str, value: Option<AttributeValue>| {
@@ -171,7 +178,14 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
 /// Reads the attributes that [`write`] writes.
 pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
     let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
-    let attributes = &meta.headers.first().ok_or("no layers")?.own_attributes;
+    let header = meta.headers.first().ok_or("no layers")?;
+    let attributes = &header.own_attributes;
+    let (at, display) = (attributes.layer_position, header.shared_attributes.display_window);
+    let is_whole = at == display.position && header.layer_size == display.size;
+    let window = || {
+        let [width, height] = [display.size.0, display.size.1].map(|n| i32::try_from(n).unwrap_or(-1));
+        (display.position == openexr::Vec2(0, 0)).then(|| Window::of_signed([at.0, at.1], [width, height])).flatten()
+    };
     let number = |name: &str| match attributes.other.get(&Text::from(name)) {
         Some(&AttributeValue::F32(x)) => Some(f64::from(x)),
         _ => None,
@@ -192,5 +206,6 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
             _ => None,
         },
         render_time_seconds: number(RENDER_TIME_SECONDS),
+        window: if is_whole { None } else { window() },
     })
 }

@@ -7,6 +7,7 @@
 use exr::prelude::f16;
 
 use super::Image;
+use super::response::{Developer, Response};
 use super::srgb;
 use crate::math::Vec4;
 
@@ -67,28 +68,32 @@ impl Channels {
     }
 }
 
-/// What a file of this type holds for the image. Without alpha the image is laid over black.
-pub(super) fn encode(image: &Image, kind: Type, alpha: bool) -> Samples {
+/// What a file of this type holds for the image: of codes, what the `response` makes of it. Without alpha the image is laid over black.
+pub(super) fn encode(image: &Image, kind: Type, alpha: bool, response: &Response) -> Samples {
     let alpha = alpha.then_some(if kind == Type::U8 { Alpha::Straight } else { Alpha::Premultiplied });
     let channels = Channels { colour: true, alpha };
     let count = channels.count();
     let linear = || image.pixels.iter().flat_map(move |p| p.to_array().into_iter().take(count));
     let values = match kind {
-        Type::U8 => Values::U8(image.pixels.iter().flat_map(|&p| encode8(p, alpha).into_iter().take(count)).collect()),
+        Type::U8 => {
+            let developer = response.developer();
+            let codes = |&p: &Vec4| encode8(p, alpha, &developer).into_iter().take(count);
+            Values::U8(image.pixels.iter().flat_map(codes).collect())
+        }
         Type::Half => Values::Half(linear().map(|v| f16::from_f32(v).to_bits()).collect()),
         Type::Float => Values::Float(linear().collect()),
     };
     Samples { width: image.width, height: image.height, channels, values }
 }
 
-fn encode8(pixel: Vec4, alpha: Option<Alpha>) -> [u8; 4] {
+fn encode8(pixel: Vec4, alpha: Option<Alpha>, developer: &Developer) -> [u8; 4] {
     // Light without coverage (alpha 0) has no straight colour; files with straight alpha cannot hold it.
     let scale = match alpha {
         None | Some(Alpha::Premultiplied) => 1.0,
         Some(Alpha::Straight) if pixel.w > 0.0 => 1.0 / pixel.w.min(1.0),
         Some(Alpha::Straight) => 0.0,
     };
-    let colour = (pixel.truncate() * scale).to_array().map(srgb::linear_to_srgb8);
+    let colour = developer.develop(pixel.truncate() * scale).to_array().map(srgb::unit_to_8bit);
     [colour[0], colour[1], colour[2], srgb::unit_to_8bit(pixel.w)]
 }
 
@@ -171,6 +176,7 @@ mod tests {
             ]),
             Type::U8,
             true,
+            &Response::default(),
         );
         let expected = [[128, 0, 255, 128], [0, 0, 255, 255], [0, 0, 0, 0], [0, 0, 0, 0], [188, 255, 255, 255]];
         assert_eq!(samples.channels, RGBA);
@@ -179,17 +185,17 @@ mod tests {
 
     #[test]
     fn without_alpha_it_lies_over_black() {
-        let samples = encode(&image(&[[0.215_860_5, 0.0, 1.0, 0.5]]), Type::U8, false);
+        let samples = encode(&image(&[[0.215_860_5, 0.0, 1.0, 0.5]]), Type::U8, false, &Response::default());
         assert_eq!(samples.values, Values::U8(vec![128, 0, 255]));
     }
 
     #[test]
     fn floating_values_are_kept() {
         let original = image(&[[0.1, -2.0, 1e30, 0.5], [f32::INFINITY, 1e-30, 0.0, 1.0]]);
-        let samples = encode(&original, Type::Float, true);
+        let samples = encode(&original, Type::Float, true, &Response { exposure: 3.0, ..Response::default() });
         assert_eq!(decode(samples), original);
         // 0.1 is 0x2e66 in binary16, 1e30 overflows, 1e-30 vanishes.
-        let Values::Half(bits) = encode(&original, Type::Half, true).values else { panic!() };
+        let Values::Half(bits) = encode(&original, Type::Half, true, &Response::default()).values else { panic!() };
         assert_eq!(bits, [0x2e66, 0xc000, 0x7c00, 0x3800, 0x7c00, 0, 0, 0x3c00]);
     }
 

@@ -48,7 +48,8 @@ pub fn explain_pixels<A: Tracer, B: Tracer>(
 ) -> PixelReport {
     explain_with(native_image, embree_image, |x, y| {
         let witness = Witness { world: renderer.world(), native, embree, seen: Mutex::default() };
-        renderer.pixel(&witness, x, y);
+        let window = renderer.window();
+        renderer.pixel(&witness, window.x + x, window.y + y);
         witness.verdict()
     })
 }

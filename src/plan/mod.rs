@@ -13,7 +13,7 @@ use std::fmt;
 pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 
 use crate::math::Vec3;
-use crate::scene::{Alpha, Geometry, Integrator, Light, Material, Scene, Unlit};
+use crate::scene::{Alpha, Fog, Geometry, Integrator, Light, Material, Scene, Unlit};
 use crate::shade::Attributes;
 use crate::shade::light::LightSource;
 use crate::shade::lights::has_emitters;
@@ -82,6 +82,8 @@ pub struct Plan {
     pub alpha: bool,
     /// Whether light comes from all around.
     pub environment: bool,
+    /// Fog between things; none where it would change nothing.
+    pub fog: Option<Fog>,
     /// Linear RGB behind everything, which then is opaque; none leaves it transparent.
     pub background: Option<Vec3>,
     /// Primitives as placed.
@@ -137,6 +139,7 @@ impl Plan {
         // What ambient light stands for, paths find.
         let ambient = !is_path && scene.ambient != Vec3::ZERO && any(|m| m.ambient != Vec3::ZERO);
         let alpha = any(|m| m.alpha != Alpha::Opaque);
+        let fog = scene.fog.filter(|fog| fog.absorption != Vec3::ZERO);
         let meshes = || {
             geometries.iter().filter_map(|g| match g {
                 Geometry::Mesh(mesh) => Some(mesh),
@@ -162,7 +165,9 @@ impl Plan {
             alpha,
             normal_maps: (lit || depth > 0) && any(|m| m.normal_texture.is_some()),
             environment,
-            background: wishes.background.or(scene.background),
+            fog,
+            // Fog is opaque, and what is behind it black where nobody says otherwise.
+            background: wishes.background.or(scene.background).or(fog.map(|_| Vec3::ZERO)),
             primitives: world.primitive_count(),
             materials: materials.len(),
         }
@@ -215,6 +220,7 @@ impl fmt::Display for Plan {
             (self.ambient, "ambient light"),
             (self.environment, "an environment"),
             (self.absorption, "absorption"),
+            (self.fog.is_some(), "fog"),
             (self.alpha, "alpha"),
             (self.normal_maps, "normal maps"),
         ];

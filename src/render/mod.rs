@@ -6,8 +6,11 @@
 mod alpha;
 mod camera;
 mod counted;
+mod explain;
 mod film;
 mod filter;
+mod finished;
+mod fog;
 mod path;
 pub(crate) mod sampler;
 mod tiles;
@@ -19,7 +22,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 pub use counted::Counted;
+pub use explain::{Explanation, HitTrail, LightTrail, RayTrail, SampleTrail};
 pub use filter::Filter;
+pub use finished::Finished;
 pub use sampler::Sampling;
 pub use tiles::TileOrder;
 
@@ -70,6 +75,8 @@ pub struct Settings {
     /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
     /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
     pub max_depth: Option<u32>,
+    /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
+    pub crop: Option<Crop>,
 }
 
 impl Default for Settings {
@@ -88,8 +95,22 @@ impl Default for Settings {
             light_samples: 1,
             integrator: None,
             max_depth: None,
+            crop: None,
         }
     }
+}
+
+/// A part of the picture; not empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// Columns to the left of it.
+    pub x: u32,
+    /// Rows above it.
+    pub y: u32,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
 }
 
 /// How a running render is watched and stopped.
@@ -99,6 +120,8 @@ pub struct Control<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Called after each tile, from any thread, with the number of its pixels.
     pub on_tile: Option<&'a (dyn Fn(u64) + Sync)>,
+    /// Called with each tile's pixels, from any thread.
+    pub on_pixels: Option<&'a (dyn Fn(Finished) + Sync)>,
 }
 
 /// A scene, a camera and settings, ready to be traced by any engine.
@@ -140,6 +163,14 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
+        if let Some(Crop { x, y, width: columns, height: rows }) = settings.crop {
+            let inside = |start: u32, length: u32, whole: u32| length > 0 && length <= whole.saturating_sub(start);
+            if !(inside(x, columns, width) && inside(y, rows, height)) {
+                let message =
+                    format!("the part {columns}x{rows} at {x},{y} does not lie in the picture of {width}x{height}");
+                return Err(Error::Usage(message));
+            }
+        }
         let view = View::new(&camera, world.centre, width, height)?;
         let [open, close] = camera.shutter;
         if !(0.0 <= open && open <= close && close <= 1.0) {
@@ -172,7 +203,9 @@ impl<'a> Renderer<'a> {
             plan,
             settings,
         };
-        renderer.lights = renderer.plan_lights(camera.eye - world.centre);
+        // A headlight stays where the camera is half-way.
+        let eye = camera.pose(f64::from(open.midpoint(close))).eye;
+        renderer.lights = renderer.plan_lights(eye - world.centre);
         Ok(renderer)
     }
 
@@ -181,24 +214,41 @@ impl<'a> Renderer<'a> {
         self.world
     }
 
+    /// Width and height of the whole picture.
+    pub const fn size(&self) -> [u32; 2] {
+        [self.settings.width, self.settings.height]
+    }
+
     /// What the render will do.
     pub const fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Renders the whole picture on rayon's current thread pool.
+    /// The part of the picture that is rendered.
+    pub fn window(&self) -> Crop {
+        let Settings { width, height, crop, .. } = self.settings;
+        crop.unwrap_or(Crop { x: 0, y: 0, width, height })
+    }
+
+    /// Renders the picture, or the part of it that is asked for, on rayon's current thread pool.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
     /// [`Error::Usage`] for a picture that does not fit into memory.
     pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
-        let film = Film::new(self.settings.width, self.settings.height)?;
+        let Crop { x, y, width, height } = self.window();
+        let film = Film::new(width, height)?;
         self.each_tile(|tile, buffers| {
             if cancelled() {
                 return ControlFlow::Break(());
             }
-            film.put(tile, self.tile(tracer, tile, buffers));
+            let pixels = self.tile(tracer, tile, buffers);
+            let on_film = Tile { x: tile.x - x, y: tile.y - y, ..*tile };
+            film.put(&on_film, pixels);
+            if let Some(on_pixels) = control.on_pixels {
+                on_pixels(Finished::new(&on_film, pixels));
+            }
             if let Some(on_tile) = control.on_tile {
                 on_tile(tile.len() as u64);
             }
@@ -220,13 +270,15 @@ impl<'a> Renderer<'a> {
 
     /// Calls `work` with each tile, on all threads of rayon's current pool, until it breaks off.
     fn each_tile(&self, work: impl Fn(&Tile, &mut Buffers) -> ControlFlow<()> + Sync) {
-        let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile_order);
+        let Crop { x, y, width, height } = self.window();
+        let tiles = tiles(width, height, self.settings.tile_order);
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
         rayon::broadcast(|_| {
             let mut buffers = Buffers::default();
             while let Some(tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if work(tile, &mut buffers).is_break() {
+                let tile = Tile { x: x + tile.x, y: y + tile.y, ..*tile };
+                if work(&tile, &mut buffers).is_break() {
                     return;
                 }
             }
@@ -255,8 +307,8 @@ impl<'a> Renderer<'a> {
     }
 
     fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
-        let ray = self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS));
-        Ray { time: if self.plan.motion { self.time(pixel, sample) } else { 0.0 }, ..ray }
+        let time = if self.plan.motion || self.view.moves() { self.time(pixel, sample) } else { 0.0 };
+        self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS), time)
     }
 
     /// When a sample of a pixel is taken.

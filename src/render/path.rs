@@ -15,12 +15,13 @@ use crate::math::{DVec2, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
-use crate::shade::light::LightSource;
-use crate::shade::lights::Found;
-use crate::shade::scattering::{Lobes, Shading, Ways};
+use crate::shade::light::{Illumination, LightSource};
+use crate::shade::lights::{Chosen, Found};
+use crate::shade::scattering::{Lobes, Shading, Value, Ways};
 use crate::trace::Tracer;
 
 use super::Renderer;
+use super::explain::Answer;
 use super::sampler::{Choice, Dimension, Pattern};
 use super::wavefront::{Buffers, Path, Wave};
 
@@ -37,6 +38,19 @@ struct Vertex<'a> {
     pattern: &'a Pattern,
     sample: u32,
     depth: u32,
+}
+
+/// What a light answered.
+struct Asked<'a> {
+    chosen: Chosen<'a>,
+    arriving: Illumination,
+    value: Value,
+    /// What is left of its light on the way.
+    fog: Vec3,
+    /// What the answer counts, by the choice of this light and of this way to find it.
+    share: f32,
+    /// What the pixel gets if nothing is in between.
+    worth: Vec3,
 }
 
 impl Renderer<'_> {
@@ -71,28 +85,47 @@ impl Renderer<'_> {
         onwards.paths.clear();
         buffers.shadow_rays.clear();
         buffers.shadow_light.clear();
-        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, .. } = &mut *buffers;
+        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, trail, .. } = &mut *buffers;
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         for ((ray, &path), hit) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()) {
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
-                let share = path.weight * self.share_of_environment(&path, ray);
-                *pixel += share.extend(1.0) * self.behind(ray.direction, depth == 0);
+                let (left, fog) = self.through_fog_beyond(path);
+                let share = left.weight * self.share_of_environment(&left, ray);
+                let seen = share.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
+                trail.ray(self, depth, ray, &path, None, seen.truncate());
+                *pixel += seen;
                 continue;
             };
             let point = self.surface(ray, hit);
             let material = self.material(&point);
-            let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
+            let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
+            let (left, fog) = self.through_fog(left, ray, &point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
-            let glow = self.glow(&path, ray, hit, &point, material, shading.base);
-            *pixel += (path.weight * glow).extend(coverage);
+            let own = left.weight * self.glow(&left, ray, hit, &point, material, shading.base) + fog;
+            trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
+            *pixel += own.extend(coverage);
+            let path = left;
             let ways = Ways::new(material, &point, ray.direction.as_dvec3().normalize());
             let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
             let pattern = &patterns[path.pixel as usize];
             let vertex = Vertex { path, point, lobes, pattern, sample, depth };
             let DVec2 { x: light, y: lobe } = self.choice(&vertex, Choice::Which);
-            if let Some((source, arriving, worth)) = self.ask(&vertex, light) {
-                if source.casts_shadows {
+            if let Some(Asked { chosen, arriving, value, fog, share, worth }) = self.ask(&vertex, light) {
+                trail.light(&path, &vertex.point, || {
+                    let faces = shading.faces(arriving.to_light);
+                    let [diffuse, highlight] = if faces { shading.lobes(arriving.to_light) } else { [Vec3::ZERO; 2] };
+                    Answer {
+                        light: chosen.index,
+                        source: chosen.source,
+                        arriving: &arriving,
+                        lobes: [diffuse, highlight, value.share - diffuse - highlight],
+                        fog,
+                        share,
+                        contribution: worth,
+                    }
+                });
+                if chosen.source.casts_shadows {
                     shadow_rays.push(LightSource::shadow_ray(&vertex.point, &arriving));
                     shadow_light.push((path.pixel, worth));
                 } else {
@@ -144,7 +177,7 @@ impl Renderer<'_> {
     }
 
     /// Light from one of the lights, and what it is worth if nothing is in between.
-    fn ask(&self, vertex: &Vertex<'_>, choice: f64) -> Option<(&LightSource, crate::shade::light::Illumination, Vec3)> {
+    fn ask(&self, vertex: &Vertex<'_>, choice: f64) -> Option<Asked<'_>> {
         if !vertex.lobes.has_values() {
             return None;
         }
@@ -159,8 +192,10 @@ impl Renderer<'_> {
             }
             _ => 1.0,
         };
-        let worth = vertex.path.weight * value.share * arriving.color * (share / chosen.chance as f32);
-        (worth != Vec3::ZERO && worth.is_finite()).then_some((chosen.source, arriving, worth))
+        let fog = self.fog_to_light(&vertex.path, &vertex.point, &arriving);
+        let share = share / chosen.chance as f32;
+        let worth = vertex.path.weight * value.share * arriving.color * fog * share;
+        (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, fog, share, worth })
     }
 
     /// The ray that goes on from a surface, if any does.

@@ -15,6 +15,8 @@ use crate::shade::{SurfacePoint, normal_map};
 use crate::trace::{Batch, Tracer};
 
 use super::camera::View;
+use super::explain::Trail;
+use super::fog::is_solid;
 use super::sampler::{Dimension, Pattern};
 use super::whitted::Lit;
 use super::{Renderer, tiles::Tile};
@@ -39,6 +41,8 @@ pub(super) struct Buffers {
     /// What each shadow ray is worth, and to which pixel.
     pub(super) shadow_light: Vec<(u32, Vec3)>,
     pub(super) occluded: Vec<bool>,
+    /// Laid where a pixel is to be explained.
+    pub(super) trail: Trail,
 }
 
 /// Rays to trace, and what for.
@@ -82,6 +86,7 @@ impl Renderer<'_> {
         buffers.weights.clear();
         buffers.weights.resize(tile.len(), 0.0);
         for sample in 0..self.settings.spp {
+            buffers.trail.begin(sample);
             self.camera_hits(tracer, sample, buffers);
             buffers.radiance.clear();
             buffers.radiance.resize(tile.len(), Vec4::ZERO);
@@ -89,7 +94,8 @@ impl Renderer<'_> {
                 Integrator::RayCast | Integrator::Whitted => self.whitted(tracer, sample, buffers),
                 Integrator::Path => self.paths(tracer, sample, buffers),
             }
-            let Buffers { patterns, sums, weights, radiance, .. } = &mut *buffers;
+            let Buffers { patterns, sums, weights, radiance, trail, .. } = &mut *buffers;
+            trail.end(radiance[0]);
             for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(radiance).zip(patterns) {
                 let weight = if self.filter.has_negative() { self.place(pixel, sample).1 } else { 1.0 };
                 *sum += *radiance * weight;
@@ -163,10 +169,11 @@ impl Renderer<'_> {
             self.add_through(tracer, buffers);
             return;
         }
-        let Buffers { radiance, shadow_rays, shadow_light, occluded, .. } = buffers;
+        let Buffers { radiance, shadow_rays, shadow_light, occluded, trail, .. } = buffers;
         occluded.clear();
         occluded.resize(shadow_rays.len(), false);
         tracer.occluded_batch(shadow_rays, occluded, batch);
+        trail.free(|i| f32::from(u8::from(!occluded[i])));
         for ((pixel, reflected), _) in shadow_light.iter().zip(occluded).filter(|(_, occluded)| !**occluded) {
             radiance[*pixel as usize] += reflected.extend(0.0);
         }
@@ -197,7 +204,8 @@ impl Renderer<'_> {
 
     /// The medium of a ray that goes through the surface at `point`.
     pub(super) fn medium_behind(&self, point: &SurfacePoint) -> u32 {
-        if point.front && self.absorbs(point).is_some() { point.material } else { OUTSIDE }
+        let keeps_fog_out = || self.plan.fog.is_some() && is_solid(self.material(point));
+        if point.front && (self.absorbs(point).is_some() || keeps_fog_out()) { point.material } else { OUTSIDE }
     }
 
     fn absorbs(&self, point: &SurfacePoint) -> Option<Absorption> {

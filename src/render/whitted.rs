@@ -18,6 +18,7 @@ use crate::shade::scattering::{Shading, Ways};
 use crate::trace::{Batch, Tracer};
 
 use super::Renderer;
+use super::explain::Answer;
 use super::sampler::Dimension;
 use super::wavefront::{Buffers, Path, Wave};
 
@@ -82,21 +83,28 @@ impl Renderer<'_> {
 
     /// What surfaces are where the rays hit, with what they give off without any light.
     fn shade(&self, depth: u32, first: usize, buffers: &mut Buffers) {
-        let Buffers { waves, hits, radiance, lit, .. } = buffers;
+        let Buffers { waves, hits, radiance, lit, trail, .. } = buffers;
         let Wave { rays, paths } = &waves[depth as usize];
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         lit.clear();
         for ((ray, &path), hit) in rays[first..].iter().zip(&paths[first..]).zip(hits) {
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
-                *pixel += path.weight.extend(1.0) * self.behind(ray.direction, depth == 0);
+                let (left, fog) = self.through_fog_beyond(path);
+                let seen = left.weight.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
+                trail.ray(self, depth, ray, &path, None, seen.truncate());
+                *pixel += seen;
                 continue;
             };
             let point = self.surface(ray, hit);
             let material = self.material(&point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
-            let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
-            *pixel += (path.weight * shading.base).extend(coverage);
+            let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
+            let (left, fog) = self.through_fog(left, ray, &point);
+            let own = left.weight * shading.base + fog;
+            trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
+            *pixel += own.extend(coverage);
+            let path = left;
             lit.push(Lit { path, direction: ray.direction, point, shading });
         }
     }
@@ -138,11 +146,15 @@ impl Renderer<'_> {
     /// (Blinn and Newell 1976, *Texture and reflection in computer generated images*).
     fn fake_reflections(&self, buffers: &mut Buffers) {
         let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
-        let Buffers { radiance, lit, .. } = buffers;
+        let Buffers { radiance, lit, trail, .. } = buffers;
         for Lit { path, direction, point, .. } in lit.iter() {
             let ways = Ways::new(self.material(point), point, direction.as_dvec3().normalize());
             for way in [ways.mirrored, ways.refracted].into_iter().flatten() {
-                let seen = path.weight * way.share * environment.radiance(way.direction);
+                let path = Path { weight: path.weight * way.share, ..*path };
+                let (left, fog) = self.through_fog_beyond(path);
+                let seen = left.weight * environment.radiance(way.direction) + fog;
+                let faked = point.spawn(way.direction.as_vec3(), f32::INFINITY);
+                trail.ray(self, 1, &faked, &path, None, seen);
                 radiance[path.pixel as usize] += seen.extend(0.0);
             }
         }
@@ -157,7 +169,7 @@ impl Renderer<'_> {
         batch: Batch,
         buffers: &mut Buffers,
     ) {
-        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, .. } = &mut *buffers;
+        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, trail, .. } = &mut *buffers;
         let (index, light) = (light as u32, &self.lights.sources()[light]);
         let count = if light.is_extended() { self.settings.light_samples } else { 1 };
         shadow_rays.clear();
@@ -175,7 +187,17 @@ impl Renderer<'_> {
                 if !shading.faces(arriving.to_light) {
                     continue;
                 }
-                let reflected = weight * shading.reflect(&arriving);
+                let fog = self.fog_to_light(path, point, &arriving);
+                let reflected = weight * shading.reflect(&arriving) * fog;
+                trail.light(path, point, || Answer {
+                    light: index,
+                    source: light,
+                    arriving: &arriving,
+                    lobes: [shading.lobes(arriving.to_light)[0], shading.lobes(arriving.to_light)[1], Vec3::ZERO],
+                    fog,
+                    share: 1.0 / count as f32,
+                    contribution: reflected,
+                });
                 if light.casts_shadows {
                     shadow_rays.push(LightSource::shadow_ray(point, &arriving));
                     shadow_light.push((path.pixel, reflected));

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::pose::{Journey, Pose};
 use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 
 /// A camera. It looks along its -z, +y is up, +x is right (glTF's convention).
@@ -9,10 +10,12 @@ use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 pub struct Camera {
     /// Name in the file, for `--camera`; may be empty.
     pub name: String,
-    /// Position of the pinhole, or of the lens's middle, in scene coordinates.
+    /// Position of the pinhole, or of the lens's middle, in scene coordinates; of one that moves, at time 0.
     pub eye: DVec3,
-    /// Right, up and back as unit columns.
+    /// Right, up and back as unit columns; of one that moves, at time 0.
     pub frame: DMat3,
+    /// Of one that moves, where it is at time 1. In between it is on its [`Journey`] there.
+    pub end: Option<Pose>,
     /// Which ray belongs to a point of the picture.
     pub projection: Projection,
     /// Lens shift: how far the picture's middle is moved from where the camera looks, to the right and up, as shares of
@@ -141,6 +144,7 @@ impl Camera {
             name: String::new(),
             eye,
             frame,
+            end: None,
             projection: Projection::Perspective(Fov::Vertical(fov)),
             shift: DVec2::ZERO,
             lens: None,
@@ -159,12 +163,16 @@ impl Camera {
         Self::look_at(eye, bounds.centre(), DVec3::Y, fov).expect("the direction is neither zero nor vertical")
     }
 
+    /// Where it is at a time from 0 to 1.
+    pub fn pose(&self, time: f64) -> Pose {
+        let start = Pose { eye: self.eye, frame: self.frame };
+        self.end.map_or(start, |end| Journey::new(start, end).at(time))
+    }
+
     /// Moves the camera. Scale and shear move the eye and leave angles of view as they are; lengths are scaled.
     pub(crate) fn transform(&mut self, transform: &DAffine3) {
-        self.eye = transform.transform_point3(self.eye);
-        let back = (transform.matrix3 * self.frame.z_axis).normalize();
-        let right = (transform.matrix3 * self.frame.y_axis).cross(back).normalize();
-        self.frame = DMat3::from_cols(right, back.cross(right), back);
+        Pose { eye: self.eye, frame: self.frame } = Pose { eye: self.eye, frame: self.frame }.transformed(transform);
+        self.end = self.end.map(|end| end.transformed(transform));
         let scale = transform.matrix3.determinant().abs().cbrt();
         if let Projection::Orthographic(height) = &mut self.projection {
             *height *= scale;

@@ -5,10 +5,12 @@
 
 mod camera;
 mod environment;
+mod fog;
 mod instance;
 mod light;
 mod material;
 mod mesh;
+mod pose;
 mod procedural;
 mod recipes;
 mod request;
@@ -18,11 +20,13 @@ mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
 pub use environment::Environment;
+pub use fog::Fog;
 pub use instance::{Group, Instance};
 pub use light::{AreaShape, Attenuation, Light, Unlit};
 pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
 pub(crate) use mesh::choose_origin;
+pub use pose::{Journey, Pose};
 pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
 pub use request::{Integrator, Request};
@@ -56,6 +60,8 @@ pub struct Scene {
     pub ambient: Vec3,
     /// Light from infinitely far, all around.
     pub environment: Option<Environment>,
+    /// What fills the space between things.
+    pub fog: Option<Fog>,
     /// What a ray that hits nothing sees, linear RGB; before an environment, camera rays alone; none where the picture is to be transparent.
     pub background: Option<Vec3>,
     /// What the file wants of a render.
@@ -169,6 +175,7 @@ impl Scene {
         for absorption in self.materials.iter_mut().filter_map(|material| material.absorption.as_mut()) {
             absorption.distance *= scale;
         }
+        self.fog.iter_mut().for_each(|fog| fog.scale(scale));
         for camera in &mut self.cameras {
             camera.transform(transform);
         }

@@ -1,6 +1,8 @@
 //! What a scene file says about the picture that is to be made of it.
 
 use super::search::Search;
+use crate::image::{Curve, Response};
+
 /// How far light is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
@@ -33,7 +35,7 @@ impl std::fmt::Display for Integrator {
 }
 
 /// Settings of a render that a scene file may carry. They stand where the caller says nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
     /// Width and height in pixels.
     pub size: Option<[u32; 2]>,
@@ -47,6 +49,23 @@ pub struct Request {
     pub max_depth: Option<u32>,
     /// Name of the picture's file, as it stands in the scene file.
     pub output: Option<String>,
+    /// Stops that pictures of codes are exposed by; see [`Response`](crate::image::Response), as for the two that follow.
+    pub exposure: Option<f32>,
+    /// Kelvin of the light that becomes white.
+    pub white_balance: Option<f32>,
+    /// From light to codes.
+    pub response: Option<Curve>,
     /// How the scene is searched.
     pub search: Search,
+}
+
+impl Request {
+    /// What a camera makes of radiance, with what is usual where the file says nothing.
+    pub fn camera_response(&self) -> Response {
+        Response {
+            exposure: self.exposure.unwrap_or(0.0),
+            white_balance: self.white_balance,
+            curve: self.response.unwrap_or_default(),
+        }
+    }
 }

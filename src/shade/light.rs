@@ -78,6 +78,19 @@ impl LightSource {
         }
     }
 
+    /// What kind of light it is, in a word.
+    pub const fn kind(&self) -> &'static str {
+        match &self.kind {
+            Kind::Light(Light::Directional { .. }) => "directional",
+            Kind::Light(Light::Point { .. }) if !self.casts_shadows => "headlight",
+            Kind::Light(Light::Point { .. }) => "point",
+            Kind::Light(Light::Spot { .. }) => "spot",
+            Kind::Light(Light::Area { .. }) => "area",
+            Kind::Environment(_) => "environment",
+            Kind::Patches(_) => "glowing surfaces",
+        }
+    }
+
     /// The light of the scene, in world coordinates, if it is one.
     pub(super) const fn light(&self) -> Option<&Light> {
         match &self.kind {

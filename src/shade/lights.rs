@@ -37,6 +37,8 @@ pub struct Lights {
 pub struct Chosen<'a> {
     /// Which.
     pub source: &'a LightSource,
+    /// Its number among [`Lights::sources`].
+    pub index: u32,
     /// How likely it was.
     pub chance: f64,
     /// Whether scattered rays may end on it.
@@ -100,7 +102,7 @@ impl Lights {
     pub fn choose(&self, choice: f64) -> Option<Chosen<'_>> {
         let index = self.cumulative.partition_point(|&sum| sum <= choice).min(self.sources.len().checked_sub(1)?);
         let (source, chance) = (&self.sources[index], self.chance(index as u32));
-        Some(Chosen { source, chance, can_be_found: self.can_be_found[index] })
+        Some(Chosen { source, index: index as u32, chance, can_be_found: self.can_be_found[index] })
     }
 
     /// What it counts for that a scattered ray from `from` found `hit`, which is `point`, glowing with `emission`.

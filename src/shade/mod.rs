@@ -9,6 +9,7 @@ mod bodies;
 pub mod coverage;
 mod emitters;
 mod environment;
+pub mod fog;
 pub mod light;
 pub mod lights;
 pub mod normal_map;

@@ -145,9 +145,12 @@ fn every_shape_comes_back_from_toml() {
     assert_eq!(again.cameras.len(), scene.cameras.len());
     for (a, b) in again.cameras.iter().zip(&scene.cameras) {
         assert_eq!((&a.name, a.eye, a.shift, a.lens, a.distortion), (&b.name, b.eye, b.shift, b.lens, b.distortion));
+        assert_eq!(a.end.map(|end| end.eye), b.end.map(|end| end.eye));
         let [extent, expected] = [a, b].map(|camera| camera.projection.half_extent(1.5).unwrap());
         assert!((extent - expected).length() < 1e-12, "{:?} {:?}", a.projection, b.projection);
     }
+    assert_eq!(again.fog, scene.fog);
+    assert!(scene.fog.is_some() && scene.cameras.iter().any(|camera| camera.end.is_some()));
     // Degrees and radians round once each.
     assert_eq!(format!("{:.6?}", again.lights), format!("{:.6?}", scene.lights));
     assert_eq!(

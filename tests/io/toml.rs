@@ -62,6 +62,7 @@ fn the_documentation_has_every_key() {
         "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 0]\nhalf_edges = [[1, 0, 0], [0, 1, 0]]\nradiance = 1",
         "[material.a]",
         "[environment]\nimage = \"sky.exr\"",
+        "[fog]\nabsorption = 1",
         "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1",
         "[[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]",
         "[[disk]]\ncentre = [0, 0, 0]\nnormal = [1, 0, 0]\nradius = 1",

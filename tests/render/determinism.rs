@@ -41,7 +41,7 @@ fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
 }
 
 /// The busy scene with all that paths know beside: glass that absorbs, gloss, what glows, light from all around.
-fn busier_scene() -> Scene {
+pub(super) fn busier_scene() -> Scene {
     let mut scene = busy_scene(DVec3::ZERO);
     let absorption = Some(twincast::scene::Absorption { color: Vec3::new(0.5, 0.9, 0.7), distance: 0.5 });
     scene.materials[0] = Material { absorption, ..Material::glass(1.5) };
@@ -181,14 +181,15 @@ fn a_render_reports_its_tiles_and_stops_when_told() {
     let count = |pixels| {
         done.fetch_add(pixels, Ordering::Relaxed);
     };
-    renderer.render(engine, Control { cancel: Some(&cancel), on_tile: Some(&count) }).unwrap();
+    renderer.render(engine, Control { cancel: Some(&cancel), on_tile: Some(&count), ..Control::default() }).unwrap();
     assert_eq!(done.swap(0, Ordering::Relaxed), 5000);
 
     let stop = |pixels| {
         done.fetch_add(pixels, Ordering::Relaxed);
         cancel.store(true, Ordering::Relaxed);
     };
-    let stopped = renderer.render(engine, Control { cancel: Some(&cancel), on_tile: Some(&stop) });
+    let stopped =
+        renderer.render(engine, Control { cancel: Some(&cancel), on_tile: Some(&stop), ..Control::default() });
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert!(done.load(Ordering::Relaxed) < 5000);
 }
@@ -227,5 +228,58 @@ fn impossible_settings_are_bad_usage() {
     for fov_y in [0.0, -1.0, std::f64::consts::PI, f64::NAN] {
         let camera = Camera { projection: Projection::Perspective(Fov::Vertical(fov_y)), ..scene.cameras[0].clone() };
         assert!(matches!(Renderer::new(&scene, &world, camera, settings(1, 1, 1)).err(), Some(Error::Usage(_))));
+    }
+}
+
+/// Wherever it lies, and for any integrator: the same bits.
+#[test]
+fn a_part_of_a_picture_is_that_part_of_the_picture() {
+    use twincast::render::Crop;
+    let scene = busier_scene();
+    let world = World::new(&scene).unwrap();
+    let engines = engines(&world);
+    let engine = engines.iter().find(|engine| engine.name == "native").expect("it is always there");
+    for integrator in Integrator::ALL {
+        let whole = Settings { integrator: Some(integrator), ..settings(90, 70, 2) };
+        let picture = render(&scene, &scene.cameras[0], &whole, engine);
+        for (x, y, width, height) in [(0, 0, 90, 70), (13, 7, 50, 41), (89, 69, 1, 1), (0, 33, 90, 2)] {
+            let crop = Some(Crop { x, y, width, height });
+            let part = render(&scene, &scene.cameras[0], &Settings { crop, ..whole.clone() }, engine);
+            assert_eq!((part.width, part.height), (width, height));
+            let rows = (y..y + height).map(|row| (row * 90 + x) as usize);
+            let expected: Vec<Vec4> =
+                rows.flat_map(|start| picture.pixels[start..start + width as usize].to_vec()).collect();
+            assert_eq!(bits(&part.pixels), bits(&expected), "{integrator} {crop:?}");
+        }
+    }
+    for (x, y, width, height) in [(0, 0, 91, 1), (80, 0, 11, 1), (0, 0, 0, 1), (0, 70, 1, 1), (u32::MAX, 0, 2, 2)] {
+        let settings = Settings { crop: Some(Crop { x, y, width, height }), ..settings(90, 70, 1) };
+        let refused = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings);
+        assert!(matches!(refused.err(), Some(Error::Usage(_))), "{x},{y},{width}x{height}");
+    }
+}
+
+/// What who watches a render is shown is the picture.
+#[test]
+fn finished_pixels_make_the_picture() {
+    use std::sync::Mutex;
+    use twincast::render::{Crop, Finished};
+    let scene = busy_scene(DVec3::ZERO);
+    let world = World::new(&scene).unwrap();
+    for crop in [None, Some(Crop { x: 20, y: 9, width: 45, height: 40 })] {
+        let renderer =
+            Renderer::new(&scene, &world, scene.cameras[0].clone(), Settings { crop, ..settings(100, 50, 1) }).unwrap();
+        let Crop { width, height, .. } = renderer.window();
+        let shown = Mutex::new(twincast::Image::new(width, height));
+        let show = |finished: Finished| {
+            let mut shown = shown.lock().unwrap();
+            for (row, pixels) in finished.pixels.chunks(finished.width as usize).enumerate() {
+                let start = ((finished.y as usize + row) * width as usize) + finished.x as usize;
+                shown.pixels[start..start + pixels.len()].copy_from_slice(pixels);
+            }
+        };
+        let control = Control { on_pixels: Some(&show), ..Control::default() };
+        let picture = renderer.render(&*engines(&world)[1].tracer, control).unwrap();
+        assert_eq!(bits(&shown.into_inner().unwrap().pixels), bits(&picture.pixels));
     }
 }

@@ -2,7 +2,10 @@
 
 mod alpha;
 mod camera;
+mod closed_forms;
 mod determinism;
+mod explain;
+mod fog;
 mod glass;
 mod shading;
 mod toy;

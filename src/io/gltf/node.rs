@@ -146,6 +146,7 @@ fn make_camera(
         name,
         eye,
         frame,
+        end: None,
         projection,
         shift: DVec2::ZERO,
         lens: None,

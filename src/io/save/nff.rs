@@ -26,8 +26,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             }
         }
     }
-    if scene.instances.iter().any(|instance| instance.transform_end.is_some()) {
+    let moves = scene.instances.iter().any(|instance| instance.transform_end.is_some());
+    if moves || scene.cameras.iter().any(|camera| camera.end.is_some()) {
         return elsewhere("motion".to_owned());
+    }
+    if scene.fog.is_some() {
+        return elsewhere("fog".to_owned());
     }
     if scene.environment.is_some() {
         return elsewhere("environments".to_owned());

@@ -4,10 +4,11 @@
 use std::io::{self, Write};
 
 use super::Unsayable;
+use crate::image::Curve;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
-    Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, Distortion, Fov, Geometry, Interface, Light, Material,
-    Mesh, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
+    Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, Distortion, Fog, Fov, Geometry, Interface, Light,
+    Material, Mesh, Pose, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
 };
 use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
@@ -30,6 +31,13 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     }
     for light in &scene.lights {
         write_light(light, out)?;
+    }
+    if let Some(Fog { absorption, color, reach }) = &scene.fog {
+        writeln!(out, "[fog]\nabsorption = {}\ncolor = {}", list(*absorption), list(*color))?;
+        if reach.is_finite() {
+            writeln!(out, "reach = {reach}")?;
+        }
+        writeln!(out)?;
     }
     for (material, index) in scene.materials.iter().zip(0..) {
         write_material(material, index, out)?;
@@ -103,7 +111,8 @@ fn lists<T>(items: &[T], list: impl Fn(&T) -> String) -> String {
 }
 
 fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
-    let Request { size, spp, seed, integrator, max_depth, output, search } = &scene.request;
+    let Request { size, spp, seed, integrator, max_depth, output, exposure, white_balance, response, search } =
+        &scene.request;
     writeln!(out, "[render]")?;
     if let Some([width, height]) = size {
         writeln!(out, "size = [{width}, {height}]")?;
@@ -118,7 +127,13 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     if let Some(output) = output {
         writeln!(out, "output = {}", quoted(output))?;
     }
+    for (key, number) in [("exposure", exposure), ("white_balance", white_balance)] {
+        if let Some(number) = number {
+            writeln!(out, "{key} = {number}")?;
+        }
+    }
     let names = [
+        ("response", response.map(Curve::name)),
         ("accel", search.accel.map(Accel::name)),
         ("triangle_method", search.triangle_method.map(TriangleMethod::name)),
         ("sphere_method", search.sphere_method.map(SphereMethod::name)),
@@ -144,6 +159,10 @@ fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(&camera.name), list_f64(camera.eye))?;
     let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
+    if let Some(Pose { eye, frame }) = camera.end {
+        writeln!(out, "eye_end = {}\nlook_at_end = {}", list_f64(eye), list_f64(eye - frame.z_axis))?;
+        writeln!(out, "up_end = {}", list_f64(frame.y_axis))?;
+    }
     match camera.projection {
         Projection::Perspective(Fov::Vertical(vertical)) => writeln!(out, "fov = {}", vertical.to_degrees())?,
         Projection::Perspective(Fov::Horizontal(horizontal)) => writeln!(out, "fov_x = {}", horizontal.to_degrees())?,

@@ -1,10 +1,11 @@
 //! What is seen, and from where: lights, cameras, and what the file asks of a render.
 
 use super::table::{Read, Table, Value};
+use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, Light, Projection, Request, Resolution, Search,
-    ThinLens,
+    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, Light, Pose, Projection, Request, Resolution,
+    Search, ThinLens,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
@@ -56,6 +57,19 @@ impl Render {
             integrator: table.optional("integrator", |value| value.choice(&integrators()))?.flatten(),
             max_depth: table.optional("max_depth", |value| value.whole(0..=u32::MAX.into()))?.map(|depth| depth as u32),
             output: table.optional("output", |value| value.text())?.map(str::to_owned),
+            exposure: table.optional("exposure", |value| {
+                let stops = value.number()? as f32;
+                let inside = stops.abs() <= MOST_STOPS;
+                if inside { Ok(stops) } else { Err(value.unlike(&format!("stops from -{MOST_STOPS} to {MOST_STOPS}"))) }
+            })?,
+            white_balance: table.optional("white_balance", |value| {
+                let kelvin = value.number()? as f32;
+                let (first, last) = (TEMPERATURES.start(), TEMPERATURES.end());
+                let inside = TEMPERATURES.contains(&kelvin);
+                if inside { Ok(kelvin) } else { Err(value.unlike(&format!("kelvin from {first} to {last}"))) }
+            })?,
+            response: table
+                .optional("response", |value| value.choice(&Curve::ALL.map(|curve| (curve.name(), curve))))?,
             search: search(&mut table)?,
         };
         render.ambient = table.optional("ambient", |value| value.color())?.unwrap_or_default();
@@ -214,6 +228,7 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
     let mut camera = Camera::look_at(eye, target, up, 1.0)
         .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    camera.end = end(&mut table, [eye, target, up])?;
     camera.projection = projection(&mut table)?;
     camera.lens = table.optional("lens", lens)?;
     let bends = table.get("distortion");
@@ -237,6 +252,21 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
     table.finish()?;
     Ok(camera)
+}
+
+/// Where a camera goes; what is not said stays as it is.
+fn end(table: &mut Table<'_>, start: [DVec3; 3]) -> Read<Option<Pose>> {
+    let (mut first, mut said) = (None, start);
+    for (key, vector) in ["eye_end", "look_at_end", "up_end"].into_iter().zip(&mut said) {
+        if let Some(value) = table.get(key) {
+            *vector = value.vector()?;
+            first = first.or(Some(value));
+        }
+    }
+    let (Some(value), [eye, target, up]) = (first, said) else { return Ok(None) };
+    let camera = Camera::look_at(eye, target, up, 1.0)
+        .ok_or_else(|| value.fault("at time 1 \"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    Ok(Some(camera.pose(0.0)))
 }
 
 fn projection(table: &mut Table<'_>) -> Read<Projection> {

@@ -7,6 +7,7 @@
 //! nobody reads is refused.
 
 mod environment;
+mod fog;
 mod group;
 mod include;
 mod look;
@@ -76,6 +77,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     match read().and_then(|placed| reader.read(Table::new(document.get_ref(), 0, "the file"), placed)) {
         Ok(()) => {
             let scene = reader.scene;
+            warnings.extend(fog::doubt(&scene).map(|doubt| Warning::new(path, "[fog]", doubt)));
             file.done(file);
             Ok(scene)
         }
@@ -159,6 +161,9 @@ impl Reader<'_> {
         }
         if let Some(value) = top.get("environment") {
             self.scene.environment = Some(environment::environment(value, self.folder)?);
+        }
+        if let Some(value) = top.get("fog") {
+            self.scene.fog = Some(fog::fog(value.table("[fog]".to_owned())?)?);
         }
         for (name, table) in top.named_tables("material")? {
             self.material(name, table)?;

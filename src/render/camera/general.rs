@@ -1,16 +1,18 @@
-//! Rays of every other camera: parallel, of the whole sphere, through a lens with an opening, through one that bends lines.
+//! Rays of every other camera: parallel, of the whole sphere, through a lens with an opening, through one that bends lines, from one
+//! that moves.
 
 use super::no_ray;
 use crate::error::{Error, Result};
-use crate::math::{DMat3, DVec2, DVec3};
+use crate::math::{DVec2, DVec3};
 use crate::ray::Ray;
-use crate::scene::{Camera, Distortion, Projection, ThinLens};
+use crate::scene::{Camera, Distortion, Journey, Pose, Projection, ThinLens};
 
 /// A camera in front of a film of given size, in world coordinates.
 #[derive(Clone, Debug)]
 pub(in crate::render) struct General {
-    eye: DVec3,
-    frame: DMat3,
+    /// At time 0.
+    pose: Pose,
+    journey: Option<Journey>,
     projection: Projection,
     /// Pixels.
     size: DVec2,
@@ -23,7 +25,9 @@ pub(in crate::render) struct General {
 
 impl General {
     pub(super) fn new(camera: &Camera, centre: DVec3, size: DVec2, half: DVec2) -> Result<Self> {
-        let Camera { frame, projection, shift, lens, distortion, .. } = *camera;
+        let Camera { frame, end, projection, shift, lens, distortion, .. } = *camera;
+        let pose = Pose { eye: camera.eye - centre, frame };
+        let journey = end.map(|end| Journey::new(pose, Pose { eye: end.eye - centre, ..end }));
         if let Some(ThinLens { radius, focus, .. }) = lens {
             for (name, length) in [("opening of radius", radius), ("focus at", focus)] {
                 if !(length > 0.0 && length.is_finite()) {
@@ -39,15 +43,20 @@ impl General {
         if distortion.is_some() && !matches!(projection, Projection::Perspective(_)) {
             return Err(Error::Usage("lens distortion is for perspective views alone".into()));
         }
-        Ok(Self { eye: camera.eye - centre, frame, projection, size, half, shift, lens, distortion })
+        Ok(Self { pose, journey, projection, size, half, shift, lens, distortion })
     }
 
     pub(super) const fn has_lens(&self) -> bool {
         self.lens.is_some()
     }
 
+    pub(super) const fn moves(&self) -> bool {
+        self.journey.is_some()
+    }
+
     /// The ray through a point of the film and, where there is a lens, through the point of it that `lens` gives.
-    pub(super) fn ray(&self, film: DVec2, lens: DVec2) -> Ray {
+    pub(super) fn ray(&self, film: DVec2, lens: DVec2, time: f32) -> Ray {
+        let Pose { eye, frame } = self.journey.map_or(self.pose, |journey| journey.at(time.into()));
         // From the picture's middle, in halves of its sides, y up.
         let at = (film / self.size * 2.0 - 1.0) * DVec2::new(1.0, -1.0) + self.shift * 2.0;
         let (mut origin, mut direction) = (DVec3::ZERO, DVec3::NEG_Z);
@@ -56,7 +65,7 @@ impl General {
                 let seen = at * self.half;
                 let Some(straight) = self.distortion.map_or(Some(seen), |distortion| undistorted(&distortion, seen))
                 else {
-                    return no_ray(self.eye.as_vec3());
+                    return no_ray(eye.as_vec3());
                 };
                 direction = straight.extend(-1.0);
             }
@@ -74,8 +83,8 @@ impl General {
             origin += (on_lens(lens, blades) * radius).extend(0.0);
             direction = sharp - origin;
         }
-        let origin = self.eye + self.frame * origin;
-        Ray::new(origin.as_vec3(), (self.frame * direction).normalize().as_vec3())
+        let origin = eye + frame * origin;
+        Ray { time, ..Ray::new(origin.as_vec3(), (frame * direction).normalize().as_vec3()) }
     }
 }
 

@@ -45,20 +45,29 @@ impl View {
         let view = General::new(camera, centre, size, half)?;
         let plain = matches!(camera.projection, Projection::Perspective(_))
             && camera.lens.is_none()
-            && camera.distortion.is_none();
+            && camera.distortion.is_none()
+            && camera.end.is_none();
         Ok(if plain { Self::Pinhole(Pinhole::new(camera, centre, size, half)) } else { Self::General(Box::new(view)) })
     }
 
     /// The ray through a point of the film in pixels, from its top left corner, and through the point of the lens that
-    /// `lens` gives, evenly over the unit square. Points of the film that the lens does not reach have a ray that is not
+    /// `lens` gives, evenly over the unit square, at a time from 0 to 1. Points of the film that the lens does not reach have a ray that is not
     /// valid, and sees nothing.
-    pub(super) fn ray(&self, film: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
+    pub(super) fn ray(&self, film: DVec2, lens: impl FnOnce() -> DVec2, time: f32) -> Ray {
         match self {
-            Self::Pinhole(pinhole) => pinhole.ray(film),
+            Self::Pinhole(pinhole) => Ray { time, ..pinhole.ray(film) },
             Self::General(view) => {
                 let lens = if view.has_lens() { lens() } else { DVec2::ZERO };
-                view.ray(film, lens)
+                view.ray(film, lens, time)
             }
+        }
+    }
+
+    /// Whether its rays depend on the time.
+    pub(super) fn moves(&self) -> bool {
+        match self {
+            Self::Pinhole(_) => false,
+            Self::General(view) => view.moves(),
         }
     }
 }

@@ -85,12 +85,18 @@ impl Shading {
 
     /// pi f cos for light along `to_light`.
     pub(super) fn value(&self, to_light: DVec3) -> Vec3 {
+        let [diffuse, highlight] = self.lobes(to_light);
+        diffuse + highlight
+    }
+
+    /// The same of Lambert's lobe and of the highlight.
+    #[inline]
+    pub fn lobes(&self, to_light: DVec3) -> [Vec3; 2] {
         let cosine = self.normal.dot(to_light);
-        let mut value = self.diffuse * cosine.max(0.0) as f32;
-        if self.highlight.color != Vec3::ZERO && cosine > 0.0 {
-            value += self.highlight.value(self.normal, self.to_viewer, to_light, cosine);
-        }
-        value
+        let diffuse = self.diffuse * cosine.max(0.0) as f32;
+        let has_highlight = self.highlight.color != Vec3::ZERO && cosine > 0.0;
+        let highlight = || self.highlight.value(self.normal, self.to_viewer, to_light, cosine);
+        [diffuse, if has_highlight { highlight() } else { Vec3::ZERO }]
     }
 }
 

@@ -22,6 +22,7 @@
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
+//! | `steps` | what a ray cannot but look at, counted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
 //!
 //! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
@@ -62,6 +63,7 @@ mod room;
 mod shapes;
 mod simd;
 mod slab;
+mod steps;
 mod tile;
 mod triangles;
 mod walk;
@@ -70,6 +72,7 @@ pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;
 pub use preset::{Options, Preset};
+pub use steps::Steps;
 
 use std::ops::Range;
 

@@ -1,0 +1,181 @@
+//! A picture in the making, in the viewer tev (T. Müller's, by its protocol: packets over TCP, as its `src/Ipc.cpp` has them).
+//!
+//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render; what waits to be sent is at most the picture. A
+//! viewer that goes away during the render is told of at the end, and costs the picture nothing.
+
+use std::io::Write;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crate::error::{Error, Result, Warning};
+use crate::render::Finished;
+
+/// The longest that the viewer may take for anything.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Makes an image, or makes it anew.
+const CREATE_IMAGE: u8 = 4;
+/// Replaces a part of an image; with offsets and strides for each channel (tev's version 3 of it).
+const UPDATE_IMAGE: u8 = 6;
+
+const CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
+
+/// A viewer that listens.
+pub(super) struct Display {
+    address: String,
+    /// What images are called, but for the engine.
+    title: String,
+    /// The image that is shown.
+    name: Mutex<String>,
+    packets: Sender<Vec<u8>>,
+    thread: JoinHandle<std::io::Result<()>>,
+}
+
+impl Display {
+    /// Finds the viewer at HOST:PORT.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] where nothing listens there.
+    pub(super) fn connect(address: &str, title: String) -> Result<Self> {
+        let mut stream = connect(address).map_err(|error| Error::Backend {
+            backend: "display server",
+            message: format!("{address} cannot be reached ({error}): start tev there, or leave out --display-server"),
+        })?;
+        let (packets, waiting) = channel::<Vec<u8>>();
+        let thread = std::thread::spawn(move || waiting.into_iter().try_for_each(|packet| stream.write_all(&packet)));
+        Ok(Self { address: address.to_owned(), title, name: Mutex::default(), packets, thread })
+    }
+
+    /// Shows an empty picture, by the engine that is to fill it.
+    pub(super) fn begin(&self, engine: &str, [width, height]: [u32; 2]) {
+        let name = format!("{} by {engine}", self.title);
+        let mut packet = Packet::new(CREATE_IMAGE, true, &name);
+        packet.numbers([width, height, CHANNELS.len() as u32]);
+        CHANNELS.iter().for_each(|channel| packet.text(channel));
+        self.send(packet);
+        *self.name.lock().unwrap_or_else(PoisonError::into_inner) = name;
+    }
+
+    /// Shows pixels that are done.
+    pub(super) fn show(&self, finished: &Finished) {
+        let name = self.name.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut packet = Packet::new(UPDATE_IMAGE, false, &name);
+        packet.numbers([CHANNELS.len() as u32]);
+        CHANNELS.iter().for_each(|channel| packet.text(channel));
+        packet.numbers([finished.x, finished.y, finished.width, finished.height()]);
+        // In floats: where each channel begins, and from pixel to pixel.
+        packet.long_numbers([0, 1, 2, 3]);
+        packet.long_numbers([4; 4]);
+        for value in finished.pixels.iter().flat_map(|pixel| pixel.to_array()) {
+            packet.0.extend(value.to_le_bytes());
+        }
+        self.send(packet);
+    }
+
+    fn send(&self, packet: Packet) {
+        // Nobody takes it where the connection is lost, which is told at the end.
+        let _ = self.packets.send(packet.finished());
+    }
+
+    /// Waits until everything is shown; a warning where it was not.
+    pub(super) fn finish(self) -> Option<Warning> {
+        drop(self.packets);
+        let lost = match self.thread.join() {
+            Ok(Ok(())) => return None,
+            Ok(Err(error)) => error.to_string(),
+            Err(_) => "it failed".to_owned(),
+        };
+        Some(Warning::new("--display-server", self.address, format!("did not show all of the picture: {lost}")))
+    }
+}
+
+fn connect(address: &str) -> std::io::Result<TcpStream> {
+    let mut refused = None;
+    for place in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&place, PATIENCE) {
+            Ok(stream) => {
+                stream.set_write_timeout(Some(PATIENCE))?;
+                stream.set_nodelay(true)?;
+                return Ok(stream);
+            }
+            Err(error) => refused = Some(error),
+        }
+    }
+    Err(refused.unwrap_or_else(|| std::io::Error::other("the name stands for no address")))
+}
+
+/// A packet: its length in bytes, this number included, then what it is; all numbers little-endian, texts end with a 0.
+struct Packet(Vec<u8>);
+
+impl Packet {
+    /// What kind, whether the viewer is to turn to the image, and which.
+    fn new(kind: u8, grab_focus: bool, name: &str) -> Self {
+        let mut packet = Self(vec![0, 0, 0, 0, kind, u8::from(grab_focus)]);
+        packet.text(name);
+        packet
+    }
+
+    fn text(&mut self, text: &str) {
+        self.0.extend(text.bytes().filter(|&byte| byte != 0).chain([0]));
+    }
+
+    fn numbers<const N: usize>(&mut self, numbers: [u32; N]) {
+        self.0.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+    }
+
+    fn long_numbers<const N: usize>(&mut self, numbers: [u64; N]) {
+        self.0.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+    }
+
+    fn finished(mut self) -> Vec<u8> {
+        // A tile is a few kilobytes.
+        let length = (self.0.len() as u32).to_le_bytes();
+        self.0[..4].copy_from_slice(&length);
+        self.0
+    }
+}
+
+/// HOST:PORT.
+pub(super) fn parse_address(text: &str) -> std::result::Result<String, String> {
+    let port =
+        text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
+    port.filter(|&port| port > 0)
+        .map(|_| text.to_owned())
+        .ok_or_else(|| "expected HOST:PORT, as in localhost:14158, where tev listens".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_are_tevs() {
+        let mut packet = Packet::new(CREATE_IMAGE, true, "ab");
+        packet.numbers([3, 2, 1]);
+        packet.text("R");
+        let bytes = [&[23u8, 0, 0, 0, 4, 1, b'a', b'b', 0][..], &[3, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0], &[b'R', 0]];
+        assert_eq!(packet.finished(), bytes.concat());
+    }
+
+    #[test]
+    fn addresses() {
+        for good in ["localhost:14158", "[::1]:80", "10.0.0.1:1"] {
+            assert_eq!(parse_address(good), Ok(good.to_owned()));
+        }
+        for bad in ["", "localhost", ":14158", "host:", "host:0", "host:65536", "host:tev"] {
+            assert!(parse_address(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn nobody_there_is_told_with_a_remedy() {
+        // A port that was free a moment ago.
+        let port = std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("its number").port();
+        let refused = Display::connect(&format!("127.0.0.1:{port}"), String::new()).err().expect("nobody listens");
+        assert_eq!(refused.exit_code(), 3);
+        assert!(refused.to_string().contains("start tev"), "{refused}");
+    }
+}
