@@ -81,7 +81,7 @@ impl Renderer<'_> {
                 continue;
             };
             let point = self.surface(ray, hit);
-            let material = self.material(&point);
+            let material = &*self.appearance(&point);
             let path = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
             let glow = self.glow(&path, ray, hit, &point, material, shading.base);
