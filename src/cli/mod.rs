@@ -12,6 +12,7 @@ mod common;
 mod compare;
 mod completions;
 mod engine;
+mod frames;
 mod info;
 mod interrupt;
 mod make;
