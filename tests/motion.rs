@@ -175,8 +175,9 @@ fn what_passes_is_as_bright_as_it_stays() {
 #[test]
 fn maps_of_normals_move_along() {
     use twincast::scene::{Mesh, Texture};
-    let pixels = (0..64u32).map(|i| [40 + (i * 37 % 170) as u8, 60 + (i * 53 % 150) as u8, 220, 255]).collect();
-    let map = Texture { width: 8, height: 8, pixels, scale: glam::Vec2::ONE, ..Texture::default() };
+    let pixels =
+        (0..64u32).map(|i| [40 + (i * 37 % 170) as u8, 60 + (i * 53 % 150) as u8, 220, 255]).collect::<Vec<_>>().into();
+    let map = Texture { width: 8, height: 8, pixels, ..Texture::default() };
     let mesh = Mesh::new(
         [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
         vec![[0, 1, 2], [0, 2, 3]],

@@ -60,6 +60,10 @@ fn corpus() -> Vec<Seed> {
         seed("gltf", "gltf", gltf::rich().into()),
         seed("glb", "glb", gltf::glb(gltf::rich_with_binary(), &gltf::triangle_bytes())),
     ];
+    for name in ["meshopt", "draco"] {
+        let path = format!("{}/tests/fixtures/{name}.gltf", env!("CARGO_MANIFEST_DIR"));
+        seeds.push(seed(name, "gltf", fs::read(path).unwrap()));
+    }
     for name in ["gltf/box_sparse.glb", "gltf/gltf_primitives.glb", "gltf/CornellBox.glb", "gltf/SimpleSkin.gltf"] {
         if let Some(path) = model(name) {
             let suffix = path.extension().unwrap().to_str().unwrap();

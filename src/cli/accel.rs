@@ -11,7 +11,7 @@ use crate::scene::{Accel, Resolution, Search};
 use crate::shape::{SphereMethod, TriangleMethod};
 use crate::trace::accel::{Methods, Options};
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct AccelArgs {
     /// How the native engine searches the scene (default: as the scene asks, else bvh); never changes a picture
     #[arg(long, value_enum)]
@@ -22,7 +22,7 @@ pub(super) struct AccelArgs {
 }
 
 /// What an accelerator may be told.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct AccelOptions {
     /// Cells of the grid: along its longest side, or along each axis (default: by the number of primitives)
     #[arg(long, value_name = "N|XxYxZ", value_parser = parse_grid)]

@@ -12,7 +12,7 @@ use crate::trace::bvh::Preset;
 /// Bytes that a picture takes for each pixel: four floats, once more while it is written.
 const BYTES_A_PIXEL: u64 = 32;
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct BuildArgs {
     /// How well the native tree is built; never changes a picture
     #[arg(long, value_enum, default_value_t)]

@@ -97,6 +97,11 @@ enum ProjectionArg {
 }
 
 impl CameraArgs {
+    /// Whether it is said when the shutter opens and closes.
+    pub(crate) const fn has_shutter(&self) -> bool {
+        self.shutter.is_some()
+    }
+
     /// The camera, and in words where it comes from.
     pub(crate) fn choose(&self, scene: &Scene, aspect: f64) -> Result<(Camera, String)> {
         let bounds = scene.bounds();

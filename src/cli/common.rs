@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::progress;
 use crate::error::{Result, Warning};
-use crate::io::{self, LoadOptions};
+use crate::io::{self, Animation, LoadOptions};
 use crate::math::DVec3;
 use crate::render::LARGEST_SIDE;
 use crate::scene::Scene;
@@ -30,6 +30,22 @@ pub(crate) struct SceneArgs {
     /// Shading normals: those of the file, flat everywhere, or smooth everywhere
     #[arg(long, value_enum, default_value_t)]
     normals: Normals,
+
+    /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the file stores)
+    #[arg(long, value_name = "SECONDS", value_parser = parse_time)]
+    pub(crate) time: Option<f64>,
+
+    /// Which animation of the file, by its name or its number from 0 on (default: its only one)
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
+
+    /// Frames a second: with --time, what moves goes on for one of them while the time of --shutter goes from 0 to 1
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps)]
+    pub(crate) fps: f64,
+
+    /// Which of the sets of materials that the file offers, by its name; glTF (default: those that things have by themselves)
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
@@ -67,24 +83,32 @@ enum Normals {
 }
 
 impl SceneArgs {
-    /// Reads the scene.
-    pub(crate) fn load(&self) -> Result<(Scene, Vec<Warning>)> {
-        io::load(&self.scene, &self.options())
+    /// Reads the scene. If `has_shutter`, what an animation moves is to move.
+    pub(crate) fn load(&self, has_shutter: bool) -> Result<(Scene, Vec<Warning>)> {
+        io::load(&self.scene, &self.options(has_shutter))
     }
 
     /// Reads the scene with a bar over the bytes of the file.
-    pub(crate) fn load_with_bar(&self, quiet: bool) -> Result<(Scene, Vec<Warning>)> {
+    pub(crate) fn load_with_bar(&self, has_shutter: bool, quiet: bool) -> Result<(Scene, Vec<Warning>)> {
         // Whatever is wrong with the file is for the loader to say.
         let length = std::fs::metadata(&self.scene).map_or(0, |file| file.len());
         let bar = progress::bar(length, "loading", quiet);
-        let scene = io::load_watched(&self.scene, &self.options(), Some(&|bytes| bar.inc(bytes)));
+        let scene = io::load_watched(&self.scene, &self.options(has_shutter), Some(&|bytes| bar.inc(bytes)));
         bar.finish_and_clear();
         scene
     }
 
     /// How the file is understood.
-    pub(crate) fn options(&self) -> LoadOptions {
+    fn options(&self, has_shutter: bool) -> LoadOptions {
+        // A pose that is stored does not move.
+        let is_animated = self.time.is_some() || self.animation.is_some();
         LoadOptions {
+            animation: Animation {
+                name: self.animation.clone(),
+                time: self.time,
+                exposure: if has_shutter && is_animated { 1.0 / self.fps } else { 0.0 },
+            },
+            variant: self.variant.clone(),
             up_axis: self.up_axis.axis(),
             unit: match self.unit {
                 Unit::M => io::Unit::Metre,
@@ -127,6 +151,18 @@ pub(super) fn by_name<T: Copy, const N: usize>(
 ) -> std::result::Result<T, String> {
     let found = all.into_iter().find(|&one| name_of(one) == name);
     found.ok_or_else(|| format!("expected one of {}", all.map(name_of).join(", ")))
+}
+
+/// A number of seconds, at least 0.
+fn parse_time(text: &str) -> std::result::Result<f64, String> {
+    let time = text.parse().ok().filter(|time: &f64| (0.0..=1e6).contains(time));
+    time.ok_or_else(|| "expected seconds from 0 to 1000000, as in 1.5".to_owned())
+}
+
+/// Frames a second.
+fn parse_fps(text: &str) -> std::result::Result<f64, String> {
+    let fps = text.parse().ok().filter(|fps: &f64| (1e-3..=1e6).contains(fps));
+    fps.ok_or_else(|| "expected frames a second, from 0.001 to 1000000, as in 24".to_owned())
 }
 
 /// Three finite numbers with commas between.

@@ -79,7 +79,7 @@ pub(super) struct CompareArgs {
 impl CompareArgs {
     /// The scene, and from where it is seen.
     fn view(&self) -> Result<(Scene, Camera)> {
-        let (scene, warnings) = self.scene.load()?;
+        let (scene, warnings) = self.scene.load(self.camera.has_shutter())?;
         warn(&warnings);
         interrupt::check()?;
         let (camera, _) = self.camera.choose(&scene, f64::from(self.size.width) / f64::from(self.size.height))?;

@@ -27,7 +27,7 @@ pub(super) struct InfoArgs {
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
-    let (scene, warnings) = args.scene.load()?;
+    let (scene, warnings) = args.scene.load(false)?;
     warn(&warnings);
     let inspection = Inspection::new(&scene);
     if args.json {

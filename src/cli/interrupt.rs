@@ -5,9 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::error::{Error, Result};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static INSTALLED: AtomicBool = AtomicBool::new(false);
 
-/// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130.
+/// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130. May be asked for again.
 pub(super) fn install() -> Result<&'static AtomicBool> {
+    if INSTALLED.swap(true, Ordering::Relaxed) {
+        return Ok(&INTERRUPTED);
+    }
     ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
             std::process::exit(130);

@@ -14,6 +14,7 @@ mod completions;
 mod display;
 mod engine;
 mod explain;
+mod frames;
 mod info;
 mod interrupt;
 mod make;

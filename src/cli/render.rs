@@ -13,6 +13,7 @@ use super::common::{SceneArgs, parse_vector};
 use super::display::{Display, parse_address};
 use super::engine::{BackendArg, Job, Outcome};
 use super::explain::ExplainArgs;
+use super::frames::{self, FrameArgs};
 use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
@@ -31,7 +32,7 @@ use crate::trace::bvh::Preset;
 use crate::trace::{Primitives, World};
 
 /// Render a scene
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "\
 Examples:
   twincast render bunny.glb -o bunny.png
@@ -39,15 +40,20 @@ Examples:
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
   twincast render large.ply --cache ~/.cache/twincast -o large.png
   twincast render bunny.glb --accel kd-tree -o bunny.png
-  twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
+  twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json
+  twincast render fox.glb --animation Walk --time 0.5 --shutter 0,0.5 -o fox.png
+  twincast render fox.glb --animation Walk --frames 0-23 --skip-existing -o walk.%04d.png")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
+
+    #[command(flatten)]
+    pub(super) frames: FrameArgs,
 
     /// Picture to write; the suffix decides the format (may be repeated; default: what the scene names, in the current
     /// folder)
     #[arg(short, long, value_name = "FILE")]
-    output: Vec<PathBuf>,
+    pub(super) output: Vec<PathBuf>,
 
     /// Engine
     #[arg(long, value_enum, default_value_t)]
@@ -62,7 +68,7 @@ pub(super) struct RenderArgs {
 
     /// Picture of the same size to compare with; exit code 1 if it differs by more than --threshold
     #[arg(long, value_name = "FILE", requires = "output")]
-    reference: Option<PathBuf>,
+    pub(super) reference: Option<PathBuf>,
 
     /// Largest root mean square difference of the linear channels that passes
     #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = parse_threshold, requires = "reference")]
@@ -74,7 +80,7 @@ pub(super) struct RenderArgs {
 
     /// Write times, rays, rays a second and memory as JSON
     #[arg(long, value_name = "FILE.json", requires = "output")]
-    stats: Option<PathBuf>,
+    pub(super) stats: Option<PathBuf>,
 
     #[command(flatten)]
     accel: AccelArgs,
@@ -104,7 +110,7 @@ pub(super) struct RenderArgs {
 
     /// Say nothing but warnings and errors
     #[arg(short, long)]
-    quiet: bool,
+    pub(super) quiet: bool,
 
     // Last, for clap puts what follows a heading under it.
     #[command(flatten)]
@@ -118,6 +124,14 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
+    if args.frames.are_given() {
+        return frames::run(args, render);
+    }
+    render(args)
+}
+
+/// Renders one picture.
+fn render(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     args.accel.check(args.backend, Some(&args.build), &args.cache)?;
     let cancel = interrupt::install()?;
@@ -135,7 +149,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     pool.install(|| {
         let start = Instant::now();
-        let (mut scene, warnings) = args.scene.load_with_bar(args.quiet)?;
+        let (mut scene, warnings) = args.scene.load_with_bar(args.camera.has_shutter(), args.quiet)?;
         warn(&warnings);
         if let Some(sun) = args.sun {
             scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];

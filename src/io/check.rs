@@ -60,7 +60,12 @@ pub(super) fn check(scene: &Scene) -> Placeless<()> {
 
 fn check_mesh(mesh: &Mesh) -> Placeless<()> {
     let count = mesh.positions.len();
-    let attributes = [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len()), ("colors", mesh.colors.len())];
+    let attributes = [
+        ("normals", mesh.normals.len()),
+        ("uvs", mesh.uvs.len()),
+        ("second uvs", mesh.second_uvs.len()),
+        ("colors", mesh.colors.len()),
+    ];
     for (name, length) in attributes {
         if length != 0 && length != count {
             return Err(format!("{length} {name} for {count} positions"));

@@ -36,7 +36,7 @@ use crate::memory::Mapped;
 use crate::scene::{Geometry, Mesh, Scene};
 
 /// How a file is understood.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// Which axis of the file points up; by default the format's own (+y).
     pub up_axis: UpAxis,
@@ -44,6 +44,23 @@ pub struct LoadOptions {
     pub unit: Unit,
     /// Where shading normals come from.
     pub normals: Normals,
+    /// In which pose things are; glTF alone.
+    pub animation: Animation,
+    /// Which of the sets of materials that a file offers things have; glTF alone. None is what they have by themselves.
+    pub variant: Option<String>,
+}
+
+/// In which pose things are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Animation {
+    /// Of the file's animations, the one with this name, or this number, counted from 0. None where the file has only one.
+    pub name: Option<String>,
+    /// When, in seconds from the animation's start; before its first key and after its last one all stands still. None, and no
+    /// name, is the pose that the file stores.
+    pub time: Option<f64>,
+    /// Seconds from `time` on in which things go from where they are at time 0 of a picture to where they are at its time 1; 0 where
+    /// nothing is to move. What is deformed by a skin or morph targets keeps its shape.
+    pub exposure: f64,
 }
 
 /// The axis that points up.
@@ -125,9 +142,15 @@ pub fn load_watched(
     if file.is_empty() {
         return Err(Error::input(path, "", "is empty, where a scene is needed"));
     }
+    let is_gltf = matches!(suffix.as_str(), "glb" | "gltf");
+    if !is_gltf && (options.animation != Animation::default() || options.variant.is_some()) {
+        let message =
+            "animations and variants of materials are asked for, which only glTF and GLB have; leave them out";
+        return Err(Error::input(path, "", message));
+    }
     let mut warnings = Vec::new();
     let mut scene = match suffix.as_str() {
-        "glb" | "gltf" => gltf::load(path, &file, &mut warnings)?,
+        "glb" | "gltf" => gltf::load(path, &file, options, &mut warnings)?,
         "nff" => nff::load(path, &file, &mut warnings)?,
         "obj" => obj::load(path, &file, &mut warnings)?,
         "ply" => ply::load(path, &file, &mut warnings)?,

@@ -2,13 +2,13 @@
 
 use std::io::Cursor;
 use std::path::Path;
+use std::sync::Arc;
 
 use image::error::ImageError;
 use image::{ImageReader, Limits};
 
 use crate::error::{Error, Result};
 use crate::io::Placeless;
-use crate::math::Vec2;
 use crate::memory::Mapped;
 use crate::scene::Texture;
 
@@ -59,8 +59,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
         name: name.to_string(),
         width,
         height,
-        pixels: bytemuck::cast_slice(image.as_raw()).to_vec(),
-        scale: Vec2::ONE,
+        pixels: Arc::new(bytemuck::cast_slice(image.as_raw()).to_vec()),
         ..Texture::default()
     })
 }

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -155,11 +156,16 @@ fn bytes(scene: &Scene) -> u64 {
                 + size_of_val(&mesh.triangles[..])
                 + size_of_val(&mesh.normals[..])
                 + size_of_val(&mesh.uvs[..])
+                + size_of_val(&mesh.second_uvs[..])
                 + size_of_val(&mesh.colors[..])
         }
         Geometry::Shapes { shapes, .. } => shapes.iter().map(Shape::bytes).sum(),
     });
-    let textures = scene.textures.iter().map(|texture| size_of_val(&texture.pixels[..]));
+    // Textures may share a picture.
+    let mut pictures: Vec<_> = scene.textures.iter().map(|texture| &texture.pixels).collect();
+    pictures.sort_by_key(|pixels| Arc::as_ptr(pixels));
+    pictures.dedup_by(|a, b| Arc::ptr_eq(a, b));
+    let textures = pictures.into_iter().map(|pixels| size_of_val(&pixels[..]));
     let instances = size_of_val(&scene.instances[..]);
     (geometries.sum::<usize>() + textures.sum::<usize>() + instances) as u64
 }

@@ -8,7 +8,8 @@ pub mod expansion;
 pub mod number;
 
 pub use glam::{
-    Affine3, BVec3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, UVec3, Vec2, Vec3, Vec4,
+    Affine2, Affine3, BVec3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, UVec3, Vec2, Vec3,
+    Vec4,
 };
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.
@@ -31,6 +32,13 @@ pub const fn gamma(n: u32) -> f32 {
 pub const fn gamma64(n: u32) -> f64 {
     let nu = n as f64 * UNIT_ROUNDOFF_64;
     nu / (1.0 - nu)
+}
+
+/// The matrix that turns normals as `m` turns surfaces: the inverse transpose times the determinant's magnitude. Needs
+/// no division, and keeps outward normals outward under a mirroring.
+pub fn cofactor(m: &DMat3) -> DMat3 {
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
 /// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al. 2017, *Building an orthonormal

@@ -98,7 +98,7 @@ impl Renderer<'_> {
                 continue;
             };
             let point = self.surface(ray, hit);
-            let material = self.material(&point);
+            let material = &*self.appearance(&point);
             let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
             let (left, fog) = self.through_fog(left, ray, &point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);

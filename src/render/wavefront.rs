@@ -5,13 +5,15 @@
 //! before the next would trace shadow rays one by one. What a pixel adds up, and in which order, does not depend on
 //! its neighbours.
 
+use std::borrow::Cow;
+
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::plan::Lighting;
 use crate::ray::{Hit, Ray};
 use crate::scene::{Absorption, Integrator, Interface, Material};
 use crate::shade::light::LightSource;
 use crate::shade::lights::Lights;
-use crate::shade::{SurfacePoint, normal_map};
+use crate::shade::{SurfacePoint, appearance, normal_map};
 use crate::trace::{Batch, Tracer};
 
 use super::camera::View;
@@ -224,6 +226,11 @@ impl Renderer<'_> {
             normal_map::bend(&mut point, self.scene, self.world, hit, material);
         }
         point
+    }
+
+    /// What the surface at `point` is there, by all its textures.
+    pub(super) fn appearance(&self, point: &SurfacePoint) -> Cow<'_, Material> {
+        appearance::at(self.material(point), point, &self.scene.textures)
     }
 
     pub(super) fn material(&self, point: &SurfacePoint) -> &Material {

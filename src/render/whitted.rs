@@ -97,7 +97,7 @@ impl Renderer<'_> {
                 continue;
             };
             let point = self.surface(ray, hit);
-            let material = self.material(&point);
+            let material = &*self.appearance(&point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
             let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
             let (left, fog) = self.through_fog(left, ray, &point);
@@ -118,7 +118,7 @@ impl Renderer<'_> {
         wave.rays.clear();
         wave.paths.clear();
         for Lit { path, direction, point, shading } in lit {
-            let material = self.material(point);
+            let material = &*self.appearance(point);
             let ways = Ways::new(material, point, direction.as_dvec3().normalize());
             for (which, way) in [(1, ways.mirrored), (2, ways.refracted)] {
                 let Some(way) = way else { continue };
@@ -148,7 +148,7 @@ impl Renderer<'_> {
         let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
         let Buffers { radiance, lit, trail, .. } = buffers;
         for Lit { path, direction, point, .. } in lit.iter() {
-            let ways = Ways::new(self.material(point), point, direction.as_dvec3().normalize());
+            let ways = Ways::new(&self.appearance(point), point, direction.as_dvec3().normalize());
             for way in [ways.mirrored, ways.refracted].into_iter().flatten() {
                 let path = Path { weight: path.weight * way.share, ..*path };
                 let (left, fog) = self.through_fog_beyond(path);

@@ -1,5 +1,6 @@
 //! What a surface is made of.
 
+use super::Physical;
 use crate::math::Vec3;
 
 /// How the highlight is computed.
@@ -105,6 +106,9 @@ pub struct Material {
     pub opacity: f32,
     /// Which highlight.
     pub model: Specular,
+    /// What the colours and the highlight follow from where textures vary more than the diffuse colour; those above are then
+    /// of its average.
+    pub physical: Option<Physical>,
 }
 
 impl Default for Material {
@@ -132,6 +136,7 @@ impl Default for Material {
             alpha: Alpha::default(),
             opacity: 1.0,
             model: Specular::default(),
+            physical: None,
         }
     }
 }
@@ -152,7 +157,15 @@ impl Material {
 
     /// The textures it uses.
     pub fn textures(&self) -> impl Iterator<Item = u32> {
-        [self.diffuse_texture, self.emission_texture, self.normal_texture].into_iter().flatten()
+        let own = [self.diffuse_texture, self.emission_texture, self.normal_texture].into_iter().flatten();
+        own.chain(self.physical.iter().flat_map(|physical| physical.textures.all()))
+    }
+
+    /// Gives the textures it uses other indices.
+    pub(crate) fn renumber_textures(&mut self, number: impl Fn(u32) -> u32) {
+        let own = [&mut self.diffuse_texture, &mut self.emission_texture, &mut self.normal_texture];
+        let physical = self.physical.iter_mut().flat_map(|physical| physical.textures.slots());
+        own.into_iter().chain(physical).flatten().for_each(|index| *index = number(*index));
     }
 
     /// Whether a ray goes on from it.

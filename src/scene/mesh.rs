@@ -23,6 +23,8 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, v up (OpenGL's and OBJ's convention, not glTF's).
     pub uvs: Vec<Vec2>,
+    /// A second set of them, for textures that lie otherwise; empty where no texture does.
+    pub second_uvs: Vec<Vec2>,
     /// Linear RGBA that multiplies the material's diffuse colour.
     pub colors: Vec<Vec4>,
     /// Corners of each triangle; every index is below `positions.len()` (loaders check).

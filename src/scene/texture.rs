@@ -1,6 +1,8 @@
 //! An image on a surface.
 
-use crate::math::Vec2;
+use std::sync::Arc;
+
+use crate::math::Affine2;
 
 /// What lies outside the unit square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,15 +36,17 @@ pub struct Texture {
     /// Rows.
     pub height: u32,
     /// sRGB-encoded colour, linear alpha; row by row; `width * height` of them.
-    pub pixels: Vec<[u8; 4]>,
+    /// Shared by textures that show the same picture in other places.
+    pub pixels: Arc<Vec<[u8; 4]>>,
     /// Outside the unit square, along u.
     pub wrap_u: Wrap,
     /// Outside the unit square, along v.
     pub wrap_v: Wrap,
     /// Between pixels.
     pub filter: Filter,
-    /// Texture coordinates are multiplied by this (OBJ's `-s`; 1 elsewhere)...
-    pub scale: Vec2,
-    /// ...and this is added (OBJ's `-o`).
-    pub offset: Vec2,
+    /// Whether it lies on the mesh by the second set of coordinates.
+    pub on_second_uvs: bool,
+    /// From the mesh's texture coordinates to those of the picture, both with v up: OBJ's `-s` and `-o`, glTF's
+    /// `KHR_texture_transform`.
+    pub transform: Affine2,
 }

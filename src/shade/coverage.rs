@@ -7,7 +7,7 @@ use crate::scene::{Alpha, Material, Texture};
 pub fn coverage(point: &SurfacePoint, material: &Material, textures: &[Texture]) -> f32 {
     let alpha = || {
         let texture = material.diffuse_texture.and_then(|i| textures.get(i as usize));
-        material.opacity * point.color.w * texture.map_or(1.0, |t| texture::sample(t, point.uv).w)
+        material.opacity * point.color.w * texture.map_or(1.0, |t| texture::sample(t, point.uv_of(t)).w)
     };
     match material.alpha {
         Alpha::Opaque => 1.0,

@@ -4,6 +4,7 @@
 //! a [`SurfacePoint`] and never a primitive. Shading is f32 arithmetic without fused operations, and sines and powers
 //! come from libm, so that a picture is the same with every C library.
 
+pub mod appearance;
 mod area;
 mod bodies;
 pub mod coverage;

@@ -5,9 +5,9 @@
 //! simpler way, `origin + t * direction` from the engine's t, would carry every engine's own rounding into the picture
 //! and put the point off the surface by an error that grows with the distance travelled.
 
-use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, gamma, gamma64};
+use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4, cofactor, gamma, gamma64};
 use crate::ray::{Hit, Ray};
-use crate::scene::{Geometry, Mesh, Scene};
+use crate::scene::{Geometry, Mesh, Scene, Texture};
 use crate::shape::{Shape, ShapeHit};
 use crate::trace::{Placement, Primitives, World};
 
@@ -52,6 +52,8 @@ pub struct SurfacePoint {
     pub front: bool,
     /// Texture coordinates, v up; zero where there are none.
     pub uv: Vec2,
+    /// Those of the second set.
+    pub second_uv: Vec2,
     /// Linear RGBA of the vertices; white where there is none.
     pub color: Vec4,
     /// Index into [`Scene::materials`].
@@ -104,6 +106,7 @@ impl SurfacePoint {
             shading_normal: normal,
             front,
             uv: Vec2::ZERO,
+            second_uv: Vec2::ZERO,
             color: Vec4::ONE,
             material: 0,
             time: ray.moment(),
@@ -121,14 +124,23 @@ impl SurfacePoint {
                 self.shading_normal = if normal.dot(self.normal) < 0.0 { -normal } else { normal };
             }
         }
-        if attributes.uvs && !mesh.uvs.is_empty() {
-            let uv = (0..3).map(|k| mesh.uvs[corners[k]].as_dvec2() * weights[k]).sum::<glam::DVec2>();
-            self.uv = uv.as_vec2();
+        if attributes.uvs {
+            let at = |uvs: &[Vec2]| (0..3).map(|k| uvs[corners[k]].as_dvec2() * weights[k]).sum::<DVec2>().as_vec2();
+            for (uv, uvs) in [(&mut self.uv, &mesh.uvs), (&mut self.second_uv, &mesh.second_uvs)] {
+                if !uvs.is_empty() {
+                    *uv = at(uvs);
+                }
+            }
         }
         if attributes.colors && !mesh.colors.is_empty() {
             let color = (0..3).map(|k| mesh.colors[corners[k]].as_dvec4() * weights[k]).sum::<glam::DVec4>();
             self.color = color.as_vec4();
         }
+    }
+
+    /// The coordinates by which `texture` lies on the surface.
+    pub fn uv_of(&self, texture: &Texture) -> Vec2 {
+        if texture.on_second_uvs { self.second_uv } else { self.uv }
     }
 
     /// A ray that leaves the surface and does not meet it again at once.
@@ -256,13 +268,6 @@ fn rounding_error(position: DVec3, normal: DVec3, placement: Option<&Placement>)
         error += to_world.matrix3.abs() * local + to_world.translation.abs();
     }
     f64::from(gamma(TEST_ROUNDINGS)) * error.dot(normal.abs())
-}
-
-/// The matrix that turns normals as `m` turns surfaces: the inverse transpose times the determinant's magnitude. Needs
-/// no division, and keeps outward normals outward under a mirroring.
-fn cofactor(m: &DMat3) -> DMat3 {
-    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-    if m.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
 #[cfg(test)]

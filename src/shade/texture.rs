@@ -18,7 +18,7 @@ pub fn numbers(texture: &Texture, uv: Vec2) -> Vec4 {
 }
 
 fn interpolate(texture: &Texture, uv: Vec2, decode: impl Fn(u8) -> f32 + Copy) -> Vec4 {
-    let st = uv * texture.scale + texture.offset;
+    let st = texture.transform.transform_point2(uv);
     if texture.pixels.is_empty() || !st.is_finite() {
         return Vec4::ONE;
     }
@@ -70,11 +70,10 @@ mod tests {
         Texture {
             width: 2,
             height: 2,
-            pixels: vec![[0, 0, 0, 255], [255; 4], [255, 0, 0, 255], [188, 188, 188, 51]],
+            pixels: vec![[0, 0, 0, 255], [255; 4], [255, 0, 0, 255], [188, 188, 188, 51]].into(),
             wrap_u: wrap,
             wrap_v: wrap,
             filter,
-            scale: Vec2::ONE,
             ..Texture::default()
         }
     }

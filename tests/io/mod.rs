@@ -2,6 +2,10 @@
 
 pub mod course;
 pub mod gltf;
+mod gltf_look;
+mod gltf_maker;
+mod gltf_packed;
+mod gltf_pose;
 mod models;
 pub mod nff;
 pub mod obj;

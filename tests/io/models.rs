@@ -17,11 +17,11 @@ fn models_load_with_the_known_number_of_triangles() {
         ("cow.obj", None, &[]),
         ("gltf/FlightHelmet/FlightHelmet.gltf", None, &[]),
         ("gltf/CornellBox.glb", None, &[]),
-        ("gltf/Fox.glb", Some(576), &["skins"]),
-        ("gltf/MorphStressTest.gltf", None, &["morph"]),
-        ("gltf/SimpleSkin.gltf", Some(8), &["skins"]),
+        ("gltf/Fox.glb", Some(576), &[]),
+        ("gltf/MorphStressTest.gltf", None, &[]),
+        ("gltf/SimpleSkin.gltf", Some(8), &[]),
         ("gltf/gltf_primitives.glb", None, &[]),
-        ("gltf/box_sparse.glb", Some(12), &["morph"]),
+        ("gltf/box_sparse.glb", Some(12), &[]),
     ];
     for (name, triangles, expected) in models {
         let Some(path) = model(name) else { continue };

@@ -1,6 +1,6 @@
 //! Surfaces that are not all there: seen through, and in shadows.
 
-use twincast::math::{DVec3, Vec2, Vec3, Vec4};
+use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::scene::{Alpha, Filter, Geometry, Integrator, Light, Material, Mesh, Texture, Wrap};
 use twincast::{Disk, Scene, Settings, Shape, World};
 
@@ -67,10 +67,9 @@ fn masks_cut_out_and_so_do_their_shadows() {
     let texture = Texture {
         width: 2,
         height: 1,
-        pixels: vec![[255, 255, 255, 200], [255, 255, 255, 100]],
+        pixels: vec![[255, 255, 255, 200], [255, 255, 255, 100]].into(),
         wrap_u: Wrap::Clamp,
         filter: Filter::Nearest,
-        scale: Vec2::ONE,
         ..Texture::default()
     };
     let masked = |cutoff| Material { diffuse_texture: Some(0), alpha: Alpha::Mask { cutoff }, ..matte(1.0) };

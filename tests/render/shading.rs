@@ -1,7 +1,7 @@
 //! Pixels with a known value.
 
 use twincast::image::Image;
-use twincast::math::{DVec3, Vec2, Vec3, Vec4};
+use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::scene::{
     AreaShape, Attenuation, Camera, Filter, Geometry, Light, Material, Mesh, Specular, Texture, Wrap,
 };
@@ -96,10 +96,9 @@ fn textures_lie_the_right_way_up() {
     let texture = Texture {
         width: 4,
         height: 4,
-        pixels: codes.iter().map(|&c| [c, 255 - c, 0, 255]).collect(),
+        pixels: codes.iter().map(|&c| [c, 255 - c, 0, 255]).collect::<Vec<_>>().into(),
         wrap_u: Wrap::Clamp,
         filter: Filter::Linear,
-        scale: Vec2::ONE,
         ..Texture::default()
     };
     let material = Material { diffuse_texture: Some(0), ..matte(1.0) };
@@ -130,8 +129,7 @@ fn normal_maps_lean_along_u_and_v() {
         let texture = Texture {
             width: 1,
             height: 1,
-            pixels: vec![[code(texel[0]), code(texel[1]), code(texel[2]), 255]],
-            scale: Vec2::ONE,
+            pixels: vec![[code(texel[0]), code(texel[1]), code(texel[2]), 255]].into(),
             ..Texture::default()
         };
         let material = Material { normal_texture: Some(0), ..matte(1.0) };

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Document;
 use super::schema::Accessor;
+use crate::error::Result;
 use crate::io::Placeless;
 use crate::io::records::Records;
 use crate::memory::Mapped;
@@ -61,14 +62,25 @@ impl Component {
         }
     }
 
+    /// What stands for 1 where numbers are normalised.
+    const fn full(self) -> f32 {
+        match self {
+            Self::I8 => 127.0,
+            Self::U8 => 255.0,
+            Self::I16 => 32_767.0,
+            Self::U16 => 65_535.0,
+            Self::U32 | Self::F32 => 1.0,
+        }
+    }
+
     /// The component at the start of `bytes`, which hold at least one.
     fn read(self, bytes: &[u8], normalized: bool) -> f32 {
-        let scale = |value: f32, full: f32| if normalized { (value / full).max(-1.0) } else { value };
+        let scale = |value: f32| if normalized { (value / self.full()).max(-1.0) } else { value };
         match self {
-            Self::I8 => scale(f32::from(bytes[0] as i8), 127.0),
-            Self::U8 => scale(f32::from(bytes[0]), 255.0),
-            Self::I16 => scale(f32::from(i16::from_le_bytes([bytes[0], bytes[1]])), 32_767.0),
-            Self::U16 => scale(f32::from(u16::from_le_bytes([bytes[0], bytes[1]])), 65_535.0),
+            Self::I8 => scale(f32::from(bytes[0] as i8)),
+            Self::U8 => scale(f32::from(bytes[0])),
+            Self::I16 => scale(f32::from(i16::from_le_bytes([bytes[0], bytes[1]]))),
+            Self::U16 => scale(f32::from(u16::from_le_bytes([bytes[0], bytes[1]]))),
             Self::U32 => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32,
             Self::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
         }
@@ -89,16 +101,36 @@ type Fault = (&'static str, String);
 
 impl<'a> View<'a> {
     /// Checks an accessor whose `type` has to be one of `kinds`.
-    pub(super) fn new(document: &'a Document<'_>, index: usize, kinds: &[&str]) -> Result<Self, (String, String)> {
-        let accessor = document.root.accessors.get(index).ok_or_else(|| {
-            let count = document.root.accessors.len();
-            ("/accessors".to_string(), format!("there is no accessor {index}; there are {count}"))
-        })?;
-        Self::check(document, accessor, kinds)
-            .map_err(|(field, message)| (format!("/accessors/{index}{field}"), message))
+    pub(super) fn new(document: &'a Document<'_>, index: usize, kinds: &[&str]) -> Result<Self> {
+        Self::told(document, index, |accessor| Self::check(document, accessor, kinds))
     }
 
-    fn check(document: &'a Document<'_>, accessor: &Accessor, kinds: &[&str]) -> Result<Self, Fault> {
+    /// The same where the elements were decoded from elsewhere: as 32-bit floats, one after the other.
+    pub(super) fn over(document: &'a Document<'_>, index: usize, kinds: &[&str], bytes: &'a [u8]) -> Result<Self> {
+        Self::told(document, index, |accessor| {
+            let mut view = Self { component: Component::F32, normalized: false, ..Self::typed(accessor, kinds)? };
+            let size = view.components * view.component.size();
+            range(bytes, 0, view.count, size, size, view.component)?;
+            view.base = Some((bytes, size));
+            Ok(view)
+        })
+    }
+
+    /// Has `check` look at an accessor, and says where its faults are.
+    fn told<T>(
+        document: &Document<'_>,
+        index: usize,
+        check: impl FnOnce(&Accessor) -> std::result::Result<T, Fault>,
+    ) -> Result<T> {
+        let accessors = &document.root.accessors;
+        let accessor = accessors.get(index).ok_or_else(|| {
+            document.error("/accessors", format!("there is no accessor {index}; there are {}", accessors.len()))
+        })?;
+        check(accessor).map_err(|(field, message)| document.error(format!("/accessors/{index}{field}"), message))
+    }
+
+    /// What an accessor says of its elements, which are zero so far.
+    fn typed(accessor: &Accessor, kinds: &[&str]) -> std::result::Result<Self, Fault> {
         let component = Component::from_code(accessor.component_type).map_err(|m| ("/componentType", m))?;
         if !kinds.contains(&accessor.kind.as_str()) {
             return Err(("/type", format!("{:?} where {} belongs", accessor.kind, kinds.join(" or "))));
@@ -107,13 +139,21 @@ impl<'a> View<'a> {
             "VEC2" => 2,
             "VEC3" => 3,
             "VEC4" => 4,
+            "MAT4" => 16,
             _ => 1,
         };
-        let size = components * component.size();
         let count = u32::try_from(accessor.count)
             .map_err(|_| ("/count", format!("{} elements; at most 2^32 - 1", accessor.count)))?
             as usize;
-        let base = match accessor.buffer_view {
+        let normalized = accessor.normalized;
+        Ok(Self { count, component, components, normalized, base: None, file: None, sparse: None })
+    }
+
+    fn check(document: &'a Document<'_>, accessor: &Accessor, kinds: &[&str]) -> std::result::Result<Self, Fault> {
+        let mut view = Self::typed(accessor, kinds)?;
+        let Self { count, component, components, .. } = view;
+        let size = components * component.size();
+        view.base = match accessor.buffer_view {
             Some(view) => {
                 let (bytes, stride) = document.view(view).map_err(|m| ("/bufferView", m))?;
                 let stride = stride.unwrap_or(size);
@@ -132,8 +172,7 @@ impl<'a> View<'a> {
                 None
             }
         };
-        let file = accessor.buffer_view.and_then(|view| document.view_file(view));
-        let mut view = Self { count, component, components, normalized: accessor.normalized, base, file, sparse: None };
+        view.file = accessor.buffer_view.and_then(|view| document.view_file(view));
         if let Some(sparse) = &accessor.sparse {
             if sparse.count > accessor.count {
                 return Err(("/sparse/count", format!("{} of only {} elements", sparse.count, accessor.count)));
@@ -242,6 +281,31 @@ impl<'a> View<'a> {
     }
 }
 
+/// What an accessor says of its elements.
+pub(super) struct Form {
+    pub(super) count: usize,
+    pub(super) components: usize,
+    component: Component,
+    normalized: bool,
+}
+
+/// What the accessor `index` says of its elements, without a look at them.
+pub(super) fn form(document: &Document<'_>, index: usize) -> Result<Form> {
+    View::told(document, index, |accessor| {
+        let View { count, components, component, normalized, .. } =
+            View::typed(accessor, &["SCALAR", "VEC2", "VEC3", "VEC4"])?;
+        Ok(Form { count, components, component, normalized })
+    })
+}
+
+impl Form {
+    /// What a component stands for that is stored as `value`.
+    pub(super) fn value(&self, value: f32) -> f32 {
+        let is_whole = !matches!(self.component, Component::U32 | Component::F32);
+        if self.normalized && is_whole { (value / self.component.full()).max(-1.0) } else { value }
+    }
+}
+
 /// The bytes of a view from `offset`, where `count` elements lie `stride` apart.
 fn range(
     bytes: &[u8],
@@ -250,7 +314,7 @@ fn range(
     stride: usize,
     size: usize,
     component: Component,
-) -> Result<&[u8], Fault> {
+) -> std::result::Result<&[u8], Fault> {
     if !offset.is_multiple_of(component.size() as u64) || !stride.is_multiple_of(component.size()) {
         let message =
             format!("offset {offset} or stride {stride} is no multiple of the component's {}", component.size());

@@ -1,182 +1,194 @@
-//! Meshes: each becomes a group, each of its primitives that has area a geometry.
-//!
-//! Primitives often share their vertices and index a part of them each; only the vertices that a primitive uses are
-//! read, so that sharing costs nothing.
+//! Meshes: each becomes a group, each of its primitives that has area a geometry; of those that are deformed, one group for each shape
+//! that they take.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
-use super::Document;
 use super::accessor::View;
+use super::attributes::Attributes;
+use super::deform::{Deformation, Deformer};
+use super::document::Document;
 use super::material::Materials;
+use super::pose::Pose;
 use super::schema::Primitive;
+use super::{draco, skin, triangles, variants};
 use crate::error::{Result, Warning};
-use crate::io::compact::{compact, pick};
-use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::io::compact::compact;
+use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Geometry, Group, Mesh, Scene};
 
-/// Makes a group of every mesh that has area. Gives the group of each of the document's meshes.
-pub(super) fn groups(
-    document: &Document<'_>,
-    materials: &mut Materials<'_>,
-    scene: &mut Scene,
-    warnings: &mut Vec<Warning>,
-) -> Result<Vec<Option<u32>>> {
-    let (mut flat, mut morphed) = (0, 0);
-    let mut groups = Vec::new();
-    for (m, mesh) in document.root.meshes.iter().enumerate() {
+/// A mesh in one of its shapes.
+#[derive(PartialEq, Eq, Hash)]
+struct Shape {
+    mesh: usize,
+    /// Weights of morph targets, as bits; none where no target counts.
+    weights: Vec<u32>,
+    skin: Option<usize>,
+}
+
+/// The groups of a document's meshes, made when a node first shows them.
+pub(super) struct Groups<'a> {
+    document: &'a Document<'a>,
+    materials: Materials<'a>,
+    /// Of the materials.
+    variant: Option<usize>,
+    known: HashMap<Shape, Option<u32>>,
+    /// By skin.
+    joints: HashMap<usize, Arc<Vec<DAffine3>>>,
+    /// Meshes whose parts without area are counted.
+    counted: Vec<bool>,
+    /// Points and lines.
+    flat: usize,
+    /// Primitives without texture coordinates that their material needs.
+    bare: usize,
+}
+
+impl<'a> Groups<'a> {
+    pub(super) fn new(document: &'a Document<'a>, variant: Option<usize>) -> Self {
+        Self {
+            document,
+            materials: Materials::new(document),
+            variant,
+            known: HashMap::new(),
+            joints: HashMap::new(),
+            counted: vec![false; document.root.meshes.len()],
+            flat: 0,
+            bare: 0,
+        }
+    }
+
+    /// The group of the mesh of the node `index`, as it is in `pose`; none where it has no area.
+    pub(super) fn get(&mut self, scene: &mut Scene, mesh: usize, index: usize, pose: &Pose) -> Result<Option<u32>> {
+        let document = self.document;
+        let pointer = format!("/nodes/{index}");
+        document.check_index(&format!("{pointer}/mesh"), mesh, document.root.meshes.len(), "mesh")?;
+        let node = &document.root.nodes[index];
+        let targets = document.root.meshes[mesh].primitives.iter().map(|p| p.targets.len()).max().unwrap_or(0);
+        let weights = pose.weights(index, node).unwrap_or(&document.root.meshes[mesh].weights);
+        let weights = if targets == 0 { &[] } else { weights };
+        if !weights.is_empty() && weights.len() != targets {
+            let message = format!("{} weights for {targets} morph targets", weights.len());
+            return Err(document.error(format!("{pointer}/weights"), message));
+        }
+        if !weights.iter().all(|weight| weight.is_finite()) {
+            return Err(document.error(format!("{pointer}/weights"), "a weight that is not finite"));
+        }
+        let weights = if weights.iter().all(|weight| *weight == 0.0) { &[] } else { weights };
+        let shape = Shape { mesh, weights: weights.iter().map(|weight| weight.to_bits()).collect(), skin: node.skin };
+        if let Some(known) = self.known.get(&shape) {
+            return Ok(*known);
+        }
+        let joints = node.skin.map(|skin| self.joints(skin, pose, &format!("{pointer}/skin"))).transpose()?;
+        let deformation = Deformation { weights, skin: joints.as_deref().map(Vec::as_slice) };
+        let group = self.make(scene, mesh, deformation)?;
+        self.known.insert(shape, group);
+        Ok(group)
+    }
+
+    fn joints(&mut self, skin: usize, pose: &Pose, pointer: &str) -> Result<Arc<Vec<DAffine3>>> {
+        Ok(match self.joints.entry(skin) {
+            Entry::Occupied(known) => known.get().clone(),
+            Entry::Vacant(free) => free.insert(Arc::new(skin::matrices(self.document, skin, pose, pointer)?)).clone(),
+        })
+    }
+
+    /// Makes a group of a mesh, if it has area.
+    fn make(&mut self, scene: &mut Scene, m: usize, deformation: Deformation<'_>) -> Result<Option<u32>> {
+        let document = self.document;
+        let mesh = &document.root.meshes[m];
         let begin = scene.geometries.len() as u32;
+        let counts = !std::mem::replace(&mut self.counted[m], true);
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let pointer = format!("/meshes/{m}/primitives/{p}");
-            morphed += usize::from(!primitive.targets.is_empty());
             let mode = primitive.mode.unwrap_or(4);
             match mode {
-                0..=3 => flat += 1,
+                0..=3 => self.flat += usize::from(counts),
                 4..=6 => {
-                    let mesh =
-                        Mesh { name: mesh.name.clone(), ..read(document, materials, primitive, mode, &pointer)? };
-                    scene.geometries.push(Geometry::Mesh(mesh));
+                    let read = self.read(primitive, mode, deformation, &pointer)?;
+                    scene.geometries.push(Geometry::Mesh(Mesh { name: mesh.name.clone(), ..read }));
                 }
                 _ => return Err(document.error(format!("{pointer}/mode"), format!("mode {mode} is none of 0 to 6"))),
             }
         }
         let geometries = begin..scene.geometries.len() as u32;
-        groups.push((!geometries.is_empty()).then_some(scene.groups.len() as u32));
-        if !geometries.is_empty() {
-            scene.groups.push(Group { name: mesh.name.clone(), geometries });
+        if geometries.is_empty() {
+            return Ok(None);
         }
+        scene.groups.push(Group { name: mesh.name.clone(), geometries });
+        Ok(Some(scene.groups.len() as u32 - 1))
     }
-    if flat > 0 {
-        let message = format!("{flat} primitives are points or lines, which have no area, and are left out");
-        warnings.push(document.warning("/meshes", message));
+
+    /// Hands materials and textures over to the scene.
+    pub(super) fn finish(self, scene: &mut Scene, warnings: &mut Vec<Warning>) {
+        let mut warn = |message| warnings.push(self.document.warning("/meshes", message));
+        if self.flat > 0 {
+            warn(format!("{} primitives are points or lines, which have no area, and are left out", self.flat));
+        }
+        if self.bare > 0 {
+            warn(format!(
+                "{} primitives lack texture coordinates that their materials want: (0, 0) all over",
+                self.bare
+            ));
+        }
+        self.materials.finish(scene, warnings);
     }
-    if morphed > 0 {
-        let message = format!("{morphed} primitives have morph targets; they are rendered without");
-        warnings.push(document.warning("/meshes", message));
-    }
-    Ok(groups)
-}
 
-/// Corners or vertices that are worth a task of their own.
-const TASK: usize = 1 << 14;
+    fn read(&mut self, primitive: &Primitive, mode: u32, deformation: Deformation<'_>, pointer: &str) -> Result<Mesh> {
+        let document = self.document;
+        let packed = draco::decode(document, primitive, pointer)?;
+        let (mut attributes, positions) = Attributes::new(document, primitive, packed.as_ref(), pointer)?;
+        let material = variants::material(document, primitive, self.variant, pointer)?;
+        let (material, sets) = self.materials.get(material, pointer)?;
+        let normals = attributes.find("NORMAL", &["VEC3"])?;
+        let colors = attributes.find("COLOR_0", &["VEC3", "VEC4"])?;
+        let mut triangles = match &packed {
+            Some(packed) => packed.triangles.clone(),
+            None => triangles::read(document, primitive, mode, positions.count, pointer)?,
+        };
+        let uv_names = [sets.0[0].or(Some(0)), sets.0[1]].map(|set| set.map(|set| format!("TEXCOORD_{set}")));
+        let uvs = uv_names.each_ref().map(|name| match name {
+            Some(name) => attributes.find(name, &["VEC2"]),
+            None => Ok(None),
+        });
+        let [uvs, second_uvs] = uvs;
+        let (uvs, second_uvs) = (uvs?, second_uvs?);
+        let lacks = |set: Option<u32>, view: &Option<View<'_>>| set.is_some() && view.is_none();
+        self.bare += usize::from(lacks(sets.0[0], &uvs) || lacks(sets.0[1], &second_uvs));
 
-fn read(
-    document: &Document<'_>,
-    materials: &mut Materials<'_>,
-    primitive: &Primitive,
-    mode: u32,
-    pointer: &str,
-) -> Result<Mesh> {
-    let view =
-        |index: usize, kinds: &[&str]| View::new(document, index, kinds).map_err(|(at, m)| document.error(at, m));
-    let attributes = format!("{pointer}/attributes");
-    let position = primitive.attributes.get("POSITION");
-    let position = *position.ok_or_else(|| document.error(&attributes, "POSITION is missing"))?;
-    let positions = view(position, &["VEC3"])?;
-    let (material, texture_set) = materials.get(primitive.material, pointer)?;
-    let attribute = |name: &str, kinds: &[&str]| match primitive.attributes.get(name) {
-        None => Ok(None),
-        Some(&index) => {
-            let view = view(index, kinds)?;
-            if view.count < positions.count {
-                let message = format!("{name} has {} elements for {} positions", view.count, positions.count);
-                return Err(document.error(format!("/accessors/{index}/count"), message));
-            }
-            Ok(Some(view))
+        attributes.used = compact(triangles.as_flattened_mut(), positions.count);
+        // Positions 12, normals 12, uvs 8 a set, colours 16, what deforms 48, and 12 a triangle.
+        let is_deformed = deformation.skin.is_some() || !deformation.weights.is_empty();
+        let vertex = 48 + if second_uvs.is_some() { 8 } else { 0 } + if is_deformed { 48 } else { 0 };
+        document.spend(pointer, attributes.count() as u64 * vertex + triangles.len() as u64 * 12)?;
+
+        // glTF's v points down, ours up.
+        let uv = |uv: [f32; 2]| Vec2::from(uv) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
+        let with_alpha = |v: &View<'_>| v.components() == 4;
+        let mut mesh = Mesh {
+            positions: Arc::default(),
+            normals: Vec::new(),
+            uvs: uvs.map_or(Vec::new(), |v| attributes.read(&v, uv)),
+            second_uvs: second_uvs.map_or(Vec::new(), |v| attributes.read(&v, uv)),
+            colors: colors.map_or(Vec::new(), |v| {
+                let alpha = if with_alpha(&v) { 0.0 } else { 1.0 };
+                attributes.read(&v, |color| Vec4::from(color) + Vec4::W * alpha)
+            }),
+            triangles: Arc::new(triangles),
+            material,
+            ..Mesh::default()
+        };
+        if is_deformed {
+            let deformer = Deformer::new(document, &attributes, primitive, deformation, pointer)?;
+            deformer.apply(&attributes, &positions, normals.as_ref(), &mut mesh);
+        } else {
+            let normal = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero().as_vec3();
+            mesh.positions = Arc::new(match &attributes.used {
+                None => positions.vectors(Vec3::from),
+                Some(_) => attributes.read(&positions, Vec3::from),
+            });
+            mesh.normals = normals.map_or(Vec::new(), |v| attributes.read(&v, normal));
         }
-    };
-    let normals = attribute("NORMAL", &["VEC3"])?;
-    let uvs = attribute(&format!("TEXCOORD_{}", texture_set.unwrap_or(0)), &["VEC2"])?;
-    let colors = attribute("COLOR_0", &["VEC3", "VEC4"])?;
-
-    let mut triangles: Vec<[u32; 3]> = match primitive.indices {
-        None => {
-            document.spend(pointer, positions.count as u64 * 4)?;
-            triangles(mode, &(0..positions.count as u32).collect::<Vec<_>>())
-        }
-        Some(index) => {
-            let indices = view(index, &["SCALAR"])?;
-            if !indices.is_index() {
-                let message = "indices have to be unsigned: component type 5121, 5123 or 5125";
-                return Err(document.error(format!("/accessors/{index}/componentType"), message));
-            }
-            document.spend(pointer, indices.count as u64 * 4)?;
-            let triangles = match mode {
-                4 => indices.triples(),
-                _ => triangles(mode, &(0..indices.count).map(|i| indices.index(i)).collect::<Vec<_>>()),
-            };
-            let is_past = |&i: &u32| i as usize >= positions.count;
-            let tasks = triangles.as_flattened().par_chunks(TASK);
-            if let Some(past) = tasks.find_map_first(|part| part.iter().copied().find(is_past)) {
-                // Looked for only now, since corners of strips and fans belong to several triangles.
-                let at = (0..indices.count).position(|i| is_past(&indices.index(i))).unwrap_or_default();
-                let message = format!("index {past} (element {at}) is past the {} vertices", positions.count);
-                return Err(document.error(format!("/accessors/{index}"), message));
-            }
-            triangles
-        }
-    };
-    let used = compact(triangles.as_flattened_mut(), positions.count);
-    // Positions 12, normals 12, uvs 8, colours 16, and 12 a triangle.
-    let count = used.as_ref().map_or(positions.count, Vec::len);
-    document.spend(pointer, count as u64 * 48 + triangles.len() as u64 * 12)?;
-    let normal = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero().as_vec3();
-    // glTF's v points down, ours up.
-    let uv = |uv: [f32; 2]| Vec2::from(uv) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
-    let color = |v: &View<'_>, color: [f32; 4]| {
-        if v.components() == 3 { Vec4::from(color).with_w(1.0) } else { Vec4::from(color) }
-    };
-    Ok(Mesh {
-        positions: Arc::new(match &used {
-            None => positions.vectors(Vec3::from),
-            Some(used) => pick(used, |i| Vec3::from(positions.floats::<3>(i))),
-        }),
-        normals: normals.map_or(Vec::new(), |v| match &used {
-            None => v.collect(count, normal),
-            Some(used) => pick(used, |i| normal(v.floats(i))),
-        }),
-        uvs: uvs.map_or(Vec::new(), |v| match &used {
-            None => v.collect(count, uv),
-            Some(used) => pick(used, |i| uv(v.floats(i))),
-        }),
-        colors: colors.map_or(Vec::new(), |v| match &used {
-            None => v.collect(count, |c| color(&v, c)),
-            Some(used) => pick(used, |i| color(&v, v.floats(i))),
-        }),
-        triangles: Arc::new(triangles),
-        material,
-        ..Mesh::default()
-    })
-}
-
-/// Triangles of a list (4), a strip (5) or a fan (6); corners that do not complete one are dropped, as they are by
-/// graphics hardware.
-fn triangles(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
-    match mode {
-        5 => {
-            // Every other triangle of a strip turns the other way.
-            let turned = |(k, w): (usize, &[u32])| [w[0], w[1 + k % 2], w[2 - k % 2]];
-            corners.windows(3).enumerate().map(turned).collect()
-        }
-        6 => match corners {
-            [first, rest @ ..] => rest.windows(2).map(|w| [w[0], w[1], *first]).collect(),
-            [] => Vec::new(),
-        },
-        _ => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn modes_make_triangles_as_specified() {
-        // Section 3.7.2.1: strips {i, i + (1 + i % 2), i + (2 - i % 2)}, fans {i + 1, i + 2, 0}.
-        assert_eq!(triangles(4, &[0, 1, 2, 3, 4]), [[0, 1, 2]]);
-        assert_eq!(triangles(5, &[0, 1, 2, 3, 4]), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
-        assert_eq!(triangles(6, &[9, 1, 2, 3]), [[1, 2, 9], [2, 3, 9]]);
-        assert!([4, 5, 6].iter().all(|&mode| triangles(mode, &[]).is_empty() && triangles(mode, &[1, 2]).is_empty()));
+        Ok(mesh)
     }
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result, Warning};
 use crate::io::Placeless;
 use crate::io::text::{Lines, Words, name, number, quoted};
 use crate::io::{system_message, texture};
-use crate::math::{Vec2, Vec3};
+use crate::math::{Affine2, Vec2, Vec3};
 use crate::memory::Mapped;
 use crate::scene::{Material, Texture, Wrap};
 
@@ -247,8 +247,9 @@ impl Textures {
             warnings.push(Warning::new(library, format!("line {}", map.line), message));
         }
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
+        let transform = Affine2::from_scale_angle_translation(map.scale, 0.0, map.offset);
         let index = texture.map(|texture| {
-            let placed = Texture { scale: map.scale, offset: map.offset, wrap_u: wrap, wrap_v: wrap, ..texture };
+            let placed = Texture { transform, wrap_u: wrap, wrap_v: wrap, ..texture };
             self.list.push(placed);
             self.list.len() as u32 - 1
         });

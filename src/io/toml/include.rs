@@ -77,7 +77,7 @@ impl Includes {
             return Ok(placed.clone());
         }
         let Include { up_axis, unit, normals, .. } = include;
-        let (mut file, odd) = load(&include.path, &LoadOptions { up_axis, unit, normals })?;
+        let (mut file, odd) = load(&include.path, &LoadOptions { up_axis, unit, normals, ..LoadOptions::default() })?;
         warnings.extend(odd);
         let too_many = |_| Error::input(&include.path, "", "more than 2^32 geometries, together with the scene's");
         let geometries = u32::try_from(scene.geometries.len() + file.geometries.len()).map_err(too_many)?;
@@ -88,13 +88,7 @@ impl Includes {
             let (Geometry::Mesh(crate::scene::Mesh { material, .. }) | Geometry::Shapes { material, .. }) = geometry;
             *material = include.material.unwrap_or(*material + materials);
         }
-        let slots = file
-            .materials
-            .iter_mut()
-            .flat_map(|m| [&mut m.diffuse_texture, &mut m.emission_texture, &mut m.normal_texture]);
-        for texture in slots.flatten() {
-            *texture += textures;
-        }
+        file.materials.iter_mut().for_each(|material| material.renumber_textures(|index| index + textures));
         for group in &mut file.groups {
             group.geometries = group.geometries.start + first..group.geometries.end + first;
         }

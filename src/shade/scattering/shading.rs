@@ -33,7 +33,7 @@ impl Shading {
     ) -> Self {
         let texel = |texture: Option<u32>| {
             let texture = texture.and_then(|i| textures.get(i as usize));
-            texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv).truncate())
+            texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv_of(t)).truncate())
         };
         let tint = texel(material.diffuse_texture) * point.color.truncate();
         let emission = match material.emission_texture {

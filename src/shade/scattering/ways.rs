@@ -120,6 +120,7 @@ mod tests {
             shading_normal,
             front,
             uv: Vec2::ZERO,
+            second_uv: Vec2::ZERO,
             color: Vec4::ONE,
             material: 0,
             time: 0.0,

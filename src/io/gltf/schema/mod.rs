@@ -3,8 +3,16 @@
 //! The `gltf` crate has all of it, but holds transforms in f32, which moves a model that a node places at 1e7, and
 //! insists on fields that the specification lets a file leave out.
 
+mod look;
+mod motion;
+
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 use serde_json::{Map, Value};
+
+pub(super) use look::{Camera, Image, Light, Lights, Material, MetallicRoughness, Sampler, Texture, TextureInfo};
+pub(super) use motion::{Animation, AnimationSampler, Skin};
 
 pub(super) type Extensions = Map<String, Value>;
 
@@ -41,6 +49,10 @@ pub(super) struct Root {
     pub(super) samplers: Vec<Sampler>,
     #[serde(default)]
     pub(super) cameras: Vec<Camera>,
+    #[serde(default)]
+    pub(super) animations: Vec<Animation>,
+    #[serde(default)]
+    pub(super) skins: Vec<Skin>,
 }
 
 #[derive(Deserialize)]
@@ -67,6 +79,8 @@ pub(super) struct Node {
     pub(super) mesh: Option<usize>,
     pub(super) camera: Option<usize>,
     pub(super) skin: Option<usize>,
+    /// Of morph targets.
+    pub(super) weights: Option<Vec<f32>>,
     #[serde(default)]
     pub(super) extensions: Extensions,
 }
@@ -76,16 +90,22 @@ pub(super) struct Mesh {
     #[serde(default)]
     pub(super) name: String,
     pub(super) primitives: Vec<Primitive>,
+    /// Of morph targets.
+    #[serde(default)]
+    pub(super) weights: Vec<f32>,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Primitive {
-    pub(super) attributes: std::collections::BTreeMap<String, usize>,
+    pub(super) attributes: BTreeMap<String, usize>,
     pub(super) indices: Option<usize>,
     pub(super) material: Option<usize>,
     pub(super) mode: Option<u32>,
+    /// Accessors of displacements, by attribute.
     #[serde(default)]
-    pub(super) targets: Vec<Value>,
+    pub(super) targets: Vec<BTreeMap<String, usize>>,
+    #[serde(default)]
+    pub(super) extensions: Extensions,
 }
 
 #[derive(Deserialize)]
@@ -128,6 +148,8 @@ pub(super) struct BufferView {
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
     pub(super) byte_stride: Option<u64>,
+    #[serde(default)]
+    pub(super) extensions: Extensions,
 }
 
 #[derive(Deserialize)]
@@ -135,135 +157,6 @@ pub(super) struct BufferView {
 pub(super) struct Buffer {
     pub(super) uri: Option<String>,
     pub(super) byte_length: u64,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Material {
-    #[serde(default)]
-    pub(super) name: String,
-    #[serde(default)]
-    pub(super) pbr_metallic_roughness: MetallicRoughness,
-    #[serde(default)]
-    pub(super) emissive_factor: [f32; 3],
-    pub(super) emissive_texture: Option<TextureInfo>,
-    pub(super) normal_texture: Option<TextureInfo>,
-    pub(super) alpha_mode: Option<String>,
-    pub(super) alpha_cutoff: Option<f32>,
     #[serde(default)]
     pub(super) extensions: Extensions,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-pub(super) struct MetallicRoughness {
-    pub(super) base_color_factor: [f32; 4],
-    pub(super) base_color_texture: Option<TextureInfo>,
-    pub(super) metallic_factor: f32,
-    pub(super) roughness_factor: f32,
-    pub(super) metallic_roughness_texture: Option<TextureInfo>,
-}
-
-impl Default for MetallicRoughness {
-    fn default() -> Self {
-        Self {
-            base_color_factor: [1.0; 4],
-            base_color_texture: None,
-            metallic_factor: 1.0,
-            roughness_factor: 1.0,
-            metallic_roughness_texture: None,
-        }
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct TextureInfo {
-    pub(super) index: usize,
-    #[serde(default)]
-    pub(super) tex_coord: u32,
-    /// Of a normal texture.
-    pub(super) scale: Option<f32>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Texture {
-    pub(super) sampler: Option<usize>,
-    pub(super) source: Option<usize>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Image {
-    #[serde(default)]
-    pub(super) name: String,
-    pub(super) uri: Option<String>,
-    pub(super) buffer_view: Option<usize>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Sampler {
-    pub(super) mag_filter: Option<u32>,
-    pub(super) wrap_s: Option<u32>,
-    pub(super) wrap_t: Option<u32>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Camera {
-    #[serde(default)]
-    pub(super) name: String,
-    pub(super) perspective: Option<Perspective>,
-    pub(super) orthographic: Option<Orthographic>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Orthographic {
-    /// Half the height of the view.
-    pub(super) ymag: f64,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Perspective {
-    pub(super) yfov: f64,
-}
-
-/// `KHR_lights_punctual` at the root.
-#[derive(Deserialize)]
-pub(super) struct Lights {
-    pub(super) lights: Vec<Light>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Light {
-    #[serde(rename = "type")]
-    pub(super) kind: String,
-    #[serde(default = "white")]
-    pub(super) color: [f32; 3],
-    #[serde(default = "one")]
-    pub(super) intensity: f32,
-    pub(super) range: Option<f64>,
-    #[serde(default)]
-    pub(super) spot: Spot,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-pub(super) struct Spot {
-    pub(super) inner_cone_angle: f32,
-    pub(super) outer_cone_angle: f32,
-}
-
-impl Default for Spot {
-    fn default() -> Self {
-        Self { inner_cone_angle: 0.0, outer_cone_angle: std::f32::consts::FRAC_PI_4 }
-    }
-}
-
-fn white() -> [f32; 3] {
-    [1.0; 3]
-}
-
-fn one() -> f32 {
-    1.0
 }
