@@ -6,9 +6,11 @@ use std::time::Instant;
 use clap::Args;
 
 use super::accel::AccelArgs;
+use super::aov::AovArgs;
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
+use super::checkpoint::{CheckpointArgs, Kept};
 use super::common::{SceneArgs, parse_vector};
 use super::engine::{BackendArg, Job, Outcome};
 use super::metadata::metadata;
@@ -17,7 +19,7 @@ use super::report::{EngineStats, Stats};
 use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
-use crate::image::{self, Image};
+use crate::image::{self, Image, Metadata};
 use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::memory::process;
@@ -36,6 +38,7 @@ Examples:
   twincast render city.glb --backend both --size 1920x1080 --spp 16 -o city.exr
   twincast render large.ply --cache ~/.cache/twincast -o large.png
   twincast render bunny.glb --accel kd-tree -o bunny.png
+  twincast render room.glb --integrator path --noise 0.01 --aov all --checkpoint 60s -o room.exr
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -52,6 +55,12 @@ pub(super) struct RenderArgs {
 
     #[command(flatten)]
     picture: PictureArgs,
+
+    #[command(flatten)]
+    aov: AovArgs,
+
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -131,10 +140,18 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         interrupt::check()?;
 
         let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
-        let settings = args.picture.settings(&scene.request, args.backend.best_width());
+        let mut settings = args.picture.settings(&scene.request, args.backend.best_width());
+        settings.aovs = args.aov.aovs();
         let (width, height) = (settings.width, settings.height);
         args.check_reference(reference.as_ref(), width, height)?;
+        if settings.adaptive.is_some() && args.backend == BackendArg::Both {
+            return Err(Error::Usage(
+                "--noise is for one engine, not for --backend both: each would choose its samples".into(),
+            ));
+        }
         let pictures = args.pictures(&scene.request)?;
+        args.aov.check(&pictures)?;
+        let kept = args.checkpoint.open(&pictures, args.backend)?;
         let aspect = f64::from(width) / f64::from(height);
         let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
         if args.print_camera {
@@ -169,13 +186,21 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
             accel: &accel,
             cache: cache.as_ref(),
+            kept: kept.as_ref(),
         };
         let outcome = job.run(args.backend)?;
-        let picture = &outcome.passes[0];
+        let pass = &outcome.passes[0];
+        let picture = &pass.picture;
+        let mean_spp = picture.samples as f64 / pixels as f64;
 
         let start = Instant::now();
-        let metadata = metadata(&camera, &settings, picture.render_seconds);
-        outputs::write_pictures(&pictures, &picture.image, &metadata)?;
+        let metadata = Metadata {
+            samples_per_pixel: Some(mean_spp.round() as u32),
+            texts: picture.texts.clone(),
+            ..metadata(&camera, &settings, pass.render_seconds)
+        };
+        outputs::write_pictures(&pictures, &picture.image, &picture.channels, &metadata)?;
+        kept.as_ref().map_or(Ok(()), Kept::remove)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
         let stats = Stats {
@@ -183,17 +208,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             triangles: placed_triangles(&scene),
             size: [width, height],
             spp: settings.spp,
+            mean_spp,
             threads: rayon::current_num_threads(),
             packet: settings.batch.width.rays(),
             load_seconds,
             prepare_seconds,
             write_seconds,
             peak_memory: process::peak(),
-            engines: outcome
-                .passes
-                .iter()
-                .map(|pass| EngineStats::new(pass, stored, pixels * u64::from(settings.spp)))
-                .collect(),
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
         };
         if let Some(path) = &args.stats {
             outputs::write_json(path, &stats)?;
@@ -250,7 +272,7 @@ impl RenderArgs {
         let mut checks = Vec::new();
         checks.extend(outcome.verdict.clone());
         if let (Some(reference), Some(path)) = (reference, &self.reference) {
-            let rmse = outcome.passes[0].image.difference(reference)?.rmse;
+            let rmse = outcome.passes[0].picture.image.difference(reference)?.rmse;
             let (path, limit) = (path.display(), self.threshold);
             let above = if rmse <= limit { "within" } else { "above" };
             checks.push((format!("{path}: root mean square difference {rmse:.3e}, {above} {limit}"), rmse <= limit));

@@ -19,6 +19,9 @@ pub struct Metadata {
     pub samples_per_pixel: Option<u32>,
     /// Wall clock time of the render (`renderTimeSeconds`).
     pub render_time_seconds: Option<f64>,
+    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`); in the order of the names when
+    /// read. OpenEXR alone.
+    pub texts: Vec<(String, String)>,
 }
 
 impl Default for Metadata {
@@ -31,8 +34,14 @@ impl Default for Metadata {
             fovcot: None,
             samples_per_pixel: None,
             render_time_seconds: None,
+            texts: Vec::new(),
         }
     }
+}
+
+/// Whether an attribute of a file is one of [`Metadata::texts`].
+pub(super) fn is_text(name: &str) -> bool {
+    name.contains('/')
 }
 
 /// Files hold f32.

@@ -3,8 +3,9 @@
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
 //! (OpenEXR, Radiance), 8-bit sRGB everywhere else, TIFF included. `samples.rs` turns pixels into a file's samples, and a
 //! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
-//! same pixels.
+//! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`).
 
+mod channels;
 mod compare;
 mod file;
 mod metadata;
@@ -14,11 +15,16 @@ mod oiio;
 mod parity;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure;
+#[cfg(any(test, not(feature = "oiio")))]
+mod pure_channels;
 mod samples;
 pub mod srgb;
 
+pub use channels::{Channel, Channels, Plane};
 pub use compare::Difference;
-pub use file::{Depth, WriteOptions, check_writable, read, read_metadata, write};
+pub use file::{
+    Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
+};
 pub use metadata::Metadata;
 
 use crate::math::Vec4;

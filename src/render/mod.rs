@@ -3,12 +3,18 @@
 //! A picture depends on scene, camera, size, samples and seed. Threads, tiles and their order, and how rays are bundled
 //! change when a pixel is computed, never what.
 
+mod adaptive;
 mod alpha;
+mod aov;
 mod camera;
+mod canvas;
+mod checkpoint;
 mod counted;
 mod film;
 mod filter;
+mod identity;
 mod path;
+mod rounds;
 pub(crate) mod sampler;
 mod tiles;
 mod wavefront;
@@ -18,10 +24,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
+pub use adaptive::Adaptive;
+pub use aov::{Aov, Expression};
+pub use checkpoint::Checkpoint;
 pub use counted::Counted;
 pub use filter::Filter;
+pub use rounds::Picture;
 pub use sampler::Sampling;
-pub use tiles::TileOrder;
+pub use tiles::{LARGEST_TILE, TileOrder};
 
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -32,11 +42,12 @@ use crate::scene::{Camera, Integrator, Material, Scene};
 use crate::shade::EnvironmentLight;
 use crate::shade::lights::Lights;
 use crate::trace::{Batch, Tracer, World};
+use aov::Request;
 use camera::View;
 use film::Film;
 use filter::FilterSampler;
 use sampler::{Dimension, Pattern, Sampler};
-use tiles::{Tile, tiles};
+use tiles::{Tile, USUAL_TILE, tiles};
 use wavefront::Buffers;
 
 /// Most pixels a picture may have along one side.
@@ -49,7 +60,7 @@ pub struct Settings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples a pixel; 1 is the pixel's centre.
+    /// Samples a pixel; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
@@ -61,6 +72,8 @@ pub struct Settings {
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
     pub tile_order: TileOrder,
+    /// Edge of a tile in pixels, a power of two from 4 to [`LARGEST_TILE`]; never changes a native picture.
+    pub tile: u32,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
     /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
@@ -70,6 +83,10 @@ pub struct Settings {
     /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
     /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
     pub max_depth: Option<u32>,
+    /// What [`Renderer::picture`] tells of each pixel beside its colour.
+    pub aovs: Vec<Aov>,
+    /// Takes samples where they are needed; none takes as many for each pixel.
+    pub adaptive: Option<Adaptive>,
 }
 
 impl Default for Settings {
@@ -84,10 +101,13 @@ impl Default for Settings {
             filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
+            tile: USUAL_TILE,
             background: None,
             light_samples: 1,
             integrator: None,
             max_depth: None,
+            aovs: Vec::new(),
+            adaptive: None,
         }
     }
 }
@@ -106,6 +126,7 @@ pub struct Renderer<'a> {
     scene: &'a Scene,
     world: &'a World,
     settings: Settings,
+    camera: Camera,
     plan: Plan,
     view: View,
     /// When it opens and when it closes.
@@ -121,6 +142,8 @@ pub struct Renderer<'a> {
     ambient: Vec3,
     /// What a geometry is made of whose material does not exist.
     fallback: Material,
+    /// What is told of each pixel beside its colour; none where nothing is asked for.
+    request: Option<Request>,
 }
 
 impl<'a> Renderer<'a> {
@@ -140,6 +163,22 @@ impl<'a> Renderer<'a> {
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }
+        if !settings.tile.is_power_of_two() || settings.tile < 4 || settings.tile > LARGEST_TILE {
+            let message = format!("tiles of {0}x{0} pixels: 4, 8, 16, 32 or {LARGEST_TILE} is possible", settings.tile);
+            return Err(Error::Usage(message));
+        }
+        if let Some(adaptive) = &settings.adaptive {
+            adaptive.check(spp)?;
+            if matches!(sampling, Sampling::Stratified | Sampling::Grid) {
+                let why = "must know the number of samples beforehand";
+                return Err(Error::Usage(format!(
+                    "the sampler \"{sampling}\" {why}: with a noise threshold take sobol"
+                )));
+            }
+        }
+        let request = Request::new(&settings.aovs, scene)?;
+        // Of what samples are spread over.
+        let most = settings.adaptive.map_or(spp, |adaptive| adaptive.max_spp);
         let view = View::new(&camera, world.centre, width, height)?;
         let [open, close] = camera.shutter;
         if !(0.0 <= open && open <= close && close <= 1.0) {
@@ -161,18 +200,20 @@ impl<'a> Renderer<'a> {
             world,
             view,
             shutter: camera.shutter,
-            sampler: Sampler::new(sampling, spp, seed),
-            light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
+            camera,
+            sampler: Sampler::new(sampling, most, seed),
+            light_sampler: Sampler::new(sampling, most.saturating_mul(settings.light_samples), seed),
             // A single sample is the pixel's middle, whatever the filter.
-            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
+            filter: FilterSampler::new(if most == 1 { Filter::Box } else { filter }),
             lights: Lights::default(),
             environment: environment.map(Arc::new),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
+            request,
             plan,
             settings,
         };
-        renderer.lights = renderer.plan_lights(camera.eye - world.centre);
+        renderer.lights = renderer.plan_lights(renderer.camera.eye - world.centre);
         Ok(renderer)
     }
 
@@ -186,12 +227,15 @@ impl<'a> Renderer<'a> {
         &self.plan
     }
 
-    /// Renders the whole picture on rayon's current thread pool.
+    /// Renders the colours of the whole picture on rayon's current thread pool; [`Renderer::picture`] gives what else is asked for.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
     /// [`Error::Usage`] for a picture that does not fit into memory.
     pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
+        if self.settings.adaptive.is_some() {
+            return Ok(self.rounds(tracer, control, None)?.0.image());
+        }
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let film = Film::new(self.settings.width, self.settings.height)?;
         self.each_tile(|tile, buffers| {
@@ -220,7 +264,7 @@ impl<'a> Renderer<'a> {
 
     /// Calls `work` with each tile, on all threads of rayon's current pool, until it breaks off.
     fn each_tile(&self, work: impl Fn(&Tile, &mut Buffers) -> ControlFlow<()> + Sync) {
-        let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile_order);
+        let tiles = tiles(self.settings.width, self.settings.height, self.settings.tile, self.settings.tile_order);
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
         rayon::broadcast(|_| {
@@ -233,7 +277,7 @@ impl<'a> Renderer<'a> {
         });
     }
 
-    /// One pixel, the same to the bit as in the whole picture. A tracer that records what it is asked learns every ray
+    /// One pixel, the same to the bit as in the whole picture; of a picture with [`Settings::adaptive`], with its fewest samples. A tracer that records what it is asked learns every ray
     /// that the pixel depends on.
     ///
     /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the

@@ -36,12 +36,12 @@ fn busy_scene(place: DVec3) -> Scene {
     scene
 }
 
-fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
+pub(super) fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
 /// The busy scene with all that paths know beside: glass that absorbs, gloss, what glows, light from all around.
-fn busier_scene() -> Scene {
+pub(super) fn busier_scene() -> Scene {
     let mut scene = busy_scene(DVec3::ZERO);
     let absorption = Some(twincast::scene::Absorption { color: Vec3::new(0.5, 0.9, 0.7), distance: 0.5 });
     scene.materials[0] = Material { absorption, ..Material::glass(1.5) };
