@@ -38,6 +38,7 @@ OIIO::TypeDesc type_of(Kind kind)
     switch (kind) {
     case Kind::U8: return OIIO::TypeDesc::UINT8;
     case Kind::U16: return OIIO::TypeDesc::UINT16;
+    case Kind::U32: return OIIO::TypeDesc::UINT32;
     case Kind::Half: return OIIO::TypeDesc::HALF;
     case Kind::Float: return OIIO::TypeDesc::FLOAT;
     }
@@ -47,7 +48,10 @@ OIIO::TypeDesc type_of(Kind kind)
 // OpenImageIO gets an address and no length: this is where the length is made sure of.
 void check_length(const Layout& layout, size_t bytes)
 {
-    size_t expected = size_t(layout.width) * layout.height * layout.channels * type_of(layout.kind).size();
+    size_t pixel = layout.channels * type_of(layout.kind).size();
+    for (auto& channel : layout.beside)
+        pixel += type_of(channel.kind).size();
+    size_t expected = size_t(layout.width) * layout.height * pixel;
     if (bytes != expected)
         throw std::logic_error("the samples are not as many as the layout says");
 }
@@ -99,6 +103,13 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
     spec.alpha_channel = layout.alpha ? int(layout.channels) - 1 : -1;
     if (layout.straight)
         spec.attribute("oiio:UnassociatedAlpha", 1);
+    for (auto& channel : layout.beside) {
+        spec.channelnames.push_back(std::string(channel.name));
+        spec.channelformats.push_back(type_of(channel.kind));
+        ++spec.nchannels;
+    }
+    if (!layout.beside.empty())
+        spec.channelformats.insert(spec.channelformats.begin(), layout.channels, type);
     const bool integers = layout.kind == Kind::U8 || layout.kind == Kind::U16;
     spec.attribute("oiio:ColorSpace", integers ? "sRGB" : "Linear");
     if (layout.tile) {
@@ -122,6 +133,8 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
         spec.attribute("samplesPerPixel", value);
     for (float value : attributes.render_time_seconds)
         spec.attribute("renderTimeSeconds", value);
+    for (auto& text : attributes.texts)
+        spec.attribute(std::string(text.name), std::string(text.value));
 
     const std::string name = text(path);
     auto file              = writer(name);
@@ -140,7 +153,9 @@ void write(Bytes path, const Layout& layout, const Attributes& attributes, Bytes
     const bool in_memory = to_memory.count(file->format_name()) && file->set_ioproxy(&memory);
     if (!file->open(name, spec))
         fail(file, "cannot be opened for writing");
-    if (!file->write_image(type, samples.data()))
+    // Where channels are of several types: each as it is.
+    const OIIO::TypeDesc given = layout.beside.empty() ? type : OIIO::TypeDesc(OIIO::TypeDesc::UNKNOWN);
+    if (!file->write_image(given, samples.data()))
         fail(file, "cannot be written");
     // Compressed formats write their last bytes here: a full disk may show only now.
     if (!file->close())
@@ -182,9 +197,11 @@ Layout Input::layout() const
     layout.alpha     = spec.nchannels > colour && spec.alpha_channel == colour;
     layout.channels  = uint32_t(colour + layout.alpha);
     layout.straight  = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
-    layout.kind      = spec.format == OIIO::TypeDesc::UINT8       ? Kind::U8
-                       : spec.format.is_floating_point()          ? Kind::Float
-                                                                  : Kind::U16;
+    // Of the colours: channels may be of several types.
+    const OIIO::TypeDesc format = spec.channelformat(0);
+    layout.kind                 = format == OIIO::TypeDesc::UINT8  ? Kind::U8
+                                  : format.is_floating_point()     ? Kind::Float
+                                                                   : Kind::U16;
     return layout;
 }
 
@@ -214,6 +231,11 @@ Attributes Input::attributes() const
     if (!whole && spec.full_x == 0 && spec.full_y == 0)
         for (int number : { spec.x, spec.y, spec.full_width, spec.full_height })
             found.window.push_back(number);
+    for (auto& attribute : spec.extra_attribs)
+        if (attribute.type() == OIIO::TypeString) {
+            const std::string value = attribute.get_string();
+            found.texts.push_back({ rust::String::lossy(attribute.name().string()), rust::String::lossy(value) });
+        }
     return found;
 }
 
@@ -222,6 +244,31 @@ void Input::read(rust::Slice<uint8_t> samples) const
     const Layout expected = layout();
     check_length(expected, samples.size());
     if (!file->read_image(0, 0, 0, int(expected.channels), type_of(expected.kind), samples.data()))
+        fail(file, "cannot be read");
+}
+
+rust::Vec<Named> Input::channels() const
+{
+    const OIIO::ImageSpec& spec = file->spec();
+    rust::Vec<Named> result;
+    for (int i = 0; i < spec.nchannels; ++i) {
+        const OIIO::TypeDesc format = spec.channelformat(i);
+        if (format != OIIO::TypeDesc::HALF && format != OIIO::TypeDesc::FLOAT && format != OIIO::TypeDesc::UINT32)
+            throw std::runtime_error("not an OpenEXR file");
+        const Kind kind = format == OIIO::TypeDesc::HALF    ? Kind::Half
+                          : format == OIIO::TypeDesc::FLOAT ? Kind::Float
+                                                            : Kind::U32;
+        result.push_back({ rust::String::lossy(spec.channel_name(i)), kind });
+    }
+    return result;
+}
+
+void Input::read_all(rust::Slice<uint8_t> samples) const
+{
+    const OIIO::ImageSpec& spec = file->spec();
+    if (samples.size() != size_t(spec.image_pixels()) * spec.pixel_bytes(true))
+        throw std::logic_error("the samples are not as many as the file's");
+    if (!file->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::UNKNOWN, samples.data()))
         fail(file, "cannot be read");
 }
 

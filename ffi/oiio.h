@@ -13,6 +13,7 @@ namespace twincast::oiio {
 
 struct Layout;
 struct Attributes;
+struct Named;
 using Bytes = rust::Slice<const uint8_t>;
 
 rust::Vec<rust::String> suffixes();
@@ -24,6 +25,8 @@ public:
     Layout layout() const;
     Attributes attributes() const;
     void read(rust::Slice<uint8_t> samples) const;
+    rust::Vec<Named> channels() const;
+    void read_all(rust::Slice<uint8_t> samples) const;
 
 private:
     std::unique_ptr<OIIO::ImageInput> file;

@@ -19,5 +19,6 @@ mod parity;
 mod queries;
 mod references;
 mod render;
+mod resume;
 mod scenes;
 mod shapes;

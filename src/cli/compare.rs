@@ -167,7 +167,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
 
     let (a, b) = (&comparison.native_image, &comparison.embree_image);
     if !diff.is_empty() {
-        outputs::write_pictures(diff, &a.difference_image(b)?, &Metadata::default(), &WriteOptions::default())?;
+        outputs::write_pictures(diff, &a.difference_image(b)?, &[], &Metadata::default(), &WriteOptions::default())?;
     }
     let report = &comparison.report;
     args.print(report)?;

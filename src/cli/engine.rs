@@ -6,11 +6,11 @@ use std::time::Instant;
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 
+use super::checkpoint::Kept;
 use super::display::Display;
 use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
-use crate::image::Image;
-use crate::render::{Control, Counted, Finished, Renderer};
+use crate::render::{Control, Counted, Finished, Picture, Renderer};
 use crate::trace::accel::{Accel, Built, Options as AccelOptions};
 use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
 use crate::trace::{Tracer, Width, World};
@@ -51,7 +51,7 @@ impl BackendArg {
 pub(super) struct Pass {
     /// The engine, with its version where it has one.
     pub(super) engine: String,
-    pub(super) image: Image,
+    pub(super) picture: Picture,
     pub(super) build_seconds: f64,
     pub(super) render_seconds: f64,
     /// Bytes the engine uses for the scene.
@@ -79,6 +79,8 @@ pub(super) struct Job<'a> {
     pub(super) cache: Option<&'a Cache>,
     /// Where the picture is shown while it is made.
     pub(super) display: Option<&'a Display>,
+    /// Whether what is done is kept.
+    pub(super) kept: Option<&'a Kept>,
 }
 
 /// What came of it.
@@ -148,8 +150,13 @@ impl Job<'_> {
     #[cfg(feature = "embree")]
     fn both(&self, (native, native_pass): (impl Tracer, Pass)) -> Result<Outcome> {
         let (embree, embree_pass) = self.embree()?;
-        let report =
-            crate::lab::explain_pixels(self.renderer, &native, &embree, &native_pass.image, &embree_pass.image);
+        let report = crate::lab::explain_pixels(
+            self.renderer,
+            &native,
+            &embree,
+            &native_pass.picture.image,
+            &embree_pass.picture.image,
+        );
         let words = match report.differing {
             0 => format!("all {} pixels of native and embree are equal", report.pixels),
             differing => format!(
@@ -187,17 +194,18 @@ impl Job<'_> {
             move |finished: Finished| display.show(&finished)
         });
         let on_pixels = show.as_ref().map(|show| show as &(dyn Fn(Finished) + Sync));
+        let checkpoint = self.kept.map(|kept| kept.by(&engine));
         let control = Control { cancel: Some(self.cancel), on_tile: Some(&on_tile), on_pixels };
-        let image = self.renderer.render(&counted, control);
+        let picture = self.renderer.picture(&counted, control, checkpoint.as_ref());
         let render_seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
 
         let (closest_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
         let bytes = bytes(&tracer);
-        let image = image?;
+        let picture = picture?;
         let (cache, notes) = (None, Vec::new());
         let pass =
-            Pass { engine, image, build_seconds, render_seconds, bytes, closest_rays, shadow_rays, cache, notes };
+            Pass { engine, picture, build_seconds, render_seconds, bytes, closest_rays, shadow_rays, cache, notes };
         Ok((tracer, pass))
     }
 }

@@ -4,10 +4,12 @@
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
 
 mod accel;
+mod aov;
 mod bench;
 mod build;
 mod cache;
 mod camera;
+mod checkpoint;
 mod common;
 mod compare;
 mod completions;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::image::{self, Image, Metadata, WriteOptions};
+use crate::image::{self, Channel, Image, Metadata, WriteOptions};
 use crate::output;
 
 /// Whether every picture and the other files can be written, before anything is done for them; and whether none of them
@@ -37,14 +37,18 @@ pub(super) fn check<'a>(
     others.into_iter().try_for_each(|path| output::check_writable(path))
 }
 
-/// Writes one picture to each path, in the format its suffix says.
+/// Writes one picture to each path, in the format its suffix says, with the channels where that holds any.
 pub(super) fn write_pictures(
     paths: &[PathBuf],
     picture: &Image,
+    channels: &[Channel],
     metadata: &Metadata,
     options: &WriteOptions,
 ) -> Result<()> {
-    paths.iter().try_for_each(|path| image::write(path, picture, metadata, options))
+    paths.iter().try_for_each(|path| {
+        let channels = if image::holds_channels(path) { channels } else { &[] };
+        image::write_channels(path, picture, channels, metadata, options)
+    })
 }
 
 /// Writes a JSON document.

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::common::{Size, by_name, parse_vector};
 use crate::math::Vec3;
-use crate::render::{Crop, Filter, Sampling, Settings, TileOrder};
+use crate::render::{Adaptive, Crop, Filter, Sampling, Settings, TileOrder};
 use crate::scene::{Integrator, Request};
 use crate::trace::{Batch, Width};
 
@@ -22,6 +22,15 @@ pub(super) struct PictureArgs {
     /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: Option<u32>,
+
+    /// Take samples where they are needed: until the standard error of a pixel is below this, as a screen shows it, 1 being
+    /// white (0.01 is about 2 of 255); no pixel has fewer than --spp and 16, nor more than --max-spp
+    #[arg(long, value_name = "X", value_parser = parse_noise)]
+    noise: Option<f32>,
+
+    /// The most samples of a pixel, with --noise
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    max_spp: u32,
 
     /// How far light is followed: ray-cast, whitted (mirrors and glass), path (all light), or auto, the cheapest that
     /// shows everything (default: the scene's, else auto)
@@ -55,6 +64,10 @@ pub(super) struct PictureArgs {
     /// Order of the tiles; never changes a picture
     #[arg(long, value_enum, default_value_t)]
     tile_order: Order,
+
+    /// Edge of the tiles that threads take, pixels: 4, 8, 16, 32 or 64; never changes a native picture
+    #[arg(long, value_name = "N", default_value_t = Settings::default().tile)]
+    tile_size: u32,
 
     /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
     #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
@@ -113,8 +126,11 @@ impl PictureArgs {
                 Order::Hilbert => TileOrder::Hilbert,
                 Order::Spiral => TileOrder::Spiral,
             },
+            tile: self.tile_size,
             background: self.background,
             crop: self.crop,
+            aovs: Vec::new(),
+            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp }),
         }
     }
 }
@@ -140,6 +156,11 @@ fn parse_crop(text: &str) -> std::result::Result<Crop, String> {
         Some(Crop { x: x.trim().parse().ok()?, y: y.trim().parse().ok()?, width, height })
     };
     crop().ok_or_else(|| "expected X,Y,WIDTHxHEIGHT, as in 600,300,200x100".to_owned())
+}
+
+fn parse_noise(text: &str) -> std::result::Result<f32, String> {
+    let noise = text.parse().ok().filter(|noise: &f32| *noise > 0.0 && noise.is_finite());
+    noise.ok_or_else(|| "expected a number above 0, as in 0.01".to_owned())
 }
 
 fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {

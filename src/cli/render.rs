@@ -6,9 +6,11 @@ use std::time::Instant;
 use clap::Args;
 
 use super::accel::AccelArgs;
+use super::aov::AovArgs;
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
+use super::checkpoint::{CheckpointArgs, Kept};
 use super::common::{SceneArgs, parse_vector};
 use super::display::{Display, parse_address};
 use super::engine::{BackendArg, Job, Outcome};
@@ -21,7 +23,7 @@ use super::response::ResponseArgs;
 use super::summary::Rendered;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
-use crate::image::{self, Image, WriteOptions};
+use crate::image::{self, Image, Metadata, WriteOptions};
 use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::memory::process;
@@ -42,7 +44,8 @@ Examples:
   twincast render bunny.glb --accel kd-tree -o bunny.png
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json
   twincast render fox.glb --animation Walk --time 0.5 --shutter 0,0.5 -o fox.png
-  twincast render fox.glb --animation Walk --frames 0-23 --skip-existing -o walk.%04d.png")]
+  twincast render fox.glb --animation Walk --frames 0-23 --skip-existing -o walk.%04d.png
+  twincast render room.glb --integrator path --noise 0.01 --aov all --checkpoint 60s -o room.exr")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneArgs,
@@ -61,6 +64,12 @@ pub(super) struct RenderArgs {
 
     #[command(flatten)]
     picture: PictureArgs,
+
+    #[command(flatten)]
+    aov: AovArgs,
+
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -161,10 +170,18 @@ fn render(args: &RenderArgs) -> Result<()> {
         interrupt::check()?;
 
         let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
-        let settings = args.picture.settings(&scene.request, args.backend.best_width());
+        let mut settings = args.picture.settings(&scene.request, args.backend.best_width());
+        settings.aovs = args.aov.aovs();
         let (width, height) = settings.crop.map_or((settings.width, settings.height), |crop| (crop.width, crop.height));
         args.check_reference(reference.as_ref(), width, height)?;
+        if settings.adaptive.is_some() && args.backend == BackendArg::Both {
+            return Err(Error::Usage(
+                "--noise is for one engine, not for --backend both: each would choose its samples".into(),
+            ));
+        }
         let pictures = args.pictures(&scene.request)?;
+        args.aov.check(&pictures)?;
+        let kept = args.checkpoint.open(&pictures, args.backend)?;
         let aspect = f64::from(settings.width) / f64::from(settings.height);
         let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
         if args.print_camera {
@@ -203,16 +220,24 @@ fn render(args: &RenderArgs) -> Result<()> {
             accel: &accel,
             cache: cache.as_ref(),
             display: display.as_ref(),
+            kept: kept.as_ref(),
         };
         let outcome = job.run(args.backend);
         warn(display.and_then(Display::finish).as_slice());
         let outcome = outcome?;
-        let picture = &outcome.passes[0];
+        let pass = &outcome.passes[0];
+        let picture = &pass.picture;
+        let mean_spp = picture.samples as f64 / pixels as f64;
 
         let start = Instant::now();
-        let metadata = metadata(&camera, &settings, picture.render_seconds);
+        let metadata = Metadata {
+            samples_per_pixel: Some(mean_spp.round() as u32),
+            texts: picture.texts.clone(),
+            ..metadata(&camera, &settings, pass.render_seconds)
+        };
         let options = WriteOptions { response: args.response.choose(&scene.request), ..WriteOptions::default() };
-        outputs::write_pictures(&pictures, &picture.image, &metadata, &options)?;
+        outputs::write_pictures(&pictures, &picture.image, &picture.channels, &metadata, &options)?;
+        kept.as_ref().map_or(Ok(()), Kept::remove)?;
         let write_seconds = start.elapsed().as_secs_f64();
 
         let stats = Stats {
@@ -220,17 +245,14 @@ fn render(args: &RenderArgs) -> Result<()> {
             triangles: placed_triangles(&scene),
             size: [width, height],
             spp: settings.spp,
+            mean_spp,
             threads: rayon::current_num_threads(),
             packet: settings.batch.width.rays(),
             load_seconds,
             prepare_seconds,
             write_seconds,
             peak_memory: process::peak(),
-            engines: outcome
-                .passes
-                .iter()
-                .map(|pass| EngineStats::new(pass, stored, pixels * u64::from(settings.spp)))
-                .collect(),
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
         };
         if let Some(path) = &args.stats {
             outputs::write_json(path, &stats)?;
@@ -287,7 +309,7 @@ impl RenderArgs {
         let mut checks = Vec::new();
         checks.extend(outcome.verdict.clone());
         if let (Some(reference), Some(path)) = (reference, &self.reference) {
-            let rmse = outcome.passes[0].image.difference(reference)?.rmse;
+            let rmse = outcome.passes[0].picture.image.difference(reference)?.rmse;
             let (path, limit) = (path.display(), self.threshold);
             let above = if rmse <= limit { "within" } else { "above" };
             checks.push((format!("{path}: root mean square difference {rmse:.3e}, {above} {limit}"), rmse <= limit));

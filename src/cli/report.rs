@@ -14,6 +14,8 @@ pub(super) struct Stats {
     pub(super) triangles: u64,
     pub(super) size: [u32; 2],
     pub(super) spp: u32,
+    /// Samples a pixel on average; fewer or more than `spp` with a noise threshold.
+    pub(super) mean_spp: f64,
     pub(super) threads: usize,
     pub(super) packet: usize,
     pub(super) load_seconds: f64,
@@ -54,9 +56,11 @@ pub(super) struct Rays {
 }
 
 impl EngineStats {
-    /// `stored` triangles were built, and `camera` rays began at the camera.
-    pub(super) fn new(pass: &Pass, stored: u64, camera: u64) -> Self {
-        let rays = Rays { camera, sent_on: pass.closest_rays - camera, shadow: pass.shadow_rays };
+    /// `stored` triangles were built.
+    pub(super) fn new(pass: &Pass, stored: u64) -> Self {
+        let camera = pass.picture.camera_rays;
+        let sent_on = pass.closest_rays.saturating_sub(camera);
+        let rays = Rays { camera, sent_on, shadow: pass.shadow_rays };
         Self {
             backend: pass.engine.clone(),
             build_seconds: pass.build_seconds,

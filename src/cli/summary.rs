@@ -32,7 +32,10 @@ impl Rendered<'_> {
         }
         summary.line("camera", self.camera);
         let [width, height] = self.stats.size;
-        let samples = counted(u64::from(self.stats.spp), "sample", "samples");
+        let samples = match self.stats.mean_spp {
+            mean if mean == f64::from(self.stats.spp) => counted(u64::from(self.stats.spp), "sample", "samples"),
+            mean => format!("on average {mean:.1} samples"),
+        };
         let threads = counted(self.stats.threads as u64, "thread", "threads");
         summary.line("picture", format_args!("{width}x{height}, {samples} a pixel, {threads}"));
         if verbose {

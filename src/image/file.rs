@@ -8,7 +8,7 @@ use super::oiio as backend;
 use super::pure as backend;
 use super::response::Response;
 use super::samples::{self, Type};
-use super::{Image, Metadata};
+use super::{Channel, Channels, Image, Metadata, channels};
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -80,6 +80,21 @@ const PIXELS_PER_BYTE: u64 = 1 << 14;
 /// [`Error::Output`] for a suffix that this build does not write, and for whatever goes wrong with the file;
 /// [`Error::Usage`] for an image without pixels or with too few, and for tiles of size 0.
 pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<()> {
+    write_channels(path, image, &[], metadata, options)
+}
+
+/// As [`write`], with further channels beside the colours, which keep all their bits.
+///
+/// # Errors
+/// Those of [`write`]; [`Error::Output`] where there are channels and the format is not OpenEXR, and [`Error::Usage`] where they do
+/// not go with the image, or with each other.
+pub fn write_channels(
+    path: &Path,
+    image: &Image,
+    channels: &[Channel],
+    metadata: &Metadata,
+    options: &WriteOptions,
+) -> Result<()> {
     let suffix = writable_suffix(path)?;
     let (width, height) = (image.width, image.height);
     if width == 0 || height == 0 || image.pixels.len() as u64 != u64::from(width) * u64::from(height) {
@@ -93,8 +108,19 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
         let message = format!("{width} x {height} pixels are too many for JPEG, which ends at {LONGEST_JPEG}");
         return Err(Error::output(path, message));
     }
+    if !channels.is_empty() && !EXR.contains(&suffix.as_str()) {
+        return Err(Error::output(path, "only OpenEXR files (.exr) hold more channels than colours"));
+    }
+    channels::check(channels, image.pixels.len())?;
     let encoding = encoding(&suffix, options);
-    output::write_atomically(path, |part| write_part(path, part, image, (encoding, &options.response), metadata))
+    let coding = (encoding, &options.response);
+    output::write_atomically(path, |part| write_part(path, part, image, channels, coding, metadata))
+}
+
+/// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.
+pub fn holds_channels(path: &Path) -> bool {
+    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    EXR.contains(&suffix.as_str())
 }
 
 /// Checks, before a long render, that an image can be written to `path`: by writing a small one beside it.
@@ -107,8 +133,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     let options = WriteOptions::default();
     let encoding = encoding(&suffix, &options);
     output::check_writable(path)?;
-    let (image, metadata) = (Image::new(16, 16), Metadata::default());
-    output::probe(path, |part| write_part(path, part, &image, (encoding, &options.response), &metadata))
+    let (image, coding, metadata) = (Image::new(16, 16), (encoding, &options.response), Metadata::default());
+    output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }
 
 /// Reads an image. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
@@ -121,6 +147,16 @@ pub fn read(path: &Path) -> Result<Image> {
     let bytes = file_size(path)?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))
+}
+
+/// Reads every channel of an OpenEXR file, those of the colours as well; halves become floating values.
+///
+/// # Errors
+/// As of [`read`]; and for a file in another format.
+pub fn read_channels(path: &Path) -> Result<Channels> {
+    let bytes = file_size(path)?;
+    let check = |width: u64, height: u64| check_size(width, height, bytes);
+    backend::read_channels(path, &check).map_err(|message| Error::input(path, "", message))
 }
 
 /// Reads what an OpenEXR file says about how it was made. Fields that it does not have are None, or empty.
@@ -136,11 +172,12 @@ fn write_part(
     path: &Path,
     part: &Path,
     image: &Image,
+    channels: &[Channel],
     (encoding, response): (Encoding, &Response),
     metadata: &Metadata,
 ) -> Result<()> {
     let samples = samples::encode(image, encoding.kind, encoding.alpha, response);
-    let written = backend::write(part, &samples, encoding, metadata);
+    let written = backend::write(part, &samples, channels, encoding, metadata);
     // Libraries put the name that they were given into their messages.
     written.map_err(|message| {
         Error::output(path, message.replace(&*part.to_string_lossy(), &path.to_string_lossy()).trim())

@@ -21,6 +21,9 @@ pub struct Metadata {
     pub render_time_seconds: Option<f64>,
     /// Of which larger picture this is a part; none for a whole one. OpenEXR's data window in its display window.
     pub window: Option<Window>,
+    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`); in the order of the names when
+    /// read. OpenEXR alone.
+    pub texts: Vec<(String, String)>,
 }
 
 /// Where a part of a picture belongs.
@@ -45,6 +48,7 @@ impl Default for Metadata {
             samples_per_pixel: None,
             render_time_seconds: None,
             window: None,
+            texts: Vec::new(),
         }
     }
 }
@@ -55,6 +59,11 @@ impl Window {
         let number = |n: i32| u32::try_from(n).ok();
         Some(Self { x: number(x)?, y: number(y)?, full: [number(width)?, number(height)?] })
     }
+}
+
+/// Whether an attribute of a file is one of [`Metadata::texts`].
+pub(super) fn is_text(name: &str) -> bool {
+    name.contains('/')
 }
 
 /// Files hold f32.

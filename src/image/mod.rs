@@ -3,8 +3,9 @@
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
 //! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light (`response`). `samples.rs` turns pixels into a file's samples, and a
 //! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
-//! same pixels.
+//! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`).
 
+mod channels;
 mod compare;
 mod file;
 mod metadata;
@@ -14,12 +15,17 @@ mod oiio;
 mod parity;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure;
+#[cfg(any(test, not(feature = "oiio")))]
+mod pure_channels;
 mod response;
 mod samples;
 pub mod srgb;
 
+pub use channels::{Channel, Channels, Plane};
 pub use compare::Difference;
-pub use file::{Depth, WriteOptions, check_writable, read, read_metadata, write};
+pub use file::{
+    Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
+};
 pub use metadata::{Metadata, Window};
 pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 

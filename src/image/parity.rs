@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::file::Encoding;
 use super::samples::{Type, decode, encode};
-use super::{Image, Metadata, Response, Window, oiio, pure};
+use super::{Channel, Image, Metadata, Response, Window, oiio, pure};
 use crate::math::Vec4;
 
 const HALF: Encoding = Encoding { kind: Type::Half, alpha: true, tile: 64 };
@@ -33,14 +33,15 @@ fn metadata() -> Metadata {
         samples_per_pixel: Some(64),
         render_time_seconds: Some(12.5),
         window: Some(Window { x: 3, y: 50, full: [1000, 300] }),
+        texts: vec![("a/b".to_owned(), "two words".to_owned()), ("a/c".to_owned(), "{}".to_owned())],
     }
 }
 
 fn write_both(folder: &Path, suffix: &str, encoding: Encoding) -> [std::path::PathBuf; 2] {
     let [a, b] = ["oiio", "pure"].map(|name| folder.join(name).with_extension(suffix));
     let samples = encode(&picture(), encoding.kind, encoding.alpha, &Response::default());
-    oiio::write(&a, &samples, encoding, &metadata()).unwrap();
-    pure::write(&b, &samples, encoding, &metadata()).unwrap();
+    oiio::write(&a, &samples, &[], encoding, &metadata()).unwrap();
+    pure::write(&b, &samples, &[], encoding, &metadata()).unwrap();
     [a, b]
 }
 
@@ -87,6 +88,45 @@ fn files_are_tiled_and_zipped() {
         assert_eq!(tiles.tile_size, exr::prelude::Vec2(64, 64));
         let names: Vec<_> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
         assert_eq!(names, ["A", "B", "G", "R"]);
+    }
+}
+
+/// Both write channels of all types, and both read what either has written, to the bit; others read its colours.
+#[test]
+fn channels_are_identical() {
+    let folder = tempfile::tempdir().unwrap();
+    let pixels = picture().pixels.len() as u32;
+    let channels = [
+        Channel::uint("primitive", (0..pixels).map(|i| u32::MAX - i).collect()),
+        Channel::float("depth.Z", (0..pixels).map(|i| if i == 7 { f32::INFINITY } else { 1.0 / i as f32 }).collect()),
+        Channel::float("A light.R", vec![-1.5; pixels as usize]),
+    ];
+    for kind in [Type::Half, Type::Float] {
+        let encoding = Encoding { kind, ..HALF };
+        let samples = encode(&picture(), kind, true, &Response::default());
+        let [a, b] = ["oiio.exr", "pure.exr"].map(|name| folder.path().join(name));
+        oiio::write(&a, &samples, &channels, encoding, &metadata()).unwrap();
+        pure::write(&b, &samples, &channels, encoding, &metadata()).unwrap();
+        let colours = decode(pure::read(&b, &|_, _| Ok(())).unwrap());
+        for file in [&a, &b] {
+            for read in [oiio::read_channels, pure::read_channels] {
+                let mut found = read(file, &|_, _| Ok(())).unwrap();
+                assert_eq!((found.width, found.height, found.channels.len()), (150, 70, 7));
+                let reds: Vec<u32> = colours.pixels.iter().map(|p| p.x.to_bits()).collect();
+                let read: Vec<u32> = found.floats("R").unwrap().iter().map(|x| x.to_bits()).collect();
+                assert_eq!(reds, read, "{file:?}");
+                found.channels.retain(|channel| channel.name.len() > 1);
+                for channel in &channels {
+                    let same = found.channels.iter().find(|found| found.name == channel.name).unwrap();
+                    assert_eq!(same.plane.bytes(), channel.plane.bytes(), "{file:?} {}", channel.name);
+                }
+            }
+            for read in [oiio::read, pure::read] {
+                assert_eq!(decode(read(file, &|_, _| Ok(())).unwrap()), colours, "{file:?}");
+            }
+            assert_eq!(oiio::read_metadata(file).unwrap(), metadata());
+            assert_eq!(pure::read_metadata(file).unwrap(), metadata());
+        }
     }
 }
 

@@ -10,8 +10,9 @@ use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 use openexr::{AttributeValue, FlatSamples, Text};
 
 use super::file::Encoding;
-use super::metadata::{Metadata, Window, narrow, widen};
+use super::metadata::{Metadata, Window, is_text, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
+use super::{Channel, pure_channels};
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -31,7 +32,16 @@ pub(super) fn writable_suffixes() -> Result<Vec<String>> {
 }
 
 /// Writes a file.
-pub(super) fn write(path: &Path, samples: &Samples, encoding: Encoding, metadata: &Metadata) -> Result<()> {
+pub(super) fn write(
+    path: &Path,
+    samples: &Samples,
+    channels: &[Channel],
+    encoding: Encoding,
+    metadata: &Metadata,
+) -> Result<()> {
+    if !channels.is_empty() {
+        return pure_channels::write(path, samples, channels, encoding, metadata);
+    }
     match &samples.values {
         Values::U8(bytes) => write_bytes(path, samples, bytes),
         Values::Half(bits) => {
@@ -63,7 +73,6 @@ fn write_exr<T: exr::image::IntoSample>(
     sample: impl Fn(usize) -> T + Sync,
 ) -> exr::error::UnitResult {
     let (width, height) = (samples.width as usize, samples.height as usize);
-    let tile = encoding.tile as usize;
     let pixel = |at: openexr::Vec2<usize>| {
         let i = 4 * (at.y() * width + at.x());
         (sample(i), sample(i + 1), sample(i + 2), sample(i + 3))
@@ -71,11 +80,7 @@ fn write_exr<T: exr::image::IntoSample>(
     let layer = openexr::Layer::new(
         (width, height),
         attributes(metadata),
-        openexr::Encoding {
-            compression: openexr::Compression::ZIP16,
-            blocks: openexr::Blocks::Tiles(openexr::Vec2(tile, tile)),
-            line_order: openexr::LineOrder::Increasing,
-        },
+        tiled(encoding),
         openexr::SpecificChannels::rgba(pixel),
     );
     let mut image = openexr::Image::from_layer(layer);
@@ -87,7 +92,17 @@ fn write_exr<T: exr::image::IntoSample>(
     image.write().to_file(path)
 }
 
-fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
+/// How a file is packed.
+pub(super) fn tiled(encoding: Encoding) -> openexr::Encoding {
+    let tile = encoding.tile as usize;
+    openexr::Encoding {
+        compression: openexr::Compression::ZIP16,
+        blocks: openexr::Blocks::Tiles(openexr::Vec2(tile, tile)),
+        line_order: openexr::LineOrder::Increasing,
+    }
+}
+
+pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
     let mut attributes = openexr::LayerAttributes {
         world_to_camera: metadata.world_to_camera.as_ref().map(narrow),
         layer_position: metadata.window.map_or(openexr::Vec2(0, 0), |w| openexr::Vec2(w.x as i32, w.y as i32)),
@@ -107,6 +122,9 @@ fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
         metadata.samples_per_pixel.map(|n| AttributeValue::I32(i32::try_from(n).unwrap_or(i32::MAX))),
     );
     put(RENDER_TIME_SECONDS, number(metadata.render_time_seconds));
+    for (name, text) in &metadata.texts {
+        put(name, Text::new_or_none(text).map(AttributeValue::Text));
+    }
     attributes
 }
 
@@ -207,5 +225,19 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
         },
         render_time_seconds: number(RENDER_TIME_SECONDS),
         window: if is_whole { None } else { window() },
+        texts: texts(attributes),
     })
 }
+
+fn texts(attributes: &openexr::LayerAttributes) -> Vec<(String, String)> {
+    let named = attributes.other.iter().filter_map(|(name, value)| match value {
+        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+        _ => None,
+    });
+    let mut texts: Vec<_> = named.filter(|(name, _)| is_text(name)).collect();
+    texts.sort();
+    texts
+}
+
+/// Every channel of a file, unless `check` refuses its width and height.
+pub(super) use super::pure_channels::read as read_channels;

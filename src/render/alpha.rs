@@ -57,7 +57,7 @@ impl Renderer<'_> {
 
     /// Adds what is worth each shadow ray, less what is covered on its way.
     pub(super) fn add_through<T: Tracer + ?Sized>(&self, tracer: &T, buffers: &mut Buffers) {
-        let Buffers { radiance, shadow_rays, shadow_light, trail, .. } = buffers;
+        let Buffers { radiance, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } = buffers;
         let mut left = vec![1.0f32; shadow_rays.len()];
         let mut pending: Vec<usize> = (0..shadow_rays.len()).collect();
         while !pending.is_empty() {
@@ -74,9 +74,13 @@ impl Renderer<'_> {
             });
         }
         trail.free(|i| left[i]);
-        for ((pixel, worth), left) in shadow_light.iter().zip(left) {
-            let worth: Vec3 = *worth * left;
+        for ((pixel, worth), left) in shadow_light.iter().zip(&left) {
+            let worth: Vec3 = *worth * *left;
             radiance[*pixel as usize] += worth.extend(0.0);
+        }
+        let Some(tally) = tally else { return };
+        for (((pixel, _), parts), left) in shadow_light.iter().zip(shadow_parts).zip(left) {
+            tally.add_parts(*pixel, parts, left);
         }
     }
 

@@ -20,8 +20,7 @@ impl Film {
     pub(super) fn new(width: u32, height: u32) -> Result<Self> {
         let count = width as usize * height as usize;
         let mut pixels = Vec::new();
-        let too_large = |_| Error::Usage(format!("a picture of {width}x{height} pixels does not fit into memory"));
-        pixels.try_reserve_exact(count).map_err(too_large)?;
+        pixels.try_reserve_exact(count).map_err(|_| too_large(width, height))?;
         pixels.resize(count, Vec4::ZERO);
         Ok(Self(Mutex::new(Image { width, height, pixels })))
     }
@@ -39,4 +38,9 @@ impl Film {
     pub(super) fn into_image(self) -> Image {
         self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The error for a picture that there is no room for.
+pub(super) fn too_large(width: u32, height: u32) -> Error {
+    Error::Usage(format!("a picture of {width}x{height} pixels does not fit into memory"))
 }

@@ -3,16 +3,23 @@
 //! A picture depends on scene, camera, size, samples and seed. Threads, tiles and their order, and how rays are bundled
 //! change when a pixel is computed, never what.
 
+mod adaptive;
 mod alpha;
+mod aov;
 mod camera;
+mod canvas;
+mod checkpoint;
 mod counted;
 mod explain;
 mod film;
 mod filter;
 mod finished;
 mod fog;
+mod identity;
 mod path;
+mod rounds;
 pub(crate) mod sampler;
+mod settings;
 mod tiles;
 mod wavefront;
 mod whitted;
@@ -21,12 +28,17 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
+pub use adaptive::Adaptive;
+pub use aov::{Aov, Expression};
+pub use checkpoint::Checkpoint;
 pub use counted::Counted;
 pub use explain::{Explanation, HitTrail, LightTrail, RayTrail, SampleTrail};
 pub use filter::Filter;
 pub use finished::Finished;
+pub use rounds::Picture;
 pub use sampler::Sampling;
-pub use tiles::TileOrder;
+pub use settings::{Crop, LARGEST_SIDE, Settings};
+pub use tiles::{LARGEST_TILE, TileOrder};
 
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -36,82 +48,14 @@ use crate::ray::Ray;
 use crate::scene::{Camera, Integrator, Material, Scene};
 use crate::shade::EnvironmentLight;
 use crate::shade::lights::Lights;
-use crate::trace::{Batch, Tracer, World};
+use crate::trace::{Tracer, World};
+use aov::Request;
 use camera::View;
 use film::Film;
 use filter::FilterSampler;
 use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
-
-/// Most pixels a picture may have along one side.
-pub const LARGEST_SIDE: u32 = 65_536;
-
-/// What picture to make of a scene.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Samples a pixel; 1 is the pixel's centre.
-    pub spp: u32,
-    /// Chooses among equally good sample patterns.
-    pub seed: u64,
-    /// How samples are spread.
-    pub sampling: Sampling,
-    /// How samples become a pixel.
-    pub filter: Filter,
-    /// How rays are bundled; never changes a native picture.
-    pub batch: Batch,
-    /// Which tiles come first; never changes a picture.
-    pub tile_order: TileOrder,
-    /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
-    pub background: Option<Vec3>,
-    /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
-    pub light_samples: u32,
-    /// How far light is followed; none for the cheapest way that shows all the scene contains.
-    pub integrator: Option<Integrator>,
-    /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
-    /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
-    pub max_depth: Option<u32>,
-    /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
-    pub crop: Option<Crop>,
-}
-
-impl Default for Settings {
-    /// 1280 x 720 pixels of 4 samples, as deep as is usual.
-    fn default() -> Self {
-        Self {
-            width: 1280,
-            height: 720,
-            spp: 4,
-            seed: 0,
-            sampling: Sampling::default(),
-            filter: Filter::default(),
-            batch: Batch::default(),
-            tile_order: TileOrder::default(),
-            background: None,
-            light_samples: 1,
-            integrator: None,
-            max_depth: None,
-            crop: None,
-        }
-    }
-}
-
-/// A part of the picture; not empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Crop {
-    /// Columns to the left of it.
-    pub x: u32,
-    /// Rows above it.
-    pub y: u32,
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-}
 
 /// How a running render is watched and stopped.
 #[derive(Clone, Copy, Default)]
@@ -129,6 +73,7 @@ pub struct Renderer<'a> {
     scene: &'a Scene,
     world: &'a World,
     settings: Settings,
+    camera: Camera,
     plan: Plan,
     view: View,
     /// When it opens and when it closes.
@@ -144,6 +89,8 @@ pub struct Renderer<'a> {
     ambient: Vec3,
     /// What a geometry is made of whose material does not exist.
     fallback: Material,
+    /// What is told of each pixel beside its colour; none where nothing is asked for.
+    request: Option<Request>,
 }
 
 impl<'a> Renderer<'a> {
@@ -154,31 +101,15 @@ impl<'a> Renderer<'a> {
     /// camera that cannot be.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
-        for side in [width, height] {
-            if side == 0 || side > LARGEST_SIDE {
-                let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
-                return Err(Error::Usage(message));
-            }
-        }
-        if spp == 0 {
-            return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
-        }
-        if let Some(Crop { x, y, width: columns, height: rows }) = settings.crop {
-            let inside = |start: u32, length: u32, whole: u32| length > 0 && length <= whole.saturating_sub(start);
-            if !(inside(x, columns, width) && inside(y, rows, height)) {
-                let message =
-                    format!("the part {columns}x{rows} at {x},{y} does not lie in the picture of {width}x{height}");
-                return Err(Error::Usage(message));
-            }
-        }
+        settings.check()?;
+        let request = Request::new(&settings.aovs, scene)?;
+        // Of what samples are spread over.
+        let most = settings.adaptive.map_or(spp, |adaptive| adaptive.max_spp);
         let view = View::new(&camera, world.centre, width, height)?;
         let [open, close] = camera.shutter;
         if !(0.0 <= open && open <= close && close <= 1.0) {
             let message = format!("a shutter from {open} to {close}: things move from time 0 to 1, and it closes last");
             return Err(Error::Usage(message));
-        }
-        if settings.light_samples == 0 {
-            return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
         }
         let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
         let Settings { integrator, background, max_depth, .. } = settings;
@@ -187,24 +118,26 @@ impl<'a> Renderer<'a> {
             let why = "its numbers are the same for every choice of a path, which makes a wrong picture";
             return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));
         }
+        // A headlight stays where the camera is half-way.
+        let eye = camera.pose(f64::from(open.midpoint(close))).eye;
         let mut renderer = Self {
+            camera,
             scene,
             world,
             view,
-            shutter: camera.shutter,
-            sampler: Sampler::new(sampling, spp, seed),
-            light_sampler: Sampler::new(sampling, spp.saturating_mul(settings.light_samples), seed),
+            shutter: [open, close],
+            sampler: Sampler::new(sampling, most, seed),
+            light_sampler: Sampler::new(sampling, most.saturating_mul(settings.light_samples), seed),
             // A single sample is the pixel's middle, whatever the filter.
-            filter: FilterSampler::new(if spp == 1 { Filter::Box } else { filter }),
+            filter: FilterSampler::new(if most == 1 { Filter::Box } else { filter }),
             lights: Lights::default(),
             environment: environment.map(Arc::new),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
+            request,
             plan,
             settings,
         };
-        // A headlight stays where the camera is half-way.
-        let eye = camera.pose(f64::from(open.midpoint(close))).eye;
         renderer.lights = renderer.plan_lights(eye - world.centre);
         Ok(renderer)
     }
@@ -226,25 +159,28 @@ impl<'a> Renderer<'a> {
 
     /// The part of the picture that is rendered.
     pub fn window(&self) -> Crop {
-        let Settings { width, height, crop, .. } = self.settings;
-        crop.unwrap_or(Crop { x: 0, y: 0, width, height })
+        self.settings.window()
     }
 
-    /// Renders the picture, or the part of it that is asked for, on rayon's current thread pool.
+    /// Renders the colours of the picture, or of the part of it that is asked for, on rayon's current thread pool; [`Renderer::picture`]
+    /// gives what else is asked for.
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
     /// [`Error::Usage`] for a picture that does not fit into memory.
     pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
+        if self.settings.adaptive.is_some() {
+            return Ok(self.rounds(tracer, control, None)?.0.image());
+        }
         let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
-        let Crop { x, y, width, height } = self.window();
-        let film = Film::new(width, height)?;
+        let window = self.window();
+        let film = Film::new(window.width, window.height)?;
         self.each_tile(|tile, buffers| {
             if cancelled() {
                 return ControlFlow::Break(());
             }
             let pixels = self.tile(tracer, tile, buffers);
-            let on_film = Tile { x: tile.x - x, y: tile.y - y, ..*tile };
+            let on_film = tile.within(&window);
             film.put(&on_film, pixels);
             if let Some(on_pixels) = control.on_pixels {
                 on_pixels(Finished::new(&on_film, pixels));
@@ -271,7 +207,7 @@ impl<'a> Renderer<'a> {
     /// Calls `work` with each tile, on all threads of rayon's current pool, until it breaks off.
     fn each_tile(&self, work: impl Fn(&Tile, &mut Buffers) -> ControlFlow<()> + Sync) {
         let Crop { x, y, width, height } = self.window();
-        let tiles = tiles(width, height, self.settings.tile_order);
+        let tiles = tiles(width, height, self.settings.tile, self.settings.tile_order);
         let next = AtomicUsize::new(0);
         // Each thread takes the next tile in order; a parallel iterator would begin in the middle of the list.
         rayon::broadcast(|_| {
@@ -285,7 +221,7 @@ impl<'a> Renderer<'a> {
         });
     }
 
-    /// One pixel, the same to the bit as in the whole picture. A tracer that records what it is asked learns every ray
+    /// One pixel, the same to the bit as in the whole picture; of a picture with [`Settings::adaptive`], with its fewest samples. A tracer that records what it is asked learns every ray
     /// that the pixel depends on.
     ///
     /// The same to the bit holds for an engine whose answer to a ray does not depend on the batch it came in: the
@@ -307,8 +243,13 @@ impl<'a> Renderer<'a> {
     }
 
     fn ray(&self, pixel: &Pattern, sample: u32) -> Ray {
-        let time = if self.plan.motion || self.view.moves() { self.time(pixel, sample) } else { 0.0 };
+        let time = if self.has_times() { self.time(pixel, sample) } else { 0.0 };
         self.view.ray(self.place(pixel, sample).0, || self.sampler.pair(pixel, sample, Dimension::LENS), time)
+    }
+
+    /// Whether rays depend on when they are sent.
+    fn has_times(&self) -> bool {
+        self.plan.motion || self.view.moves()
     }
 
     /// When a sample of a pixel is taken.

@@ -21,6 +21,7 @@ use crate::shade::scattering::{Lobes, Shading, Value, Ways};
 use crate::trace::Tracer;
 
 use super::Renderer;
+use super::aov::{Event, Parts, Route, Tally};
 use super::explain::Answer;
 use super::sampler::{Choice, Dimension, Pattern};
 use super::wavefront::{Buffers, Path, Wave};
@@ -65,7 +66,7 @@ impl Renderer<'_> {
             self.scatter(depth, sample, current, next, buffers);
             self.add_unshadowed(tracer, batch, buffers);
             let Buffers { patterns, waves, hits, .. } = &mut *buffers;
-            let Wave { rays, paths } = &mut waves[next];
+            let Wave { rays, paths, .. } = &mut waves[next];
             if rays.is_empty() {
                 return;
             }
@@ -81,13 +82,16 @@ impl Renderer<'_> {
     /// Adds what the traced rays of a wave see, and makes the shadow rays and the rays that go on.
     fn scatter(&self, depth: u32, sample: u32, current: usize, next: usize, buffers: &mut Buffers) {
         let (wave, mut onwards) = (mem::take(&mut buffers.waves[current]), mem::take(&mut buffers.waves[next]));
-        onwards.rays.clear();
-        onwards.paths.clear();
+        onwards.clear();
         buffers.shadow_rays.clear();
         buffers.shadow_light.clear();
-        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, trail, .. } = &mut *buffers;
+        buffers.shadow_parts.clear();
+        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } =
+            &mut *buffers;
+        let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
-        for ((ray, &path), hit) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()) {
+        for (i, ((ray, &path), hit)) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()).enumerate() {
+            let route = wave.route(i);
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
                 let (left, fog) = self.through_fog_beyond(path);
@@ -95,6 +99,9 @@ impl Renderer<'_> {
                 let seen = share.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
+                if let Some(tally) = &mut tally {
+                    tally.add(path.pixel, route, seen.truncate());
+                }
                 continue;
             };
             let point = self.surface(ray, hit);
@@ -105,6 +112,9 @@ impl Renderer<'_> {
             let own = left.weight * self.glow(&left, ray, hit, &point, material, shading.base) + fog;
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
+            if let Some(tally) = &mut tally {
+                tally.add(path.pixel, route, own);
+            }
             let path = left;
             let ways = Ways::new(material, &point, ray.direction.as_dvec3().normalize());
             let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
@@ -131,8 +141,19 @@ impl Renderer<'_> {
                 } else {
                     *pixel += worth.extend(0.0);
                 }
+                if let Some(tally) = &mut tally {
+                    let parts = Parts::new(route, worth, vertex.lobes.parts(arriving.to_light));
+                    if chosen.source.casts_shadows {
+                        shadow_parts.push(parts);
+                    } else {
+                        tally.add_parts(path.pixel, &parts, 1.0);
+                    }
+                }
             }
             if let (true, Some((ray, path))) = (depth < self.plan.depth, self.go_on(&vertex, lobe)) {
+                if let Some(tally) = &tally {
+                    onwards.routes.push(self.route_on(tally, &vertex, route, &ray, &path));
+                }
                 onwards.rays.push(ray);
                 onwards.paths.push(path);
             }
@@ -196,6 +217,18 @@ impl Renderer<'_> {
         let share = share / chosen.chance as f32;
         let worth = vertex.path.weight * value.share * arriving.color * fog * share;
         (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, fog, share, worth })
+    }
+
+    /// How light comes to the eye that the ray finds which goes on.
+    fn route_on(&self, tally: &Tally, vertex: &Vertex<'_>, route: Route, ray: &Ray, path: &Path) -> Route {
+        let direction = ray.direction.as_dvec3();
+        if path.density == 0.0 {
+            let goes_through = direction.dot(vertex.point.normal) < 0.0;
+            return tally.after(route, if goes_through { Event::Transmitted } else { Event::Specular });
+        }
+        // The other number of the pair says whether the path ends.
+        let even = self.choice(vertex, Choice::End).y as f32;
+        tally.choose(route, vertex.lobes.parts(direction.normalize()), even)
     }
 
     /// The ray that goes on from a surface, if any does.

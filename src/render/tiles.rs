@@ -1,7 +1,12 @@
 //! Which part of the picture is rendered when.
 
-/// Edge of a tile in pixels, a power of two. 1024 rays fill packets of any width and fit into the cache.
-pub(super) const TILE: u32 = 32;
+use super::Crop;
+
+/// Largest edge of a tile in pixels; edges are powers of two.
+pub const LARGEST_TILE: u32 = 64;
+
+/// 1024 rays fill packets of any width and fit into the cache.
+pub(super) const USUAL_TILE: u32 = 32;
 
 /// The order in which tiles are begun. Never changes a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,10 +34,17 @@ impl Tile {
     /// Its pixels along a Z-order curve (Morton 1966): every 64 are a block of 8 x 8, every 16 one of 4 x 4.
     pub(super) fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let Self { x, y, width, height } = *self;
-        Z_ORDER.iter().filter_map(move |&[px, py]| {
+        // Beyond its square the curve does not come back.
+        let edge = width.max(height).next_power_of_two() as usize;
+        Z_ORDER[..edge * edge].iter().filter_map(move |&[px, py]| {
             let (px, py) = (u32::from(px), u32::from(py));
             (px < width && py < height).then_some((x + px, y + py))
         })
+    }
+
+    /// Where it is in a part of the picture.
+    pub(super) fn within(&self, window: &Crop) -> Self {
+        Self { x: self.x - window.x, y: self.y - window.y, ..*self }
     }
 
     /// How many pixels.
@@ -42,29 +54,29 @@ impl Tile {
 }
 
 /// Column and row of every place along the curve.
-static Z_ORDER: [[u8; 2]; (TILE * TILE) as usize] = {
-    let mut order = [[0; 2]; (TILE * TILE) as usize];
+static Z_ORDER: [[u8; 2]; (LARGEST_TILE * LARGEST_TILE) as usize] = {
+    let mut order = [[0; 2]; (LARGEST_TILE * LARGEST_TILE) as usize];
     let mut place = 0;
-    while place < TILE * TILE {
+    while place < LARGEST_TILE * LARGEST_TILE {
         order[place as usize] = [every_other_bit(place), every_other_bit(place >> 1)];
         place += 1;
     }
     order
 };
 
-/// Bits 0, 2, 4, 6, 8 of a number below 2^10, side by side.
+/// Bits 0, 2, 4 ... of a number below 2^12, side by side.
 const fn every_other_bit(number: u32) -> u8 {
     let (mut bits, mut i) = (0, 0);
-    while i < 5 {
+    while i < 6 {
         bits |= (number >> (2 * i) & 1) << i;
         i += 1;
     }
     bits as u8
 }
 
-/// All tiles of a picture, in the given order.
-pub(super) fn tiles(width: u32, height: u32, order: TileOrder) -> Vec<Tile> {
-    let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
+/// All tiles of a picture, with edges of `edge` pixels, in the given order.
+pub(super) fn tiles(width: u32, height: u32, edge: u32, order: TileOrder) -> Vec<Tile> {
+    let (columns, rows) = (width.div_ceil(edge), height.div_ceil(edge));
     let mut places: Vec<_> = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).collect();
     match order {
         TileOrder::Scanline => {}
@@ -75,8 +87,8 @@ pub(super) fn tiles(width: u32, height: u32, order: TileOrder) -> Vec<Tile> {
         TileOrder::Spiral => places.sort_by_key(|&place| spiral(columns, rows, place)),
     }
     let tile = |(cx, cy): (u32, u32)| {
-        let (x, y) = (cx * TILE, cy * TILE);
-        Tile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) }
+        let (x, y) = (cx * edge, cy * edge);
+        Tile { x, y, width: edge.min(width - x), height: edge.min(height - y) }
     };
     places.into_iter().map(tile).collect()
 }
@@ -122,11 +134,14 @@ fn spiral(columns: u32, rows: u32, (x, y): (u32, u32)) -> (i64, i64) {
 mod tests {
     use super::*;
 
+    const TILE: u32 = USUAL_TILE;
+
     #[test]
     fn every_order_covers_every_pixel_once() {
         for (width, height) in [(1, 1), (31, 33), (200, 100), (64, 7)] {
             for order in [TileOrder::Scanline, TileOrder::Hilbert, TileOrder::Spiral] {
-                let tiles = tiles(width, height, order);
+                let edge = 4 << ((width + height) % 5);
+                let tiles = tiles(width, height, edge, order);
                 let mut pixels: Vec<_> = tiles.iter().flat_map(Tile::pixels).collect();
                 assert_eq!(pixels.len(), tiles.iter().map(Tile::len).sum::<usize>());
                 pixels.sort_unstable();
@@ -138,7 +153,7 @@ mod tests {
 
     #[test]
     fn hilberts_curve_steps_to_neighbours() {
-        let tiles = tiles(8 * TILE, 8 * TILE, TileOrder::Hilbert);
+        let tiles = tiles(8 * TILE, 8 * TILE, TILE, TileOrder::Hilbert);
         for pair in tiles.windows(2) {
             assert_eq!(pair[0].x.abs_diff(pair[1].x) + pair[0].y.abs_diff(pair[1].y), TILE, "{pair:?}");
         }
@@ -146,7 +161,7 @@ mod tests {
 
     #[test]
     fn spirals_begin_in_the_middle_and_end_at_the_rim() {
-        let tiles = tiles(5 * TILE, 3 * TILE, TileOrder::Spiral);
+        let tiles = tiles(5 * TILE, 3 * TILE, TILE, TileOrder::Spiral);
         assert_eq!((tiles[0].x, tiles[0].y), (2 * TILE, TILE));
         let last = tiles.last().unwrap();
         assert!(last.x == 0 || last.x == 4 * TILE);

@@ -6,6 +6,7 @@
 //! its neighbours.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::plan::Lighting;
@@ -16,12 +17,13 @@ use crate::shade::lights::Lights;
 use crate::shade::{SurfacePoint, appearance, normal_map};
 use crate::trace::{Batch, Tracer};
 
+use super::aov::{Parts, Request, Route, Tally};
 use super::camera::View;
 use super::explain::Trail;
 use super::fog::is_solid;
 use super::sampler::{Dimension, Pattern};
 use super::whitted::Lit;
-use super::{Renderer, tiles::Tile};
+use super::{Renderer, adaptive, tiles::Tile};
 
 /// Camera rays that are made at a time: enough for vectors of any width, few enough for registers and a little stack.
 const LANES: usize = 16;
@@ -29,11 +31,15 @@ const LANES: usize = 16;
 /// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
 pub(super) struct Buffers {
-    /// In the order of [`Tile::pixels`], as `sums`, `weights` and `radiance`.
+    /// In the order of [`Tile::pixels`], as `sums`, `weights`, `halves` and `radiance`.
     pub(super) patterns: Vec<Pattern>,
-    sums: Vec<Vec4>,
+    pub(super) sums: Vec<Vec4>,
     /// Of each pixel's samples so far, added up.
-    weights: Vec<f32>,
+    pub(super) weights: Vec<f32>,
+    /// Sums of every other sample, where the error is to be known; else empty.
+    pub(super) halves: Vec<Vec4>,
+    /// What is added up beside the colours; none where nothing is asked for.
+    pub(super) tally: Option<Box<Tally>>,
     pub(super) radiance: Vec<Vec4>,
     /// The rays of each depth, those of a pixel side by side; the camera's first.
     pub(super) waves: Vec<Wave>,
@@ -42,6 +48,8 @@ pub(super) struct Buffers {
     pub(super) shadow_rays: Vec<Ray>,
     /// What each shadow ray is worth, and to which pixel.
     pub(super) shadow_light: Vec<(u32, Vec3)>,
+    /// The same by kinds of paths; empty where light is not told apart.
+    pub(super) shadow_parts: Vec<Parts>,
     pub(super) occluded: Vec<bool>,
     /// Laid where a pixel is to be explained.
     pub(super) trail: Trail,
@@ -52,6 +60,22 @@ pub(super) struct Buffers {
 pub(super) struct Wave {
     pub(super) rays: Vec<Ray>,
     pub(super) paths: Vec<Path>,
+    /// As many where light is told apart; else empty.
+    pub(super) routes: Vec<Route>,
+}
+
+impl Wave {
+    pub(super) fn clear(&mut self) {
+        self.rays.clear();
+        self.paths.clear();
+        self.routes.clear();
+    }
+
+    /// How a ray's light came from there to the eye; camera rays have none, and where light is not told apart it means nothing.
+    #[inline]
+    pub(super) fn route(&self, ray: usize) -> Route {
+        self.routes.get(ray).copied().unwrap_or_default()
+    }
 }
 
 /// What a ray contributes to.
@@ -82,28 +106,12 @@ impl Path {
 impl Renderer<'_> {
     /// The pixels of a tile, in the order of [`Tile::pixels`].
     pub(super) fn tile<'b, T: Tracer + ?Sized>(&self, tracer: &T, tile: &Tile, buffers: &'b mut Buffers) -> &'b [Vec4] {
-        self.begin(tile, buffers);
+        self.begin(tile.pixels(), buffers);
         buffers.sums.clear();
         buffers.sums.resize(tile.len(), Vec4::ZERO);
         buffers.weights.clear();
         buffers.weights.resize(tile.len(), 0.0);
-        for sample in 0..self.settings.spp {
-            buffers.trail.begin(sample);
-            self.camera_hits(tracer, sample, buffers);
-            buffers.radiance.clear();
-            buffers.radiance.resize(tile.len(), Vec4::ZERO);
-            match self.plan.integrator {
-                Integrator::RayCast | Integrator::Whitted => self.whitted(tracer, sample, buffers),
-                Integrator::Path => self.paths(tracer, sample, buffers),
-            }
-            let Buffers { patterns, sums, weights, radiance, trail, .. } = &mut *buffers;
-            trail.end(radiance[0]);
-            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(radiance).zip(patterns) {
-                let weight = if self.filter.has_negative() { self.place(pixel, sample).1 } else { 1.0 };
-                *sum += *radiance * weight;
-                *total += weight;
-            }
-        }
+        self.add_samples(tracer, 0..self.settings.spp, None, buffers);
         for (sum, total) in buffers.sums.iter_mut().zip(&buffers.weights) {
             // Divided, not multiplied by the reciprocal: full coverage is 1 for any number of samples. By 1 where the
             // weights cancel out.
@@ -112,9 +120,53 @@ impl Renderer<'_> {
         &buffers.sums
     }
 
+    /// Adds samples of the pixels that were begun to their sums; and what is asked for beside.
+    pub(super) fn add_samples<T: Tracer + ?Sized>(
+        &self,
+        tracer: &T,
+        samples: Range<u32>,
+        request: Option<&Request>,
+        buffers: &mut Buffers,
+    ) {
+        for sample in samples {
+            buffers.trail.begin(sample);
+            self.camera_hits(tracer, sample, buffers);
+            buffers.radiance.clear();
+            buffers.radiance.resize(buffers.patterns.len(), Vec4::ZERO);
+            if let Some(request) = request {
+                self.observe(request, sample, buffers);
+            }
+            match self.plan.integrator {
+                Integrator::RayCast | Integrator::Whitted => self.whitted(tracer, sample, buffers),
+                Integrator::Path => self.paths(tracer, sample, buffers),
+            }
+            let Buffers { patterns, sums, weights, halves, radiance, tally, trail, .. } = &mut *buffers;
+            trail.end(radiance[0]);
+            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(&*radiance).zip(&*patterns) {
+                let weight = self.weight(pixel, sample);
+                *sum += *radiance * weight;
+                *total += weight;
+            }
+            if adaptive::in_half(sample) {
+                for ((half, radiance), pixel) in halves.iter_mut().zip(radiance).zip(&*patterns) {
+                    *half += *radiance * self.weight(pixel, sample);
+                }
+            }
+            if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
+                patterns.iter().enumerate().for_each(|(i, pixel)| tally.close(i, self.weight(pixel, sample)));
+            }
+        }
+    }
+
+    /// What a sample counts.
+    #[inline]
+    pub(super) fn weight(&self, pixel: &Pattern, sample: u32) -> f32 {
+        if self.filter.has_negative() { self.place(pixel, sample).1 } else { 1.0 }
+    }
+
     /// How many camera rays of a tile hit something.
     pub(super) fn tile_hits<T: Tracer + ?Sized>(&self, tracer: &T, tile: &Tile, buffers: &mut Buffers) -> u64 {
-        self.begin(tile, buffers);
+        self.begin(tile.pixels(), buffers);
         let hits = (0..self.settings.spp).map(|sample| {
             self.camera_hits(tracer, sample, buffers);
             buffers.hits.iter().flatten().count() as u64
@@ -122,17 +174,17 @@ impl Renderer<'_> {
         hits.sum()
     }
 
-    /// What all samples of a pixel have in common, for each pixel of a tile.
-    fn begin(&self, tile: &Tile, buffers: &mut Buffers) {
+    /// What all samples of a pixel have in common, for each pixel.
+    pub(super) fn begin(&self, pixels: impl Iterator<Item = (u32, u32)>, buffers: &mut Buffers) {
         buffers.patterns.clear();
-        buffers.patterns.extend(tile.pixels().map(|(x, y)| self.sampler.pattern(x, y)));
+        buffers.patterns.extend(pixels.map(|(x, y)| self.sampler.pattern(x, y)));
     }
 
     /// One sample of each pixel: its camera ray, and what that hits.
     fn camera_hits<T: Tracer + ?Sized>(&self, tracer: &T, sample: u32, buffers: &mut Buffers) {
         let Buffers { patterns, waves, hits, .. } = buffers;
         waves.resize_with(waves.len().max(1), Wave::default);
-        let Wave { rays, paths } = &mut waves[0];
+        let Wave { rays, paths, .. } = &mut waves[0];
         let place = |pixel: &Pattern| self.place(pixel, sample).0;
         // None of them is cleared: every one is written.
         rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
@@ -171,13 +223,19 @@ impl Renderer<'_> {
             self.add_through(tracer, buffers);
             return;
         }
-        let Buffers { radiance, shadow_rays, shadow_light, occluded, trail, .. } = buffers;
+        let Buffers { radiance, shadow_rays, shadow_light, shadow_parts, tally, occluded, trail, .. } = buffers;
         occluded.clear();
         occluded.resize(shadow_rays.len(), false);
         tracer.occluded_batch(shadow_rays, occluded, batch);
         trail.free(|i| f32::from(u8::from(!occluded[i])));
-        for ((pixel, reflected), _) in shadow_light.iter().zip(occluded).filter(|(_, occluded)| !**occluded) {
+        for ((pixel, reflected), _) in shadow_light.iter().zip(&*occluded).filter(|(_, occluded)| !**occluded) {
             radiance[*pixel as usize] += reflected.extend(0.0);
+        }
+        let Some(tally) = tally else { return };
+        for (((pixel, _), parts), _) in
+            shadow_light.iter().zip(shadow_parts).zip(occluded).filter(|(_, hidden)| !**hidden)
+        {
+            tally.add_parts(*pixel, parts, 1.0);
         }
     }
 

@@ -18,6 +18,7 @@ use crate::shade::scattering::{Shading, Ways};
 use crate::trace::{Batch, Tracer};
 
 use super::Renderer;
+use super::aov::{Event, Parts, Route};
 use super::explain::Answer;
 use super::sampler::Dimension;
 use super::wavefront::{Buffers, Path, Wave};
@@ -40,6 +41,7 @@ struct Stage {
 /// A ray that hit something.
 pub(super) struct Lit {
     path: Path,
+    route: Route,
     direction: Vec3,
     point: SurfacePoint,
     shading: Shading,
@@ -69,7 +71,7 @@ impl Renderer<'_> {
         while let Some(range) = buffers.waves[depth as usize + 1].batch(begin) {
             begin = range.end;
             let Buffers { patterns, waves, hits, .. } = &mut *buffers;
-            let Wave { rays, paths } = &mut waves[depth as usize + 1];
+            let Wave { rays, paths, .. } = &mut waves[depth as usize + 1];
             let (rays, paths) = (&mut rays[range.clone()], &paths[range.clone()]);
             hits.clear();
             hits.resize(rays.len(), None);
@@ -83,17 +85,22 @@ impl Renderer<'_> {
 
     /// What surfaces are where the rays hit, with what they give off without any light.
     fn shade(&self, depth: u32, first: usize, buffers: &mut Buffers) {
-        let Buffers { waves, hits, radiance, lit, trail, .. } = buffers;
-        let Wave { rays, paths } = &waves[depth as usize];
+        let Buffers { waves, hits, radiance, lit, tally, trail, .. } = buffers;
+        let wave = &waves[depth as usize];
+        let Wave { rays, paths, .. } = wave;
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         lit.clear();
-        for ((ray, &path), hit) in rays[first..].iter().zip(&paths[first..]).zip(hits) {
+        for (i, ((ray, &path), hit)) in (first..).zip(rays[first..].iter().zip(&paths[first..]).zip(hits)) {
+            let route = wave.route(i);
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
                 let (left, fog) = self.through_fog_beyond(path);
                 let seen = left.weight.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
+                if let Some(tally) = tally {
+                    tally.add(path.pixel, route, seen.truncate());
+                }
                 continue;
             };
             let point = self.surface(ray, hit);
@@ -105,22 +112,28 @@ impl Renderer<'_> {
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
             let path = left;
-            lit.push(Lit { path, direction: ray.direction, point, shading });
+            if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
+                // Ambient light is scattered, what a surface gives off is not.
+                let dark = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
+                tally.add(path.pixel, route, path.weight * dark.base + fog);
+                let scattered = tally.after(route, Event::Diffuse);
+                tally.add(path.pixel, scattered, path.weight * (shading.base - dark.base));
+            }
+            lit.push(Lit { path, route, direction: ray.direction, point, shading });
         }
     }
 
     /// The mirrored and refracted rays of all surfaces that were hit at a depth, into the wave below.
     fn send_on(&self, Stage { sample, depth }: Stage, buffers: &mut Buffers) {
-        let Buffers { patterns, waves, lit, .. } = buffers;
+        let Buffers { patterns, waves, lit, tally, .. } = buffers;
         let below = depth as usize + 1;
         waves.resize_with(waves.len().max(below + 1), Wave::default);
         let wave = &mut waves[below];
-        wave.rays.clear();
-        wave.paths.clear();
-        for Lit { path, direction, point, shading } in lit {
+        wave.clear();
+        for Lit { path, route, direction, point, shading } in lit {
             let material = &*self.appearance(point);
             let ways = Ways::new(material, point, direction.as_dvec3().normalize());
-            for (which, way) in [(1, ways.mirrored), (2, ways.refracted)] {
+            for (which, way, event) in [(1, ways.mirrored, Event::Specular), (2, ways.refracted, Event::Transmitted)] {
                 let Some(way) = way else { continue };
                 let weight = path.weight * way.share * way.scale;
                 if weight.max_element() <= FAINT {
@@ -138,6 +151,9 @@ impl Renderer<'_> {
                 wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
                 let medium = if which == 2 { self.medium_behind(point) } else { path.medium };
                 wave.paths.push(Path { weight, branch, medium, ..*path });
+                if let Some(tally) = tally {
+                    wave.routes.push(tally.after(*route, event));
+                }
             }
         }
     }
@@ -146,16 +162,20 @@ impl Renderer<'_> {
     /// (Blinn and Newell 1976, *Texture and reflection in computer generated images*).
     fn fake_reflections(&self, buffers: &mut Buffers) {
         let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
-        let Buffers { radiance, lit, trail, .. } = buffers;
-        for Lit { path, direction, point, .. } in lit.iter() {
+        let Buffers { radiance, lit, tally, trail, .. } = buffers;
+        for Lit { path, route, direction, point, .. } in lit.iter() {
             let ways = Ways::new(&self.appearance(point), point, direction.as_dvec3().normalize());
-            for way in [ways.mirrored, ways.refracted].into_iter().flatten() {
+            for (way, event) in [(ways.mirrored, Event::Specular), (ways.refracted, Event::Transmitted)] {
+                let Some(way) = way else { continue };
                 let path = Path { weight: path.weight * way.share, ..*path };
                 let (left, fog) = self.through_fog_beyond(path);
                 let seen = left.weight * environment.radiance(way.direction) + fog;
                 let faked = point.spawn(way.direction.as_vec3(), f32::INFINITY);
                 trail.ray(self, 1, &faked, &path, None, seen);
                 radiance[path.pixel as usize] += seen.extend(0.0);
+                if let Some(tally) = tally {
+                    tally.add(path.pixel, tally.after(*route, event), seen);
+                }
             }
         }
     }
@@ -169,12 +189,15 @@ impl Renderer<'_> {
         batch: Batch,
         buffers: &mut Buffers,
     ) {
-        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, trail, .. } = &mut *buffers;
+        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } =
+            &mut *buffers;
         let (index, light) = (light as u32, &self.lights.sources()[light]);
         let count = if light.is_extended() { self.settings.light_samples } else { 1 };
         shadow_rays.clear();
         shadow_light.clear();
-        for Lit { path, point, shading, .. } in lit.iter() {
+        shadow_parts.clear();
+        let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
+        for Lit { path, route, point, shading, .. } in lit.iter() {
             let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
             for k in 0..count {
                 let even = if light.is_extended() {
@@ -203,6 +226,15 @@ impl Renderer<'_> {
                     shadow_light.push((path.pixel, reflected));
                 } else {
                     radiance[path.pixel as usize] += reflected.extend(0.0);
+                }
+                if let Some(tally) = &mut tally {
+                    let [diffuse, highlight] = shading.parts(arriving.to_light);
+                    let parts = Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO]);
+                    if light.casts_shadows {
+                        shadow_parts.push(parts);
+                    } else {
+                        tally.add_parts(path.pixel, &parts, 1.0);
+                    }
                 }
             }
         }

@@ -36,7 +36,7 @@ fn busy_scene(place: DVec3) -> Scene {
     scene
 }
 
-fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
+pub(super) fn bits(pixels: &[Vec4]) -> Vec<[u32; 4]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 

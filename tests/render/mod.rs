@@ -1,7 +1,10 @@
 //! Pictures: against closed forms, and against themselves under everything that must not change them.
 
+mod adaptive;
 mod alpha;
+mod aov;
 mod camera;
+mod checkpoint;
 mod closed_forms;
 mod determinism;
 mod explain;

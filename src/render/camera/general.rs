@@ -54,6 +54,12 @@ impl General {
         self.journey.is_some()
     }
 
+    /// What chooses the middle of the lens.
+    pub(super) fn middle_of_lens(&self) -> DVec2 {
+        // Of a polygon the second number is the way outwards; a disk is made of a square.
+        if self.lens.is_some_and(|lens| lens.blades >= 3) { DVec2::ZERO } else { DVec2::splat(0.5) }
+    }
+
     /// The ray through a point of the film and, where there is a lens, through the point of it that `lens` gives.
     pub(super) fn ray(&self, film: DVec2, lens: DVec2, time: f32) -> Ray {
         let Pose { eye, frame } = self.journey.map_or(self.pose, |journey| journey.at(time.into()));

@@ -70,6 +70,14 @@ impl View {
             Self::General(view) => view.moves(),
         }
     }
+
+    /// The ray through a point of the film and through the middle of the lens, at a time.
+    pub(super) fn middle_ray(&self, film: DVec2, time: f32) -> Ray {
+        match self {
+            Self::Pinhole(pinhole) => pinhole.ray(film),
+            Self::General(view) => view.ray(film, view.middle_of_lens(), time),
+        }
+    }
 }
 
 /// Unit vectors in f32 differ by 2^-24 at least where a component is near 1; twice that tells every two pixels apart.

@@ -83,6 +83,17 @@ impl<'a> Lobes<'a> {
         value
     }
 
+    /// The share of [`Lobes::evaluate`] by what it is: diffuse, reflected, transmitted.
+    pub fn parts(&self, to_light: DVec3) -> [Vec3; 3] {
+        let whole = self.evaluate(to_light).share;
+        if !self.shading.faces(to_light) {
+            return [Vec3::ZERO, Vec3::ZERO, whole];
+        }
+        let diffuse = self.shading.parts(to_light)[0];
+        // A way through is behind the surface, where nothing else is.
+        [diffuse, (whole - diffuse).max(Vec3::ZERO), Vec3::ZERO]
+    }
+
     /// A direction to go on in: `choice` (from 0 to below 1) chooses the lobe, `even` (in the unit square) the
     /// direction. None where that leads nowhere.
     pub fn sample(&self, choice: f64, even: DVec2) -> Option<Scattered> {

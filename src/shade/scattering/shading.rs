@@ -83,6 +83,17 @@ impl Shading {
         self.value(arriving.to_light) * arriving.color
     }
 
+    /// Share of even light that is sent on by what is diffuse and by the highlight, linear RGB.
+    pub fn albedo(&self) -> Vec3 {
+        self.diffuse + self.highlight.color
+    }
+
+    /// pi f cos for light along `to_light`: what is diffuse, and the highlight.
+    pub fn parts(&self, to_light: DVec3) -> [Vec3; 2] {
+        let diffuse = self.diffuse * self.normal.dot(to_light).max(0.0) as f32;
+        [diffuse, (self.value(to_light) - diffuse).max(Vec3::ZERO)]
+    }
+
     /// pi f cos for light along `to_light`.
     pub(super) fn value(&self, to_light: DVec3) -> Vec3 {
         let [diffuse, highlight] = self.lobes(to_light);

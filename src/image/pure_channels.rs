@@ -1,0 +1,81 @@
+//! OpenEXR files with any channels, by the crate exr.
+
+use std::path::Path;
+
+use exr::prelude::{self as openexr, FlatSamples, ReadChannels, ReadLayers, WritableImage, f16};
+
+use super::file::Encoding;
+use super::metadata::Metadata;
+use super::pure::{attributes, tiled};
+use super::samples::{Samples, Values};
+use super::{Channel, Channels, Plane};
+
+type Result<T> = std::result::Result<T, String>;
+
+/// Writes colours and what stands beside them.
+pub(super) fn write(
+    path: &Path,
+    samples: &Samples,
+    channels: &[Channel],
+    encoding: Encoding,
+    metadata: &Metadata,
+) -> Result<()> {
+    let count = samples.channels.count();
+    let mut list = Vec::new();
+    for (i, name) in ["R", "G", "B", "A"].into_iter().take(count).enumerate() {
+        let plane = match &samples.values {
+            Values::Half(bits) => {
+                FlatSamples::F16(bits.iter().skip(i).step_by(count).map(|&b| f16::from_bits(b)).collect())
+            }
+            Values::Float(values) => FlatSamples::F32(values.iter().skip(i).step_by(count).copied().collect()),
+            Values::U8(_) | Values::U16(_) => return Err("integer colours are not written beside channels".to_owned()),
+        };
+        list.push(openexr::AnyChannel::new(name, plane));
+    }
+    list.extend(channels.iter().map(|Channel { name, plane }| {
+        let plane = match plane {
+            Plane::Float(values) => FlatSamples::F32(values.clone()),
+            Plane::Uint(values) => FlatSamples::U32(values.clone()),
+        };
+        openexr::AnyChannel::new(name.as_str(), plane)
+    }));
+    let layer = openexr::Layer::new(
+        (samples.width as usize, samples.height as usize),
+        attributes(metadata),
+        tiled(encoding),
+        openexr::AnyChannels::sort(list.into()),
+    );
+    openexr::Image::from_layer(layer).write().to_file(path).map_err(|e| e.to_string())
+}
+
+/// Every channel of a file, unless `check` refuses its width and height.
+pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Channels> {
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let header = meta.headers.first().ok_or("no layers")?;
+    if header.deep {
+        return Err("a deep image; only flat ones are read".to_owned());
+    }
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    check(width as u64, height as u64)?;
+    let image = openexr::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|e| e.to_string())?;
+    let channels = image.layer_data.channel_data.list.into_iter().map(|channel| {
+        let plane = match channel.sample_data {
+            FlatSamples::F16(values) => Plane::Float(values.into_iter().map(f16::to_f32).collect()),
+            FlatSamples::F32(values) => Plane::Float(values),
+            FlatSamples::U32(values) => Plane::Uint(values),
+        };
+        Channel { name: channel.name.to_string(), plane }
+    });
+    let channels: Vec<_> = channels.collect();
+    if channels.iter().any(|channel| channel.plane.len() != width * height) {
+        return Err("channels of a lower resolution are not read".to_owned());
+    }
+    Ok(Channels { width: width as u32, height: height as u32, channels })
+}

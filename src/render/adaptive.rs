@@ -1,0 +1,192 @@
+//! How many samples a pixel needs: as many as bring its error below a threshold.
+//!
+//! The samples of a pixel are parted into two halves, each well spread, and how far their means differ tells how far their common
+//! mean is off (Dammertz, Hanika, Keller and Lensch 2010, *A hierarchical automatic stopping condition for Monte Carlo
+//! global illumination*). The variance of single samples, the alternative, takes well-spread samples for random ones: at every edge
+//! it finds many times the error that there is. One such difference is one number drawn at random, and small by chance in many a
+//! pixel that is noisy; so that of a pixel is averaged with its neighbours', 5 x 5 by binomial weights, which are about as noisy. A path
+//! to a small bright light, too, that one pixel has found and the next one not yet, makes both go on.
+//!
+//! The error is measured as it is seen: of the square root of the pixel, which is about what a screen shows, 1 being white. So a
+//! threshold of 0.01 means two or three steps of 255, in the dark as in the light.
+//!
+//! Pixels are judged between rounds, all of them at once, so that neither tiles nor threads decide anything. A pixel that has
+//! stopped stays so: its samples are those of a render with that many.
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::math::Vec4;
+
+/// When a pixel has samples enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive {
+    /// Standard error of the square root of a pixel, above 0; 1 is white.
+    pub noise: f32,
+    /// Samples that no pixel exceeds.
+    pub max_spp: u32,
+}
+
+/// Samples that every pixel has: fewer tell nothing about their error.
+const FEWEST: u32 = 16;
+/// What numbers of samples are multiples of, so that the halves are equal.
+const STEP: u32 = 8;
+
+impl Adaptive {
+    /// # Errors
+    /// [`Error::Usage`] for a threshold that is not above 0, and fewer samples than tell the error.
+    pub(super) fn check(&self, spp: u32) -> Result<()> {
+        if !(self.noise > 0.0 && self.noise.is_finite()) {
+            return Err(Error::Usage(format!("a noise threshold of {}: it must be above 0", self.noise)));
+        }
+        let fewest = spp.max(FEWEST);
+        if self.max_spp < fewest {
+            let message =
+                format!("at most {} samples a pixel: a noise threshold needs at least {fewest}", self.max_spp);
+            return Err(Error::Usage(message));
+        }
+        Ok(())
+    }
+
+    /// How many samples the pixels have that go on after `done`; of which none are done, at least `spp`.
+    ///
+    /// By a quarter at a time: no pixel gets more than a quarter too many, and the rounds are few.
+    pub(super) fn next(&self, done: u32, spp: u32) -> u32 {
+        let next = if done == 0 { spp.max(FEWEST) } else { done + done / 4 };
+        next.next_multiple_of(STEP).max(done + STEP).min(self.max_spp)
+    }
+}
+
+/// Whether a sample is in the half that is added up by itself: by the first digit of the third dimension of Sobol's sequence
+/// (1967), so that both halves are spread over the two dimensions of a pixel as well as samples of their number are.
+/// Every other sample, which is simpler, is one side of the pixel.
+pub(super) const fn in_half(sample: u32) -> bool {
+    (sample & 0xdb6d_b6db).count_ones() % 2 == 1
+}
+
+/// What is known of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Estimate {
+    /// Of all samples.
+    pub(super) sum: Vec4,
+    /// Of the half that is [`in_half`].
+    pub(super) half: Vec4,
+    /// Of all samples.
+    pub(super) weight: f32,
+    /// How many samples.
+    pub(super) count: u32,
+}
+
+impl Estimate {
+    /// The square of the error of a single sample, by what the halves tell.
+    fn variance(&self) -> Vec4 {
+        let difference = (2.0 * self.half - self.sum) / self.weight.max(1.0);
+        difference * difference * self.count as f32
+    }
+
+    /// The error as it is seen, if single samples have this variance.
+    fn error(&self, variance: Vec4) -> f32 {
+        let deviation = (variance / self.count as f32).map(f32::sqrt);
+        let mean = (self.sum / self.weight.max(1.0)).max(Vec4::ZERO);
+        // Of a root near 0 the slope says nothing: what one deviation more makes of it does.
+        let seen = (mean + deviation).map(f32::sqrt) - mean.map(f32::sqrt);
+        seen.truncate().max_element().max(deviation.w)
+    }
+}
+
+/// Binomial: nearly a normal distribution of standard deviation 1.
+const KERNEL: [f32; 5] = [1.0, 4.0, 6.0, 4.0, 1.0];
+
+/// The error of each pixel of a picture in rows of `width`, as it is seen.
+pub(super) fn errors(width: usize, pixels: usize, estimate: impl Fn(usize) -> Estimate + Sync) -> Vec<f32> {
+    let own: Vec<Vec4> = (0..pixels).into_par_iter().map(|i| estimate(i).variance()).collect();
+    let height = pixels / width;
+    let along = |values: &[Vec4], at: usize, end: usize, place: &dyn Fn(usize) -> usize| {
+        let (mut sum, mut weights) = (Vec4::ZERO, 0.0);
+        for (k, weight) in KERNEL.into_iter().enumerate() {
+            // Not beyond the picture.
+            if let Some(neighbour) = (at + k).checked_sub(2).filter(|&neighbour| neighbour < end) {
+                sum += values[place(neighbour)] * weight;
+                weights += weight;
+            }
+        }
+        sum / weights
+    };
+    let rows = (0..pixels).into_par_iter().map(|i| along(&own, i % width, width, &|x| i / width * width + x));
+    let rows: Vec<Vec4> = rows.collect();
+    let errors = (0..pixels).into_par_iter().map(|i| {
+        let variance = along(&rows, i / width, height, &|y| y * width + i % width);
+        estimate(i).error(variance)
+    });
+    errors.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::sampler::{Sampler, Sampling};
+
+    #[test]
+    fn rounds_grow_to_the_most_and_halves_are_equal() {
+        let adaptive = Adaptive { noise: 0.1, max_spp: 100 };
+        let mut counts = vec![0];
+        while *counts.last().unwrap() < 100 {
+            counts.push(adaptive.next(*counts.last().unwrap(), 4));
+        }
+        assert_eq!(counts, [0, 16, 24, 32, 40, 56, 72, 96, 100]);
+        for count in (0..2000).step_by(STEP as usize) {
+            assert_eq!((0..count).filter(|&s| in_half(s)).count() * 2, count as usize);
+        }
+        assert!(adaptive.check(4).is_ok() && adaptive.check(101).is_err());
+        assert!(Adaptive { noise: 0.0, ..adaptive }.check(4).is_err());
+        assert!(Adaptive { max_spp: 15, ..adaptive }.check(4).is_err());
+    }
+
+    /// Each half of 64 samples has as many in every strip of the pixel, upright, lying or square.
+    #[test]
+    fn both_halves_are_well_spread() {
+        let sampler = Sampler::new(Sampling::Sobol, 64, 3);
+        let pattern = sampler.pattern(5, 7);
+        for (columns, rows) in [(16, 1), (1, 16), (4, 4), (8, 2), (2, 8)] {
+            let mut counts = vec![0; columns * rows];
+            for sample in (0..64).filter(|&s| in_half(s)) {
+                let at = sampler.film(&pattern, sample);
+                counts[(at.y * rows as f64) as usize * columns + (at.x * columns as f64) as usize] += 1;
+            }
+            assert!(counts.iter().all(|&n| (1..=3).contains(&n)), "{columns}x{rows}: {counts:?}");
+        }
+    }
+
+    /// Random pixels of known variance: the estimate must be near it, for every one of them.
+    #[test]
+    fn errors_are_those_of_random_samples() {
+        let (side, count, deviation) = (40usize, 64u32, 0.05f64);
+        let sampler = Sampler::new(Sampling::Independent, count, 1);
+        let estimate = |i: usize| {
+            let pattern = sampler.pattern((i % side) as u32, (i / side) as u32);
+            let (mut sum, mut half) = (Vec4::ZERO, Vec4::ZERO);
+            for sample in 0..count {
+                // Even over an interval: its deviation is its width over the root of 12.
+                let x = 0.25 + (sampler.film(&pattern, sample).x - 0.5) * deviation * 12f64.sqrt();
+                let value = Vec4::new(x as f32, 0.0, 0.0, 1.0);
+                sum += value;
+                half += if in_half(sample) { value } else { Vec4::ZERO };
+            }
+            Estimate { sum, half, weight: count as f32, count }
+        };
+        let errors = errors(side, side * side, estimate);
+        // d sqrt(x) = dx / (2 sqrt(x)), at 1/4.
+        let expected = deviation / f64::from(count).sqrt();
+        let mean = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
+        assert!((mean / expected - 1.0).abs() < 0.05, "{mean} {expected}");
+        for error in errors {
+            assert!((0.35..2.0).contains(&(f64::from(error) / expected)), "{error} {expected}");
+        }
+    }
+
+    #[test]
+    fn darkness_and_full_coverage_have_no_error() {
+        let even = |_| Estimate { sum: Vec4::new(0.0, 0.0, 0.0, 8.0), half: Vec4::W * 4.0, weight: 8.0, count: 8 };
+        assert!(errors(3, 9, even).iter().all(|&error| error == 0.0));
+    }
+}

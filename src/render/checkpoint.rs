@@ -1,0 +1,181 @@
+//! Long renders that are interrupted: what is known so far is written to a file now and then, and read to go on from.
+//!
+//! The file is an OpenEXR picture that any viewer shows, of the render as far as it is, with the undivided sums beside it as 32-bit
+//! channels. It is written beside its place and renamed, so that whenever the process is killed there is a whole one, the last or the
+//! one before. In the header stands what the render was of; a file of another scene, other settings, or by another program is refused,
+//! for what went on from it would be a mixture.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::Renderer;
+use super::canvas::Canvas;
+use super::identity::identity;
+use crate::error::{Error, Result};
+use crate::image::{self, Channel, Channels, Metadata, WriteOptions};
+use crate::math::Vec4;
+
+/// How a render is kept, and gone on with.
+///
+/// What goes wrong with the file is [`Error::Output`] where it is written; [`Error::Input`] where it is to be read and is missing,
+/// broken or of another render.
+#[derive(Clone, Copy, Debug)]
+pub struct Checkpoint<'a> {
+    /// The file, with the suffix `.exr`.
+    pub path: &'a Path,
+    /// How often it is written; none for never. It is also written when the render is interrupted.
+    pub every: Option<Duration>,
+    /// Whether to go on from what it holds.
+    pub resume: bool,
+    /// The engine, which must be the same one all the time.
+    pub engine: &'a str,
+}
+
+/// Prefix of the header's entries.
+const OWN: &str = "twincast/";
+/// The entry that holds the number of samples with which the present round began.
+const ROUND: &str = "round";
+
+/// Writes checkpoints.
+pub(super) struct Keeper<'k> {
+    path: &'k Path,
+    every: Duration,
+    last: Instant,
+    identity: Vec<(&'static str, String)>,
+}
+
+impl Keeper<'_> {
+    /// Writes, if the last time is long enough ago.
+    pub(super) fn write_if_due(&mut self, canvas: &Canvas, done: u32) -> Result<()> {
+        if self.last.elapsed() < self.every {
+            return Ok(());
+        }
+        self.write(canvas, done)?;
+        self.last = Instant::now();
+        Ok(())
+    }
+
+    /// Writes what is known within the round that began with `done` samples.
+    pub(super) fn write(&self, canvas: &Canvas, done: u32) -> Result<()> {
+        let mut texts: Vec<_> = self.identity.iter().map(|(key, text)| (format!("{OWN}{key}"), text.clone())).collect();
+        texts.push((format!("{OWN}{ROUND}"), done.to_string()));
+        let metadata = Metadata { texts, ..Metadata::default() };
+        image::write_channels(self.path, &canvas.image(), &planes(canvas), &metadata, &WriteOptions::default())
+    }
+}
+
+impl Renderer<'_> {
+    /// The canvas to go on with, which is as empty as the one given where nothing is to be resumed; the samples with which the round
+    /// begins; and what writes checkpoints.
+    pub(super) fn open_checkpoint<'k>(
+        &self,
+        checkpoint: &Checkpoint<'k>,
+        mut canvas: Canvas,
+    ) -> Result<(Canvas, u32, Option<Keeper<'k>>)> {
+        let Checkpoint { path, every, resume, engine } = *checkpoint;
+        let identity = identity(self, engine);
+        let mut done = 0;
+        if resume {
+            done = same_render(path, &identity)?;
+            let channels = image::read_channels(path)?;
+            let broken = || Error::input(path, "", "is no whole checkpoint: leave out --resume to begin anew");
+            fill(&mut canvas, &channels).ok_or_else(broken)?;
+        }
+        let keeper = every.map(|every| Keeper { path, every, last: Instant::now(), identity });
+        Ok((canvas, done, keeper))
+    }
+}
+
+/// Whether a checkpoint is of this render; the samples with which its round began.
+fn same_render(path: &Path, identity: &[(&'static str, String)]) -> Result<u32> {
+    let refuse = |message: String| Error::input(path, "", message);
+    if !path.exists() {
+        return Err(refuse("there is no checkpoint to resume: leave out --resume to begin anew".to_owned()));
+    }
+    let Metadata { texts, .. } = image::read_metadata(path)?;
+    let entry = |key: &str| {
+        let found = texts.iter().find(|(name, _)| name.strip_prefix(OWN) == Some(key));
+        found.map(|(_, text)| text.as_str()).ok_or_else(|| refuse("is not a checkpoint of a render".to_owned()))
+    };
+    for (key, own) in identity {
+        let found = entry(key)?;
+        if found != own {
+            // Of long entries only what differs.
+            let differing = found.split("; ").zip(own.split("; ")).find(|(a, b)| a != b);
+            let (found, own) = differing.unwrap_or((found, own.as_str()));
+            return Err(refuse(format!(
+                "is of another render, by its {key}: {found}, and here {own}; begin anew without --resume"
+            )));
+        }
+    }
+    entry(ROUND)?.parse().map_err(|_| refuse("does not say how far it is".to_owned()))
+}
+
+/// Everything about a canvas.
+fn planes(canvas: &Canvas) -> Vec<Channel> {
+    let mut channels = Vec::new();
+    let mut colours = |name: &str, values: &[Vec4]| {
+        for (axis, component) in ["R", "G", "B", "A"].into_iter().enumerate() {
+            channels.push(Channel::float(format!("{name}.{component}"), values.iter().map(|v| v[axis]).collect()));
+        }
+    };
+    colours("sum", &canvas.sums);
+    if !canvas.halves.is_empty() {
+        colours("half", &canvas.halves);
+    }
+    channels.push(Channel::float("weight", canvas.weights.clone()));
+    channels.push(Channel::uint("count", canvas.counts.clone()));
+    channels.push(Channel::uint("active", canvas.active.iter().map(|&active| active.into()).collect()));
+    let stride = canvas.beside.len() / canvas.sums.len();
+    for k in 0..stride {
+        channels.push(Channel::float(
+            format!("beside.{k}"),
+            canvas.beside.iter().skip(k).step_by(stride).copied().collect(),
+        ));
+    }
+    for (name, coverage) in [("object", &canvas.objects), ("material", &canvas.materials)] {
+        for k in 0..coverage.iter().map(Vec::len).max().unwrap_or(0) {
+            // No id is 0.
+            let of = |covers: &super::aov::Coverage| covers.get(k).copied().unwrap_or_default();
+            channels.push(Channel::uint(format!("{name}{k}.id"), coverage.iter().map(|c| of(c).0).collect()));
+            channels.push(Channel::float(format!("{name}{k}.share"), coverage.iter().map(|c| of(c).1).collect()));
+        }
+    }
+    channels
+}
+
+/// Puts everything into a canvas that [`planes`] made of one like it; none where something is missing.
+fn fill(canvas: &mut Canvas, channels: &Channels) -> Option<()> {
+    if (channels.width, channels.height) != (canvas.window.width, canvas.window.height) {
+        return None;
+    }
+    let colours = |name: &str, values: &mut [Vec4]| {
+        for (axis, component) in ["R", "G", "B", "A"].into_iter().enumerate() {
+            let plane = channels.floats(&format!("{name}.{component}"))?;
+            values.iter_mut().zip(plane).for_each(|(value, &x)| value[axis] = x);
+        }
+        Some(())
+    };
+    colours("sum", &mut canvas.sums)?;
+    if !canvas.halves.is_empty() {
+        colours("half", &mut canvas.halves)?;
+    }
+    canvas.weights.copy_from_slice(channels.floats("weight")?);
+    canvas.counts.copy_from_slice(channels.uints("count")?);
+    canvas.active.iter_mut().zip(channels.uints("active")?).for_each(|(active, &n)| *active = n != 0);
+    let stride = canvas.beside.len() / canvas.sums.len();
+    for k in 0..stride {
+        let plane = channels.floats(&format!("beside.{k}"))?;
+        canvas.beside.iter_mut().skip(k).step_by(stride).zip(plane).for_each(|(value, &x)| *value = x);
+    }
+    for (name, coverage) in [("object", &mut canvas.objects), ("material", &mut canvas.materials)] {
+        for k in 0.. {
+            let Some(ids) = channels.uints(&format!("{name}{k}.id")) else { break };
+            let shares = channels.floats(&format!("{name}{k}.share"))?;
+            for ((covers, &id), &share) in coverage.iter_mut().zip(ids).zip(shares) {
+                covers.extend((id != 0).then_some((id, share)));
+            }
+        }
+    }
+    Some(())
+}

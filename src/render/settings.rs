@@ -1,0 +1,152 @@
+//! What picture to make.
+
+use super::tiles::USUAL_TILE;
+use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+use crate::scene::Integrator;
+use crate::trace::Batch;
+
+/// Most pixels a picture may have along one side.
+pub const LARGEST_SIDE: u32 = 65_536;
+
+/// What picture to make of a scene.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples a pixel; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
+    pub spp: u32,
+    /// Chooses among equally good sample patterns.
+    pub seed: u64,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How samples become a pixel.
+    pub filter: Filter,
+    /// How rays are bundled; never changes a native picture.
+    pub batch: Batch,
+    /// Which tiles come first; never changes a picture.
+    pub tile_order: TileOrder,
+    /// Edge of a tile in pixels, a power of two from 4 to [`LARGEST_TILE`]; never changes a native picture.
+    pub tile: u32,
+    /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
+    pub background: Option<Vec3>,
+    /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
+    pub light_samples: u32,
+    /// How far light is followed; none for the cheapest way that shows all the scene contains.
+    pub integrator: Option<Integrator>,
+    /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
+    /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
+    pub max_depth: Option<u32>,
+    /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
+    pub crop: Option<Crop>,
+    /// What [`Renderer::picture`] tells of each pixel beside its colour.
+    pub aovs: Vec<Aov>,
+    /// Takes samples where they are needed; none takes as many for each pixel.
+    pub adaptive: Option<Adaptive>,
+}
+
+impl Default for Settings {
+    /// 1280 x 720 pixels of 4 samples, as deep as is usual.
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            spp: 4,
+            seed: 0,
+            sampling: Sampling::default(),
+            filter: Filter::default(),
+            batch: Batch::default(),
+            tile_order: TileOrder::default(),
+            tile: USUAL_TILE,
+            background: None,
+            light_samples: 1,
+            integrator: None,
+            max_depth: None,
+            crop: None,
+            aovs: Vec::new(),
+            adaptive: None,
+        }
+    }
+}
+
+/// A part of the picture; not empty.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Crop {
+    /// Columns to the left of it.
+    pub x: u32,
+    /// Rows above it.
+    pub y: u32,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Crop {
+    /// How many pixels.
+    pub(super) const fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Where a pixel of the whole picture is in a list of those of this part, row by row.
+    pub(super) const fn index(&self, (x, y): (u32, u32)) -> usize {
+        (y - self.y) as usize * self.width as usize + (x - self.x) as usize
+    }
+}
+
+impl Settings {
+    /// The part of the picture that is rendered.
+    pub(super) fn window(&self) -> Crop {
+        let Self { width, height, crop, .. } = *self;
+        crop.unwrap_or(Crop { x: 0, y: 0, width, height })
+    }
+
+    /// What no scene and no camera can make right.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub(super) fn check(&self) -> Result<()> {
+        let Self { width, height, spp, sampling, .. } = *self;
+        for side in [width, height] {
+            if side == 0 || side > LARGEST_SIDE {
+                let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
+                return Err(Error::Usage(message));
+            }
+        }
+        if spp == 0 {
+            return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
+        }
+        if let Some(Crop { x, y, width: columns, height: rows }) = self.crop {
+            let inside = |start: u32, length: u32, whole: u32| length > 0 && length <= whole.saturating_sub(start);
+            if !(inside(x, columns, width) && inside(y, rows, height)) {
+                let message =
+                    format!("the part {columns}x{rows} at {x},{y} does not lie in the picture of {width}x{height}");
+                return Err(Error::Usage(message));
+            }
+        }
+        if !self.tile.is_power_of_two() || self.tile < 4 || self.tile > LARGEST_TILE {
+            let message = format!("tiles of {0}x{0} pixels: 4, 8, 16, 32 or {LARGEST_TILE} is possible", self.tile);
+            return Err(Error::Usage(message));
+        }
+        if let Some(adaptive) = &self.adaptive {
+            adaptive.check(spp)?;
+            if self.crop.is_some() {
+                let why = "a pixel's samples depend on its neighbours' noise";
+                return Err(Error::Usage(format!("no part of a picture alone with a noise threshold: {why}")));
+            }
+            if matches!(sampling, Sampling::Stratified | Sampling::Grid) {
+                let why = "must know the number of samples beforehand";
+                return Err(Error::Usage(format!(
+                    "the sampler \"{sampling}\" {why}: with a noise threshold take sobol"
+                )));
+            }
+        }
+        if self.light_samples == 0 {
+            return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,99 @@
+//! The program is killed while it renders, and started again.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+fn render(output: &Path, flags: &[&str]) -> Child {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml");
+    Command::new(env!("CARGO_BIN_EXE_twincast"))
+        .arg("render")
+        .arg(scene)
+        .args([
+            "--integrator",
+            "path",
+            "--size",
+            "64x48",
+            "--spp",
+            "96",
+            "--threads",
+            "2",
+            "--tile-size",
+            "16",
+            "-q",
+            "-o",
+        ])
+        .arg(output)
+        .args(flags)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs")
+}
+
+/// Exit code, none for a signal, and what it says on stderr.
+fn end(child: Child) -> (Option<i32>, String) {
+    let output = child.wait_with_output().expect("it ends");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn a_render_that_is_killed_goes_on_to_the_same_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, killed] = ["whole.png", "killed.png"].map(|name| folder.path().join(name));
+    let kept = folder.path().join("killed.checkpoint.exr");
+    assert_eq!(end(render(&whole, &[])), (Some(0), String::new()));
+
+    let mut resume = false;
+    let mut kills = 0;
+    // Until it is done before it is killed; each time it is given a little longer.
+    for time in 0.. {
+        assert!(time < 60, "it gets on");
+        let flags: &[&str] = if resume { &["--checkpoint", "0.02s", "--resume"] } else { &["--checkpoint", "0.02s"] };
+        let mut child = render(&killed, flags);
+        std::thread::sleep(Duration::from_millis(150 + 70 * time));
+        let _ = child.kill();
+        let (code, said) = end(child);
+        match code {
+            Some(0) => break,
+            Some(code) => panic!("exit code {code}: {said}"),
+            None => kills += 1,
+        }
+        resume = kept.exists();
+    }
+    assert!(kills > 0 && resume, "{kills} kills, a checkpoint: {resume}");
+    assert_eq!(std::fs::read(&whole).unwrap(), std::fs::read(&killed).unwrap());
+    assert!(!kept.exists(), "it is of no more use");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let whole_files = left.iter().filter(|name| !name.to_string_lossy().starts_with('.')).count();
+    assert_eq!(whole_files, 2, "{left:?}");
+
+    let (code, said) = end(render(&killed, &["--resume"]));
+    assert!(code == Some(3) && said.contains("no checkpoint to resume"), "{said}");
+}
+
+/// Ctrl-C ends it with 130 and leaves a checkpoint, where one was asked for.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_leaves_a_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("a.png");
+    let kept = folder.path().join("a.checkpoint.exr");
+    for (flags, is_kept) in [(&["--spp", "60000"][..], false), (&["--spp", "60000", "--checkpoint", "1h"], true)] {
+        let child = Command::new(env!("CARGO_BIN_EXE_twincast"))
+            .arg("render")
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml"))
+            .args(["--integrator", "path", "--size", "64x48", "-q", "-o"])
+            .arg(&output)
+            .args(flags)
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the binary runs");
+        std::thread::sleep(Duration::from_millis(1500));
+        let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a signal");
+        assert!(signal.success());
+        let (code, said) = end(child);
+        assert_eq!(code, Some(130), "{said}");
+        assert_eq!((kept.exists(), output.exists()), (is_kept, false));
+    }
+}
