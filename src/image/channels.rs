@@ -62,6 +62,7 @@ impl Plane {
     }
 
     /// Four bytes a pixel, in the machine's order.
+    #[cfg(feature = "oiio")]
     pub(super) fn bytes(&self) -> &[u8] {
         match self {
             Self::Float(values) => bytemuck::cast_slice(values),

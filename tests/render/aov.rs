@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use twincast::image::{self, Channels, Metadata, Plane, WriteOptions};
 use twincast::math::{DVec3, Vec3, Vec4};
-use twincast::render::{Aov, Control, Filter, Picture};
-use twincast::scene::{Alpha, Camera, Environment, Integrator, Light, Material, Specular};
+use twincast::render::{Aov, Control, Crop, Filter, Picture};
+use twincast::scene::{Alpha, Camera, Environment, Fog, Integrator, Light, Material, Specular};
 use twincast::{Image, Renderer, Scene, Settings, World};
 
 use super::determinism::{bits, busier_scene};
@@ -93,6 +93,29 @@ fn geometry_is_that_of_rays_cast_by_hand() {
 }
 
 #[test]
+fn a_part_of_a_picture_has_that_part_of_the_channels() {
+    let scene = busier_scene();
+    let names = "depth,position,normal,uv,primitive,instance,albedo,samples,crypto-object,direct,indirect";
+    let whole = Settings { aovs: aovs(names), ..settings(90, 70, 2) };
+    let window = Crop { x: 31, y: 17, width: 40, height: 23 };
+    let part = Settings { crop: Some(window), ..whole.clone() };
+    let [whole, part] = [whole, part].map(|settings| picture(&scene, &scene.cameras[0], &settings));
+    assert!(!part.channels.is_empty());
+    for (own, all) in part.channels.iter().zip(&whole.channels) {
+        assert_eq!(own.name, all.name);
+        let bits = |plane: &Plane, at: usize| match plane {
+            Plane::Float(values) => values[at].to_bits(),
+            Plane::Uint(values) => values[at],
+        };
+        for (y, x) in (0..window.height).flat_map(|y| (0..window.width).map(move |x| (y, x))) {
+            let (at, in_all) = (y * window.width + x, (window.y + y) * 90 + window.x + x);
+            assert_eq!(bits(&own.plane, at as usize), bits(&all.plane, in_all as usize), "{} at {x},{y}", own.name);
+        }
+    }
+    assert_eq!(part.channels.len(), whole.channels.len());
+}
+
+#[test]
 fn uv_normals_and_albedo_of_a_floor() {
     let material = Material { specular: Vec3::splat(0.1), ..matte(0.5) };
     let scene = Scene::from_geometries(vec![floor(0.5, 0)], vec![material]);
@@ -124,6 +147,7 @@ fn light_by_its_paths_sums_up_to_the_picture() {
     scene.ambient = Vec3::new(0.1, 0.05, 0.2);
     scene.materials[1].alpha = Alpha::Blend;
     scene.materials[1].opacity = 0.7;
+    scene.fog = Some(Fog { absorption: Vec3::splat(0.05), color: Vec3::new(0.2, 0.3, 0.4), reach: 3.0 });
     let partitions =
         [&["emission", "direct", "indirect"][..], &["emission", "diffuse", "specular", "transmission"], &["all"]];
     let names = "emission,direct,indirect,diffuse,specular,transmission,all=L.*E";
