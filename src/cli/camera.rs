@@ -1,9 +1,12 @@
 //! Where to look from: a camera of the file, or flags; and a camera as flags.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 
 use super::common::parse_vector;
 use crate::error::{Error, Result};
+use crate::image;
 use crate::math::{DAabb, DVec2, DVec3};
 use crate::scene::{Camera, Distortion, Fov, Pose, Projection, Scene, ThinLens};
 
@@ -15,7 +18,8 @@ const DEFAULT_FOV: f64 = 40.0;
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
-    /// Camera of the file, by name (default: its first; without any, a view of the whole scene)
+    /// Camera of the file, by name, or that of an OpenEXR picture which this program wrote (default: the file's first;
+    /// without any, a view of the whole scene)
     #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "look_at", "up", "eye_end", "look_at_end", "up_end", "fov", "fov_x", "shift",
         "projection", "height"])]
     camera: Option<String>,
@@ -126,6 +130,12 @@ impl CameraArgs {
         }
         if let Some(name) = &self.camera {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);
+            if found.is_none() && image::holds_channels(Path::new(name)) {
+                let path = Path::new(name);
+                let camera = super::metadata::camera(&image::read_metadata(path)?);
+                let camera = camera.ok_or_else(|| Error::input(path, "", "does not tell of a camera"))?;
+                return Ok((camera, format!("that of the picture {name}")));
+            }
             let camera = found.ok_or_else(|| Error::Usage(unknown_camera(name, &scene.cameras)))?;
             return Ok((camera.clone(), format!("{name:?} of the file")));
         }

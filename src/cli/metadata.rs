@@ -1,9 +1,9 @@
 //! What a picture's file says about its camera.
 
 use crate::image::{Metadata, Window};
-use crate::math::{DAffine3, DMat4, DVec2};
+use crate::math::{DAffine3, DMat3, DMat4, DVec2, DVec3};
 use crate::render::{Crop, Settings};
-use crate::scene::{Camera, Pose, Projection};
+use crate::scene::{Camera, Fov, Pose, Projection};
 
 /// Nearest distance of the depth range that `worldToScreen` maps to -1..1; the far end is infinite. Rays know neither.
 const NEAR: f64 = 0.01;
@@ -32,6 +32,32 @@ pub(super) fn metadata(camera: &Camera, settings: &Settings, seconds: f64) -> Me
     }
 }
 
+/// The camera that a picture's file tells of, as exactly as its f32 are; none where it tells of none. Lens, distortion and shutter are
+/// not in it.
+pub(super) fn camera(metadata: &Metadata) -> Option<Camera> {
+    let to_camera = DMat4::from_cols_array(metadata.world_to_camera.as_ref()?);
+    let from_camera = to_camera.inverse();
+    let back = from_camera.z_axis.truncate().try_normalize()?;
+    let right = (from_camera.x_axis.truncate().reject_from_normalized(back)).try_normalize()?;
+    let usual = Camera::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 1.0)?;
+    let frame = DMat3::from_cols(right, back.cross(right), back);
+    let placed = Camera { eye: from_camera.w_axis.truncate(), frame, ..usual };
+    let Some(to_screen) = &metadata.world_to_screen else {
+        return Some(Camera { projection: Projection::Equirectangular, ..placed });
+    };
+    let screen = DMat4::from_cols_array(to_screen) * from_camera;
+    let half = DVec2::new(screen.x_axis.x, screen.y_axis.y).recip();
+    // What tells the two apart is whether w depends on z, which is -1 or 0.
+    let (projection, shift) = if screen.z_axis.w < -0.5 {
+        let [horizontal, vertical] = half.to_array().map(|half| 2.0 * libm::atan(half));
+        (Projection::Perspective(Fov::Both { horizontal, vertical }), screen.z_axis.truncate().truncate() / 2.0)
+    } else {
+        (Projection::Orthographic(2.0 * half.y), screen.w_axis.truncate().truncate() / -2.0)
+    };
+    let camera = Camera { projection, shift, ..placed };
+    (camera.eye.is_finite() && half.is_finite() && half.cmpgt(DVec2::ZERO).all()).then_some(camera)
+}
+
 /// OpenGL's perspective with the far plane at infinity, for a picture of the given half extent at distance 1, moved by
 /// `shift`.
 fn perspective(half: DVec2, shift: DVec2) -> DMat4 {
@@ -56,7 +82,6 @@ fn orthographic(half: DVec2, shift: DVec2) -> DMat4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DVec3;
     use crate::render::Renderer;
     use crate::scene::Scene;
     use crate::trace::World;
@@ -69,6 +94,33 @@ mod tests {
         let camera = Camera { shift: DVec2::new(0.25, -0.125), ..camera };
         agrees(&settings, camera.clone());
         agrees(&settings, Camera { projection: Projection::Orthographic(3.0), ..camera });
+    }
+
+    /// By way of a file the camera comes back: its rays are the same, but for the rounding to f32.
+    #[test]
+    fn the_camera_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let (settings, scene, world) =
+            (Settings { width: 40, height: 20, ..Settings::default() }, Scene::default(), World::default());
+        let camera = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 0.0), DVec3::Y, 0.7).unwrap();
+        let shifted = Camera { shift: DVec2::new(0.25, -0.125), ..camera.clone() };
+        for camera in [
+            Camera { projection: Projection::Orthographic(3.0), ..shifted.clone() },
+            Camera { projection: Projection::Equirectangular, ..camera.clone() },
+            shifted,
+            camera,
+        ] {
+            let image = crate::Image::new(4, 2);
+            crate::image::write(&path, &image, &metadata(&camera, &settings, 1.0), &Default::default()).unwrap();
+            let found = super::camera(&crate::image::read_metadata(&path).unwrap()).unwrap();
+            let [own, found] = [camera, found].map(|c| Renderer::new(&scene, &world, c, settings.clone()).unwrap());
+            for (x, y) in [(0, 0), (39, 3), (17, 19)] {
+                let (a, b) = (own.middle_ray(x, y), found.middle_ray(x, y));
+                assert!((a.origin - b.origin).length() < 1e-5 && (a.direction - b.direction).length() < 1e-5);
+            }
+        }
+        assert_eq!(super::camera(&Metadata::default()), None);
     }
 
     fn agrees(settings: &Settings, camera: Camera) {

@@ -1,11 +1,14 @@
 //! How many samples a pixel needs: as many as bring its error below a threshold.
 //!
-//! The samples of a pixel are parted into two halves, each well spread, and how far their means differ tells how far their common
-//! mean is off (Dammertz, Hanika, Keller and Lensch 2010, *A hierarchical automatic stopping condition for Monte Carlo
-//! global illumination*). The variance of single samples, the alternative, takes well-spread samples for random ones: at every edge
-//! it finds many times the error that there is. One such difference is one number drawn at random, and small by chance in many a
-//! pixel that is noisy; so that of a pixel is averaged with its neighbours', 5 x 5 by binomial weights, which are about as noisy. A path
-//! to a small bright light, too, that one pixel has found and the next one not yet, makes both go on.
+//! The samples of a pixel are parted into two, and how far the two means differ tells how far the mean of all is off
+//! (Dammertz, Hanika, Keller and Lensch 2010, *A hierarchical automatic stopping condition for Monte Carlo global
+//! illumination*). The variance of single samples, the alternative, takes well-spread samples for random ones: at every edge
+//! it finds many times the error that there is. For the same reason the first part is a power of two, and the second as many or half of that: those
+//! are well spread by themselves, where every other sample is not.
+//!
+//! One such difference is a number drawn at random, and small by chance in many a pixel that is noisy. So what a pixel's tells is
+//! averaged with its neighbours', 5 x 5 by binomial weights, which are about as noisy. A path to a small bright light, too, that one pixel has found and
+//! the next one not yet, makes both go on.
 //!
 //! The error is measured as it is seen: of the square root of the pixel, which is about what a screen shows, 1 being white. So a
 //! threshold of 0.01 means two or three steps of 255, in the dark as in the light.
@@ -29,8 +32,8 @@ pub struct Adaptive {
 
 /// Samples that every pixel has: fewer tell nothing about their error.
 const FEWEST: u32 = 16;
-/// What numbers of samples are multiples of, so that the halves are equal.
-const STEP: u32 = 8;
+/// Samples of the first round.
+const FIRST: u32 = 8;
 
 impl Adaptive {
     /// # Errors
@@ -48,20 +51,21 @@ impl Adaptive {
         Ok(())
     }
 
-    /// How many samples the pixels have that go on after `done`; of which none are done, at least `spp`.
-    ///
-    /// By a quarter at a time: no pixel gets more than a quarter too many, and the rounds are few.
-    pub(super) fn next(&self, done: u32, spp: u32) -> u32 {
-        let next = if done == 0 { spp.max(FEWEST) } else { done + done / 4 };
-        next.next_multiple_of(STEP).max(done + STEP).min(self.max_spp)
+    /// How many samples the pixels have that go on after `done`: a power of two, then half as many more, and so on.
+    pub(super) fn next(&self, done: u32) -> u32 {
+        let next = match done {
+            0 => FIRST,
+            FIRST => FEWEST,
+            done if done.is_power_of_two() => done + done / 2,
+            done => done.next_power_of_two(),
+        };
+        next.min(self.max_spp)
     }
-}
 
-/// Whether a sample is in the half that is added up by itself: by the first digit of the third dimension of Sobol's sequence
-/// (1967), so that both halves are spread over the two dimensions of a pixel as well as samples of their number are.
-/// Every other sample, which is simpler, is one side of the pixel.
-pub(super) const fn in_half(sample: u32) -> bool {
-    (sample & 0xdb6d_b6db).count_ones() % 2 == 1
+    /// Whether pixels are judged that have so many samples, of which all have at least `spp`.
+    pub(super) fn judges(&self, done: u32, spp: u32) -> bool {
+        done >= spp.max(FEWEST)
+    }
 }
 
 /// What is known of a pixel.
@@ -69,19 +73,23 @@ pub(super) const fn in_half(sample: u32) -> bool {
 pub(super) struct Estimate {
     /// Of all samples.
     pub(super) sum: Vec4,
-    /// Of the half that is [`in_half`].
-    pub(super) half: Vec4,
+    /// Of the first ones: the greatest power of two that is less than all of them.
+    pub(super) first: Vec4,
     /// Of all samples.
     pub(super) weight: f32,
-    /// How many samples.
+    /// How many samples, at least 2.
     pub(super) count: u32,
 }
 
 impl Estimate {
-    /// The square of the error of a single sample, by what the halves tell.
+    /// The square of the error of a single sample, by what the two parts tell.
     fn variance(&self) -> Vec4 {
-        let difference = (2.0 * self.half - self.sum) / self.weight.max(1.0);
-        difference * difference * self.count as f32
+        let first = self.count.next_power_of_two() / 2;
+        let (a, b) = (first as f32, (self.count - first) as f32);
+        let scale = self.count as f32 / self.weight.max(1.0);
+        let difference = (self.first / a - (self.sum - self.first) / b) * scale;
+        // The variance of a difference of means is v / a + v / b.
+        difference * difference * (a * b / (a + b))
     }
 
     /// The error as it is seen, if single samples have this variance.
@@ -127,66 +135,71 @@ mod tests {
     use crate::render::sampler::{Sampler, Sampling};
 
     #[test]
-    fn rounds_grow_to_the_most_and_halves_are_equal() {
+    fn rounds_grow_to_the_most() {
         let adaptive = Adaptive { noise: 0.1, max_spp: 100 };
         let mut counts = vec![0];
         while *counts.last().unwrap() < 100 {
-            counts.push(adaptive.next(*counts.last().unwrap(), 4));
+            counts.push(adaptive.next(*counts.last().unwrap()));
         }
-        assert_eq!(counts, [0, 16, 24, 32, 40, 56, 72, 96, 100]);
-        for count in (0..2000).step_by(STEP as usize) {
-            assert_eq!((0..count).filter(|&s| in_half(s)).count() * 2, count as usize);
-        }
+        assert_eq!(counts, [0, 8, 16, 24, 32, 48, 64, 96, 100]);
+        assert!(
+            !adaptive.judges(8, 4) && adaptive.judges(16, 4) && !adaptive.judges(48, 50) && adaptive.judges(64, 50)
+        );
         assert!(adaptive.check(4).is_ok() && adaptive.check(101).is_err());
         assert!(Adaptive { noise: 0.0, ..adaptive }.check(4).is_err());
         assert!(Adaptive { max_spp: 15, ..adaptive }.check(4).is_err());
     }
 
-    /// Each half of 64 samples has as many in every strip of the pixel, upright, lying or square.
+    /// What is compared is well spread by itself: as many samples as cells, one in each, upright, lying or square.
     #[test]
-    fn both_halves_are_well_spread() {
+    fn both_parts_are_well_spread() {
         let sampler = Sampler::new(Sampling::Sobol, 64, 3);
         let pattern = sampler.pattern(5, 7);
-        for (columns, rows) in [(16, 1), (1, 16), (4, 4), (8, 2), (2, 8)] {
-            let mut counts = vec![0; columns * rows];
-            for sample in (0..64).filter(|&s| in_half(s)) {
-                let at = sampler.film(&pattern, sample);
-                counts[(at.y * rows as f64) as usize * columns + (at.x * columns as f64) as usize] += 1;
+        for samples in [0..32, 32..64, 32..48, 16..32, 16..24] {
+            let n = samples.len();
+            for columns in (0..).map(|k| 1 << k).take_while(|&columns| columns <= n) {
+                let mut counts = vec![0; n];
+                for sample in samples.clone() {
+                    let at = sampler.film(&pattern, sample);
+                    counts[(at.y * (n / columns) as f64) as usize * columns + (at.x * columns as f64) as usize] += 1;
+                }
+                assert!(counts.iter().all(|&n| n == 1), "{samples:?} in {columns} columns: {counts:?}");
             }
-            assert!(counts.iter().all(|&n| (1..=3).contains(&n)), "{columns}x{rows}: {counts:?}");
         }
     }
 
     /// Random pixels of known variance: the estimate must be near it, for every one of them.
     #[test]
     fn errors_are_those_of_random_samples() {
-        let (side, count, deviation) = (40usize, 64u32, 0.05f64);
-        let sampler = Sampler::new(Sampling::Independent, count, 1);
-        let estimate = |i: usize| {
-            let pattern = sampler.pattern((i % side) as u32, (i / side) as u32);
-            let (mut sum, mut half) = (Vec4::ZERO, Vec4::ZERO);
-            for sample in 0..count {
-                // Even over an interval: its deviation is its width over the root of 12.
-                let x = 0.25 + (sampler.film(&pattern, sample).x - 0.5) * deviation * 12f64.sqrt();
-                let value = Vec4::new(x as f32, 0.0, 0.0, 1.0);
-                sum += value;
-                half += if in_half(sample) { value } else { Vec4::ZERO };
+        let (side, deviation) = (40usize, 0.05f64);
+        for count in [64, 96] {
+            let sampler = Sampler::new(Sampling::Independent, count, 1);
+            let estimate = |i: usize| {
+                let pattern = sampler.pattern((i % side) as u32, (i / side) as u32);
+                let (mut sum, mut first) = (Vec4::ZERO, Vec4::ZERO);
+                for sample in 0..count {
+                    // Even over an interval: its deviation is its width over the root of 12.
+                    let x = 0.25 + (sampler.film(&pattern, sample).x - 0.5) * deviation * 12f64.sqrt();
+                    let value = Vec4::new(x as f32, 0.0, 0.0, 1.0);
+                    sum += value;
+                    first += if sample < count.next_power_of_two() / 2 { value } else { Vec4::ZERO };
+                }
+                Estimate { sum, first, weight: count as f32, count }
+            };
+            let errors = errors(side, side * side, estimate);
+            // d sqrt(x) = dx / (2 sqrt(x)), at 1/4.
+            let expected = deviation / f64::from(count).sqrt();
+            let mean = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
+            assert!((mean / expected - 1.0).abs() < 0.06, "{mean} {expected}");
+            for error in errors {
+                assert!((0.3..2.2).contains(&(f64::from(error) / expected)), "{error} {expected}");
             }
-            Estimate { sum, half, weight: count as f32, count }
-        };
-        let errors = errors(side, side * side, estimate);
-        // d sqrt(x) = dx / (2 sqrt(x)), at 1/4.
-        let expected = deviation / f64::from(count).sqrt();
-        let mean = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
-        assert!((mean / expected - 1.0).abs() < 0.05, "{mean} {expected}");
-        for error in errors {
-            assert!((0.35..2.0).contains(&(f64::from(error) / expected)), "{error} {expected}");
         }
     }
 
     #[test]
     fn darkness_and_full_coverage_have_no_error() {
-        let even = |_| Estimate { sum: Vec4::new(0.0, 0.0, 0.0, 8.0), half: Vec4::W * 4.0, weight: 8.0, count: 8 };
+        let even = |_| Estimate { sum: Vec4::new(0.0, 0.0, 0.0, 8.0), first: Vec4::W * 4.0, weight: 8.0, count: 8 };
         assert!(errors(3, 9, even).iter().all(|&error| error == 0.0));
     }
 }

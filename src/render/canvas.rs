@@ -25,8 +25,8 @@ pub(super) struct Canvas {
     pub(super) counts: Vec<u32>,
     /// Whether it gets more of them.
     pub(super) active: Vec<bool>,
-    /// Of every other sample, where the error is to be known.
-    pub(super) halves: Vec<Vec4>,
+    /// Of the first samples, as [`Estimate::first`] has it; empty where the error need not be known.
+    pub(super) firsts: Vec<Vec4>,
     /// What is told beside the colours, of each pixel as many as [`Request::stride`].
     pub(super) beside: Vec<f32>,
     pub(super) objects: Vec<Coverage>,
@@ -38,7 +38,7 @@ impl Canvas {
     ///
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) where it does not fit into memory.
-    pub(super) fn new(window: Crop, with_halves: bool, request: Option<&Request>) -> Result<Self> {
+    pub(super) fn new(window: Crop, with_firsts: bool, request: Option<&Request>) -> Result<Self> {
         let (pixels, Crop { width, height, .. }) = (window.len(), window);
         let mattes = request.and_then(|request| request.mattes.as_deref());
         let only = |wanted: bool| if wanted { pixels } else { 0 };
@@ -48,7 +48,7 @@ impl Canvas {
             weights: zeros(width, height, pixels)?,
             counts: zeros(width, height, pixels)?,
             active: vec![true; pixels],
-            halves: zeros(width, height, only(with_halves))?,
+            firsts: zeros(width, height, only(with_firsts))?,
             beside: zeros(width, height, pixels.saturating_mul(request.map_or(0, |request| request.stride)))?,
             objects: zeros(width, height, only(mattes.is_some_and(|mattes| mattes.has_objects)))?,
             materials: zeros(width, height, only(mattes.is_some_and(|mattes| mattes.has_materials)))?,
@@ -69,7 +69,6 @@ impl Canvas {
     pub(super) fn load(&self, pixels: &[(u32, u32)], request: Option<&Request>, buffers: &mut Buffers) {
         buffers.sums.clear();
         buffers.weights.clear();
-        buffers.halves.clear();
         if let (Some(request), Some(tally)) = (request, &mut buffers.tally) {
             tally.begin(request, pixels.len());
         }
@@ -77,7 +76,6 @@ impl Canvas {
             let i = self.index(pixel);
             buffers.sums.push(self.sums[i]);
             buffers.weights.push(self.weights[i]);
-            buffers.halves.extend(self.halves.get(i));
             let (Some(request), Some(tally)) = (request, &mut buffers.tally) else { continue };
             let stride = request.stride;
             tally.sums[k * stride..(k + 1) * stride].copy_from_slice(&self.beside[i * stride..(i + 1) * stride]);
@@ -100,12 +98,14 @@ impl Canvas {
     ) {
         for (k, &pixel) in pixels.iter().enumerate() {
             let i = self.index(pixel);
+            if let Some(first) = self.firsts.get_mut(i)
+                && self.counts[i].is_power_of_two()
+            {
+                *first = self.sums[i];
+            }
             self.sums[i] = buffers.sums[k];
             self.weights[i] = buffers.weights[k];
             self.counts[i] = count;
-            if let Some(half) = self.halves.get_mut(i) {
-                *half = buffers.halves[k];
-            }
             let (Some(request), Some(tally)) = (request, &mut buffers.tally) else { continue };
             let stride = request.stride;
             let beside = &mut self.beside[i * stride..(i + 1) * stride];
@@ -123,7 +123,7 @@ impl Canvas {
 
     /// What tells the error of a pixel.
     pub(super) fn estimate(&self, i: usize) -> Estimate {
-        Estimate { sum: self.sums[i], half: self.halves[i], weight: self.weights[i], count: self.counts[i] }
+        Estimate { sum: self.sums[i], first: self.firsts[i], weight: self.weights[i], count: self.counts[i] }
     }
 
     /// All samples so far.

@@ -120,8 +120,8 @@ fn planes(canvas: &Canvas) -> Vec<Channel> {
         }
     };
     colours("sum", &canvas.sums);
-    if !canvas.halves.is_empty() {
-        colours("half", &canvas.halves);
+    if !canvas.firsts.is_empty() {
+        colours("first", &canvas.firsts);
     }
     channels.push(Channel::float("weight", canvas.weights.clone()));
     channels.push(Channel::uint("count", canvas.counts.clone()));
@@ -157,8 +157,8 @@ fn fill(canvas: &mut Canvas, channels: &Channels) -> Option<()> {
         Some(())
     };
     colours("sum", &mut canvas.sums)?;
-    if !canvas.halves.is_empty() {
-        colours("half", &mut canvas.halves)?;
+    if !canvas.firsts.is_empty() {
+        colours("first", &mut canvas.firsts)?;
     }
     canvas.weights.copy_from_slice(channels.floats("weight")?);
     canvas.counts.copy_from_slice(channels.uints("count")?);

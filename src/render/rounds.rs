@@ -135,7 +135,7 @@ impl Renderer<'_> {
     /// How many samples active pixels have after the round that they enter with `done`.
     fn next_round(&self, done: u32, keeps: bool) -> u32 {
         match self.settings.adaptive {
-            Some(adaptive) => adaptive.next(done, self.settings.spp),
+            Some(adaptive) => adaptive.next(done),
             None if keeps => self.settings.spp.min(done + ROUND),
             None => self.settings.spp,
         }
@@ -143,7 +143,9 @@ impl Renderer<'_> {
 
     /// Decides which pixels go on that have `done` samples; whether any does.
     fn some_need_more(&self, canvas: &mut Canvas, done: u32) -> bool {
-        let Some(adaptive) = self.settings.adaptive else { return true };
+        let Some(adaptive) = self.settings.adaptive.filter(|adaptive| adaptive.judges(done, self.settings.spp)) else {
+            return true;
+        };
         let errors = adaptive::errors(canvas.window.width as usize, canvas.sums.len(), |i| canvas.estimate(i));
         let counts = &canvas.counts;
         canvas.active.par_iter_mut().enumerate().for_each(|(i, active)| {

@@ -23,7 +23,7 @@ use super::explain::Trail;
 use super::fog::is_solid;
 use super::sampler::{Dimension, Pattern};
 use super::whitted::Lit;
-use super::{Renderer, adaptive, tiles::Tile};
+use super::{Renderer, tiles::Tile};
 
 /// Camera rays that are made at a time: enough for vectors of any width, few enough for registers and a little stack.
 const LANES: usize = 16;
@@ -31,13 +31,11 @@ const LANES: usize = 16;
 /// Room for one tile, used again for each sample and for the tiles that follow.
 #[derive(Default)]
 pub(super) struct Buffers {
-    /// In the order of [`Tile::pixels`], as `sums`, `weights`, `halves` and `radiance`.
+    /// In the order of [`Tile::pixels`], as `sums`, `weights` and `radiance`.
     pub(super) patterns: Vec<Pattern>,
     pub(super) sums: Vec<Vec4>,
     /// Of each pixel's samples so far, added up.
     pub(super) weights: Vec<f32>,
-    /// Sums of every other sample, where the error is to be known; else empty.
-    pub(super) halves: Vec<Vec4>,
     /// What is added up beside the colours; none where nothing is asked for.
     pub(super) tally: Option<Box<Tally>>,
     pub(super) radiance: Vec<Vec4>,
@@ -140,17 +138,12 @@ impl Renderer<'_> {
                 Integrator::RayCast | Integrator::Whitted => self.whitted(tracer, sample, buffers),
                 Integrator::Path => self.paths(tracer, sample, buffers),
             }
-            let Buffers { patterns, sums, weights, halves, radiance, tally, trail, .. } = &mut *buffers;
+            let Buffers { patterns, sums, weights, radiance, tally, trail, .. } = &mut *buffers;
             trail.end(radiance[0]);
-            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(&*radiance).zip(&*patterns) {
+            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(radiance).zip(&*patterns) {
                 let weight = self.weight(pixel, sample);
                 *sum += *radiance * weight;
                 *total += weight;
-            }
-            if adaptive::in_half(sample) {
-                for ((half, radiance), pixel) in halves.iter_mut().zip(radiance).zip(&*patterns) {
-                    *half += *radiance * self.weight(pixel, sample);
-                }
             }
             if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
                 patterns.iter().enumerate().for_each(|(i, pixel)| tally.close(i, self.weight(pixel, sample)));
