@@ -166,8 +166,7 @@ impl Plan {
             normal_maps: (lit || depth > 0) && any(|m| m.normal_texture.is_some()),
             environment,
             fog,
-            // Fog is opaque, and what is behind it black where nobody says otherwise.
-            background: wishes.background.or(scene.background).or(fog.map(|_| Vec3::ZERO)),
+            background: wishes.background.or(scene.background),
             primitives: world.primitive_count(),
             materials: materials.len(),
         }

@@ -239,7 +239,8 @@ impl Renderer<'_> {
             (Some(_), Some(color)) if is_camera => color.extend(coverage),
             (Some(environment), _) => environment.radiance(direction.as_dvec3()).extend(coverage),
             (None, Some(color)) => color.extend(coverage),
-            (None, None) => Vec4::ZERO,
+            // Fog is opaque.
+            (None, None) => Vec3::ZERO.extend(if self.plan.fog.is_some() { coverage } else { 0.0 }),
         }
     }
 

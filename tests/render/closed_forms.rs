@@ -24,7 +24,7 @@ fn by(integrator: Integrator, settings: Settings) -> Settings {
 /// one that has some: under a lamp at twice the distance it is a quarter as bright.
 #[test]
 fn light_weakens_with_the_square_of_the_distance() {
-    let aside = DVec3::new(3.0, 0.0, 0.0);
+    let aside = DVec3::new(2.0, 0.0, 2.0);
     let lamps = |height: f64| {
         let (position, color) = (DVec3::Y * height, Vec3::splat(9.0));
         let (attenuation, range) = (Attenuation::INVERSE_SQUARE, f64::INFINITY);
@@ -89,7 +89,7 @@ fn penumbras_are_as_wide_as_tangents_have_it() {
         assert!((width / expected - 1.0).abs() < 0.05, "{r}: {width} wide, not {expected}");
         let middle = (share(99) + share(100)) / 2.0;
         assert!((middle - 0.5).abs() < 0.01, "{r}: {middle} in the middle");
-        let falls = (1..columns as usize).all(|i| share(i) <= share(i - 1) + 0.005);
+        let falls = (1..columns as usize).all(|i| share(i) <= share(i - 1) + 0.02);
         assert!(falls, "{r}: darker towards the shadow");
     }
 }
@@ -99,7 +99,7 @@ fn penumbras_are_as_wide_as_tangents_have_it() {
 /// middle the share (p f / (R |f - d|))^2 of the lens sees it.
 #[test]
 fn a_point_out_of_focus_becomes_a_disk() {
-    let (lens, focus, size) = (0.2f64, 5.0f64, 200u32);
+    let (lens, focus, size) = (0.2f64, 5.0f64, 100u32);
     let glow = Material { emission: Vec3::ONE, ambient: Vec3::ZERO, ..matte(0.0) };
     for (distance, point) in [(3.0, 0.03), (10.0, 0.05)] {
         let ball = Shape::Sphere(Sphere { centre: Vec3::Z * -distance as f32, radius: point as f32 });
@@ -130,7 +130,7 @@ fn a_point_out_of_focus_becomes_a_disk() {
         let sharp = std::f64::consts::PI * (point * focus / distance).powi(2) / (pixel * pixel);
         assert!((sum / sharp - 1.0).abs() < 0.02, "{distance}: {sum}, not {sharp}");
         let middle =
-            (0..100).map(|k| seen.pixels[((95 + k / 10) * size + 95 + k % 10) as usize].x).sum::<f32>() / 100.0;
+            (0..100).map(|k| seen.pixels[((45 + k / 10) * size + 45 + k % 10) as usize].x).sum::<f32>() / 100.0;
         let share = (point * focus / (lens * (focus - distance).abs())).powi(2);
         assert!((f64::from(middle) / share - 1.0).abs() < 0.05, "{distance}: {middle}, not {share}");
     }

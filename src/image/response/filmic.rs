@@ -32,7 +32,7 @@ mod tests {
     fn known_values() {
         // 1 / f(11.2), the white scale that implementations have as a constant.
         assert!((1.0 / film(WHITE) - 1.379_064_2).abs() < 1e-5, "{}", 1.0 / film(WHITE));
-        assert_eq!(curve(0.0), 0.0);
+        assert!(curve(0.0).abs() < 1e-7);
         assert!((curve(WHITE / BIAS) - 1.0).abs() < 1e-6);
         // By hand for 0.18: x = 0.36; (0.36 * 0.104 + 0.004) / (0.36 * 0.554 + 0.06) - 1/15.
         let by_hand = (0.041_44 / 0.259_44 - 1.0 / 15.0) * 1.379_064_2;
