@@ -5,7 +5,7 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
-use crate::scene::{Fog, Interface, Material};
+use crate::scene::{Interface, Material};
 use crate::shade::SurfacePoint;
 use crate::shade::fog::{Stretch, stretch, transmittance};
 use crate::shade::light::Illumination;
@@ -14,36 +14,43 @@ use super::Renderer;
 use super::wavefront::{OUTSIDE, Path};
 
 impl Renderer<'_> {
-    /// The path after the fog on its ray to `point`, and the light that came in on the way.
+    /// What the fog does on a ray to `point`; none where there is none.
     #[inline]
-    pub(super) fn through_fog(&self, path: Path, ray: &Ray, point: &SurfacePoint) -> (Path, Vec3) {
-        let Some(fog) = self.fog_before(&path, point) else { return (path, Vec3::ZERO) };
-        let Stretch { left, added } = stretch(fog, point.t as f32 * ray.direction.length());
-        (Path { weight: path.weight * left, ..path }, path.weight * added)
+    pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<Stretch> {
+        let fog = self.plan.fog.as_ref()?;
+        self.is_in_fog(path, point).then(|| stretch(fog, point.t as f32 * ray.direction.length()))
     }
 
     /// The same for a ray that hits nothing.
     #[inline]
-    pub(super) fn through_fog_beyond(&self, path: Path) -> (Path, Vec3) {
-        let Some(fog) = self.plan.fog.as_ref().filter(|_| path.medium == OUTSIDE) else { return (path, Vec3::ZERO) };
-        let Stretch { left, added } = stretch(fog, fog.reach);
-        (Path { weight: path.weight * left, ..path }, path.weight * added)
-    }
-
-    /// What is left of light that arrives at `point`, which the path has come to, on its way from a light.
-    #[inline]
-    pub(super) fn fog_to_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Vec3 {
-        // Light arrives on the side that the path came from.
-        let Some(fog) = self.fog_before(path, point) else { return Vec3::ONE };
-        let way = |end: DVec3| (end - point.position).length() as f32;
-        transmittance(fog, arriving.end.map_or(fog.reach, way))
-    }
-
-    /// The fog that a path came through to `point`; none if there is none, or if it came through something solid.
-    fn fog_before(&self, path: &Path, point: &SurfacePoint) -> Option<&Fog> {
+    pub(super) fn fog_beyond(&self, path: &Path) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
-        let inside = path.medium != OUTSIDE || !point.front && is_solid(self.material(point));
-        (!inside).then_some(fog)
+        (path.medium == OUTSIDE).then(|| stretch(fog, fog.reach))
+    }
+
+    /// What is left of light that arrives at `point`, which the path has come to, on its way from a light; none for all of it.
+    #[inline]
+    pub(super) fn fog_to_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
+        let fog = self.plan.fog.as_ref()?;
+        let way = |end: DVec3| (end - point.position).length() as f32;
+        // Light arrives on the side that the path came from.
+        self.is_in_fog(path, point).then(|| transmittance(fog, arriving.end.map_or(fog.reach, way)))
+    }
+
+    /// Whether a path came to `point` through the fog, and not through something solid.
+    fn is_in_fog(&self, path: &Path, point: &SurfacePoint) -> bool {
+        path.medium == OUTSIDE && (point.front || !is_solid(self.material(point)))
+    }
+}
+
+impl Path {
+    /// Goes on behind the fog; what came in on the way is the light that is returned.
+    #[inline]
+    pub(super) fn pass(&mut self, fog: Option<Stretch>) -> Vec3 {
+        let Some(Stretch { left, added }) = fog else { return Vec3::ZERO };
+        let added = self.weight * added;
+        self.weight *= left;
+        added
     }
 }
 

@@ -46,8 +46,8 @@ struct Asked<'a> {
     chosen: Chosen<'a>,
     arriving: Illumination,
     value: Value,
-    /// What is left of its light on the way.
-    fog: Vec3,
+    /// What is left of its light on the way; none for all of it.
+    fog: Option<Vec3>,
     /// What the answer counts, by the choice of this light and of this way to find it.
     share: f32,
     /// What the pixel gets if nothing is in between.
@@ -90,12 +90,12 @@ impl Renderer<'_> {
             &mut *buffers;
         let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
-        for (i, ((ray, &path), hit)) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()).enumerate() {
-            let route = wave.route(i);
+        for (i, ((ray, path), hit)) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()).enumerate() {
+            let (mut path, route) = (*path, wave.route(i));
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
-                let (left, fog) = self.through_fog_beyond(path);
-                let share = left.weight * self.share_of_environment(&left, ray);
+                let fog = path.pass(self.fog_beyond(&path));
+                let share = path.weight * self.share_of_environment(&path, ray);
                 let seen = share.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
@@ -106,16 +106,15 @@ impl Renderer<'_> {
             };
             let point = self.surface(ray, hit);
             let material = &*self.appearance(&point);
-            let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
-            let (left, fog) = self.through_fog(left, ray, &point);
+            path.weight *= self.transmittance(&path, ray.direction, &point);
+            let fog = path.pass(self.fog_on(&path, ray, &point));
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
-            let own = left.weight * self.glow(&left, ray, hit, &point, material, shading.base) + fog;
+            let own = path.weight * self.glow(&path, ray, hit, &point, material, shading.base) + fog;
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
             if let Some(tally) = &mut tally {
                 tally.add(path.pixel, route, own);
             }
-            let path = left;
             let ways = Ways::new(material, &point, ray.direction.as_dvec3().normalize());
             let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
             let pattern = &patterns[path.pixel as usize];
@@ -130,7 +129,7 @@ impl Renderer<'_> {
                         source: chosen.source,
                         arriving: &arriving,
                         lobes: [diffuse, highlight, value.share - diffuse - highlight],
-                        fog,
+                        fog: fog.unwrap_or(Vec3::ONE),
                         share,
                         contribution: worth,
                     }
@@ -215,7 +214,10 @@ impl Renderer<'_> {
         };
         let fog = self.fog_to_light(&vertex.path, &vertex.point, &arriving);
         let share = share / chosen.chance as f32;
-        let worth = vertex.path.weight * value.share * arriving.color * fog * share;
+        let mut worth = vertex.path.weight * value.share * arriving.color * share;
+        if let Some(left) = fog {
+            worth *= left;
+        }
         (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, fog, share, worth })
     }
 

@@ -90,12 +90,12 @@ impl Renderer<'_> {
         let Wave { rays, paths, .. } = wave;
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         lit.clear();
-        for (i, ((ray, &path), hit)) in (first..).zip(rays[first..].iter().zip(&paths[first..]).zip(hits)) {
-            let route = wave.route(i);
+        for (i, ((ray, path), hit)) in (first..).zip(rays[first..].iter().zip(&paths[first..]).zip(hits)) {
+            let (mut path, route) = (*path, wave.route(i));
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
-                let (left, fog) = self.through_fog_beyond(path);
-                let seen = left.weight.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
+                let fog = path.pass(self.fog_beyond(&path));
+                let seen = path.weight.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
                 if let Some(tally) = tally {
@@ -106,12 +106,11 @@ impl Renderer<'_> {
             let point = self.surface(ray, hit);
             let material = &*self.appearance(&point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
-            let left = Path { weight: path.weight * self.transmittance(&path, ray.direction, &point), ..path };
-            let (left, fog) = self.through_fog(left, ray, &point);
-            let own = left.weight * shading.base + fog;
+            path.weight *= self.transmittance(&path, ray.direction, &point);
+            let fog = path.pass(self.fog_on(&path, ray, &point));
+            let own = path.weight * shading.base + fog;
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
-            let path = left;
             if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
                 // Ambient light is scattered, what a surface gives off is not.
                 let dark = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
@@ -167,9 +166,9 @@ impl Renderer<'_> {
             let ways = Ways::new(&self.appearance(point), point, direction.as_dvec3().normalize());
             for (way, event) in [(ways.mirrored, Event::Specular), (ways.refracted, Event::Transmitted)] {
                 let Some(way) = way else { continue };
-                let path = Path { weight: path.weight * way.share, ..*path };
-                let (left, fog) = self.through_fog_beyond(path);
-                let seen = left.weight * environment.radiance(way.direction) + fog;
+                let mut path = Path { weight: path.weight * way.share, ..*path };
+                let fog = path.pass(self.fog_beyond(&path));
+                let seen = path.weight * environment.radiance(way.direction) + fog;
                 let faked = point.spawn(way.direction.as_vec3(), f32::INFINITY);
                 trail.ray(self, 1, &faked, &path, None, seen);
                 radiance[path.pixel as usize] += seen.extend(0.0);
@@ -211,13 +210,16 @@ impl Renderer<'_> {
                     continue;
                 }
                 let fog = self.fog_to_light(path, point, &arriving);
-                let reflected = weight * shading.reflect(&arriving) * fog;
+                let mut reflected = weight * shading.reflect(&arriving);
+                if let Some(left) = fog {
+                    reflected *= left;
+                }
                 trail.light(path, point, || Answer {
                     light: index,
                     source: light,
                     arriving: &arriving,
                     lobes: [shading.lobes(arriving.to_light)[0], shading.lobes(arriving.to_light)[1], Vec3::ZERO],
-                    fog,
+                    fog: fog.unwrap_or(Vec3::ONE),
                     share: 1.0 / count as f32,
                     contribution: reflected,
                 });

@@ -55,7 +55,7 @@ pub struct RayTrail {
     pub direction: [f32; 3],
     /// When, from 0 to 1.
     pub time: f32,
-    /// Share of what it sees that reaches the sample, before fog and absorption on its way.
+    /// Share of what it sees at its end that reaches the sample; fog and absorption on its way are taken off.
     pub weight: [f32; 3],
     /// What it met; none where it left the scene.
     pub hit: Option<HitTrail>,

@@ -59,7 +59,7 @@ impl Trail {
         }
     }
 
-    /// A ray was followed: `path` is what it was for, `own` what the sample gets of it without asking lights.
+    /// A ray was followed: `path` is what it was for, at its end; `own` what the sample gets of it without asking lights.
     #[inline]
     pub(in crate::render) fn ray(
         &mut self,
@@ -72,7 +72,7 @@ impl Trail {
     ) {
         if let Some(notes) = &mut self.0 {
             let hit = hit.map(|(hit, point)| renderer.hit_trail(ray, hit, point));
-            notes.samples[notes.sample].rays.push(RayTrail {
+            notes.add(RayTrail {
                 depth,
                 number: path.branch,
                 origin: renderer.in_scene(ray.origin.as_dvec3()),
@@ -96,17 +96,37 @@ impl Trail {
         point: &SurfacePoint,
         answer: impl FnOnce() -> Answer<'a>,
     ) {
-        let Some(notes) = &mut self.0 else { return };
-        let Answer { light, source, arriving, lobes: [diffuse, highlight, glossy], fog, share, contribution } =
-            answer();
-        let rays = &mut notes.samples[notes.sample].rays;
+        if let Some(notes) = &mut self.0 {
+            notes.add_light(path.branch, point, &answer());
+        }
+    }
+
+    /// The shadow rays since the last time have been traced: of each, how much is free.
+    #[inline]
+    pub(in crate::render) fn free(&mut self, visibility: impl Fn(usize) -> f32) {
+        if let Some(notes) = &mut self.0 {
+            notes.free(&visibility);
+        }
+    }
+}
+
+impl Notes {
+    #[cold]
+    fn add(&mut self, ray: RayTrail) {
+        self.samples[self.sample].rays.push(ray);
+    }
+
+    #[cold]
+    fn add_light(&mut self, number: u32, point: &SurfacePoint, answer: &Answer<'_>) {
+        let Answer { light, source, arriving, lobes: [diffuse, highlight, glossy], fog, share, contribution } = answer;
+        let rays = &mut self.samples[self.sample].rays;
         // The last of the number: a path's all have the same, and lights are asked before it goes on.
-        let Some(at) = rays.iter().rposition(|ray| ray.number == path.branch) else { return };
+        let Some(at) = rays.iter().rposition(|ray| ray.number == number) else { return };
         if source.casts_shadows {
-            notes.pending.push([at, rays[at].lights.len()]);
+            self.pending.push([at, rays[at].lights.len()]);
         }
         rays[at].lights.push(LightTrail {
-            light,
+            light: *light,
             kind: source.kind(),
             direction: arriving.to_light.to_array(),
             distance: arriving.end.map(|end| (end - point.position).length()),
@@ -116,18 +136,16 @@ impl Trail {
             highlight: highlight.to_array(),
             glossy: glossy.to_array(),
             fog: fog.to_array(),
-            share,
+            share: *share,
             visibility: 1.0,
             contribution: contribution.to_array(),
         });
     }
 
-    /// The shadow rays since the last time have been traced: of each, how much is free.
-    #[inline]
-    pub(in crate::render) fn free(&mut self, visibility: impl Fn(usize) -> f32) {
-        let Some(notes) = &mut self.0 else { return };
-        for (i, [ray, light]) in notes.pending.drain(..).enumerate() {
-            let light = &mut notes.samples[notes.sample].rays[ray].lights[light];
+    #[cold]
+    fn free(&mut self, visibility: &dyn Fn(usize) -> f32) {
+        for (i, [ray, light]) in self.pending.drain(..).enumerate() {
+            let light = &mut self.samples[self.sample].rays[ray].lights[light];
             light.visibility = visibility(i);
             light.contribution = light.contribution.map(|share| share * light.visibility);
         }
@@ -135,6 +153,7 @@ impl Trail {
 }
 
 impl Renderer<'_> {
+    #[cold]
     fn hit_trail(&self, ray: &Ray, hit: &Hit, point: &SurfacePoint) -> HitTrail {
         HitTrail {
             distance: point.t * ray.direction.as_dvec3().length(),

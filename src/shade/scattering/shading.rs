@@ -96,18 +96,28 @@ impl Shading {
 
     /// pi f cos for light along `to_light`.
     pub(super) fn value(&self, to_light: DVec3) -> Vec3 {
-        let [diffuse, highlight] = self.lobes(to_light);
-        diffuse + highlight
+        let cosine = self.normal.dot(to_light);
+        let matte = self.matte(cosine);
+        self.shine(to_light, cosine).map_or(matte, |shine| matte + shine)
     }
 
-    /// The same of Lambert's lobe and of the highlight.
+    /// What of it is Lambert's lobe's.
     #[inline]
+    fn matte(&self, cosine: f64) -> Vec3 {
+        self.diffuse * cosine.max(0.0) as f32
+    }
+
+    /// What of it is the highlight's, if there is one.
+    #[inline]
+    fn shine(&self, to_light: DVec3, cosine: f64) -> Option<Vec3> {
+        let is_there = self.highlight.color != Vec3::ZERO && cosine > 0.0;
+        is_there.then(|| self.highlight.value(self.normal, self.to_viewer, to_light, cosine))
+    }
+
+    /// pi f cos for light along `to_light`, of Lambert's lobe and of the highlight.
     pub fn lobes(&self, to_light: DVec3) -> [Vec3; 2] {
         let cosine = self.normal.dot(to_light);
-        let diffuse = self.diffuse * cosine.max(0.0) as f32;
-        let has_highlight = self.highlight.color != Vec3::ZERO && cosine > 0.0;
-        let highlight = || self.highlight.value(self.normal, self.to_viewer, to_light, cosine);
-        [diffuse, if has_highlight { highlight() } else { Vec3::ZERO }]
+        [self.matte(cosine), self.shine(to_light, cosine).unwrap_or(Vec3::ZERO)]
     }
 }
 
