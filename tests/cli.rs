@@ -46,6 +46,12 @@ fn help_names_every_command_and_flag() {
         "--up-axis",
         "--unit",
         "--normals",
+        "--time",
+        "--animation",
+        "--fps",
+        "--variant",
+        "--frames",
+        "--skip-existing",
         "--print-camera",
         "--reference",
         "--threshold",
@@ -443,4 +449,42 @@ fn scenes_are_made_by_rule() {
     }
     let (code, message) = fails(&["make", "tetra", "-o", &path("none/b.nff")]);
     assert!(code == 4 && message.contains("does not exist"), "{message}");
+}
+
+/// A triangle that is moved by a metre a second: frames of two a second, each as a picture of its time.
+#[test]
+fn frames_of_an_animation() {
+    use crate::io::gltf_maker::Maker;
+    let mut maker = Maker::triangle();
+    let input = maker.floats("SCALAR", &[0.0, 2.0]);
+    let output = maker.floats("VEC3", &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    maker.json["animations"] = serde_json::json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": input, "output": output}],
+    }]);
+    let files = maker.files();
+    let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
+    let (scene, numbered) = (path("a.gltf"), path("f.%02d.exr"));
+    let view = ["--eye", "1,0.5,4", "--look-at", "1,0.5,0", "--size", "32x16", "--spp", "1", "--backend", "native"];
+    let render = |rest: &[&str]| fails(&[&["render", &scene], &view[..], rest].concat());
+    assert_eq!(render(&["--frames", "0-2", "--fps", "2", "-o", &numbered]), (0, String::new()));
+    for (frame, time) in [("f.00.exr", "0"), ("f.01.exr", "0.5"), ("f.02.exr", "1")] {
+        let frame = path(frame);
+        let exact = ["--time", time, "-o", &path("t.exr"), "--reference", &frame, "--threshold", "0.001"];
+        assert_eq!(render(&exact), (0, String::new()), "{frame}");
+    }
+    let other = ["--time", "0.5", "-o", &path("t.exr"), "--reference", &path("f.02.exr"), "--threshold", "0.001"];
+    assert_eq!(render(&other).0, 1, "it moves");
+    // What is there stays, what is missing is made.
+    std::fs::write(path("f.01.exr"), "kept").expect("written");
+    std::fs::remove_file(path("f.02.exr")).expect("it was there");
+    assert_eq!(render(&["--frames", "1-2", "--fps", "2", "--skip-existing", "-o", &numbered]).0, 0);
+    assert_eq!(std::fs::read(path("f.01.exr")).expect("still there"), b"kept");
+    assert!(files.path("f.02.exr").is_file());
+    let (code, said) = render(&["--frames", "0-1", "-o", &path("one.exr")]);
+    assert!(code == 2 && said.contains("put %04d into its name"), "{said}");
+    let (code, said) = render(&["--animation", "none", "-o", &path("one.exr")]);
+    assert!(code == 3 && said.contains("/animations: no animation \"none\"; the file has 0"), "{said}");
+    let (code, said) = render(&["--variant", "red", "-o", &path("one.exr")]);
+    assert!(code == 3 && said.contains("the file has none"), "{said}");
 }

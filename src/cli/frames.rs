@@ -68,13 +68,13 @@ fn frame(args: &RenderArgs, number: u32) -> RenderArgs {
 fn numbered(path: &Path, number: u32) -> PathBuf {
     // What is not UTF-8 has no number; names are not changed otherwise.
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return path.to_owned() };
-    let places = name.match_indices('%').filter_map(|(start, _)| {
+    let mut places = name.match_indices('%').filter_map(|(start, _)| {
         let rest = &name[start + 1..];
         let digits = rest.find(|c: char| !c.is_ascii_digit())?;
         let width = if digits == 0 { 0 } else { rest[..digits].parse::<usize>().ok().filter(|width| *width <= 20)? };
         rest[digits..].starts_with('d').then_some((start, start + 1 + digits + 1, width))
     });
-    match places.last() {
+    match places.next_back() {
         None => path.to_owned(),
         Some((start, end, width)) => path.with_file_name(format!("{}{number:0width$}{}", &name[..start], &name[end..])),
     }

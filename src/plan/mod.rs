@@ -148,7 +148,7 @@ impl Plan {
         };
         let attributes = Attributes {
             normals: (lit || depth > 0 || environment) && meshes().any(|m| !m.normals.is_empty()),
-            uvs: (lit || ambient || alpha || any(|m| m.unlit || m.emission_texture.is_some()))
+            uvs: (lit || ambient || alpha || any(|m| m.unlit || m.emission_texture.is_some() || m.physical.is_some()))
                 && any(|m| m.textures().next().is_some()),
             colors: (lit || ambient || alpha || any(|m| m.unlit)) && meshes().any(|m| !m.colors.is_empty()),
         };

@@ -3,7 +3,7 @@
 pub mod course;
 pub mod gltf;
 mod gltf_look;
-mod gltf_maker;
+pub mod gltf_maker;
 mod gltf_packed;
 mod gltf_pose;
 mod models;

@@ -1,7 +1,7 @@
 //! Pixels with a known value.
 
 use twincast::image::Image;
-use twincast::math::{DVec3, Vec3, Vec4};
+use twincast::math::{Affine2, DVec3, Vec2, Vec3, Vec4};
 use twincast::scene::{
     AreaShape, Attenuation, Camera, Filter, Geometry, Light, Material, Mesh, Specular, Texture, Wrap,
 };
@@ -125,19 +125,31 @@ fn textures_lie_the_right_way_up() {
 fn normal_maps_lean_along_u_and_v() {
     // (0.8, 0, 0.6) and (0, -0.6, 0.8), as codes: x = 2 code / 255 - 1.
     let code = |x: f64| ((x + 1.0) * 127.5).round() as u8;
-    for (texel, mirrored) in [([0.8, 0.0, 0.6], false), ([0.0, -0.6, 0.8], false), ([0.8, 0.0, 0.6], true)] {
+    let [plain, mirrored_mesh, mirrored_texture, second] = [0, 1, 2, 3];
+    let red = [0.8, 0.0, 0.6];
+    for (texel, case) in
+        [(red, plain), ([0.0, -0.6, 0.8], plain), (red, mirrored_mesh), (red, mirrored_texture), (red, second)]
+    {
+        let mirrored = case == mirrored_mesh || case == mirrored_texture;
         let texture = Texture {
             width: 1,
             height: 1,
             pixels: vec![[code(texel[0]), code(texel[1]), code(texel[2]), 255]].into(),
+            transform: Affine2::from_scale(Vec2::new(if case == mirrored_texture { -1.0 } else { 1.0 }, 1.0)),
+            on_second_uvs: case == second,
             ..Texture::default()
         };
         let material = Material { normal_texture: Some(0), ..matte(1.0) };
         let mut scene = floor_scene(material, vec![Light::Directional { direction: -towards(30.0), color: Vec3::ONE }]);
         scene.textures = vec![texture];
-        if mirrored {
+        let Geometry::Mesh(mesh) = &mut scene.geometries[0] else { unreachable!() };
+        if case == mirrored_mesh {
             // u grows along -x.
-            let Geometry::Mesh(mesh) = &mut scene.geometries[0] else { unreachable!() };
+            mesh.uvs.iter_mut().for_each(|uv| uv.x = 1.0 - uv.x);
+        }
+        if case == second {
+            // The first set would turn the bump around.
+            mesh.second_uvs = mesh.uvs.clone();
             mesh.uvs.iter_mut().for_each(|uv| uv.x = 1.0 - uv.x);
         }
         let decoded = texel.map(|x| f64::from(code(x)) / 127.5 - 1.0);

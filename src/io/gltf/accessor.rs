@@ -3,10 +3,10 @@
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::Document;
+use super::component::Component;
+use super::document::Document;
 use super::schema::Accessor;
 use crate::error::Result;
-use crate::io::Placeless;
 use crate::io::records::Records;
 use crate::memory::Mapped;
 
@@ -28,72 +28,6 @@ pub(super) struct View<'a> {
     file: Option<&'a Mapped<'a>>,
     /// Replaced elements: their rising indices, and their values.
     sparse: Option<(Vec<u32>, &'a [u8])>,
-}
-
-/// The type of one component.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    fn from_code(code: u32) -> Placeless<Self> {
-        Ok(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return Err(format!("component type {code} is none of 5120 to 5123, 5125, 5126")),
-        })
-    }
-
-    const fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-
-    /// What stands for 1 where numbers are normalised.
-    const fn full(self) -> f32 {
-        match self {
-            Self::I8 => 127.0,
-            Self::U8 => 255.0,
-            Self::I16 => 32_767.0,
-            Self::U16 => 65_535.0,
-            Self::U32 | Self::F32 => 1.0,
-        }
-    }
-
-    /// The component at the start of `bytes`, which hold at least one.
-    fn read(self, bytes: &[u8], normalized: bool) -> f32 {
-        let scale = |value: f32| if normalized { (value / self.full()).max(-1.0) } else { value };
-        match self {
-            Self::I8 => scale(f32::from(bytes[0] as i8)),
-            Self::U8 => scale(f32::from(bytes[0])),
-            Self::I16 => scale(f32::from(i16::from_le_bytes([bytes[0], bytes[1]]))),
-            Self::U16 => scale(f32::from(u16::from_le_bytes([bytes[0], bytes[1]]))),
-            Self::U32 => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32,
-            Self::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        }
-    }
-
-    /// The same as an index.
-    fn read_index(self, bytes: &[u8]) -> u32 {
-        match self {
-            Self::U8 => bytes[0].into(),
-            Self::U16 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
-            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        }
-    }
 }
 
 /// A failure and the JSON pointer below the accessor that it is about.
@@ -301,8 +235,7 @@ pub(super) fn form(document: &Document<'_>, index: usize) -> Result<Form> {
 impl Form {
     /// What a component stands for that is stored as `value`.
     pub(super) fn value(&self, value: f32) -> f32 {
-        let is_whole = !matches!(self.component, Component::U32 | Component::F32);
-        if self.normalized && is_whole { (value / self.component.full()).max(-1.0) } else { value }
+        self.component.value(value, self.normalized)
     }
 }
 

@@ -127,7 +127,7 @@ impl<'a> Groups<'a> {
         }
         if self.bare > 0 {
             warn(format!(
-                "{} primitives lack texture coordinates that their materials want: (0, 0) all over",
+                "{} primitives lack texture coordinates that their materials want: one point of each texture is seen",
                 self.bare
             ));
         }

@@ -12,6 +12,7 @@
 
 mod accessor;
 mod attributes;
+mod component;
 mod container;
 mod deform;
 mod document;

@@ -13,6 +13,9 @@ pub(super) enum Target {
     Data(Vec<u8>),
 }
 
+/// Most bytes of a file's name: no system takes much more, and no message should hold them.
+const LONGEST_NAME: usize = 1024;
+
 /// Resolves a URI within the file `base` (RFC 3986, RFC 2397).
 ///
 /// # Errors
@@ -33,6 +36,9 @@ pub(super) fn resolve(base: &Path, uri: &str) -> Placeless<Target> {
     let name = String::from_utf8(percent(uri)?).map_err(|_| "a file name that is not UTF-8")?;
     if name.is_empty() || name.contains('\0') {
         return Err("an empty file name, or one with a zero byte".into());
+    }
+    if name.len() > LONGEST_NAME {
+        return Err(format!("a file name of {} bytes; data within the file begin with data:", name.len()));
     }
     Ok(Target::File(base.parent().unwrap_or(Path::new("")).join(name)))
 }
@@ -104,7 +110,7 @@ mod tests {
         assert_eq!(resolve(base, "my%20tex.png"), Ok(Target::File("models/my tex.png".into())));
         assert_eq!(resolve(base, "data:,a%2Cb"), Ok(Target::Data(b"a,b".to_vec())));
         assert_eq!(resolve(base, "data:image/png;base64,Zg=="), Ok(Target::Data(b"f".to_vec())));
-        for bad in ["http://example.org/a.png", "file:///a", "a%2", "data:x", ""] {
+        for bad in ["http://example.org/a.png", "file:///a", "a%2", "data:x", "", &"a".repeat(1025)] {
             assert!(resolve(base, bad).is_err(), "{bad}");
         }
     }

@@ -61,9 +61,8 @@ pub(super) fn material(
     variant: Option<usize>,
     pointer: &str,
 ) -> Result<Option<usize>> {
-    let Some((variant, mappings)) = variant.zip(read(document, &primitive.extensions, pointer)?) else {
-        return Ok(primitive.material);
-    };
+    let Some(variant) = variant else { return Ok(primitive.material) };
+    let Some(mappings) = read(document, &primitive.extensions, pointer)? else { return Ok(primitive.material) };
     let mapping = mappings.mappings.iter().find(|mapping| mapping.variants.contains(&variant));
     Ok(mapping.map(|mapping| mapping.material).or(primitive.material))
 }

@@ -12,7 +12,7 @@ pub(super) fn decode(source: &[u8], count: usize, stride: usize) -> Placeless<Ve
     let (mut stream, tail) = Stream::open(source, HEADER, stride.max(32))?;
     let mut last = tail[tail.len() - stride..].to_vec();
     let mut out = vec![0; count * stride];
-    let block = (8192 / stride & !(GROUP - 1)).min(256);
+    let block = ((8192 / stride) & !(GROUP - 1)).min(256);
     for elements in out.chunks_mut(block * stride) {
         let groups = (elements.len() / stride).div_ceil(GROUP);
         for (byte, last) in last.iter_mut().enumerate() {

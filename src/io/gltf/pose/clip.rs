@@ -1,6 +1,6 @@
 //! One animation of a file, and what it says at a time.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::Animated;
 use super::curve::Curve;
@@ -53,6 +53,7 @@ impl<'a> Clip<'a> {
     pub(super) fn at(&self, time: f64, warnings: &mut Vec<Warning>) -> Result<HashMap<usize, Animated>> {
         let Self { document, index, source } = self;
         let mut nodes: HashMap<usize, Animated> = HashMap::new();
+        let mut known_times = HashSet::new();
         let mut unknown = 0;
         for (c, channel) in source.channels.iter().enumerate() {
             let pointer = format!("/animations/{index}/channels/{c}");
@@ -70,7 +71,8 @@ impl<'a> Clip<'a> {
             let samplers = &source.samplers;
             document.check_index(&format!("{pointer}/sampler"), channel.sampler, samplers.len(), "sampler")?;
             let place = format!("/animations/{index}/samplers/{}", channel.sampler);
-            let curve = |kind: &str| Curve::new(document, &samplers[channel.sampler], kind, &place);
+            let mut curve =
+                |kind: &str| Curve::new(document, &samplers[channel.sampler], kind, &place, &mut known_times);
             let animated = nodes.entry(node).or_default();
             match path {
                 "translation" => animated.translation = Some(DVec3::from(curve("VEC3")?.vector(time)?)),

@@ -1,6 +1,7 @@
 //! Values over time: keys, and what lies between them (Khronos Group 2021, *glTF 2.0 specification*, appendix C).
 
 use std::array;
+use std::collections::HashSet;
 
 use crate::error::Result;
 use crate::io::gltf::accessor::View;
@@ -36,12 +37,13 @@ struct Between {
 }
 
 impl<'a> Curve<'a> {
-    /// `kind` is the type of the values, `place` the sampler's pointer.
+    /// `kind` is the type of the values, `place` the sampler's pointer; `known_times` has the accessors of times that are checked.
     pub(super) fn new(
         document: &'a Document<'a>,
         sampler: &AnimationSampler,
         kind: &str,
         place: &'a str,
+        known_times: &mut HashSet<usize>,
     ) -> Result<Self> {
         let interpolation = match sampler.interpolation.as_deref() {
             Some("STEP") => Interpolation::Step,
@@ -57,19 +59,30 @@ impl<'a> Curve<'a> {
         if times.count == 0 {
             return Err(document.error(format!("{place}/input"), "no key; a curve needs at least one"));
         }
+        if known_times.insert(sampler.input) {
+            let mut last = f32::NEG_INFINITY;
+            let rises = |key| {
+                let [time] = times.floats::<1>(key);
+                time.is_finite() && std::mem::replace(&mut last, time) <= time
+            };
+            if !(0..times.count).all(rises) {
+                let message = "the times of the keys have to rise, and to be finite";
+                return Err(document.error(format!("{place}/input"), message));
+            }
+        }
         Ok(Self { document, times, values, interpolation, place })
     }
 
     /// Three values at a time.
     pub(super) fn vector(&self, time: f64) -> Result<[f64; 3]> {
         self.check(1)?;
-        self.value(&self.between(time)?, 0, 1)
+        self.value(&self.between(time), 0, 1)
     }
 
     /// A unit quaternion at a time.
     pub(super) fn rotation(&self, time: f64) -> Result<[f64; 4]> {
         self.check(1)?;
-        let between = self.between(time)?;
+        let between = self.between(time);
         let value = if self.interpolation == Interpolation::Linear && between.share > 0.0 {
             let [from, to] = [0, 1].map(|k| self.part::<4>(between.key + k, 0, 0, 1));
             slerp(from, to, between.share)
@@ -88,7 +101,7 @@ impl<'a> Curve<'a> {
     pub(super) fn weights(&self, time: f64) -> Result<Vec<f32>> {
         let width = self.values.count / self.times.count / self.parts();
         self.check(width.max(1))?;
-        let between = self.between(time)?;
+        let between = self.between(time);
         (0..width).map(|k| self.value::<1>(&between, k, width).map(|[weight]| weight as f32)).collect()
     }
 
@@ -108,7 +121,7 @@ impl<'a> Curve<'a> {
         Err(self.document.error(format!("{}/output", self.place), message))
     }
 
-    fn between(&self, time: f64) -> Result<Between> {
+    fn between(&self, time: f64) -> Between {
         let at = |key: usize| f64::from(self.times.floats::<1>(key)[0]);
         // The number of keys that are not after the time, by halving.
         let (mut low, mut high) = (0, self.times.count);
@@ -121,15 +134,10 @@ impl<'a> Curve<'a> {
             }
         }
         if low == 0 || low == self.times.count {
-            return Ok(Between { key: low.saturating_sub(1), share: 0.0, length: 0.0 });
+            return Between { key: low.saturating_sub(1), share: 0.0, length: 0.0 };
         }
         let (from, to) = (at(low - 1), at(low));
-        if !(from <= time && time < to && to.is_finite()) {
-            let message = "the times of the keys have to rise, and to be finite";
-            return Err(self.document.error(format!("{}/input", self.place), message));
-        }
-        let length = to - from;
-        Ok(Between { key: low - 1, share: (time - from) / length, length })
+        Between { key: low - 1, share: (time - from) / (to - from), length: to - from }
     }
 
     /// Element `k` of the `width` that a value has. A finite number whatever the file has, or an error.
