@@ -6,7 +6,7 @@ use super::common::parse_bytes;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
 use crate::memory::process;
-use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, Lighting, NotEnoughMemory, Plan};
+use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory, Rays};
 use crate::trace::bvh::Preset;
 
 /// Bytes that a picture takes for each pixel: four floats, once more while it is written.
@@ -56,7 +56,7 @@ impl BuildArgs {
         self.max_memory.is_some() || self.build.wanted().is_some()
     }
 
-    /// How to build the native tree over so many triangles; none where only Embree renders.
+    /// How to build the native tree over so many triangles, for so many rays; none where only Embree renders.
     ///
     /// # Errors
     /// [`Error::Backend`] where there is not the memory for it.
@@ -64,19 +64,14 @@ impl BuildArgs {
         &self,
         backend: BackendArg,
         triangles: u64,
-        samples: u64,
+        rays: &Rays,
         pixels: u64,
-        plan: &Plan,
     ) -> Result<Option<BuildChoice>> {
-        let shadow_lights = match &plan.lighting {
-            Lighting::Lights(lights) => lights.len() as u64,
-            Lighting::None | Lighting::Headlight => 0,
-        };
         let embree = if backend == BackendArg::Native { 0 } else { triangles.saturating_mul(EMBREE_BYTES) };
         let picture = pixels.saturating_mul(BYTES_A_PIXEL);
         let request = BuildRequest {
             triangles,
-            rays: samples.saturating_mul(1 + shadow_lights),
+            rays: rays.total(),
             held: process::held().unwrap_or(0).saturating_add(picture).saturating_add(embree),
             max_memory: self.max_memory,
             wanted: self.build.wanted(),

@@ -11,8 +11,10 @@ use super::cache::CacheArgs;
 use super::camera::CameraArgs;
 use super::common::{SceneArgs, Size};
 use super::engine::BackendArg;
+use super::plan::PlanArgs;
 use super::{interrupt, say, warn};
 use crate::error::{Error, Result};
+use crate::plan;
 use crate::render::Settings;
 use crate::scene::{Camera, Scene};
 
@@ -53,6 +55,9 @@ pub(super) struct CompareArgs {
     seed: u64,
 
     #[command(flatten)]
+    plan: PlanArgs,
+
+    #[command(flatten)]
     accel: AccelArgs,
 
     /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
@@ -91,7 +96,8 @@ impl CompareArgs {
         let Size { width, height } = self.size;
         let usual = Settings::default();
         let max_depth = scene.request.max_depth.or(usual.max_depth);
-        Settings { width, height, max_depth, integrator: scene.request.integrator, seed: self.seed, ..usual }
+        let complete = self.plan.complete();
+        Settings { width, height, max_depth, integrator: scene.request.integrator, seed: self.seed, complete, ..usual }
     }
 
     /// Says what came of it, as was asked for.
@@ -124,11 +130,11 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer};
+    use crate::trace::Tracer;
     use crate::trace::accel::{Accel, Built};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
-    use crate::trace::{Tracer, World};
 
     args.accel.check(BackendArg::Both, None, &args.cache)?;
     let diff = args.diff.as_slice();
@@ -137,7 +143,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let cancel = interrupt::install()?;
     let (scene, camera) = args.view()?;
     let (accel, options) = args.accel.choose(scene.request.search, BackendArg::Both, None, &args.cache)?;
-    let world = World::new(&scene)?;
+    let world = plan::world(&scene, args.plan.complete())?;
     let settings = Settings { spp: args.spp, ..args.settings(&scene) };
     let Settings { width, height, .. } = settings;
     let renderer = Renderer::new(&scene, &world, camera, settings)?;
@@ -179,13 +185,12 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
     use super::progress;
     use crate::lab::{Entrant, all};
     use crate::render::{Control, Renderer};
-    use crate::trace::World;
     use crate::trace::accel::Accel;
 
     let cancel = interrupt::install()?;
     let (scene, camera) = args.view()?;
     let options = args.accel.options.choose(&Accel::ALL, scene.request.search)?;
-    let world = World::new(&scene)?;
+    let world = plan::world(&scene, args.plan.complete())?;
     let settings = Settings { spp: 1, ..args.settings(&scene) };
     let Settings { width, height, .. } = settings;
     let renderer = Renderer::new(&scene, &world, camera, settings)?;

@@ -9,6 +9,7 @@ mod bench;
 mod build;
 mod cache;
 mod camera;
+mod chart;
 mod checkpoint;
 mod common;
 mod compare;
@@ -24,6 +25,7 @@ mod man;
 mod metadata;
 mod outputs;
 mod picture;
+mod plan;
 mod progress;
 mod render;
 mod report;
@@ -53,6 +55,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     Compare(Box<compare::CompareArgs>),
     Bench(bench::BenchArgs),
+    Chart(chart::ChartArgs),
+    Plan(Box<plan::PlanCommand>),
     Info(info::InfoArgs),
     Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
@@ -65,6 +69,8 @@ impl Command {
             Self::Render(args) => render::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Bench(args) => bench::run(args),
+            Self::Chart(args) => chart::run(args),
+            Self::Plan(args) => plan::run(args),
             Self::Info(args) => info::run(args),
             Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::common::{Size, by_name, parse_vector};
+use super::plan::PlanArgs;
 use crate::math::Vec3;
 use crate::render::{Adaptive, Crop, Filter, Sampling, Settings, TileOrder};
 use crate::scene::{Integrator, Request};
@@ -72,6 +73,9 @@ pub(super) struct PictureArgs {
     /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
     #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
     background: Option<Vec3>,
+
+    #[command(flatten)]
+    plan: PlanArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -131,6 +135,7 @@ impl PictureArgs {
             crop: self.crop,
             aovs: Vec::new(),
             adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp }),
+            complete: self.plan.complete(),
         }
     }
 }

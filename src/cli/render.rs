@@ -27,6 +27,7 @@ use crate::image::{self, Image, Metadata, WriteOptions};
 use crate::io;
 use crate::math::{DVec3, Vec3};
 use crate::memory::process;
+use crate::plan;
 use crate::render::Renderer;
 use crate::scene::{Environment, Geometry, Light, Request, Scene};
 use crate::trace::accel::Accel;
@@ -192,7 +193,7 @@ fn render(args: &RenderArgs) -> Result<()> {
         }
 
         let start = Instant::now();
-        let world = World::new(&scene)?;
+        let world = plan::world(&scene, settings.complete)?;
         let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
         let prepare_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
@@ -205,8 +206,8 @@ fn render(args: &RenderArgs) -> Result<()> {
         // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
         let build = match accel.0 {
             Accel::Bvh => {
-                let samples = pixels * u64::from(settings.spp);
-                args.build.choose(args.backend, stored, samples, pixels, renderer.plan())?
+                let rays = settings.expected_rays(renderer.plan());
+                args.build.choose(args.backend, stored, &rays, pixels)?
             }
             _ => None,
         };
@@ -338,7 +339,7 @@ fn placed_triangles(scene: &Scene) -> u64 {
     placed.map(|(_, geometry)| triangles(geometry)).sum()
 }
 
-fn stored_triangles(world: &World) -> u64 {
+pub(super) fn stored_triangles(world: &World) -> u64 {
     let triangles = world.parts.iter().map(|part| match &part.primitives {
         Primitives::Triangles { triangles, .. } => triangles.len() as u64,
         Primitives::Shapes(_) => 0,

@@ -8,8 +8,10 @@
 
 pub mod all;
 pub mod bench;
+pub mod chart;
 mod classify;
 pub mod compare;
+mod drawing;
 mod entrants;
 pub mod exact;
 pub(crate) mod exact_shapes;
@@ -19,6 +21,7 @@ mod paired;
 mod pixels;
 pub mod rays;
 pub mod rounding;
+pub mod savings;
 
 pub use classify::{Answers, Class, classify_closest, classify_occluded, is_boundary, ulps};
 pub use compare::{Comparison, Report, Setup};

@@ -6,7 +6,7 @@
 use crate::scene::Integrator;
 
 /// What the choice depends on.
-pub(super) struct Census<'a> {
+pub(super) struct Needs<'a> {
     /// Whether anything mirrors or refracts.
     pub(super) sends_on: bool,
     /// Whether anything is matte or has highlights.
@@ -18,13 +18,13 @@ pub(super) struct Census<'a> {
 }
 
 /// The integrator, and why.
-pub(super) fn choose(wish: Option<Integrator>, census: &Census<'_>) -> (Integrator, &'static str) {
+pub(super) fn choose(wish: Option<Integrator>, needs: &Needs<'_>) -> (Integrator, &'static str) {
     if let Some(wish) = wish {
         return (wish, "asked for");
     }
-    if census.is_dark && census.is_lit && (census.emitters)() {
+    if needs.is_dark && needs.is_lit && (needs.emitters)() {
         (Integrator::Path, "only surfaces that glow light the scene")
-    } else if census.sends_on {
+    } else if needs.sends_on {
         (Integrator::Whitted, "mirrors or glass send rays on")
     } else {
         (Integrator::RayCast, "nothing sends rays on")

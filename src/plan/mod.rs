@@ -1,19 +1,37 @@
 //! What this render needs, and nothing else.
 //!
-//! [`Plan::new`] takes a census of the scene and switches off what no pixel can show: shadow rays where no light casts
+//! | file | idea |
+//! | --- | --- |
+//! | `census` | what is in the scene, counted |
+//! | `reach` | whether a light can reach anything |
+//! | `integrator` | the cheapest integrator that shows everything |
+//! | `reduction` | what is left out of the complete model, and how to put it back |
+//! | `work` | the rays to expect |
+//! | `build` | how well the tree is worth building |
+//! | `text`, `report` | the plan in words, and as a document |
+//!
+//! [`Plan::new`] takes the census and switches off what no pixel can show: shadow rays where no light casts
 //! any, texture coordinates where no texture is used, shading normals where no mesh in view of a light has them, the
-//! ambient term, lights that are black. The renderer reads the plan and never asks the scene again.
+//! ambient term, lights that are black or out of reach. The renderer reads the plan and never asks the scene again.
 
 mod build;
+mod census;
 mod integrator;
-
-use std::collections::BTreeSet;
-use std::fmt;
+mod reach;
+mod reduction;
+mod report;
+mod text;
+mod work;
 
 pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
+pub use census::Census;
+pub use reduction::{Complete, Reduction};
+pub use report::PlanReport;
+pub use work::{Rays, Work};
 
+use crate::error::Result;
 use crate::math::Vec3;
-use crate::scene::{Alpha, Fog, Geometry, Integrator, Light, Material, Scene, Unlit};
+use crate::scene::{Fog, Integrator, Light, Scene, Unlit};
 use crate::shade::Attributes;
 use crate::shade::light::LightSource;
 use crate::shade::lights::has_emitters;
@@ -35,7 +53,7 @@ pub enum Lighting {
     None,
     /// The scene has no light and is not meant to be dark, so that the viewer carries one; it needs no shadow rays.
     Headlight,
-    /// The scene's lights by index, without those that are black; each casts shadows.
+    /// The scene's lights by index, without those that are black or out of reach; each casts shadows.
     Lights(Vec<usize>),
 }
 
@@ -43,6 +61,10 @@ pub enum Lighting {
 pub const USUAL_DEPTH: u32 = 5;
 /// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
 pub const USUAL_PATH_DEPTH: u32 = 64;
+
+/// A share of the picture, in each channel, that is not worth a mirrored or refracted ray: below half the smallest step of 8 bits,
+/// which in sRGB is 1 / 255 / 12.92, so that what is white and less shows no difference.
+pub const FAINT: f32 = 1e-4;
 
 /// What is wanted of a render. What is none is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,6 +75,8 @@ pub struct Wishes {
     pub background: Option<Vec3>,
     /// How often rays may be sent on.
     pub max_depth: Option<u32>,
+    /// What is modelled whether it is needed or not.
+    pub complete: Complete,
 }
 
 /// What a render will do.
@@ -64,7 +88,7 @@ pub struct Plan {
     pub attributes: Attributes,
     /// Where light comes from.
     pub lighting: Lighting,
-    /// Whether something moves, so that rays have times.
+    /// Whether rays have times: where something moves.
     pub motion: bool,
     /// Whether ambient light is added.
     pub ambient: bool,
@@ -74,6 +98,8 @@ pub struct Plan {
     pub why: &'static str,
     /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
+    /// Mirrored and refracted rays of no larger share are not followed: [`FAINT`], or 0.
+    pub faint: f32,
     /// Whether anything takes light from rays on their way through it.
     pub absorption: bool,
     /// Whether textures bend normals.
@@ -90,34 +116,48 @@ pub struct Plan {
     pub primitives: u64,
     /// Materials that something is made of.
     pub materials: usize,
+    /// The rays that follow from those of the camera.
+    pub work: Work,
+}
+
+/// The world of a scene: one level where that is enough, unless `complete` says otherwise.
+///
+/// # Errors
+/// Those of [`World::new`].
+pub fn world(scene: &Scene, complete: Complete) -> Result<World> {
+    if complete.has(Reduction::Levels) { World::placed(scene) } else { World::new(scene) }
 }
 
 impl Plan {
     /// The plan for a scene.
     pub fn new(scene: &Scene, world: &World, wishes: &Wishes) -> Self {
-        let geometries = placed_geometries(scene);
-        let used: BTreeSet<u32> = geometries.iter().map(|g| g.material()).collect();
-        let default = Material::default();
-        let materials: Vec<_> = used.iter().map(|&m| scene.materials.get(m as usize).unwrap_or(&default)).collect();
+        Self::of_census(scene, world, wishes, &Census::new(scene, world))
+    }
 
-        let any = |holds: fn(&Material) -> bool| materials.iter().any(|material| holds(material));
-        let environment = scene.environment.as_ref().is_some_and(|light| light.intensity > 0.0);
-        let given: Vec<usize> = (0..scene.lights.len()).filter(|&i| gives_light(&scene.lights[i])).collect();
+    /// The same of a scene that is counted already.
+    pub fn of_census(scene: &Scene, world: &World, wishes: &Wishes, census: &Census) -> Self {
+        let Census { materials, meshes, lights, environment, .. } = census;
+        let (environment, complete) = (*environment, wishes.complete);
+        let (sends_on, is_lit) = (materials.sending_on > 0, materials.lit > 0);
         let bodies = || {
-            let sources: Vec<_> = given.iter().map(|&i| LightSource::new(&scene.lights[i], world.centre)).collect();
+            let sources: Vec<_> =
+                lights.bright.iter().map(|&i| LightSource::new(&scene.lights[i], world.centre)).collect();
             has_emitters(scene, world, &sources)
         };
         let is_meant_dark = scene.unlit == Unlit::Darkness || !scene.lights.is_empty();
-        let census = integrator::Census {
-            sends_on: any(Material::sends_on),
-            is_lit: any(Material::is_lit),
-            is_dark: is_meant_dark && given.is_empty() && !environment && scene.ambient == Vec3::ZERO,
+        let asked = integrator::Needs {
+            sends_on,
+            is_lit,
+            is_dark: is_meant_dark && lights.bright.is_empty() && !environment && !census.ambient,
             emitters: &bodies,
         };
-        let (integrator, why) = integrator::choose(wishes.integrator, &census);
+        let (mut integrator, why) = integrator::choose(wishes.integrator, &asked);
+        if complete.has(Reduction::Recursion) && integrator == Integrator::RayCast && wishes.integrator.is_none() {
+            integrator = Integrator::Whitted;
+        }
         let is_path = integrator == Integrator::Path;
 
-        let reflects = any(Material::is_lit) || is_path && any(Material::sends_on);
+        let reflects = is_lit || is_path && sends_on;
         // To paths, what is behind everything is light too.
         let shines = |color: Option<Vec3>| color.is_some_and(|color| color != Vec3::ZERO);
         let found = is_path && (shines(wishes.background.or(scene.background)) || bodies());
@@ -125,50 +165,66 @@ impl Plan {
         let lighting = match (reflects, headlight) {
             (false, _) => Lighting::None,
             (true, true) => Lighting::Headlight,
-            (true, false) => Lighting::Lights(given),
+            (true, false) => Lighting::Lights(lights.reaching.clone()),
         };
         let lit =
             is_path || environment || !matches!(&lighting, Lighting::None) && lighting != Lighting::Lights(vec![]);
-        let sends_on = any(Material::sends_on);
+        let lighting = match lighting {
+            Lighting::None | Lighting::Lights(_) if complete.has(Reduction::Lights) => {
+                // The bodies of black lights would be mistaken for them by paths.
+                Lighting::Lights(if is_path { lights.bright.clone() } else { (0..scene.lights.len()).collect() })
+            }
+            needed => needed,
+        };
+        let sends = complete.has(Reduction::Recursion);
         let depth = match integrator {
             Integrator::RayCast => 0,
-            Integrator::Whitted if sends_on => wishes.max_depth.unwrap_or(USUAL_DEPTH),
-            Integrator::Path if reflects => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
+            Integrator::Whitted if sends_on || sends => wishes.max_depth.unwrap_or(USUAL_DEPTH),
+            Integrator::Path if reflects || sends => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
             Integrator::Whitted | Integrator::Path => 0,
         };
         // What ambient light stands for, paths find.
-        let ambient = !is_path && scene.ambient != Vec3::ZERO && any(|m| m.ambient != Vec3::ZERO);
-        let alpha = any(|m| m.alpha != Alpha::Opaque);
-        let fog = scene.fog.filter(|fog| fog.absorption != Vec3::ZERO);
-        let meshes = || {
-            geometries.iter().filter_map(|g| match g {
-                Geometry::Mesh(mesh) => Some(mesh),
-                Geometry::Shapes { .. } => None,
-            })
-        };
+        let ambient = !is_path && census.ambient && materials.ambient > 0;
+        let has_fog = scene.fog.filter(|_| census.fog);
+        let alpha = materials.alpha > 0;
+        let surfaces = complete.has(Reduction::Surfaces);
         let attributes = Attributes {
-            normals: (lit || depth > 0 || environment) && meshes().any(|m| !m.normals.is_empty()),
-            uvs: (lit || ambient || alpha || any(|m| m.unlit || m.emission_texture.is_some() || m.physical.is_some()))
-                && any(|m| m.textures().next().is_some()),
-            colors: (lit || ambient || alpha || any(|m| m.unlit)) && meshes().any(|m| !m.colors.is_empty()),
+            normals: (lit || depth > 0) && meshes.normals > 0 || surfaces,
+            uvs: (lit || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0 || surfaces,
+            colors: (lit || ambient || alpha || materials.unlit > 0) && meshes.colors > 0 || surfaces,
         };
+        let casting = match &lighting {
+            Lighting::Lights(lights) => &lights[..],
+            Lighting::None | Lighting::Headlight => &[],
+        };
+        let has_surface = |&&i: &&usize| matches!(scene.lights[i], Light::Area { .. });
+        let extended = casting.iter().filter(has_surface).count();
+        let around = usize::from(environment && lighting != Lighting::None);
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
-            lighting,
-            motion: world.moves(),
+            motion: world.moves() || complete.has(Reduction::Motion),
             ambient,
             integrator,
             why,
             depth,
-            absorption: depth > 0 && any(|m| m.absorption.is_some()),
-            alpha,
-            normal_maps: (lit || depth > 0) && any(|m| m.normal_texture.is_some()),
+            faint: if complete.has(Reduction::Faint) { 0.0 } else { FAINT },
+            absorption: depth > 0 && (materials.absorbing > 0 || complete.has(Reduction::Media)),
+            alpha: alpha || complete.has(Reduction::Alpha),
+            normal_maps: (lit || depth > 0) && materials.normal_mapped > 0 || surfaces,
             environment,
-            fog,
+            fog: if complete.has(Reduction::Media) { scene.fog } else { has_fog },
             background: wishes.background.or(scene.background),
             primitives: world.primitive_count(),
-            materials: materials.len(),
+            materials: materials.used as usize,
+            work: Work::new(&work::Means {
+                integrator,
+                depth,
+                ways: census.ways,
+                albedo: census.albedo,
+                lights: [casting.len() - extended, extended + around],
+            }),
+            lighting,
         }
     }
 
@@ -176,65 +232,20 @@ impl Plan {
     pub fn shadows(&self) -> bool {
         matches!(&self.lighting, Lighting::Lights(lights) if !lights.is_empty())
     }
-}
 
-/// Every geometry that is placed at least once.
-fn placed_geometries(scene: &Scene) -> Vec<&Geometry> {
-    let groups: BTreeSet<u32> = scene.instances.iter().map(|instance| instance.group).collect();
-    groups.into_iter().flat_map(|group| scene.group_geometries(group).map(|(_, geometry)| geometry)).collect()
-}
-
-fn gives_light(light: &Light) -> bool {
-    match light {
-        Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. } => {
-            *color != Vec3::ZERO
-        }
-        Light::Area { radiance, .. } => *radiance != Vec3::ZERO,
-    }
-}
-
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let levels = match self.levels {
-            Levels::One => "one level",
-            Levels::Two => "two levels (instances)",
-        };
-        let lights = match &self.lighting {
-            Lighting::None => "no light".to_owned(),
-            Lighting::Lights(lights) if lights.is_empty() && self.integrator == Integrator::Path => {
-                "light of what glows".to_owned()
-            }
-            Lighting::Lights(lights) if lights.is_empty() => "no light".to_owned(),
-            Lighting::Headlight => "a headlight without shadows".to_owned(),
-            Lighting::Lights(lights) if lights.len() == 1 => "1 light with shadows".to_owned(),
-            Lighting::Lights(lights) => format!("{} lights with shadows", lights.len()),
-        };
-        write!(f, "{} ({}): {} primitives on {levels}, {lights}", self.integrator, self.why, self.primitives)?;
-        let Attributes { normals, uvs, colors } = self.attributes;
-        let parts = [
-            (normals, "smooth normals"),
-            (uvs, "textures"),
-            (colors, "vertex colours"),
-            (self.motion, "motion"),
-            (self.ambient, "ambient light"),
-            (self.environment, "an environment"),
-            (self.absorption, "absorption"),
-            (self.fog.is_some(), "fog"),
-            (self.alpha, "alpha"),
-            (self.normal_maps, "normal maps"),
-        ];
-        for (_, name) in parts.iter().filter(|(on, _)| *on) {
-            write!(f, ", {name}")?;
-        }
-        if self.depth > 0 {
-            match self.integrator {
-                Integrator::RayCast | Integrator::Whitted => {
-                    write!(f, ", mirrored and refracted rays to depth {}", self.depth)?;
+    /// What of the complete model is left out of this plan, which was made with `wishes`.
+    pub fn left_out(&self, scene: &Scene, world: &World, wishes: &Wishes, census: &Census) -> Vec<Reduction> {
+        let changes = |reduction: &Reduction| {
+            let complete = wishes.complete.with(*reduction);
+            match reduction {
+                Reduction::Levels => !wishes.complete.has(Reduction::Levels) && !world.fixed.is_empty(),
+                Reduction::Faint => {
+                    self.faint > 0.0 && census.materials.sending_on > 0 && self.integrator == Integrator::Whitted
                 }
-                Integrator::Path => write!(f, ", paths scattered up to {} times", self.depth)?,
+                _ => Self::of_census(scene, world, &Wishes { complete, ..*wishes }, census) != *self,
             }
-        }
-        write!(f, ", {} {}", self.materials, if self.materials == 1 { "material" } else { "materials" })
+        };
+        Reduction::ALL.into_iter().filter(changes).collect()
     }
 }
 
@@ -242,7 +253,7 @@ impl fmt::Display for Plan {
 mod tests {
     use super::*;
     use crate::math::{DVec3, Vec2};
-    use crate::scene::Mesh;
+    use crate::scene::{Attenuation, Geometry, Material, Mesh};
 
     fn scene() -> Scene {
         let mesh = Mesh {
@@ -335,5 +346,44 @@ mod tests {
         scene.materials[0] = Material { diffuse: Vec3::ZERO, emission: Vec3::ONE, ..Material::default() };
         let plan = plan(&scene);
         assert_eq!((plan.lighting, plan.attributes), (Lighting::None, Attributes::default()));
+    }
+
+    #[test]
+    fn lights_out_of_reach_are_not_asked() {
+        let mut scene = scene();
+        let near = |range| {
+            let (color, attenuation) = (Vec3::ONE, Attenuation::NONE);
+            Light::Point { position: DVec3::Z * 5.0, color, attenuation, range, radius: 0.0 }
+        };
+        scene.lights = vec![near(4.0), near(6.0)];
+        assert_eq!(plan(&scene).lighting, Lighting::Lights(vec![1]));
+        let complete = Complete::NOTHING.with(Reduction::Lights);
+        let full = wished(&scene, &Wishes { complete, ..Wishes::default() });
+        assert_eq!(full.lighting, Lighting::Lights(vec![0, 1]));
+        assert_eq!((plan(&scene).work.shadow, full.work.shadow), (1.0, 2.0));
+    }
+
+    #[test]
+    fn the_complete_model_is_all_of_it_and_what_is_left_out_is_named() {
+        let scene = scene();
+        let full = wished(&scene, &Wishes { complete: Complete::ALL, ..Wishes::default() });
+        assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, USUAL_DEPTH, 0.0));
+        assert_eq!(full.attributes, Attributes::ALL);
+        assert!(full.motion && full.alpha && full.absorption && full.normal_maps);
+        let asked = Wishes { integrator: Some(Integrator::RayCast), complete: Complete::ALL, ..Wishes::default() };
+        assert_eq!(wished(&scene, &asked).integrator, Integrator::RayCast, "what is asked for stays");
+
+        let world = World::new(&scene).unwrap();
+        let census = Census::new(&scene, &world);
+        let wishes = Wishes::default();
+        use Reduction::{Alpha, Levels, Media, Motion, Recursion, Surfaces};
+        // The headlight is all the light there is, nothing is faint where nothing mirrors, and there is no fog.
+        let left_out = plan(&scene).left_out(&scene, &world, &wishes, &census);
+        assert_eq!(left_out, [Levels, Surfaces, Motion, Recursion, Alpha]);
+        let mut mirror = scene.clone();
+        mirror.materials[0].reflection = Vec3::X;
+        let left_out = plan(&mirror).left_out(&mirror, &world, &wishes, &Census::new(&mirror, &world));
+        assert_eq!(left_out, [Levels, Surfaces, Motion, Media, Alpha, Reduction::Faint]);
+        assert!(full.left_out(&scene, &world, &asked, &census).is_empty());
     }
 }

@@ -41,13 +41,14 @@ fn settings(settings: &Settings) -> String {
         crop,
         aovs,
         adaptive,
+        complete,
     } = settings;
     let aovs: Vec<_> = aovs.iter().map(ToString::to_string).collect();
     let aovs = aovs.join(" ");
     format!(
         "size {width}x{height}; spp {spp}; seed {seed}; sampler {sampling}; filter {filter}; \
          background {background:?}; light samples {light_samples}; integrator {integrator:?}; depth {max_depth:?}; \
-         crop {crop:?}; noise {adaptive:?}; aovs {aovs}"
+         crop {crop:?}; noise {adaptive:?}; aovs {aovs}; plan {complete:?}"
     )
 }
 

@@ -43,7 +43,7 @@ pub use tiles::{LARGEST_TILE, TileOrder};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::{DVec2, Vec3, Vec4};
-use crate::plan::{Plan, Wishes};
+use crate::plan::Plan;
 use crate::ray::Ray;
 use crate::scene::{Camera, Integrator, Material, Scene};
 use crate::shade::EnvironmentLight;
@@ -112,8 +112,7 @@ impl<'a> Renderer<'a> {
             return Err(Error::Usage(message));
         }
         let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
-        let Settings { integrator, background, max_depth, .. } = settings;
-        let plan = Plan::new(scene, world, &Wishes { integrator, background, max_depth });
+        let plan = Plan::new(scene, world, &settings.wishes());
         if plan.integrator == Integrator::Path && sampling == Sampling::Grid {
             let why = "its numbers are the same for every choice of a path, which makes a wrong picture";
             return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));

@@ -4,6 +4,7 @@ use super::tiles::USUAL_TILE;
 use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::plan::{Complete, Plan, Rays, Wishes};
 use crate::scene::Integrator;
 use crate::trace::Batch;
 
@@ -46,6 +47,9 @@ pub struct Settings {
     pub aovs: Vec<Aov>,
     /// Takes samples where they are needed; none takes as many for each pixel.
     pub adaptive: Option<Adaptive>,
+    /// What is modelled whether the scene needs it or not; never changes a picture, but for roundings of what is placed by
+    /// transforms, what is too faint to be seen, and noise of paths.
+    pub complete: Complete,
 }
 
 impl Default for Settings {
@@ -68,6 +72,7 @@ impl Default for Settings {
             crop: None,
             aovs: Vec::new(),
             adaptive: None,
+            complete: Complete::NOTHING,
         }
     }
 }
@@ -98,6 +103,18 @@ impl Crop {
 }
 
 impl Settings {
+    /// What a plan follows from beside the scene.
+    pub fn wishes(&self) -> Wishes {
+        let Self { integrator, background, max_depth, complete, .. } = *self;
+        Wishes { integrator, background, max_depth, complete }
+    }
+
+    /// The rays to expect of a render by `plan`.
+    pub fn expected_rays(&self, plan: &Plan) -> Rays {
+        let pixels = self.window().len() as u64;
+        plan.work.rays(pixels.saturating_mul(self.spp.into()), self.light_samples)
+    }
+
     /// The part of the picture that is rendered.
     pub(super) fn window(&self) -> Crop {
         let Self { width, height, crop, .. } = *self;

@@ -26,9 +26,6 @@ use super::wavefront::{Buffers, Path, Wave};
 /// Most rays that are followed at once below the camera's.
 const BATCH: usize = 4096;
 
-/// A share of the picture, in each channel, that is not worth a ray: far below what 8 bits show.
-const FAINT: f32 = 1e-4;
-
 /// Which rays are followed.
 #[derive(Clone, Copy)]
 struct Stage {
@@ -135,7 +132,7 @@ impl Renderer<'_> {
             for (which, way, event) in [(1, ways.mirrored, Event::Specular), (2, ways.refracted, Event::Transmitted)] {
                 let Some(way) = way else { continue };
                 let weight = path.weight * way.share * way.scale;
-                if weight.max_element() <= FAINT {
+                if weight.max_element() <= self.plan.faint {
                     continue;
                 }
                 let branch = path.branch.wrapping_mul(2).wrapping_add(which);

@@ -101,6 +101,18 @@ impl World {
     /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name; and for more
     /// primitives in one place than tracers can name.
     pub fn new(scene: &Scene) -> Result<Self> {
+        Self::with(scene, true)
+    }
+
+    /// The same with everything placed by transforms: two levels, whether they are needed or not.
+    ///
+    /// # Errors
+    /// Those of [`World::new`].
+    pub fn placed(scene: &Scene) -> Result<Self> {
+        Self::with(scene, false)
+    }
+
+    fn with(scene: &Scene, bakes: bool) -> Result<Self> {
         let mut uses = vec![0usize; scene.groups.len()];
         for (i, instance) in scene.instances.iter().enumerate() {
             uses[instance.group as usize] += 1;
@@ -111,7 +123,8 @@ impl World {
             let only_meshes = scene.group_geometries(instance.group).all(is_mesh);
             let is_still = instance.transform_end.is_none();
             // A scaled sphere is no sphere, so shapes are baked only where they merely move.
-            is_still
+            bakes
+                && is_still
                 && uses[instance.group as usize] == 1
                 && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
         };

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::rays::Kind;
 use super::report::{Ratio, Report, TraversalRow};
-use super::svg::{Anchor, Font, Svg};
+use crate::lab::drawing::{Anchor, Drawing, Font};
 
 const WIDTH: f64 = 900.0;
 const MARGIN: f64 = 28.0;
@@ -57,7 +57,7 @@ fn color(row: &TraversalRow) -> &'static str {
 
 /// A chart of these reports, an SVG document 900 units wide; `notes` are lines that say what was measured on what.
 pub fn chart(reports: &[Report], notes: &[String]) -> String {
-    let mut svg = Svg::new();
+    let mut svg = Drawing::new();
     let mut y = MARGIN + 12.0;
     svg.text((MARGIN, y), Anchor::Start, TITLE, "Millions of rays a second, native and Embree");
     y += 6.0;
@@ -84,10 +84,10 @@ pub fn chart(reports: &[Report], notes: &[String]) -> String {
             y += heights.fold(0.0, f64::max);
         }
     }
-    svg.finish(WIDTH, (y + MARGIN).ceil())
+    svg.svg(WIDTH, (y + MARGIN).ceil())
 }
 
-fn legend(svg: &mut Svg, y: f64) {
+fn legend(svg: &mut Drawing, y: f64) {
     let mut x = MARGIN;
     for (color, meaning) in LEGEND {
         svg.rectangle((x, y - BAR), (16.0, BAR), color);
@@ -108,7 +108,7 @@ fn legend(svg: &mut Svg, y: f64) {
 }
 
 /// One kind of ray of one scene; its height.
-fn panel(svg: &mut Svg, (x, y): (f64, f64), report: &Report, ratio: &Ratio) -> f64 {
+fn panel(svg: &mut Drawing, (x, y): (f64, f64), report: &Report, ratio: &Ratio) -> f64 {
     let kind = ratio.kind;
     let (above, y) = (y, y + HEADING);
     svg.text((x, y - 6.0), Anchor::Start, KIND, title(kind));
@@ -137,7 +137,7 @@ fn panel(svg: &mut Svg, (x, y): (f64, f64), report: &Report, ratio: &Ratio) -> f
 }
 
 /// One engine in one mode: its rows, a width each.
-fn bar(svg: &mut Svg, x: f64, middle: f64, rows: &[&TraversalRow], at: impl Fn(f64) -> f64) {
+fn bar(svg: &mut Drawing, x: f64, middle: f64, rows: &[&TraversalRow], at: impl Fn(f64) -> f64) {
     let Some(best) = rows.iter().max_by(|a, b| a.mrays_per_s.median.total_cmp(&b.mrays_per_s.median)) else { return };
     let baseline = middle + 4.0;
     let name = format!("{} {}", best.backend, best.mode);
@@ -154,7 +154,7 @@ fn bar(svg: &mut Svg, x: f64, middle: f64, rows: &[&TraversalRow], at: impl Fn(f
 }
 
 /// From the smallest to the largest.
-fn whiskers(svg: &mut Svg, (from, to): (f64, f64), y: f64) {
+fn whiskers(svg: &mut Drawing, (from, to): (f64, f64), y: f64) {
     svg.line((from, y), (to, y), INK);
     for x in [from, to] {
         svg.line((x, y - 3.0), (x, y + 3.0), INK);

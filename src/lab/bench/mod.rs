@@ -7,7 +7,7 @@
 //! | `pixel_loop` | camera rays made within the time, by the renderer's own loop |
 //! | `run`, `answers` | builds and passes over the rays, in turn; answers compared first |
 //! | `report` | rates, ratios, the table |
-//! | `chart`, `svg` | the rates as a picture |
+//! | `chart` | the rates as a picture |
 //! | `machine` | what they were measured on |
 //!
 //! Rates move by 15 % from run to run on a shared machine, so only ratios within a run count: every engine is timed
@@ -27,7 +27,6 @@ mod run;
 mod scaling;
 mod scaling_chart;
 mod subject;
-mod svg;
 
 pub use chart::chart;
 pub use machine::processor;

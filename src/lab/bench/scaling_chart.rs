@@ -2,7 +2,7 @@
 //! slope.
 
 use super::scaling::{Family, Point, ScalingReport, Swept};
-use super::svg::{Anchor, Font, Svg};
+use crate::lab::drawing::{Anchor, Drawing, Font};
 
 const WIDTH: f64 = 960.0;
 const MARGIN: f64 = 28.0;
@@ -51,7 +51,7 @@ struct Series {
 
 /// A chart of the report, an SVG document; `notes` say what was measured on what.
 pub fn scaling_chart(report: &ScalingReport, notes: &[String]) -> String {
-    let mut svg = Svg::new();
+    let mut svg = Drawing::new();
     let mut y = MARGIN + 12.0;
     svg.text((MARGIN, y), Anchor::Start, TITLE, "Time against the number of triangles");
     for note in notes {
@@ -98,7 +98,7 @@ pub fn scaling_chart(report: &ScalingReport, notes: &[String]) -> String {
         svg.text((MARGIN, y), Anchor::Start, NOTE, stopped);
         y += 16.0;
     }
-    svg.finish(WIDTH, (y + MARGIN).ceil())
+    svg.svg(WIDTH, (y + MARGIN).ceil())
 }
 
 /// The accelerators that were measured, in the order of [`COLORS`].
@@ -106,7 +106,7 @@ fn measured(report: &ScalingReport) -> impl Iterator<Item = (&'static str, &'sta
     COLORS.into_iter().filter(|(name, _)| report.points.iter().any(|point| point.accel == *name))
 }
 
-fn legend(svg: &mut Svg, y: f64, report: &ScalingReport) {
+fn legend(svg: &mut Drawing, y: f64, report: &ScalingReport) {
     let mut x = MARGIN;
     for (name, color) in measured(report) {
         svg.rectangle((x, y - 6.0), (18.0, 3.0), color);
@@ -130,7 +130,7 @@ fn decades(numbers: impl Iterator<Item = f64>) -> (i32, i32) {
     if low > high { (0, 1) } else { (low.floor() as i32, (high.ceil() as i32).max(low.floor() as i32 + 1)) }
 }
 
-fn plot(svg: &mut Svg, (x, y): (f64, f64), title: &str, across: &str, series: &[Series]) {
+fn plot(svg: &mut Drawing, (x, y): (f64, f64), title: &str, across: &str, series: &[Series]) {
     svg.text((x, y + HEADING - 8.0), Anchor::Start, HEAD, title);
     let points = || series.iter().flat_map(|series| series.points.iter().copied());
     let (left, top) = (x + NUMBERS.0, y + HEADING);
