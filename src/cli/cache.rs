@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub(super) struct CacheArgs {
     /// Folder where built native trees are kept, to be read the next time; never changes a picture
     ///

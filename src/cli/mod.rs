@@ -29,7 +29,9 @@ mod render;
 mod report;
 mod response;
 mod scaling;
+mod stress;
 mod summary;
+mod trace;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -54,6 +56,8 @@ enum Command {
     Compare(Box<compare::CompareArgs>),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
+    Stress(stress::StressArgs),
+    Trace(Box<trace::TraceArgs>),
     Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
@@ -66,6 +70,8 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Bench(args) => bench::run(args),
             Self::Info(args) => info::run(args),
+            Self::Stress(args) => stress::run(args),
+            Self::Trace(args) => trace::run(args),
             Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::rays::Kind;
 use super::report::{Ratio, Report, TraversalRow};
-use super::svg::{Anchor, Font, Svg};
+use crate::lab::svg::{Anchor, Font, Svg};
 
 const WIDTH: f64 = 900.0;
 const MARGIN: f64 = 28.0;

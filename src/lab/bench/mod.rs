@@ -27,7 +27,6 @@ mod run;
 mod scaling;
 mod scaling_chart;
 mod subject;
-mod svg;
 
 pub use chart::chart;
 pub use machine::processor;

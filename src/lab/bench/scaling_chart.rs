@@ -2,7 +2,7 @@
 //! slope.
 
 use super::scaling::{Family, Point, ScalingReport, Swept};
-use super::svg::{Anchor, Font, Svg};
+use crate::lab::svg::{Anchor, Font, Svg};
 
 const WIDTH: f64 = 960.0;
 const MARGIN: f64 = 28.0;

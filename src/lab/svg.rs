@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 /// A picture that grows downwards.
-pub(super) struct Svg {
+pub(in crate::lab) struct Svg {
     body: String,
 }
 
 /// Where a text's x is.
 #[derive(Clone, Copy)]
-pub(super) enum Anchor {
+pub(in crate::lab) enum Anchor {
     Start,
     Middle,
     End,
@@ -17,7 +17,7 @@ pub(super) enum Anchor {
 
 /// How a text looks.
 #[derive(Clone, Copy)]
-pub(super) struct Font {
+pub(in crate::lab) struct Font {
     pub size: f64,
     pub bold: bool,
     pub color: &'static str,
