@@ -22,3 +22,4 @@ mod render;
 mod resume;
 mod scenes;
 mod shapes;
+mod stress;

@@ -31,7 +31,9 @@ mod render;
 mod report;
 mod response;
 mod scaling;
+mod stress;
 mod summary;
+mod trace;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -58,6 +60,8 @@ enum Command {
     Chart(chart::ChartArgs),
     Plan(Box<plan::PlanCommand>),
     Info(info::InfoArgs),
+    Stress(stress::StressArgs),
+    Trace(Box<trace::TraceArgs>),
     Make(make::MakeArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
@@ -72,6 +76,8 @@ impl Command {
             Self::Chart(args) => chart::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Info(args) => info::run(args),
+            Self::Stress(args) => stress::run(args),
+            Self::Trace(args) => trace::run(args),
             Self::Make(args) => make::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Man(args) => man::run(args),

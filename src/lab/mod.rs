@@ -3,7 +3,7 @@
 //! [`oracle`] answers exactly, slowly, and alone: it shares no code with any tracer. [`rounding`] says how far an
 //! answer computed in f32 or f64 may be from that, and [`classify_closest`] puts both together: of two engines that differ on a
 //! ray, which is wrong, if any. [`compare`] does so for every ray of a picture and for rays made to be difficult.
-//! [`all`] does so for every accelerator at once. [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`mod@bench`] times the engines against
+//! [`all`] does so for every accelerator at once. [`stress`] runs every method on the cases that are known to be hard, and [`tree`] is the oracle at a pace for that. [`inspect`] looks for what is suspicious in a scene before anything is traced, and [`mod@bench`] times the engines against
 //! each other.
 
 pub mod all;
@@ -22,6 +22,8 @@ mod pixels;
 pub mod rays;
 pub mod rounding;
 pub mod savings;
+pub mod stress;
+pub mod tree;
 
 pub use classify::{Answers, Class, classify_closest, classify_occluded, is_boundary, ulps};
 pub use compare::{Comparison, Report, Setup};

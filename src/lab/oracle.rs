@@ -145,7 +145,7 @@ pub(super) fn place<R: Ring>(p: Vec3, to_world: Option<&Affine3>) -> Vector<R> {
 }
 
 /// The corners of a triangle relative to the ray's origin.
-fn relative<R: Ring>(ray: &Ray, corners: [Vec3; 3], to_world: Option<&Affine3>) -> [Vector<R>; 3] {
+pub(super) fn relative<R: Ring>(ray: &Ray, corners: [Vec3; 3], to_world: Option<&Affine3>) -> [Vector<R>; 3] {
     let origin = vector::<R>(ray.origin);
     corners.map(|p| zip(&place(p, to_world), &origin, R::sub))
 }

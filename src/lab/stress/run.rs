@@ -1,0 +1,172 @@
+//! The matrix: every column on every case.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+
+use rayon::prelude::*;
+
+use super::expected::expected;
+use super::report::{Cell, Replay, Report, Row};
+use super::verdict::{Fault, Gate, Tally, Verdict};
+use super::{Case, Column, Probe, hex};
+use crate::error::{Error, Result};
+use crate::lab::tree::{Exact, Oracle};
+use crate::ray::{Hit, Ray};
+use crate::render::Control;
+use crate::trace::{Batch, Tracer};
+
+/// Rays that are asked together.
+const CHUNK: usize = 1024;
+/// Rays that are kept of those that fail, for each form of a column.
+const KEPT: usize = 3;
+
+/// What is run.
+pub struct Setup {
+    /// Which cases.
+    pub cases: Vec<Case>,
+    /// Cases of the caller's own, by name; nothing is expected of them.
+    pub own: Vec<(String, Probe)>,
+    /// Which columns.
+    pub columns: Vec<Column>,
+    /// About how many rays a case.
+    pub rays: usize,
+    /// Chooses the rays.
+    pub seed: u64,
+}
+
+/// What one form of a column made of a case.
+#[derive(Default)]
+struct Form {
+    tally: Tally,
+    replay: Vec<Replay>,
+}
+
+impl Setup {
+    /// Rays a case where none are asked for: what is expected to fail is recorded for these.
+    pub const RAYS: usize = 1500;
+    /// The seed that goes with it.
+    pub const SEED: u64 = 0;
+
+    /// Runs it all; `control.on_tile` hears of every case.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`], and those of Embree.
+    pub fn run(&self, control: Control<'_>) -> Result<Report> {
+        let mut rows = Vec::new();
+        let is_recorded = self.rays == Self::RAYS && self.seed == Self::SEED;
+        for case in &self.cases {
+            let row = Row::new(case.name, case.about, case.source, case.gate, case.t_relative);
+            let expected = |column: Column| if is_recorded { expected(case.name, column) } else { None };
+            rows.push(self.row(row, &case.probes(self.rays, self.seed), expected, &control)?);
+            if let Some(on_tile) = control.on_tile {
+                on_tile(1);
+            }
+        }
+        for (name, probe) in &self.own {
+            let row = Row::new(name, "from a file", "", Gate::Hits, None);
+            rows.push(self.row(row, std::slice::from_ref(probe), |_| None, &control)?);
+        }
+        Ok(Report { rays: self.rays, seed: self.seed, rows })
+    }
+
+    fn row(
+        &self,
+        mut row: Row,
+        probes: &[Probe],
+        expected: impl Fn(Column) -> Option<char>,
+        control: &Control<'_>,
+    ) -> Result<Row> {
+        let mut forms: Vec<BTreeMap<String, Form>> = self.columns.iter().map(|_| BTreeMap::new()).collect();
+        for probe in probes {
+            let oracle = Oracle::new(&probe.world, 0.0);
+            let exact: Vec<Exact> = probe.rays.par_iter().map(|ray| oracle.closest(ray)).collect();
+            row.rays += exact.len() as u64;
+            row.hits += exact.iter().filter(|exact| !exact.nearest.is_empty()).count() as u64;
+            row.touching += exact.iter().filter(|exact| exact.touches).count() as u64;
+            let scene = match probe.label.as_str() {
+                "" => format!("case:{}", row.name),
+                label => format!("case:{}/{label}", row.name),
+            };
+            for (column, forms) in self.columns.iter().zip(&mut forms) {
+                if control.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                    return Err(Error::Interrupted);
+                }
+                if !column.applies(&probe.world) {
+                    continue;
+                }
+                let gate = column.gate(row.gate);
+                column.each(&probe.world, &mut |name, tracer, batch| {
+                    let (found, occluded) = answers(tracer, &probe.rays, batch);
+                    let form = forms.entry(name.to_owned()).or_default();
+                    let failing = form.tally.add(gate, &probe.rays, &exact, &found, &occluded);
+                    let room = KEPT.saturating_sub(form.replay.len());
+                    let replay = |(i, fault): (usize, Fault)| Replay {
+                        form: name.to_owned(),
+                        fault,
+                        scene: scene.clone(),
+                        ray: hex::ray_to_hex(&probe.rays[i]),
+                    };
+                    form.replay.extend(failing.into_iter().take(room).map(replay));
+                    Ok(())
+                })?;
+            }
+        }
+        for (&column, forms) in self.columns.iter().zip(forms) {
+            row.cells.extend(cell(column, forms, row.t_relative, &expected));
+        }
+        Ok(row)
+    }
+}
+
+/// Nearest hits, and whether there is any, of all rays.
+pub(super) fn answers(tracer: &dyn Tracer, rays: &[Ray], batch: Batch) -> (Vec<Option<Hit>>, Vec<bool>) {
+    let (mut found, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+    let chunks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).zip(occluded.par_chunks_mut(CHUNK));
+    chunks.for_each(|((rays, found), occluded)| {
+        tracer.closest_batch(rays, found, batch);
+        tracer.occluded_batch(rays, occluded, batch);
+    });
+    (found, occluded)
+}
+
+/// None for a column that nothing in the case is about.
+fn cell(
+    column: Column,
+    forms: BTreeMap<String, Form>,
+    t_relative: Option<f64>,
+    expected: &impl Fn(Column) -> Option<char>,
+) -> Option<Cell> {
+    if forms.is_empty() {
+        return None;
+    }
+    let count = forms.len();
+    let mut failing = 0;
+    let mut worst: Option<(bool, Verdict, Form)> = None;
+    for form in forms.into_values() {
+        let verdict = form.tally.verdict();
+        let fails = verdict.failing > 0 || t_relative.is_some_and(|bound| verdict.t_relative_max > bound);
+        failing += usize::from(fails);
+        let is_worse = worst.as_ref().is_none_or(|(also, other, _)| {
+            (fails, verdict.failing, verdict.t_relative_max) > (*also, other.failing, other.t_relative_max)
+        });
+        if is_worse {
+            worst = Some((fails, verdict, form));
+        }
+    }
+    let (_, verdict, form) = worst?;
+    let mark = match failing {
+        0 => '.',
+        all if all == count => 'x',
+        _ => '-',
+    };
+    let expected = expected(column);
+    Some(Cell {
+        column: column.name(),
+        is_exact: column.is_exact(),
+        mark,
+        expected,
+        forms: count,
+        verdict,
+        replay: form.replay,
+    })
+}
