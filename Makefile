@@ -11,7 +11,7 @@ SPP ?= 16
 
 TWINCAST = target/release/twincast
 
-.PHONY: help render test check test-embree4 install packages build
+.PHONY: help render test check stress stress-long test-embree4 install packages build
 
 help: ## list these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -36,6 +36,16 @@ check: packages ## formatting, lints, documentation, and everything once more wi
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
 	$(CARGO) test --locked --no-default-features
+
+stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg
+	@mkdir -p out/stress
+	$(TWINCAST) stress -o out/stress
+	$(TWINCAST) stress --search 20 -o out/stress
+
+stress-long: build ## a hundred million rays on the native tracer, and an hour of looking for more
+	@mkdir -p out/stress
+	$(TWINCAST) stress --method native --rays 4000000 --seed 1 -o out/stress
+	$(TWINCAST) stress --search 3600 --seed 1 -o out/stress
 
 test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5
 	@scripts/test-embree4.sh

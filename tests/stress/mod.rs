@@ -1,6 +1,7 @@
 //! The catalogue of cases on which ray casters fail: the record of it holds, and what is broken on purpose is caught.
 
 mod mutants;
+mod oracle;
 mod program;
 
 use twincast::lab::stress::{Column, Found, Gate, Search, Setup, Tally, catalogue, columns, file};

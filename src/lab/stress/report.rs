@@ -38,6 +38,8 @@ pub struct Row {
     pub hits: u64,
     /// Rays that merely touch what they hit.
     pub touching: u64,
+    /// What the oracle took for all of them, on all threads.
+    pub oracle_seconds: f64,
     /// One for each column that something in the case is about.
     pub cells: Vec<Cell>,
 }
@@ -81,12 +83,18 @@ impl Row {
     /// Before anything was asked.
     pub(super) fn new(name: &str, about: &str, source: &str, gate: Gate, t_relative: Option<f64>) -> Self {
         let [name, about, source] = [name, about, source].map(str::to_owned);
-        Self { name, about, source, gate, t_relative, rays: 0, hits: 0, touching: 0, cells: Vec::new() }
-    }
-
-    /// Its marks, column by column, as the record has them.
-    pub fn marks(&self) -> String {
-        self.cells.iter().map(|cell| format!("{}={} ", cell.column, cell.mark)).collect()
+        Self {
+            name,
+            about,
+            source,
+            gate,
+            t_relative,
+            rays: 0,
+            hits: 0,
+            touching: 0,
+            oracle_seconds: 0.0,
+            cells: Vec::new(),
+        }
     }
 }
 
@@ -171,6 +179,9 @@ impl fmt::Display for Report {
             }
             writeln!(f)?;
         }
-        Ok(())
+        let rays: u64 = self.rows.iter().map(|row| row.rays).sum();
+        let seconds: f64 = self.rows.iter().map(|row| row.oracle_seconds).sum();
+        let pace = rays as f64 / seconds.max(1e-9) * 60e-6;
+        writeln!(f, "\nthe oracle answered {rays} rays, {pace:.1} million a minute")
     }
 }

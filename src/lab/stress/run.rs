@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -78,8 +79,10 @@ impl Setup {
     ) -> Result<Row> {
         let mut forms: Vec<BTreeMap<String, Form>> = self.columns.iter().map(|_| BTreeMap::new()).collect();
         for probe in probes {
+            let start = Instant::now();
             let oracle = Oracle::new(&probe.world, 0.0);
             let exact: Vec<Exact> = probe.rays.par_iter().map(|ray| oracle.closest(ray)).collect();
+            row.oracle_seconds += start.elapsed().as_secs_f64();
             row.rays += exact.len() as u64;
             row.hits += exact.iter().filter(|exact| !exact.nearest.is_empty()).count() as u64;
             row.touching += exact.iter().filter(|exact| exact.touches).count() as u64;
