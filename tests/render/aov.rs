@@ -296,7 +296,7 @@ fn cryptomatte_tells_how_much_of_what_covers_a_pixel() {
         let ids: Vec<Option<u32>> =
             names.iter().map(|name| Some(u32::from_str_radix(manifest.get(*name)?, 16).unwrap())).collect();
         assert_eq!(manifest.len(), ids.iter().flatten().count(), "what is seen, and nothing else");
-        assert!(manifest.len() > 2);
+        assert!(manifest.len() >= 2);
         let plane = |rank: usize, component: usize| {
             let name = format!("{layer}{:02}.{}", rank / 2, ["R", "G", "B", "A"][rank % 2 * 2 + component]);
             channels.floats(&name).unwrap().to_vec()
