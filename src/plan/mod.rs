@@ -366,11 +366,12 @@ mod tests {
     #[test]
     fn the_complete_model_is_all_of_it_and_what_is_left_out_is_named() {
         let scene = scene();
-        let full = wished(&scene, &Wishes { complete: Complete::ALL, ..Wishes::default() });
+        let all = Wishes { complete: Complete::ALL, ..Wishes::default() };
+        let full = wished(&scene, &all);
         assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, USUAL_DEPTH, 0.0));
         assert_eq!(full.attributes, Attributes::ALL);
         assert!(full.motion && full.alpha && full.absorption && full.normal_maps);
-        let asked = Wishes { integrator: Some(Integrator::RayCast), complete: Complete::ALL, ..Wishes::default() };
+        let asked = Wishes { integrator: Some(Integrator::RayCast), ..all };
         assert_eq!(wished(&scene, &asked).integrator, Integrator::RayCast, "what is asked for stays");
 
         let world = World::new(&scene).unwrap();
@@ -384,6 +385,6 @@ mod tests {
         mirror.materials[0].reflection = Vec3::X;
         let left_out = plan(&mirror).left_out(&mirror, &world, &wishes, &Census::new(&mirror, &world));
         assert_eq!(left_out, [Levels, Surfaces, Motion, Media, Alpha, Reduction::Faint]);
-        assert!(full.left_out(&scene, &world, &asked, &census).is_empty());
+        assert!(full.left_out(&scene, &world, &all, &census).is_empty());
     }
 }
