@@ -83,10 +83,10 @@ pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOpt
     write_channels(path, image, &[], metadata, options)
 }
 
-/// As [`write`], with further channels beside the colours, which keep all their bits.
+/// As [`write()`], with further channels beside the colours, which keep all their bits.
 ///
 /// # Errors
-/// Those of [`write`]; [`Error::Output`] where there are channels and the format is not OpenEXR, and [`Error::Usage`] where they do
+/// Those of [`write()`]; [`Error::Output`] where there are channels and the format is not OpenEXR, and [`Error::Usage`] where they do
 /// not go with the image, or with each other.
 pub fn write_channels(
     path: &Path,

@@ -83,13 +83,17 @@ fn write_exr<T: exr::image::IntoSample>(
         tiled(encoding),
         openexr::SpecificChannels::rgba(pixel),
     );
-    let mut image = openexr::Image::from_layer(layer);
+    within(openexr::Image::from_layer(layer), metadata).write().to_file(path)
+}
+
+/// The image in the window of the whole picture, where it is a part of one.
+pub(super) fn within<L>(mut image: openexr::Image<L>, metadata: &Metadata) -> openexr::Image<L> {
     if let Some(Window { full: [width, height], .. }) = metadata.window {
         let origin = openexr::Vec2(0, 0);
         image.attributes.display_window =
             exr::meta::attribute::IntegerBounds::new(origin, (width as usize, height as usize));
     }
-    image.write().to_file(path)
+    image
 }
 
 /// How a file is packed.

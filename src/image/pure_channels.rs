@@ -6,7 +6,7 @@ use exr::prelude::{self as openexr, FlatSamples, ReadChannels, ReadLayers, Writa
 
 use super::file::Encoding;
 use super::metadata::Metadata;
-use super::pure::{attributes, tiled};
+use super::pure::{attributes, tiled, within};
 use super::samples::{Samples, Values};
 use super::{Channel, Channels, Plane};
 
@@ -45,7 +45,7 @@ pub(super) fn write(
         tiled(encoding),
         openexr::AnyChannels::sort(list.into()),
     );
-    openexr::Image::from_layer(layer).write().to_file(path).map_err(|e| e.to_string())
+    within(openexr::Image::from_layer(layer), metadata).write().to_file(path).map_err(|e| e.to_string())
 }
 
 /// Every channel of a file, unless `check` refuses its width and height.

@@ -142,7 +142,7 @@ mod tests {
     };
     use crate::trace::World;
 
-    /// A floor, and above it a tilted square of another material, lit by the sun and a lamp; without anything but flat, matte surfaces.
+    /// A floor, and above it a tilted square of another material, before a blue sky, lit by the sun and a lamp; without anything but flat, matte surfaces.
     fn plain() -> Scene {
         let square = |half: f32, height: f32, tilt: f32, material| {
             let corner = |x: f32, z: f32| Vec3::new(x * half, height + tilt * x, z * half);
@@ -153,6 +153,8 @@ mod tests {
         let matte = |color| Material { diffuse: Vec3::from(color), ambient: Vec3::ZERO, ..Material::default() };
         let materials = vec![matte([0.8, 0.6, 0.4]), matte([0.3, 0.5, 0.7])];
         let mut scene = Scene::from_geometries(vec![square(3.0, 0.0, 0.0, 0), square(1.0, 1.0, 0.3, 1)], materials);
+        // So that mirrors have something to show.
+        scene.background = Some(Vec3::new(0.1, 0.2, 0.3));
         scene.lights = vec![
             Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2).normalize(), color: Vec3::splat(0.7) },
             lamp(DVec3::new(-2.0, 3.0, 1.0), f64::INFINITY, Vec3::ONE),

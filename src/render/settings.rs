@@ -43,7 +43,7 @@ pub struct Settings {
     pub max_depth: Option<u32>,
     /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
     pub crop: Option<Crop>,
-    /// What [`Renderer::picture`] tells of each pixel beside its colour.
+    /// What [`Renderer::picture`](super::Renderer::picture) tells of each pixel beside its colour.
     pub aovs: Vec<Aov>,
     /// Takes samples where they are needed; none takes as many for each pixel.
     pub adaptive: Option<Adaptive>,

@@ -140,8 +140,7 @@ impl Renderer<'_> {
         [x, y]: [u32; 2],
         steps: Option<&dyn Fn(&Ray) -> Steps>,
     ) -> Explanation {
-        let mut buffers = Buffers::default();
-        buffers.trail = Trail::laid(self.settings.spp);
+        let mut buffers = Buffers { trail: Trail::laid(self.settings.spp), ..Buffers::default() };
         let value = self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut buffers)[0];
         let mut samples = buffers.trail.into_samples();
         let pattern = self.sampler.pattern(x, y);
