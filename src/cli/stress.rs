@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::engine::BackendArg;
 use super::{interrupt, outputs, progress, say};
 use crate::error::{Error, Result};
-use crate::lab::stress::{Case, Column, Found, Gate, Report, Search, Setup, catalogue, columns, file, heat_map};
+use crate::lab::stress::{Case, Column, Found, Report, Search, Setup, catalogue, columns, file, heat_map};
 use crate::render::Control;
 
 /// Run every method on the cases on which ray casters are known to fail
@@ -186,8 +186,7 @@ struct Finding {
 fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Control<'_>) -> Result<()> {
     // What a native tracer must not do at all, others may be found to do a few times.
     const ENOUGH: usize = 10;
-    let search =
-        Search { columns, gate: Gate::Hits, time: Some(time), most: u64::MAX, enough: ENOUGH, seed: args.seed };
+    let search = Search { columns, time: Some(time), most: u64::MAX, enough: ENOUGH, seed: args.seed };
     let (rays, found) = search.run(control)?;
     let wrong = found.iter().filter(|found| found.column.is_exact()).count();
     let mut findings = Findings { seed: args.seed, rays, found: Vec::new() };

@@ -8,10 +8,8 @@
 //! The tree is this file's own: median splits, boxes around exact corners, slabs that are widened by far more than f64
 //! rounds. Shapes are met one by one, as their boxes would be those of the code that is judged.
 
-use std::cmp::Ordering;
-
 use super::exact::{Approx, Ring, det, vector};
-use super::oracle::{self, Body, Id, Primitive};
+use super::oracle::{self, Body, Id, Meeting, Primitive};
 use crate::math::is_traceable;
 use crate::ray::Ray;
 use crate::trace::World;
@@ -28,6 +26,8 @@ pub struct Oracle<'a> {
 pub struct Exact {
     /// What is hit: nothing, one, or several at exactly the same t, by rising id.
     pub nearest: Vec<Id>,
+    /// What is hit behind that by so little that a t in f64 does not tell.
+    pub as_near: Vec<Id>,
     /// Where, to all digits of f64 but the last few; infinite for a miss.
     pub t: f64,
     /// Whether the ray merely touches all of these: at an edge, a corner or a silhouette.
@@ -37,8 +37,12 @@ pub struct Exact {
 }
 
 impl Exact {
-    const MISS: Self = Self { nearest: Vec::new(), t: f64::INFINITY, touches: false, at_range_end: false };
+    const MISS: Self =
+        Self { nearest: Vec::new(), as_near: Vec::new(), t: f64::INFINITY, touches: false, at_range_end: false };
 }
+
+/// By how much, relative to t, an engine that computes t in f64 may be off: its last three bits or so.
+const AS_NEAR: f64 = 1e-15;
 
 /// Triangles of a leaf.
 const LEAF: usize = 2;
@@ -87,26 +91,25 @@ impl<'a> Oracle<'a> {
         {
             let (id, _) = self.triangles[only.index];
             let t = only.low + (only.high - only.low) / 2.0;
-            return Exact { nearest: vec![id], t, touches: false, at_range_end: false };
+            return Exact { nearest: vec![id], t, ..Exact::MISS };
         }
         let doubtful = candidates.iter().map(|candidate| &self.triangles[candidate.index]);
-        let mut nearest: Vec<(Id, oracle::Meeting)> = Vec::new();
-        for (id, primitive) in doubtful.chain(&self.shapes) {
-            let Some(meeting) = oracle::meet(ray, primitive).filter(|meeting| meeting.in_range) else { continue };
-            match nearest.first().map(|(_, first)| meeting.t.cmp(&first.t)) {
-                Some(Ordering::Greater) => continue,
-                Some(Ordering::Less) => nearest.clear(),
-                Some(Ordering::Equal) | None => {}
-            }
-            nearest.push((*id, meeting));
-        }
-        nearest.sort_by_key(|(id, _)| *id);
-        let Some((_, first)) = nearest.first() else { return Exact::MISS };
+        let meet = |(id, primitive): &(Id, Primitive<'_>)| {
+            oracle::meet(ray, primitive).filter(|meeting| meeting.in_range).map(|meeting| (*id, meeting))
+        };
+        let mut all: Vec<(Id, Meeting)> = doubtful.chain(&self.shapes).filter_map(meet).collect();
+        all.sort_by(|(a, x), (b, y)| x.t.cmp(&y.t).then(a.cmp(b)));
+        let Some((_, first)) = all.first() else { return Exact::MISS };
+        let t = first.t.to_f64();
+        let ties = all.partition_point(|(_, meeting)| meeting.t <= first.t);
+        let ids = |some: &[(Id, Meeting)]| some.iter().map(|(id, _)| *id).collect();
+        let as_near = all.partition_point(|(_, meeting)| meeting.t.to_f64() <= t * (1.0 + AS_NEAR));
         Exact {
-            t: first.t.to_f64(),
-            touches: nearest.iter().all(|(_, meeting)| meeting.touches),
+            t,
+            touches: all[..ties].iter().all(|(_, meeting)| meeting.touches),
             at_range_end: first.at_range_end,
-            nearest: nearest.iter().map(|(id, _)| *id).collect(),
+            nearest: ids(&all[..ties]),
+            as_near: ids(&all[ties..as_near.max(ties)]),
         }
     }
 
@@ -129,7 +132,7 @@ impl<'a> Oracle<'a> {
             for index in node.first as usize..(node.first + node.count) as usize {
                 if let Some(candidate) = meet_roughly(ray, &self.triangles[index].1, index) {
                     if candidate.is_sure {
-                        limit = limit.min(candidate.high);
+                        limit = limit.min(candidate.high * (1.0 + 2.0 * AS_NEAR));
                     }
                     found.push(candidate);
                 }

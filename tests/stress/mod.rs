@@ -34,7 +34,7 @@ fn native_is_exact_on_other_rays() {
 }
 
 fn search(columns: Vec<Column>, most: u64) -> Vec<Found> {
-    let search = Search { columns, gate: Gate::Hits, time: None, most, enough: 1, seed: 5 };
+    let search = Search { columns, time: None, most, enough: 1, seed: 5 };
     search.run(Control::default()).expect("nothing stops it").1
 }
 

@@ -30,8 +30,6 @@ const PATIENCE: u32 = 60;
 pub struct Search {
     /// Who is asked.
     pub columns: Vec<Column>,
-    /// What those that are not exact are held to.
-    pub gate: super::Gate,
     /// How long; none for no limit but `most`.
     pub time: Option<Duration>,
     /// Rays after which it ends.
@@ -111,7 +109,7 @@ impl Search {
         column.each(&probe.world, &mut |form, tracer, batch| {
             if found.is_none() {
                 let (hits, occluded) = answers(tracer, &probe.rays, batch);
-                let failing = Tally::default().add(column.gate(self.gate), &probe.rays, exact, &hits, &occluded);
+                let failing = Tally::default().add(column.gate_of_search(), &probe.rays, exact, &hits, &occluded);
                 if let Some(&(i, fault)) = failing.first() {
                     let who = format!("{} {form}", column.name()).trim_end().to_owned();
                     let note = format!("{who}: {fault:?}; found by the search, seed {}", self.seed);
