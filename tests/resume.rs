@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 fn render(output: &Path, flags: &[&str]) -> Child {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml");
@@ -67,7 +67,9 @@ fn an_interrupted_render_leaves_a_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("a.png");
     let kept = folder.path().join("a.checkpoint.exr");
-    for (flags, is_kept) in [(&[][..], false), (&["--checkpoint", "1h"], true)] {
+    let begin = Instant::now();
+    let mut ready = None;
+    for (flags, is_kept) in [(&["--checkpoint", "0.01s"][..], true), (&[], false)] {
         let child = Command::new(env!("CARGO_BIN_EXE_twincast"))
             .arg("render")
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml"))
@@ -77,11 +79,25 @@ fn an_interrupted_render_leaves_a_checkpoint() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the binary runs");
-        std::thread::sleep(Duration::from_millis(1500));
-        let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a signal");
-        assert!(signal.success());
+        // While it renders: what the first took until there was a checkpoint is enough for the second.
+        match ready {
+            None => {
+                while !kept.exists() {
+                    assert!(begin.elapsed().as_secs() < 120, "there is a checkpoint");
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                ready = Some(begin.elapsed());
+            }
+            Some(time) => std::thread::sleep(2 * time + Duration::from_secs(1)),
+        }
+        // The shell's own: a system may have no other.
+        let kill = format!("kill -INT {}", child.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
         let (code, said) = end(child);
         assert_eq!(code, Some(130), "{said}");
         assert_eq!((kept.exists(), output.exists()), (is_kept, false));
+        if is_kept {
+            std::fs::remove_file(&kept).unwrap();
+        }
     }
 }
