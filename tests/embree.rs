@@ -301,6 +301,33 @@ fn invalid_rays_miss_and_leave_their_neighbours_alone() {
     }
 }
 
+/// Debian's package ends the process when it is given a coordinate above 1.844e18.
+#[test]
+fn rays_beyond_embrees_numbers_miss_and_leave_their_neighbours_alone() {
+    let tracer = build(&world(vec![Geometry::Mesh(Random(9).soup(200, 0.4))]));
+    let mut rays = Random(2).rays(48);
+    for (i, ray) in rays.iter_mut().enumerate() {
+        match i % 7 {
+            1 => ray.origin.y = 1.9e18,
+            3 => ray.direction *= 1e18,
+            4 => ray.origin.x = -f32::MAX,
+            6 => ray.direction.z = f32::MAX,
+            _ => {}
+        }
+        assert!(ray.is_valid());
+    }
+    let near: Vec<usize> = (0..rays.len()).filter(|i| [0, 2, 5].contains(&(i % 7))).collect();
+    let expected: Vec<_> = rays.iter().map(|ray| tracer.closest(ray)).collect();
+    assert!(near.iter().filter(|&&i| expected[i].is_some()).count() > 5);
+    for batch in batches() {
+        let (hits, shadows) = (closest(&tracer, &rays, batch), occluded(&tracer, &rays, batch));
+        for i in 0..rays.len() {
+            let known = if near.contains(&i) { expected[i].map(|hit| hit.id()) } else { None };
+            assert_eq!((hits[i].map(|hit| hit.id()), shadows[i]), (known, known.is_some()), "{batch:?}, ray {i}");
+        }
+    }
+}
+
 /// Two places, one of them mirrored.
 fn places() -> [DAffine3; 2] {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);

@@ -10,6 +10,7 @@ use super::checkpoint::Kept;
 use super::display::Display;
 use super::{cache, interrupt, progress};
 use crate::error::{Error, Result};
+use crate::math::expansion::decisions;
 use crate::render::{Control, Counted, Finished, Picture, Renderer};
 use crate::trace::accel::{Accel, Built, Options as AccelOptions};
 use crate::trace::bvh::{self, Bvh, Cache, CacheReport, Preset};
@@ -58,6 +59,8 @@ pub(super) struct Pass {
     pub(super) bytes: usize,
     pub(super) closest_rays: u64,
     pub(super) shadow_rays: u64,
+    /// Decisions that were left to exact arithmetic.
+    pub(super) exact: u64,
     /// What became of the native tree's file.
     pub(super) cache: Option<CacheReport>,
     /// What there is to say about how the engine was built.
@@ -185,7 +188,7 @@ impl Job<'_> {
 
         let engine = name(&tracer);
         let bar = progress::bar(self.pixels, &engine, self.quiet);
-        let counted = Counted::new(&tracer);
+        let (counted, decided) = (Counted::new(&tracer), decisions());
         let on_tile = |pixels| bar.inc(pixels);
         let start = Instant::now();
         let show = self.display.map(|display| {
@@ -201,11 +204,22 @@ impl Job<'_> {
         bar.finish_and_clear();
 
         let (closest_rays, shadow_rays) = (counted.closest_rays(), counted.occluded_rays());
+        let exact = decisions() - decided;
         let bytes = bytes(&tracer);
         let picture = picture?;
         let (cache, notes) = (None, Vec::new());
-        let pass =
-            Pass { engine, picture, build_seconds, render_seconds, bytes, closest_rays, shadow_rays, cache, notes };
+        let pass = Pass {
+            engine,
+            picture,
+            build_seconds,
+            render_seconds,
+            bytes,
+            closest_rays,
+            shadow_rays,
+            exact,
+            cache,
+            notes,
+        };
         Ok((tracer, pass))
     }
 }

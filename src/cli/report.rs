@@ -53,6 +53,8 @@ pub(super) struct Rays {
     /// Mirrored and refracted.
     pub(super) sent_on: u64,
     pub(super) shadow: u64,
+    /// Decisions about hits that f64 could not take, so that exact arithmetic did.
+    pub(super) exact: u64,
 }
 
 impl EngineStats {
@@ -60,7 +62,7 @@ impl EngineStats {
     pub(super) fn new(pass: &Pass, stored: u64) -> Self {
         let camera = pass.picture.camera_rays;
         let sent_on = pass.closest_rays.saturating_sub(camera);
-        let rays = Rays { camera, sent_on, shadow: pass.shadow_rays };
+        let rays = Rays { camera, sent_on, shadow: pass.shadow_rays, exact: pass.exact };
         Self {
             backend: pass.engine.clone(),
             build_seconds: pass.build_seconds,

@@ -54,13 +54,17 @@ impl Rendered<'_> {
                 if let Some(cache) = &engine.cache {
                     summary.line("cache", cache);
                 }
-                let Rays { camera, sent_on, shadow } = &engine.rays;
+                let Rays { camera, sent_on, shadow, exact } = &engine.rays;
                 let speed = engine.rays_per_second / 1e6;
                 let (camera, shadow) = (grouped(*camera), grouped(*shadow));
                 let sent_on = if *sent_on > 0 { format!(" + {} sent on", grouped(*sent_on)) } else { String::new() };
                 summary.line(
                     "rays",
                     format_args!("{camera} camera{sent_on} + {shadow} shadow, {speed:.2} million a second"),
+                );
+                summary.line(
+                    "exact",
+                    counted(*exact, "decision that f64 could not take", "decisions that f64 could not take"),
                 );
                 let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
                 summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));

@@ -26,8 +26,6 @@ pub struct Oracle<'a> {
 pub struct Exact {
     /// What is hit: nothing, one, or several at exactly the same t, by rising id.
     pub nearest: Vec<Id>,
-    /// What is hit behind that by so little that a t in f64 does not tell.
-    pub as_near: Vec<Id>,
     /// Where, to all digits of f64 but the last few; infinite for a miss.
     pub t: f64,
     /// Whether the ray merely touches all of these: at an edge, a corner or a silhouette.
@@ -37,12 +35,8 @@ pub struct Exact {
 }
 
 impl Exact {
-    const MISS: Self =
-        Self { nearest: Vec::new(), as_near: Vec::new(), t: f64::INFINITY, touches: false, at_range_end: false };
+    const MISS: Self = Self { nearest: Vec::new(), t: f64::INFINITY, touches: false, at_range_end: false };
 }
-
-/// By how much, relative to t, an engine that computes t in f64 may be off: its last three bits or so.
-const AS_NEAR: f64 = 1e-15;
 
 /// Triangles of a leaf.
 const LEAF: usize = 2;
@@ -102,14 +96,11 @@ impl<'a> Oracle<'a> {
         let Some((_, first)) = all.first() else { return Exact::MISS };
         let t = first.t.to_f64();
         let ties = all.partition_point(|(_, meeting)| meeting.t <= first.t);
-        let ids = |some: &[(Id, Meeting)]| some.iter().map(|(id, _)| *id).collect();
-        let as_near = all.partition_point(|(_, meeting)| meeting.t.to_f64() <= t * (1.0 + AS_NEAR));
         Exact {
             t,
             touches: all[..ties].iter().all(|(_, meeting)| meeting.touches),
             at_range_end: first.at_range_end,
-            nearest: ids(&all[..ties]),
-            as_near: ids(&all[ties..as_near.max(ties)]),
+            nearest: all[..ties].iter().map(|(id, _)| *id).collect(),
         }
     }
 
@@ -132,7 +123,7 @@ impl<'a> Oracle<'a> {
             for index in node.first as usize..(node.first + node.count) as usize {
                 if let Some(candidate) = meet_roughly(ray, &self.triangles[index].1, index) {
                     if candidate.is_sure {
-                        limit = limit.min(candidate.high * (1.0 + 2.0 * AS_NEAR));
+                        limit = limit.min(candidate.high);
                     }
                     found.push(candidate);
                 }

@@ -7,10 +7,23 @@
 //! integers, the simpler alternative, would cost ten times as much there.
 
 use std::ops::{Add, Mul, Neg, Sub};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A sum of f64, kept exactly.
 #[derive(Clone, Debug, Default)]
 pub struct Expansion(Vec<f64>);
+
+static DECISIONS: AtomicU64 = AtomicU64::new(0);
+
+/// How many decisions of this process were left to exact arithmetic, because f64 could not take them.
+pub fn decisions() -> u64 {
+    DECISIONS.load(Ordering::Relaxed)
+}
+
+/// Counts one of them.
+pub(crate) fn count_decision() {
+    DECISIONS.fetch_add(1, Ordering::Relaxed);
+}
 
 impl From<f64> for Expansion {
     fn from(value: f64) -> Self {
@@ -28,6 +41,12 @@ impl Expansion {
     /// The nearest f64, off by at most one ulp.
     pub fn estimate(&self) -> f64 {
         self.0.iter().sum()
+    }
+
+    /// Times a power of two.
+    pub fn scaled(mut self, power: f64) -> Self {
+        self.0.iter_mut().for_each(|component| *component *= power);
+        self
     }
 
     /// -1, 0 or 1: exact, since the largest component outweighs the rest.

@@ -6,7 +6,7 @@
 //! cancels is noticed. A bound derived by hand for each formula, the simpler alternative at run time, is a page of
 //! analysis a formula.
 
-use super::expansion::Expansion;
+use super::expansion::{Expansion, count_decision};
 use super::{DVec3, UNIT_ROUNDOFF_64};
 
 /// What a polynomial is evaluated in.
@@ -111,6 +111,7 @@ pub trait Formula<const K: usize> {
 #[cold]
 #[inline(never)]
 pub fn exactly<const K: usize>(formula: &(impl Formula<K> + ?Sized)) -> [f64; K] {
+    count_decision();
     formula.evaluate::<Expansion>().map(|x| x.estimate())
 }
 

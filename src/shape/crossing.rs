@@ -12,7 +12,7 @@
 //! differ by little, the simpler alternative, needs a tolerance, counts a touched silhouette once, and loses thin walls.
 
 use super::triangle::{Corners, TriangleHit, intersect};
-use crate::math::expansion::{Expansion, cross, dot};
+use crate::math::expansion::{Expansion, count_decision, cross, dot};
 use crate::ray::Ray;
 
 /// A hit, and where in the triangle it is.
@@ -50,6 +50,7 @@ pub fn crossing(ray: &Ray, corners: &impl Corners) -> Option<Crossing> {
 #[cold]
 #[inline(never)]
 fn touch(ray: &Ray, corners: &impl Corners) -> Option<Touch> {
+    count_decision();
     let origin = ray.origin.to_array().map(Expansion::from);
     let d = ray.direction.to_array().map(Expansion::from);
     let p = corners.exact().map(|p| [0, 1, 2].map(|i| &p[i] - &origin[i]));

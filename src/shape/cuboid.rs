@@ -6,6 +6,7 @@
 //! edge or a corner hits: it does. A component of the direction that is zero asks whether the origin lies in the slab,
 //! and nothing is divided by it.
 
+use super::distance::Support;
 use super::line::{Interval, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number};
@@ -75,6 +76,20 @@ impl Cuboid {
         }
         // Where they are equal but for rounding, they may be rounded to the wrong order.
         [Some(inside.enter), Some(inside.exit.max(inside.enter))]
+    }
+
+    /// The plane of the face that is met at `t`, one of the roots.
+    pub(super) fn support(&self, ray: &Ray, t: f64) -> Support {
+        for axis in (0..3).filter(|&axis| ray.direction[axis] != 0.0) {
+            for corner in [self.min, self.max] {
+                let crossing =
+                    Crossing { bound: corner[axis], origin: ray.origin[axis], direction: ray.direction[axis] };
+                if crossing.t() == t {
+                    return Support::Plane(corner.as_dvec3(), DVec3::AXES[axis]);
+                }
+            }
+        }
+        Support::Itself
     }
 
     /// The axis of the face that is nearest, and whether it is the upper one.

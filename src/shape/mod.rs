@@ -11,6 +11,7 @@ pub mod crossing;
 mod cuboid;
 mod cylinder;
 mod disk;
+pub(crate) mod distance;
 mod ellipsoid;
 mod flat;
 mod line;
@@ -38,6 +39,7 @@ pub use triangle_methods::TriangleMethod;
 
 use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
+use distance::Support;
 use line::{NO_ROOTS, Roots};
 
 /// A primitive that is not a triangle.
@@ -206,6 +208,17 @@ impl Shape {
     /// The hit at a known `t`.
     pub(crate) fn hit_at(&self, ray: &Ray, t: f64) -> ShapeHit {
         ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) }
+    }
+
+    /// What the `t` of one of its [`crossings`](Self::crossings) follows from.
+    pub(crate) fn support(&self, ray: &Ray, t: f64) -> Support {
+        match self {
+            Self::Plane(plane) => Support::Plane(plane.point.as_dvec3(), plane.normal.as_dvec3()),
+            Self::Disk(disk) => Support::Plane(disk.centre.as_dvec3(), disk.normal.as_dvec3()),
+            Self::Cuboid(cuboid) => cuboid.support(ray, t),
+            Self::Polygon(polygon) => polygon.support(ray, t),
+            Self::Sphere(_) | Self::Cylinder(_) | Self::Cone(_) | Self::Ellipsoid(_) => Support::Itself,
+        }
     }
 
     /// Where the line crosses it.

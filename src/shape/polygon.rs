@@ -13,6 +13,7 @@
 //! [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the corners. Triangulating, the simpler
 //! way, would choose among outlines that are not the polygon's where it is not flat.
 
+use super::distance::Support;
 use super::flat::Flat;
 use super::line::{Interval, Line, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};
@@ -98,13 +99,23 @@ impl Polygon {
         if self.bounds.is_empty() {
             return NO_ROOTS;
         }
-        let reach = self.bounds.min.abs().max(self.bounds.max.abs());
-        let line = Line::new(ray, reach.max_element());
-        let flat = Flat { point: line.place_f64(self.centre), normal: self.normal, line };
+        let flat = self.flat(ray);
         match flat.t() {
-            Some(t) if self.contains(&line) => [Some(self.within_bounds(ray, t)), None],
+            Some(t) if self.contains(&flat.line) => [Some(self.within_bounds(ray, t)), None],
             _ => NO_ROOTS,
         }
+    }
+
+    /// Its plane, where `t` is not that of its bounds.
+    pub(super) fn support(&self, ray: &Ray, t: f64) -> Support {
+        let is_of_plane = self.flat(ray).t() == Some(t);
+        if is_of_plane { Support::Plane(self.centre, self.normal) } else { Support::Itself }
+    }
+
+    fn flat(&self, ray: &Ray) -> Flat {
+        let reach = self.bounds.min.abs().max(self.bounds.max.abs());
+        let line = Line::new(ray, reach.max_element());
+        Flat { point: line.place_f64(self.centre), normal: self.normal, line }
     }
 
     /// The t within the bounds that is nearest to `t`.

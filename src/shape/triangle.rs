@@ -11,7 +11,8 @@
 //!
 //! A zero volume counts as inside; a ray in the triangle's plane and a triangle without an area miss.
 
-use crate::math::expansion::{Expansion, cross, dot};
+use super::distance::Support;
+use crate::math::expansion::{Expansion, count_decision, cross, dot};
 use crate::math::{Affine3, DVec3, Vec3, gamma64};
 use crate::ray::Ray;
 
@@ -27,7 +28,7 @@ pub struct TriangleHit {
 }
 
 /// Three corners in world coordinates.
-pub trait Corners {
+pub(crate) trait Corners {
     /// Whether `rounded` has an error at all.
     const IS_ROUNDED: bool;
     /// The corners, each component off by at most `gamma64(8)` times its [`slack`](Corners::slack).
@@ -36,6 +37,8 @@ pub trait Corners {
     fn slack(&self) -> [DVec3; 3];
     /// The corners as they are.
     fn exact(&self) -> [[Expansion; 3]; 3];
+    /// What the t of a hit follows from.
+    fn support(&self) -> Support;
 }
 
 impl Corners for [Vec3; 3] {
@@ -50,6 +53,10 @@ impl Corners for [Vec3; 3] {
     }
     fn exact(&self) -> [[Expansion; 3]; 3] {
         self.map(|p| p.to_array().map(Expansion::from))
+    }
+    #[inline]
+    fn support(&self) -> Support {
+        Support::Triangle(*self)
     }
 }
 
@@ -84,6 +91,10 @@ impl Corners for Placed<'_> {
                 &dot(&row, &p) + &translation[i].into()
             })
         })
+    }
+    #[inline]
+    fn support(&self) -> Support {
+        Support::Placed(self.corners, *self.to_world)
     }
 }
 
@@ -196,6 +207,7 @@ pub(crate) const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
 #[cold]
 #[inline(never)]
 fn intersect_exactly(origin: DVec3, direction: DVec3, corners: &impl Corners) -> Option<TriangleHit> {
+    count_decision();
     #[cfg(test)]
     tests::EXACT.with(|count| count.set(count.get() + 1));
     let origin = origin.to_array().map(Expansion::from);

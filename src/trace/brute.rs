@@ -73,7 +73,7 @@ impl Brute {
                         offer_triangle(&mut nearest, ray, &corners[k], part.id(part.instance, primitives[k]));
                     });
                 }
-                Prepared::Shapes(shapes) => offer_shapes(&mut nearest, ray, shapes, part, part.instance),
+                Prepared::Shapes(shapes) => offer_shapes(&mut nearest, ray, None, shapes, part, part.instance),
             }
             if any && nearest.hit().is_some() {
                 return nearest;
@@ -96,7 +96,7 @@ impl Brute {
                         }
                     }
                     Prepared::Shapes(shapes) => {
-                        offer_shapes(&mut nearest, &object_ray, shapes, part, placement.instance);
+                        offer_shapes(&mut nearest, ray, Some(&object_ray), shapes, part, placement.instance);
                     }
                 }
             }
@@ -115,9 +115,9 @@ impl Tracer for Brute {
     }
 }
 
-fn offer_shapes(nearest: &mut Nearest, ray: &Ray, shapes: &[Shape], part: &Part, instance: u32) {
+fn offer_shapes(nearest: &mut Nearest, ray: &Ray, local: Option<&Ray>, shapes: &[Shape], part: &Part, instance: u32) {
     for (primitive, shape) in shapes.iter().enumerate() {
-        offer_shape(nearest, ray, shape, part.id(instance, primitive as u32));
+        offer_shape(nearest, ray, local, shape, part.id(instance, primitive as u32));
     }
 }
 

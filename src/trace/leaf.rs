@@ -3,6 +3,7 @@
 use super::Part;
 use super::nearest::Nearest;
 use crate::ray::{Hit, Ray};
+use crate::shape::distance::Distance;
 use crate::shape::triangle::{self, Corners};
 use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod, is_within};
 
@@ -56,23 +57,28 @@ impl Part {
 #[inline]
 pub(super) fn offer_triangle(nearest: &mut Nearest, ray: &Ray, corners: &impl Corners, id: Id) {
     if let Some(hit) = triangle::intersect(ray, corners) {
-        nearest.offer(hit.t, id.hit(hit.t, hit.u as f32, hit.v as f32));
+        let distance = Distance { t: hit.t, support: corners.support() };
+        nearest.offer(ray, distance, id.hit(hit.t, hit.u as f32, hit.v as f32));
     }
 }
 
-/// Offers where `local`, the ray in the shape's coordinates, meets it.
+/// Offers where `ray`, in the world, meets a shape; `local` is the ray in the coordinates of a shape that is placed.
 #[inline]
-pub(super) fn offer_shape(nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
-    if let Some(t) = shape.crossings(local).next() {
-        offer_crossing(nearest, local, shape, t, id);
+pub(super) fn offer_shape(nearest: &mut Nearest, ray: &Ray, local: Option<&Ray>, shape: &Shape, id: Id) {
+    if let Some(t) = shape.crossings(local.unwrap_or(ray)).next() {
+        offer_crossing(nearest, ray, local, shape, t, id);
     }
 }
 
 /// Offers the hit at a t at which a shape is met; its parameters are computed only if it is taken.
 #[inline]
-pub(super) fn offer_crossing(nearest: &mut Nearest, local: &Ray, shape: &Shape, t: f64, id: Id) {
-    if nearest.takes(t, id.order()) {
-        nearest.offer(t, id.of_shape(&shape.hit_at(local, t)));
+pub(super) fn offer_crossing(nearest: &mut Nearest, ray: &Ray, local: Option<&Ray>, shape: &Shape, t: f64, id: Id) {
+    let distance = match local {
+        Some(_) => Distance::itself(t),
+        None => Distance { t, support: shape.support(ray, t) },
+    };
+    if nearest.takes(ray, &distance, id.order()) {
+        nearest.take(distance, id.of_shape(&shape.hit_at(local.unwrap_or(ray), t)));
     }
 }
 
@@ -83,21 +89,22 @@ impl Methods {
         if self.triangle == TriangleMethod::Exact {
             offer_triangle(nearest, ray, corners, id);
         } else if let Some(hit) = self.triangle.intersect(ray, corners.rounded().map(|corner| corner.as_vec3())) {
-            nearest.offer(hit.t, id.hit(hit.t, hit.u as f32, hit.v as f32));
+            nearest.offer(ray, Distance::itself(hit.t), id.hit(hit.t, hit.u as f32, hit.v as f32));
         }
     }
 
     /// [`offer_shape`] by the chosen method.
     #[inline]
-    pub(super) fn offer_shape(self, nearest: &mut Nearest, local: &Ray, shape: &Shape, id: Id) {
+    pub(super) fn offer_shape(self, nearest: &mut Nearest, ray: &Ray, local: Option<&Ray>, shape: &Shape, id: Id) {
         match shape {
             Shape::Sphere(sphere) if self.sphere != SphereMethod::Exact => {
-                let mut roots = self.sphere.roots(local, sphere).into_iter().flatten();
-                if let Some(t) = roots.find(|&t| is_within(t, local)) {
-                    offer_crossing(nearest, local, shape, t, id);
+                let of_shape = local.unwrap_or(ray);
+                let mut roots = self.sphere.roots(of_shape, sphere).into_iter().flatten();
+                if let Some(t) = roots.find(|&t| is_within(t, of_shape)) {
+                    offer_crossing(nearest, ray, local, shape, t, id);
                 }
             }
-            _ => offer_shape(nearest, local, shape, id),
+            _ => offer_shape(nearest, ray, local, shape, id),
         }
     }
 }

@@ -49,8 +49,8 @@ impl Unbounded {
     /// Offers what the ray, in the world, hits.
     pub fn offer(&self, ray: &Ray, nearest: &mut Nearest) {
         for entry in &self.0 {
-            let local = entry.placement.as_ref().map_or(*ray, |placement| placement.at(ray.moment()).object_ray(ray));
-            offer_shape(nearest, &local, &entry.shape, entry.id);
+            let local = entry.placement.as_ref().map(|placement| placement.at(ray.moment()).object_ray(ray));
+            offer_shape(nearest, ray, local.as_ref(), &entry.shape, entry.id);
         }
     }
 

@@ -51,6 +51,14 @@ pub(super) const CASES: &[Case] = &[
         make: polygon,
     },
     Case {
+        name: "flush",
+        about: "boxes, a disk, a polygon and triangles in one plane: the first of those that are hit is",
+        source: "-",
+        gate: Gate::Exact,
+        t_relative: None,
+        make: flush,
+    },
+    Case {
         name: "box-rims",
         about: "boxes and disks, rays exactly at rims and along faces, with zeros of both signs",
         source: "Williams, Barrus, Morley, Shirley 2005, An efficient and robust ray-box intersection algorithm",
@@ -59,6 +67,29 @@ pub(super) const CASES: &[Case] = &[
         make: box_rims,
     },
 ];
+
+fn flush(rays: usize, random: &mut Random) -> Vec<Probe> {
+    let p = |x: f32, y: f32| Vec3::new(x, y, 0.3);
+    let square = [p(-1.0, -1.0), p(1.0, -1.0), p(1.0, 1.0), p(-1.0, 1.0)];
+    let [a, b, c, d] = square;
+    let shapes = vec![
+        Shape::Disk(Disk::new(p(0.0, 0.0), Vec3::new(0.0, 0.0, 0.7), 1.0).expect("a disk")),
+        Shape::Cuboid(Cuboid::new(Vec3::new(-0.8, -0.8, -1.0), p(0.8, 0.8)).expect("a box")),
+        Shape::Polygon(Arc::new(Polygon::new(square.to_vec()).expect("a square"))),
+        Shape::Cuboid(Cuboid::new(Vec3::new(-0.5, -0.5, 0.3), Vec3::new(0.5, 0.5, 1.0)).expect("a box")),
+    ];
+    let shapes = |material| Geometry::Shapes { shapes: shapes.clone(), material };
+    let mesh = || Geometry::Mesh(loose(&[[c, a, b], [a, c, d], [b, d, a], [d, b, c]]));
+    let probe = |(label, geometries): (&str, Vec<Geometry>)| {
+        let ray = |_| {
+            let target = Vec3::new(random.unit() - 0.5, random.unit() - 0.5, 0.15) * 2.0;
+            towards(random.vector() * 3.0, target)
+        };
+        let rays = (0..rays / 2).map(ray).collect();
+        Probe::new(label, &Scene::from_geometries(geometries, vec![Material::default()]), rays)
+    };
+    [("shapes-first", vec![shapes(0), mesh()]), ("triangles-first", vec![mesh(), shapes(0)])].map(probe).into()
+}
 
 fn far_sphere(rays: usize, random: &mut Random) -> Vec<Probe> {
     let probe = |distance: f32| {

@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::run::answers;
-use super::verdict::{Fault, Tally};
+use super::verdict::{Fault, Gate, Tally};
 use super::{Column, Probe, file, loose};
 use crate::error::Result;
 use crate::lab::oracle::{self, Primitive};
@@ -109,7 +109,7 @@ impl Search {
         column.each(&probe.world, &mut |form, tracer, batch| {
             if found.is_none() {
                 let (hits, occluded) = answers(tracer, &probe.rays, batch);
-                let failing = Tally::default().add(column.gate_of_search(), &probe.rays, exact, &hits, &occluded);
+                let failing = Tally::default().add(column.gate(Gate::Hits), &probe.rays, exact, &hits, &occluded);
                 if let Some(&(i, fault)) = failing.first() {
                     let who = format!("{} {form}", column.name()).trim_end().to_owned();
                     let note = format!("{who}: {fault:?}; found by the search, seed {}", self.seed);

@@ -125,10 +125,10 @@ fn soups(rays: usize, random: &mut Random) -> Vec<Probe> {
 
 fn depth(rays: usize, random: &mut Random) -> Vec<Probe> {
     let at = |x: f32, size: f32| [Vec3::new(x, -size, -size), Vec3::new(x, size, -size), Vec3::new(x, 0.0, size)];
-    // Up to where f64 tells 1 + x from 1 with bits to spare: beyond, what is nearer is for the order of ids to say.
-    let halves: Vec<[Vec3; 3]> = (0..44).map(|i| libm::scalbnf(1.0, -i)).map(|x| at(x, x)).collect();
+    // To well beyond where f64 tells 1 + x from 1.
+    let halves: Vec<[Vec3; 3]> = (0..100).map(|i| libm::scalbnf(1.0, -i)).map(|x| at(x, x)).collect();
     let ray = |i: usize| {
-        let x = libm::scalbnf(1.0, -(random.below(44) as i32));
+        let x = libm::scalbnf(1.0, -(random.below(100) as i32));
         let target = Vec3::new(x, 0.0, 0.0);
         match i % 2 {
             0 => Ray::new(Vec3::NEG_X, Vec3::X),

@@ -84,12 +84,6 @@ impl Column {
         if self.is_exact() { Gate::Exact } else { of_case }
     }
 
-    /// What it is held to where anything may be asked: t in f64 depends on the order in which a triangle's corners are
-    /// stored, so equal triangles may be swapped.
-    pub const fn gate_of_search(self) -> Gate {
-        if self.is_exact() { Gate::Near } else { Gate::Hits }
-    }
-
     /// Whether there is something in the world that it is about.
     pub fn applies(self, world: &World) -> bool {
         let any = |has: fn(&Primitives) -> bool| world.parts.iter().any(|part| has(&part.primitives));

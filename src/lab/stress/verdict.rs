@@ -17,8 +17,6 @@ pub enum Fault {
     WrongPrimitive,
     /// Of several at exactly the same distance, not the one with the lowest id.
     SwappedTie,
-    /// What is behind the nearest by less than f64 tells: allowed by every gate, and counted.
-    Unordered,
     /// NaN, or weights outside of the triangle by more than rounding.
     NotANumber,
     /// Whether there is any hit was answered otherwise than by the nearest one.
@@ -31,9 +29,7 @@ pub enum Fault {
 pub enum Gate {
     /// Nothing is missed, nothing is made up: a neighbour at about the same distance will do. This is what f32 may be asked for.
     Hits,
-    /// The primitive of exact arithmetic, or one that f64 cannot tell from it.
-    Near,
-    /// The same, and of several at exactly the same t the one with the lowest id.
+    /// The primitive of exact arithmetic, and of several at exactly the same t the one with the lowest id.
     Exact,
 }
 
@@ -42,7 +38,6 @@ impl Gate {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hits => "hits",
-            Self::Near => "near",
             Self::Exact => "exact",
         }
     }
@@ -50,8 +45,7 @@ impl Gate {
     /// Whether a fault counts.
     pub const fn forbids(self, fault: Fault) -> bool {
         match (self, fault) {
-            (_, Fault::Unordered) | (Self::Hits | Self::Near, Fault::SwappedTie) => false,
-            (Self::Hits, Fault::WrongPrimitive) => false,
+            (Self::Hits, Fault::SwappedTie | Fault::WrongPrimitive) => false,
             _ => true,
         }
     }
@@ -68,7 +62,6 @@ pub fn fault(ray: &Ray, exact: &Exact, found: Option<Hit>) -> Option<Fault> {
     match exact.nearest.iter().position(|&id| id == hit.id()) {
         Some(0) => None,
         Some(_) => Some(Fault::SwappedTie),
-        None if exact.as_near.contains(&hit.id()) => Some(Fault::Unordered),
         None if exact.nearest.is_empty() => Some(Fault::FalseHit),
         None => {
             let t = f64::from(hit.t);
@@ -91,7 +84,7 @@ pub struct Tally {
     /// Rays that were asked.
     pub rays: u64,
     /// Of each fault, in the order of [`Fault`].
-    counts: [u64; 7],
+    counts: [u64; 6],
     /// Rays with a fault that the gate forbids.
     pub failing: u64,
     /// Errors of t in steps of f32, where the right primitive was hit: of the first [`SAMPLES`].
@@ -118,8 +111,6 @@ pub struct Verdict {
     pub wrong_primitives: u64,
     /// [`Fault::SwappedTie`].
     pub swapped_ties: u64,
-    /// [`Fault::Unordered`].
-    pub unordered: u64,
     /// [`Fault::NotANumber`].
     pub not_numbers: u64,
     /// [`Fault::Inconsistent`].
@@ -180,15 +171,13 @@ impl Tally {
         let mut steps = self.steps.clone();
         steps.sort_by(f64::total_cmp);
         let at = |part: f64| steps.get((part * steps.len() as f64) as usize).or(steps.last()).copied().unwrap_or(0.0);
-        let [false_misses, false_hits, wrong_primitives, swapped_ties, unordered, not_numbers, inconsistent] =
-            self.counts;
+        let [false_misses, false_hits, wrong_primitives, swapped_ties, not_numbers, inconsistent] = self.counts;
         Verdict {
             rays: self.rays,
             false_misses,
             false_hits,
             wrong_primitives,
             swapped_ties,
-            unordered,
             not_numbers,
             inconsistent,
             failing: self.failing,
@@ -213,7 +202,7 @@ mod tests {
 
     fn exact(ids: &[u32], t: f64) -> Exact {
         let nearest = ids.iter().map(|&id| (0, 0, id)).collect();
-        Exact { nearest, as_near: vec![(0, 0, 9)], t, touches: false, at_range_end: false }
+        Exact { nearest, t, touches: false, at_range_end: false }
     }
 
     #[test]
@@ -229,7 +218,6 @@ mod tests {
         assert_eq!(of(&none, hit(4, 1.0)), Some(Fault::FalseHit));
         assert_eq!(of(&two, hit(3, 2.0)), None);
         assert_eq!(of(&two, hit(5, 2.0)), Some(Fault::SwappedTie));
-        assert_eq!(of(&one, hit(9, 2.0)), Some(Fault::Unordered));
         assert_eq!(of(&one, hit(3, f32::NAN)), Some(Fault::NotANumber));
     }
 

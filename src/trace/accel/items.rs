@@ -95,7 +95,10 @@ impl Items {
             (Some(&corners), Some(Through { to_world, .. })) => {
                 self.methods.offer_triangle(nearest, ray, &Placed { corners, to_world }, id);
             }
-            (None, _) => self.methods.offer_shape(nearest, local, &self.shapes[item - self.triangles.len()], id),
+            (None, through) => {
+                let local = through.map(|_| local);
+                self.methods.offer_shape(nearest, ray, local, &self.shapes[item - self.triangles.len()], id);
+            }
         }
     }
 

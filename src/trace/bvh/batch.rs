@@ -7,7 +7,7 @@ use super::flight::{self, Flight};
 use super::found::{Found, NONE};
 use super::noted::Rays;
 use super::placements::{FIXED, walk_over};
-use super::query::{Query, SOMETHING};
+use super::query::{Closest, Query, SOMETHING};
 use super::simd::Simd;
 use super::walk::{Stack, Visit};
 use super::{Bvh, bundle, isa, tile};
@@ -89,7 +89,7 @@ impl Bvh {
             upper,
             #[inline(always)]
             |level, place| {
-                level.trace_triangles::<S, Q>(ray, place, lower, nearest);
+                level.trace_triangles::<S, Q>(ray, Some(place), lower, nearest);
                 level.trace_placed_shapes::<S, Q>(ray, place, lower, nearest);
                 Visit::after::<Q>(nearest)
             },
@@ -191,14 +191,39 @@ impl Bvh {
     ) {
         for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
             let mut nearest = Nearest::new(ray);
-            if Q::resume(&mut nearest, t, *answer) {
+            if !Q::resume(&mut nearest, t, *answer) {
+                continue;
+            }
+            loop {
                 self.unbounded.offer(ray, &mut nearest);
-                self.fixed.trace_shapes::<S, Q>(ray, None, &mut stacks.level, &mut nearest);
+                self.fixed.trace_shapes::<S, Q>(ray, ray, None, &mut stacks.level, &mut nearest);
                 self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
                 self.enter_moving::<S, Q>(ray, stacks, &mut nearest);
-                *answer = Q::answer(nearest.hit());
+                if !nearest.is_open() {
+                    break;
+                }
+                nearest = self.closest_triangle::<S>(ray, stacks);
             }
+            *answer = Q::answer(nearest.hit());
         }
+    }
+
+    /// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.
+    #[cold]
+    #[inline(never)]
+    fn closest_triangle<S: Simd>(&self, ray: &Ray, stacks: &mut Stacks) -> Nearest {
+        let mut nearest = Nearest::new(ray);
+        let Stacks { upper, level: lower } = stacks;
+        self.fixed.trace_triangles::<S, Closest>(ray, None, lower, &mut nearest);
+        if self.placements.has_triangles() {
+            walk_over::<S, Closest>(self.placements.tree(), ray, nearest.limit(), upper, |number| {
+                let place = self.placements.at(number);
+                let level = &self.objects[place.placement.object as usize];
+                level.trace_triangles::<S, Closest>(ray, Some(place), lower, &mut nearest);
+                Visit::after::<Closest>(&nearest)
+            });
+        }
+        nearest
     }
 }
 

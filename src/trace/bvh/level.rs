@@ -37,12 +37,12 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// Offers the triangles that `ray`, in the world, hits in this level, which `place` places; all by itself.
+    /// Offers the triangles that `ray`, in the world, hits in this level, which may be placed; all by itself.
     #[inline(always)]
     pub fn trace_triangles<S: Simd, Q: Query>(
         &self,
         ray: &Ray,
-        place: &Place,
+        place: Option<&Place>,
         stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
@@ -51,7 +51,8 @@ impl Level {
         if is_done || tree.is_empty() {
             return;
         }
-        let (local, blur) = place.local::<S>(ray);
+        let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
+        let through = place.map(Place::through);
         let (slab, filter) = (SlabRay::new(&local, tree.reach(), blur), Filter::new(&local, blur));
         walk::single::<S, Q>(
             stack,
@@ -60,7 +61,7 @@ impl Level {
             nearest.limit(),
             #[inline(always)]
             |leaf| {
-                self.triangles.offer_leaf::<S>(leaf, ray, &filter, place.through(), nearest);
+                self.triangles.offer_leaf::<S>(leaf, ray, &filter, through, nearest);
                 Visit::after::<Q>(nearest)
             },
         );
@@ -77,14 +78,16 @@ impl Level {
     ) {
         let local = place.placement.object_ray(ray);
         if local.is_valid() {
-            self.trace_shapes::<S, Q>(&local, Some(place.through()), stack, nearest);
+            self.trace_shapes::<S, Q>(ray, &local, Some(place.through()), stack, nearest);
         }
     }
 
-    /// Offers the shapes that `local` hits in this level: the ray in this level's coordinates, whose rounding is part of it.
+    /// Offers the shapes that `ray`, in the world, hits in this level, as `local`: the ray in this level's coordinates, whose
+    /// rounding is part of it.
     #[inline(always)]
     pub fn trace_shapes<S: Simd, Q: Query>(
         &self,
+        ray: &Ray,
         local: &Ray,
         through: Option<Through<'_>>,
         stack: &mut Stack,
@@ -100,7 +103,7 @@ impl Level {
                 nearest.limit(),
                 #[inline(always)]
                 |leaf| {
-                    self.shapes.offer_leaf::<Q>(leaf, local, through, nearest);
+                    self.shapes.offer_leaf::<Q>(leaf, ray, local, through, nearest);
                     Visit::after::<Q>(nearest)
                 },
             );

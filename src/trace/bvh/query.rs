@@ -31,7 +31,7 @@ impl Query for Closest {
     #[inline(always)]
     fn resume(nearest: &mut Nearest, t: f64, answer: Option<Hit>) -> bool {
         if let Some(hit) = answer {
-            nearest.offer(t, hit);
+            nearest.resume(t, hit);
         }
         true
     }

@@ -8,6 +8,7 @@ use super::preset::Options;
 use super::query::{Query, SOMETHING};
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
+use crate::shape::distance::Distance;
 use crate::trace::leaf::{Id, offer_crossing};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
@@ -63,18 +64,25 @@ impl ShapeTree {
         &self.entries[items.start as usize..items.end as usize]
     }
 
-    /// Offers what `local` (the ray in this level's coordinates) hits in a leaf.
+    /// Offers what `ray`, in the world, hits in a leaf; `local` is the ray in this level's coordinates.
     #[inline]
-    pub fn offer_leaf<Q: Query>(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer_leaf<Q: Query>(
+        &self,
+        leaf: Child,
+        ray: &Ray,
+        local: &Ray,
+        through: Option<Through<'_>>,
+        nearest: &mut Nearest,
+    ) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
             let Some(t) = shape.crossings(local).next() else { continue };
             if Q::ANY {
-                nearest.offer(t, SOMETHING);
+                nearest.take(Distance::itself(t), SOMETHING);
                 return;
             }
             let instance = through.map_or(part.instance, |through| through.instance);
             let id = Id { instance, geometry: part.geometry, primitive: *primitive };
-            offer_crossing(nearest, local, shape, t, id);
+            offer_crossing(nearest, ray, through.map(|_| local), shape, t, id);
         }
     }
 

@@ -16,7 +16,8 @@ use super::{PartId, refit};
 use crate::error::Result;
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
-use crate::shape::triangle::{self, Placed};
+use crate::shape::triangle::Placed;
+use crate::trace::leaf::{Id, offer_triangle};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -135,7 +136,7 @@ impl TriangleTree {
         self.tree.bytes() + self.leaves.bytes() + size_of_val(&self.parts[..])
     }
 
-    /// Offers what `ray`, in the world, hits in a leaf of a placed object; `filter` is of the ray in this level's
+    /// Offers what `ray`, in the world, hits in a leaf, which may be placed; `filter` is of the ray in this level's
     /// coordinates.
     #[inline(always)]
     pub fn offer_leaf<S: Simd>(
@@ -143,7 +144,7 @@ impl TriangleTree {
         leaf: Child,
         ray: &Ray,
         filter: &Filter,
-        through: Through<'_>,
+        through: Option<Through<'_>>,
         nearest: &mut Nearest,
     ) {
         for index in leaf.blocks() {
@@ -153,7 +154,7 @@ impl TriangleTree {
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;
                 open &= open - 1;
-                self.offer(block, lane, ray, Some(through), nearest);
+                self.offer(block, lane, ray, through, nearest);
             }
         }
     }
@@ -179,14 +180,12 @@ impl TriangleTree {
     pub fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
         let corners = block.triangle(lane);
         let part = self.parts[block.part[lane] as usize];
-        let (hit, instance) = match through {
-            None => (triangle::intersect(ray, &corners), part.instance),
-            Some(Through { instance, to_world }) => (triangle::intersect(ray, &Placed { corners, to_world }), instance),
-        };
-        if let Some(hit) = hit {
-            let (primitive, geometry) = (block.primitive[lane], part.geometry);
-            let (t, u, v) = (hit.t as f32, hit.u as f32, hit.v as f32);
-            nearest.offer(hit.t, Hit { t, u, v, primitive, geometry, instance });
+        let id = Id { instance: part.instance, geometry: part.geometry, primitive: block.primitive[lane] };
+        match through {
+            None => offer_triangle(nearest, ray, &corners, id),
+            Some(Through { instance, to_world }) => {
+                offer_triangle(nearest, ray, &Placed { corners, to_world }, Id { instance, ..id });
+            }
         }
     }
 }

@@ -6,6 +6,19 @@ use crate::ray::Ray;
 /// Stands in for rays that are not traced: even if it were, it would hit nothing.
 pub(super) const NOWHERE: Ray = Ray { tmin: f32::INFINITY, tmax: 0.0, ..Ray::new(Vec3::ZERO, Vec3::Z) };
 
+/// The largest coordinate that Embree takes, its `FLT_LARGE`: Debian's package is built with an assertion that ends the process
+/// on a ray with a larger one.
+const MOST: f32 = 1.844e18;
+
+/// Its square, but for rounding of sums.
+const MOST_SQUARED: f32 = 0.999 * MOST * MOST;
+
+/// Whether a ray is [valid](Ray::is_valid) and Embree can trace it; any other misses.
+#[inline]
+pub(super) fn is_traceable(ray: &Ray) -> bool {
+    ray.is_valid() && ray.origin.abs().max(ray.direction.abs()).max_element() < MOST
+}
+
 /// Four rays, component by component.
 pub(super) struct Lanes {
     pub origin: [Vec4; 3],
@@ -34,17 +47,16 @@ impl Lanes {
         }
     }
 
-    /// Where [`Ray::is_valid`] holds for certain. Coordinates beyond 1e19 or so and directions shorter than 1e-19 are left
+    /// Where [`is_traceable`] holds for certain. Coordinates beyond 1.7e18 or so and directions shorter than 1e-19 are left
     /// undecided: the exact conditions take half as many instructions again.
     #[inline(always)]
-    pub fn surely_valid(&self) -> BVec4A {
-        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
-        let length_squared = dx * dx + dy * dy + dz * dz;
-        // Finite only where every term is; then this adds zero, else NaN.
-        let sum = ox + oy + oz;
-        let judged = length_squared + sum * 0.0;
-        judged.cmpge(Vec4::splat(f32::MIN_POSITIVE))
-            & judged.cmple(Vec4::splat(f32::MAX))
+    pub fn surely_traceable(&self) -> BVec4A {
+        let square = |[x, y, z]: [Vec4; 3]| x * x + y * y + z * z;
+        let (reach, length) = (square(self.origin), square(self.direction));
+        // False for NaN.
+        reach.cmple(Vec4::splat(MOST_SQUARED))
+            & length.cmple(Vec4::splat(MOST_SQUARED))
+            & length.cmpge(Vec4::splat(f32::MIN_POSITIVE))
             & self.tmin.cmpge(Vec4::ZERO)
             & self.tmin.cmple(self.tmax)
     }
@@ -55,13 +67,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_surely_valid_is_valid() {
-        const ODD: [f32; 12] = [
+    fn what_is_surely_traceable_is_traceable() {
+        const ODD: [f32; 14] = [
             0.0,
             -0.0,
             1.0,
             -1e-15,
             1e18,
+            MOST,
+            -2e18,
             f32::MAX,
             f32::MIN,
             f32::INFINITY,
@@ -91,13 +105,13 @@ mod tests {
             for lane in 0..4 {
                 let mut four = [good; 4];
                 four[lane] = *ray;
-                let bits = Lanes::new(&four).surely_valid().bitmask();
+                let bits = Lanes::new(&four).surely_traceable().bitmask();
                 assert_eq!(bits | 1 << lane, 0b1111, "the others do not matter: {ray:?}");
                 surely += bits >> lane & 1;
-                assert!(bits >> lane & 1 == 0 || ray.is_valid(), "{ray:?}");
+                assert!(bits >> lane & 1 == 0 || is_traceable(ray), "{ray:?}");
                 // Nothing ordinary is left undecided.
                 let numbers = [ray.origin, ray.direction].map(|v| v.to_array()).concat();
-                if ray.is_valid() && numbers.iter().all(|x| *x == 0.0 || (1e-18..1e19).contains(&x.abs())) {
+                if is_traceable(ray) && numbers.iter().all(|x| *x == 0.0 || (1e-18..=1e18).contains(&x.abs())) {
                     assert!(bits >> lane & 1 != 0, "{ray:?}");
                 }
             }

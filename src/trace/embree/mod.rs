@@ -11,7 +11,7 @@
 //!
 //! Embree's answers are passed on as they are. They bend the conventions of [`trace`](super) a little: t is not
 //! correctly rounded, so a hit at exactly `tmin` or `tmax` may be missed, and at equal t any of the primitives may be
-//! named.
+//! named. A ray with a coordinate beyond 1.8e18, which Embree refuses, misses.
 
 mod builder;
 mod device;
@@ -29,6 +29,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
+use crate::shape::distance::Distance;
 use crate::trace::nearest::Nearest;
 use crate::trace::unbounded::Unbounded;
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
@@ -190,7 +191,7 @@ impl Embree {
     fn beyond_bounds(&self, ray: &Ray, hit: Option<Hit>) -> Option<Hit> {
         let mut nearest = Nearest::new(ray);
         if let Some(hit) = hit {
-            nearest.offer(hit.t.into(), hit);
+            nearest.offer(ray, Distance::itself(hit.t.into()), hit);
         }
         self.unbounded.offer(ray, &mut nearest);
         nearest.hit()

@@ -14,7 +14,7 @@
 
 use std::mem::offset_of;
 
-use super::lanes::{Lanes, NOWHERE};
+use super::lanes::{Lanes, NOWHERE, is_traceable};
 use super::single::{SingleRay, SingleRayHit};
 use super::{PartIds, sys};
 use crate::math::{BVec4A, Mat4, Vec4};
@@ -113,19 +113,19 @@ impl<const G: usize> Rays<G> {
         Self(rows)
     }
 
-    /// Takes new rays; those that are not valid are inactive.
+    /// Takes new rays; those that Embree cannot trace are inactive.
     #[inline(always)]
     pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
-        let mut valid = BVec4A::splat(true);
+        let mut traceable = BVec4A::splat(true);
         for (g, four) in rays.iter().enumerate() {
             let lanes = Lanes::new(four);
-            valid &= lanes.surely_valid();
+            traceable &= lanes.surely_traceable();
             self.put(g, &lanes);
             active.0[g] = Vec4::splat(ALL_BITS);
         }
         // One branch a packet.
-        if !valid.all() {
-            self.leave_out_invalid(rays, active);
+        if !traceable.all() {
+            self.leave_out_untraceable(rays, active);
         }
     }
 
@@ -140,13 +140,13 @@ impl<const G: usize> Rays<G> {
         self.0[ray_row::TFAR][group] = lanes.tmax;
     }
 
-    /// Judges each ray; in the place of those that are not valid stands one that hits nothing.
+    /// Judges each ray; in the place of those that Embree cannot trace stands one that hits nothing.
     #[cold]
     #[inline(never)]
-    fn leave_out_invalid(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+    fn leave_out_untraceable(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
         for (g, four) in rays.iter().enumerate() {
-            active.0[g] = Vec4::from_array(four.map(|ray| if ray.is_valid() { ALL_BITS } else { 0.0 }));
-            self.put(g, &Lanes::new(&four.map(|ray| if ray.is_valid() { ray } else { NOWHERE })));
+            active.0[g] = Vec4::from_array(four.map(|ray| if is_traceable(&ray) { ALL_BITS } else { 0.0 }));
+            self.put(g, &Lanes::new(&four.map(|ray| if is_traceable(&ray) { ray } else { NOWHERE })));
         }
     }
 
@@ -169,7 +169,7 @@ impl<const G: usize> RayHits<G> {
         Self { rays: Rays::new(), hits: [[[sys::INVALID_ID; 4]; G]; hit_row::COUNT] }
     }
 
-    /// Takes new rays, which have hit nothing yet; those that are not valid are inactive.
+    /// Takes new rays, which have hit nothing yet; those that Embree cannot trace are inactive.
     #[inline(always)]
     pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
         self.rays.load(rays, active);

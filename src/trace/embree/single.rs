@@ -1,9 +1,9 @@
 //! A single ray and its hit as Embree lays them out.
 //!
-//! What is judged by four rays at a time is whether they are valid: one by one, that took half of all instructions around
+//! What is judged by four rays at a time is whether Embree can trace them: one by one, that took half of all instructions around
 //! a query.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, is_traceable};
 use super::packet::{ALL_BITS, hit_row};
 use super::{PartIds, sys};
 use crate::math::Vec4;
@@ -20,13 +20,13 @@ pub(super) struct SingleRayHit {
     hit: [u32; size_of::<sys::RTCHit>() / 4],
 }
 
-/// Calls `trace` for each ray that is valid, and gives `miss` for the others.
+/// Calls `trace` for each ray that Embree can trace, and gives `miss` for the others.
 #[inline(always)]
 pub(super) fn each<T: Copy>(rays: &[Ray], answers: &mut [T], miss: T, mut trace: impl FnMut(&Ray) -> T) {
     for (rays, answers) in rays.chunks(4).zip(answers.chunks_mut(4)) {
-        let all_valid = rays.first_chunk::<4>().is_some_and(|four| Lanes::new(four).surely_valid().all());
+        let all_traceable = rays.first_chunk::<4>().is_some_and(|four| Lanes::new(four).surely_traceable().all());
         for (ray, answer) in rays.iter().zip(answers) {
-            *answer = if all_valid || ray.is_valid() { trace(ray) } else { miss };
+            *answer = if all_traceable || is_traceable(ray) { trace(ray) } else { miss };
         }
     }
 }
@@ -39,7 +39,7 @@ impl SingleRay {
         Self([Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, ALL_BITS, 0.0, 0.0)])
     }
 
-    /// Takes a valid ray.
+    /// Takes a ray that Embree can trace.
     #[inline(always)]
     pub fn load(&mut self, ray: &Ray) {
         self.0[0] = ray.origin.extend(ray.tmin);
@@ -61,7 +61,7 @@ impl SingleRayHit {
         Self { ray: SingleRay::new(), hit: [sys::INVALID_ID; _] }
     }
 
-    /// Takes a valid ray, which has hit nothing yet.
+    /// Takes a ray that Embree can trace, which has hit nothing yet.
     #[inline(always)]
     pub fn load(&mut self, ray: &Ray) {
         self.hit[hit_row::GEOMETRY] = sys::INVALID_ID;

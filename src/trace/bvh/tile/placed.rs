@@ -96,7 +96,7 @@ pub(super) fn one_by_one<S: Simd, Q: Query>(
         }
         found.compute(bvh, rays, i);
         let nearest = &mut found.nearest[i];
-        level.trace_triangles::<S, Q>(ray, place, stack, nearest);
+        level.trace_triangles::<S, Q>(ray, Some(place), stack, nearest);
         match nearest.hit() {
             Some(_) if Q::ANY => range.set(i, DONE, DONE),
             Some(hit) => range.set(i, hit.t.next_down(), nearest.limit()),
