@@ -4,9 +4,39 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-fn render(output: &Path, flags: &[&str]) -> Child {
+/// A program that is ended when the test is, whatever becomes of it.
+struct Running(Option<Child>);
+
+impl Running {
+    fn kill(&mut self) {
+        if let Some(child) = &mut self.0 {
+            let _ = child.kill();
+        }
+    }
+
+    fn id(&self) -> u32 {
+        self.0.as_ref().expect("it runs").id()
+    }
+
+    /// Exit code, none for a signal, and what it says on stderr.
+    fn end(mut self) -> (Option<i32>, String) {
+        let output = self.0.take().expect("it runs").wait_with_output().expect("it ends");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.kill();
+        if let Some(mut child) = self.0.take() {
+            let _ = child.wait();
+        }
+    }
+}
+
+fn render(output: &Path, flags: &[&str]) -> Running {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml");
-    Command::new(env!("CARGO_BIN_EXE_twincast"))
+    let child = Command::new(env!("CARGO_BIN_EXE_twincast"))
         .arg("render")
         .arg(scene)
         .args(["--integrator", "path", "--size", "64x48", "--spp", "192"])
@@ -15,14 +45,8 @@ fn render(output: &Path, flags: &[&str]) -> Child {
         .args(flags)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
-        .spawn()
-        .expect("the binary runs")
-}
-
-/// Exit code, none for a signal, and what it says on stderr.
-fn end(child: Child) -> (Option<i32>, String) {
-    let output = child.wait_with_output().expect("it ends");
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        .spawn();
+    Running(Some(child.expect("the binary runs")))
 }
 
 #[test]
@@ -30,7 +54,7 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
     let folder = tempfile::tempdir().unwrap();
     let [whole, killed] = ["whole.png", "killed.png"].map(|name| folder.path().join(name));
     let kept = folder.path().join("killed.checkpoint.exr");
-    assert_eq!(end(render(&whole, &[])), (Some(0), String::new()));
+    assert_eq!(render(&whole, &[]).end(), (Some(0), String::new()));
 
     let mut resume = false;
     let mut kills = 0;
@@ -40,8 +64,8 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
         let flags: &[&str] = if resume { &["--checkpoint", "0.02s", "--resume"] } else { &["--checkpoint", "0.02s"] };
         let mut child = render(&killed, flags);
         std::thread::sleep(time);
-        let _ = child.kill();
-        let (code, said) = end(child);
+        child.kill();
+        let (code, said) = child.end();
         match code {
             Some(0) => break,
             Some(code) => panic!("exit code {code}: {said}"),
@@ -56,7 +80,7 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
     let whole_files = left.iter().filter(|name| !name.to_string_lossy().starts_with('.')).count();
     assert_eq!(whole_files, 2, "{left:?}");
 
-    let (code, said) = end(render(&killed, &["--resume"]));
+    let (code, said) = render(&killed, &["--resume"]).end();
     assert!(code == Some(3) && said.contains("no checkpoint to resume"), "{said}");
 }
 
@@ -77,8 +101,8 @@ fn an_interrupted_render_leaves_a_checkpoint() {
             .arg(&output)
             .args(flags)
             .stderr(Stdio::piped())
-            .spawn()
-            .expect("the binary runs");
+            .spawn();
+        let child = Running(Some(child.expect("the binary runs")));
         // While it renders: what the first took until there was a checkpoint is enough for the second.
         match ready {
             None => {
@@ -93,7 +117,7 @@ fn an_interrupted_render_leaves_a_checkpoint() {
         // The shell's own: a system may have no other.
         let kill = format!("kill -INT {}", child.id());
         assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
-        let (code, said) = end(child);
+        let (code, said) = child.end();
         assert_eq!(code, Some(130), "{said}");
         assert_eq!((kept.exists(), output.exists()), (is_kept, false));
         if is_kept {

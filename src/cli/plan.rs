@@ -1,6 +1,7 @@
 //! `twincast plan`: what a render of a scene would do, and what that saves.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
 use super::accel::AccelArgs;
@@ -23,49 +24,31 @@ use crate::trace::accel::Accel;
 pub(super) struct PlanArgs {
     /// What is modelled: no more than the scene needs, all of it (full), or named parts of what it does not need, so that what leaving them out
     /// saves can be told
-    #[arg(long = "plan", value_name = "NAME,...", value_enum, value_delimiter = ',', default_value = "needed")]
-    plan: Vec<Part>,
+    #[arg(long = "plan", value_name = "NAME,...", value_parser = parts(), value_delimiter = ',', default_value = NEEDED)]
+    plan: Vec<Complete>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Part {
-    /// No more than the scene needs
-    Needed,
-    /// Everything
-    Full,
-    /// Transforms of what stands in one place alone; coordinates are rounded otherwise
-    Levels,
-    /// Lights that are black or cannot reach anything
-    Lights,
-    /// Normals, texture coordinates and colours that nothing reads
-    Surfaces,
-    /// The time of each ray
-    Motion,
-    /// Rays sent on where nothing mirrors or refracts
-    Recursion,
-    /// Absorption and fog
-    Media,
-    /// Rays through surfaces that are not all there
-    Alpha,
-    /// Mirrored and refracted rays too faint to be seen
-    Faint,
+const NEEDED: &str = "needed";
+const FULL: &str = "full";
+
+/// What each name asks to be modelled completely.
+fn parts() -> impl TypedValueParser<Value = Complete> {
+    let whole = [(NEEDED, "no more than the scene needs"), (FULL, "everything")];
+    let each = Reduction::ALL.map(|reduction| (reduction.name(), reduction.words()));
+    let values = whole.into_iter().chain(each).map(|(name, words)| PossibleValue::new(name).help(words));
+    PossibleValuesParser::new(values).map(|name| match name.as_str() {
+        FULL => Complete::ALL,
+        name => {
+            let named = Reduction::ALL.into_iter().filter(|reduction| reduction.name() == name);
+            named.fold(Complete::NOTHING, Complete::with)
+        }
+    })
 }
 
 impl PlanArgs {
     /// What is modelled whether it is needed or not.
     pub(super) fn complete(&self) -> Complete {
-        self.plan.iter().fold(Complete::NOTHING, |complete, part| match part {
-            Part::Needed => complete,
-            Part::Full => Complete::ALL,
-            Part::Levels => complete.with(Reduction::Levels),
-            Part::Lights => complete.with(Reduction::Lights),
-            Part::Surfaces => complete.with(Reduction::Surfaces),
-            Part::Motion => complete.with(Reduction::Motion),
-            Part::Recursion => complete.with(Reduction::Recursion),
-            Part::Media => complete.with(Reduction::Media),
-            Part::Alpha => complete.with(Reduction::Alpha),
-            Part::Faint => complete.with(Reduction::Faint),
-        })
+        self.plan.iter().copied().fold(Complete::NOTHING, Complete::union)
     }
 }
 

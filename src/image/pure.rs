@@ -156,17 +156,22 @@ fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sam
     Ok(Samples { width, height, channels, values })
 }
 
-fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+/// The channels of a flat OpenEXR file, in the order of their names.
+pub(super) struct Planes {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) list: Vec<openexr::AnyChannel<FlatSamples>>,
+}
+
+/// Reads them, unless `check` refuses width, height and number.
+pub(super) fn read_planes(path: &Path, check: impl FnOnce(u64, u64, u64) -> Result<()>) -> Result<Planes> {
     let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
     let header = meta.headers.first().ok_or("no layers")?;
     if header.deep {
         return Err("a deep image; only flat ones are read".to_owned());
     }
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
-    // Every channel is decoded: many channels count as many pixels.
-    let factor = header.channels.list.len().div_ceil(4) as u64;
-    check(width as u64, (height as u64).saturating_mul(factor))?;
-
+    check(width as u64, height as u64, header.channels.list.len() as u64)?;
     let image = openexr::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -176,7 +181,17 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
         .non_parallel()
         .from_file(path)
         .map_err(|e| e.to_string())?;
-    let planes = &image.layer_data.channel_data.list;
+    let list: Vec<_> = image.layer_data.channel_data.list.into_iter().collect();
+    if list.iter().any(|channel| channel.sample_data.len() != width * height) {
+        return Err("channels of a lower resolution are not read".to_owned());
+    }
+    Ok(Planes { width: width as u32, height: height as u32, list })
+}
+
+fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    // Every channel is decoded: many channels count as many pixels.
+    let by_pixels = |width, height: u64, count: u64| check(width, height.saturating_mul(count.div_ceil(4)));
+    let Planes { width, height, list: planes } = read_planes(path, by_pixels)?;
     let plane = |name: &str| planes.iter().find(|c| c.name == *name).map(|c| &c.sample_data);
     let colours = match (plane("R"), plane("G"), plane("B"), plane("Y")) {
         (Some(r), Some(g), Some(b), _) => vec![r, g, b],
@@ -190,11 +205,9 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
     let alpha = plane("A");
     let channels = Channels { colour: colours.len() == 3, alpha: alpha.map(|_| Alpha::Premultiplied) };
     let planes: Vec<&FlatSamples> = colours.into_iter().chain(alpha).collect();
-    if planes.iter().any(|p| p.len() != width * height) {
-        return Err("channels of a lower resolution are not read".to_owned());
-    }
-    let values = (0..width * height).flat_map(|i| planes.iter().map(move |p| p.value_by_flat_index(i).to_f32()));
-    Ok(Samples { width: width as u32, height: height as u32, channels, values: Values::Float(values.collect()) })
+    let count = width as usize * height as usize;
+    let values = (0..count).flat_map(|i| planes.iter().map(move |p| p.value_by_flat_index(i).to_f32()));
+    Ok(Samples { width, height, channels, values: Values::Float(values.collect()) })
 }
 
 /// Reads the attributes that [`write`] writes.

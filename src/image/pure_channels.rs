@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use exr::prelude::{self as openexr, FlatSamples, ReadChannels, ReadLayers, WritableImage, f16};
+use exr::prelude::{self as openexr, FlatSamples, WritableImage, f16};
 
 use super::file::Encoding;
 use super::metadata::Metadata;
-use super::pure::{attributes, tiled, within};
+use super::pure::{Planes, attributes, read_planes, tiled, within};
 use super::samples::{Samples, Values};
 use super::{Channel, Channels, Plane};
 
@@ -50,22 +50,8 @@ pub(super) fn write(
 
 /// Every channel of a file, unless `check` refuses its width and height.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Channels> {
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
-    let header = meta.headers.first().ok_or("no layers")?;
-    if header.deep {
-        return Err("a deep image; only flat ones are read".to_owned());
-    }
-    let (width, height) = (header.layer_size.width(), header.layer_size.height());
-    check(width as u64, height as u64)?;
-    let image = openexr::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_file(path)
-        .map_err(|e| e.to_string())?;
-    let channels = image.layer_data.channel_data.list.into_iter().map(|channel| {
+    let Planes { width, height, list } = read_planes(path, |width, height, _| check(width, height))?;
+    let channels = list.into_iter().map(|channel| {
         let plane = match channel.sample_data {
             FlatSamples::F16(values) => Plane::Float(values.into_iter().map(f16::to_f32).collect()),
             FlatSamples::F32(values) => Plane::Float(values),
@@ -73,9 +59,5 @@ pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Resul
         };
         Channel { name: channel.name.to_string(), plane }
     });
-    let channels: Vec<_> = channels.collect();
-    if channels.iter().any(|channel| channel.plane.len() != width * height) {
-        return Err("channels of a lower resolution are not read".to_owned());
-    }
-    Ok(Channels { width: width as u32, height: height as u32, channels })
+    Ok(Channels { width, height, channels: channels.collect() })
 }

@@ -82,6 +82,12 @@ impl Complete {
         Self(self.0 | 1 << reduction as u16)
     }
 
+    /// What is in either.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// Whether it is modelled completely.
     pub const fn has(self, reduction: Reduction) -> bool {
         self.0 >> reduction as u16 & 1 == 1

@@ -133,15 +133,18 @@ impl Canvas {
 
     /// The picture as far as it is.
     pub(super) fn image(&self) -> Image {
-        // As a tile divides: by 1 where the weights cancel out.
-        let pixels = self.sums.iter().zip(&self.weights).map(|(sum, weight)| *sum / weight.max(1.0));
+        let pixels = (0..self.sums.len()).map(|i| self.pixel(i));
         Image { width: self.window.width, height: self.window.height, pixels: pixels.collect() }
+    }
+
+    /// As a tile divides: by 1 where the weights cancel out.
+    fn pixel(&self, i: usize) -> Vec4 {
+        self.sums[i] / self.weights[i].max(1.0)
     }
 
     /// A tile of the picture as far as it is.
     pub(super) fn finished(&self, tile: &Tile) -> Finished {
-        let pixel = |at| self.sums[self.index(at)] / self.weights[self.index(at)].max(1.0);
-        let pixels: Vec<_> = tile.pixels().map(pixel).collect();
+        let pixels: Vec<_> = tile.pixels().map(|at| self.pixel(self.index(at))).collect();
         Finished::new(&tile.within(&self.window), &pixels)
     }
 

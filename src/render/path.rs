@@ -225,7 +225,7 @@ impl Renderer<'_> {
     fn route_on(&self, tally: &Tally, vertex: &Vertex<'_>, route: Route, ray: &Ray, path: &Path) -> Route {
         let direction = ray.direction.as_dvec3();
         if path.density == 0.0 {
-            let goes_through = direction.dot(vertex.point.normal) < 0.0;
+            let goes_through = !vertex.point.is_above(direction);
             return tally.after(route, if goes_through { Event::Transmitted } else { Event::Specular });
         }
         // The other number of the pair says whether the path ends.
@@ -247,7 +247,7 @@ impl Renderer<'_> {
             }
             weight /= chance;
         }
-        let goes_through = scattered.direction.dot(point.normal) < 0.0;
+        let goes_through = !point.is_above(scattered.direction);
         let medium = if goes_through { self.medium_behind(point) } else { path.medium };
         let density = scattered.density.map_or(0.0, |density| density as f32);
         let ray = point.spawn(scattered.direction.as_vec3(), f32::INFINITY);

@@ -47,6 +47,12 @@ pub struct SurfacePoint {
     pub normal: DVec3,
     /// Unit shading normal, on the same side; the geometric normal where the mesh has none or it is zero.
     pub shading_normal: DVec3,
+    /// From `position` to the smooth surface that normals of vertices stand for; zero where there is none, or where the triangle
+    /// bulges more than it does.
+    pub lift: DVec3,
+    /// Unit normal of the surface by which it is told on which side a direction leaves: where the surface is lifted, that
+    /// between the vertices; else the geometric one.
+    pub horizon: DVec3,
     /// Whether the viewer sees the front: triangles wind counter-clockwise (clockwise under a mirroring transform),
     /// shapes are seen from outside.
     pub front: bool,
@@ -60,6 +66,15 @@ pub struct SurfacePoint {
     pub material: u32,
     /// When it was seen, which is when rays that leave it look: see [`Ray::time`].
     pub time: f32,
+}
+
+/// A triangle of a mesh where it stands.
+struct Facet {
+    corners: [DVec3; 3],
+    /// The linear part of its transform.
+    linear: DMat3,
+    /// Along which it is seen.
+    direction: DVec3,
 }
 
 impl SurfacePoint {
@@ -76,13 +91,18 @@ impl SurfacePoint {
         };
         let mut point = match &part.primitives {
             Primitives::Triangles { positions, triangles } => {
-                let corners = triangles[hit.primitive as usize].map(|i| positions[i as usize].as_dvec3());
+                let local = triangles[hit.primitive as usize].map(|i| positions[i as usize].as_dvec3());
+                let corners = placement.map_or(local, |placement| {
+                    let to_world = placement.to_world.as_daffine3();
+                    local.map(|p| to_world.transform_point3(p))
+                });
                 let mut point = on_triangle(ray, placement, corners);
                 if linear.determinant() < 0.0 {
                     point.front = !point.front;
                 }
                 if let Geometry::Mesh(mesh) = geometry {
-                    point.interpolate(mesh, hit.primitive, &linear, attributes);
+                    let seen = Facet { corners, linear, direction: ray.direction.as_dvec3() };
+                    point.interpolate(mesh, hit.primitive, &seen, attributes);
                 }
                 point
             }
@@ -104,6 +124,8 @@ impl SurfacePoint {
             error,
             normal,
             shading_normal: normal,
+            lift: DVec3::ZERO,
+            horizon: normal,
             front,
             uv: Vec2::ZERO,
             second_uv: Vec2::ZERO,
@@ -113,15 +135,22 @@ impl SurfacePoint {
         }
     }
 
-    /// Fills in what the mesh gives at its vertices. `linear` is the linear part of its transform.
-    fn interpolate(&mut self, mesh: &Mesh, triangle: u32, linear: &DMat3, attributes: Attributes) {
+    /// Fills in what the mesh gives at its vertices.
+    fn interpolate(&mut self, mesh: &Mesh, triangle: u32, seen: &Facet, attributes: Attributes) {
         let corners = mesh.triangles[triangle as usize].map(|i| i as usize);
         let [u, v] = self.parameters;
         let weights = [1.0 - u - v, u, v];
         if attributes.normals && !mesh.normals.is_empty() {
-            let normal = (0..3).map(|k| mesh.normals[corners[k]].as_dvec3() * weights[k]).sum::<DVec3>();
-            if let Some(normal) = (cofactor(linear) * normal).try_normalize() {
-                self.shading_normal = if normal.dot(self.normal) < 0.0 { -normal } else { normal };
+            let to_world = cofactor(&seen.linear);
+            let normals = corners.map(|i| mesh.normals[i].as_dvec3());
+            let normal = (0..3).map(|k| normals[k] * weights[k]).sum::<DVec3>();
+            if let Some(normal) = (to_world * normal).try_normalize() {
+                let side = if normal.dot(self.normal) < 0.0 { -1.0 } else { 1.0 };
+                self.shading_normal = normal * side;
+                // Not where the normal leans away from the viewer, to whom no smooth surface would show that side.
+                if seen.direction.dot(self.shading_normal) < 0.0 {
+                    self.lift_over(&seen.corners, normals.map(|normal| to_world * normal * side), weights);
+                }
             }
         }
         if attributes.uvs {
@@ -138,6 +167,29 @@ impl SurfacePoint {
         }
     }
 
+    /// Lifts the point to the smooth surface: to between the planes through the vertices, across their normals, where they are
+    /// above it (Hanika 2021, *Hacking the shadow terminator*, in Ray tracing gems II). Rays that left the triangle itself would
+    /// meet its neighbours where light grazes, and show them as dark facets.
+    fn lift_over(&mut self, corners: &[DVec3; 3], normals: [DVec3; 3], weights: [f64; 3]) {
+        let mut lift = DVec3::ZERO;
+        for k in 0..3 {
+            let (normal, square) = (normals[k], normals[k].length_squared());
+            let below = (corners[k] - self.position).dot(normal);
+            if below > 0.0 && square > 0.0 {
+                lift += normal * (weights[k] * below / square);
+            }
+        }
+        if lift != DVec3::ZERO && lift.is_finite() {
+            (self.lift, self.horizon) = (lift, self.shading_normal);
+        }
+    }
+
+    /// Whether a direction leaves the surface on the viewer's side.
+    #[inline]
+    pub fn is_above(&self, direction: DVec3) -> bool {
+        direction.dot(self.horizon) >= 0.0
+    }
+
     /// The coordinates by which `texture` lies on the surface.
     pub fn uv_of(&self, texture: &Texture) -> Vec2 {
         if texture.on_second_uvs { self.second_uv } else { self.uv }
@@ -145,8 +197,8 @@ impl SurfacePoint {
 
     /// A ray that leaves the surface and does not meet it again at once.
     ///
-    /// It starts beside `position` by the error bound, on the side `direction` points to, and every coordinate is
-    /// rounded away from the surface (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 3.9; Wächter and
+    /// It starts beside `position`, lifted to the smooth surface if it leaves above, by the error bound, on the side `direction`
+    /// points to, and every coordinate is rounded away from the surface (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 3.9; Wächter and
     /// Binder 2019, *A fast and robust method for avoiding self-intersection*). A fixed epsilon would be too small for
     /// large scenes and would lose the shadows of small ones.
     pub fn spawn(&self, direction: Vec3, tmax: f32) -> Ray {
@@ -161,8 +213,11 @@ impl SurfacePoint {
     }
 
     fn start(&self, direction: DVec3) -> Vec3 {
-        let away = if direction.dot(self.normal) >= 0.0 { self.normal } else { -self.normal };
-        let exact = self.position + away * self.error;
+        let (from, away) = match self.is_above(direction) {
+            true => (self.position + self.lift, self.normal),
+            false => (self.position, -self.normal),
+        };
+        let exact = from + away * self.error;
         Vec3::from_array([0, 1, 2].map(|axis| round_towards(exact[axis], away[axis])))
     }
 }
@@ -179,9 +234,7 @@ fn round_towards(x: f64, side: f64) -> f32 {
     }
 }
 
-fn on_triangle(ray: &Ray, placement: Option<&Placement>, local: [DVec3; 3]) -> SurfacePoint {
-    let to_world = placement.map(|p| p.to_world.as_daffine3());
-    let [a, b, c] = to_world.map_or(local, |m| local.map(|p| m.transform_point3(p)));
+fn on_triangle(ray: &Ray, placement: Option<&Placement>, [a, b, c]: [DVec3; 3]) -> SurfacePoint {
     let (e1, e2) = (b - a, c - a);
     let [u, v] = barycentrics(ray, a, e1, e2);
     let position = a + e1 * u + e2 * v;

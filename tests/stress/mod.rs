@@ -3,6 +3,7 @@
 mod mutants;
 mod oracle;
 mod program;
+mod spawned;
 
 use twincast::lab::stress::{Column, Found, Gate, Search, Setup, Tally, catalogue, columns, file};
 use twincast::lab::tree::Oracle;

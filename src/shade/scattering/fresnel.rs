@@ -51,6 +51,31 @@ mod tests {
         assert_eq!(reflectance(cos(critical + 1e-6), 1.0 / 1.5), 1.0);
     }
 
+    /// 50 steps of f32 to both sides of the critical cosine, with the light that is let through by its own formula.
+    #[test]
+    fn at_the_critical_angle_nothing_is_lost_and_nothing_is_nan() {
+        let (inside, outside) = (1.5f64, 1.0f64);
+        let critical = (1.0 - (outside / inside).powi(2)).sqrt() as f32;
+        let mut let_through = 0;
+        for step in -50i32..=50 {
+            let cosine = f64::from(f32::from_bits(critical.to_bits().wrapping_add_signed(step)));
+            let mirrored = reflectance(cosine, outside / inside);
+            let behind = 1.0 - (1.0 - cosine * cosine) * (inside / outside).powi(2);
+            let passed = if behind > 0.0 {
+                let behind = behind.sqrt();
+                let across = 2.0 * inside * cosine / (inside * cosine + outside * behind);
+                let parallel = 2.0 * inside * cosine / (outside * cosine + inside * behind);
+                let_through += 1;
+                outside * behind / (inside * cosine) * (across * across + parallel * parallel) / 2.0
+            } else {
+                0.0
+            };
+            assert!((0.0..=1.0).contains(&mirrored), "step {step}: {mirrored}");
+            assert!((mirrored + passed - 1.0).abs() < 1e-6, "step {step}: {mirrored} + {passed}");
+        }
+        assert!((40..=60).contains(&let_through), "{let_through} of 101");
+    }
+
     /// Against the sum over bounces, one by one.
     #[test]
     fn a_pane_sums_up_all_bounces() {

@@ -58,7 +58,7 @@ impl<'a> Lobes<'a> {
 
     /// For light along `to_light`.
     pub fn evaluate(&self, to_light: DVec3) -> Value {
-        let Shading { normal, geometric, to_viewer, highlight, .. } = self.shading;
+        let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;
         let [diffuse, shiny, mirrored, refracted] = self.chances;
         let mut value = Value { share: Vec3::ZERO, density: 0.0 };
         let front = self.shading.faces(to_light);
@@ -70,7 +70,7 @@ impl<'a> Lobes<'a> {
             }
         }
         let Some(gloss) = self.gloss else { return value };
-        let behind = normal.dot(to_light) < 0.0 && geometric.dot(to_light) < 0.0;
+        let behind = normal.dot(to_light) < 0.0 && horizon.dot(to_light) < 0.0;
         for (way, chance, on_its_side) in
             [(&self.ways.mirrored, mirrored, front), (&self.ways.refracted, refracted, behind)]
         {
@@ -130,9 +130,9 @@ impl Way {
     /// A direction near this one, spread by `gloss` as `even` chooses; none where it would be on the other side of the
     /// surface. The share stays: all that is lost is what goes there.
     pub fn spread(&self, gloss: f32, even: DVec2, shading: &Shading) -> Option<DVec3> {
-        let side = |direction: DVec3| (shading.normal.dot(direction), shading.geometric.dot(direction));
+        let side = |direction: DVec3| (shading.normal.dot(direction), shading.horizon.dot(direction));
         let spread = warp::power(self.direction, f64::from(gloss), even);
-        let crosses = shading.geometric.dot(self.direction) < 0.0;
+        let crosses = shading.horizon.dot(self.direction) < 0.0;
         let (a, b) = side(spread);
         let stays = if crosses { a < 0.0 && b < 0.0 } else { a > 0.0 && b > 0.0 };
         stays.then_some(spread)

@@ -15,7 +15,8 @@ pub struct Shading {
     /// Unit vector towards the viewer.
     pub(super) to_viewer: DVec3,
     pub(super) normal: DVec3,
-    pub(super) geometric: DVec3,
+    /// [`SurfacePoint::horizon`].
+    pub(super) horizon: DVec3,
     pub(super) diffuse: Vec3,
     pub(super) highlight: Highlight,
     /// Light the point sends out without any light source: emission and ambient.
@@ -43,7 +44,7 @@ impl Shading {
         let mut shading = Self {
             to_viewer: -direction.as_dvec3().normalize(),
             normal: point.shading_normal,
-            geometric: point.normal,
+            horizon: point.horizon,
             diffuse: material.diffuse * tint,
             highlight: Highlight::new(material),
             base: emission + material.ambient * tint * ambient,
@@ -75,7 +76,7 @@ impl Shading {
     /// Whether light along `to_light` can be seen at all: it must come from the viewer's side, by the shading normal
     /// and by the surface itself.
     pub fn faces(&self, to_light: DVec3) -> bool {
-        self.normal.dot(to_light) > 0.0 && self.geometric.dot(to_light) > 0.0
+        self.normal.dot(to_light) > 0.0 && self.horizon.dot(to_light) > 0.0
     }
 
     /// What of the arriving light goes to the viewer, linear RGB.
@@ -131,7 +132,7 @@ mod tests {
         Shading {
             to_viewer,
             normal: DVec3::Y,
-            geometric: DVec3::Y,
+            horizon: DVec3::Y,
             diffuse: Vec3::new(0.5, 0.25, 0.0),
             highlight: Highlight::new(&material),
             base: Vec3::ZERO,

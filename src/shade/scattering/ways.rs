@@ -83,7 +83,7 @@ pub(super) fn mirrored_share(material: &Material, point: &SurfacePoint, directio
 fn reflected(direction: DVec3, point: &SurfacePoint) -> DVec3 {
     let mirrored = mirror(direction, point.shading_normal);
     // A shading normal that leans away from the viewer would send the ray into the surface.
-    if mirrored.dot(point.normal) > 0.0 { mirrored } else { mirror(direction, point.normal) }
+    if mirrored.dot(point.horizon) > 0.0 { mirrored } else { mirror(direction, point.horizon) }
 }
 
 /// Where `direction` (unit length) goes behind `point` by Snell's law, `ior` being the index of the inside relative to
@@ -92,7 +92,7 @@ fn refracted(direction: DVec3, point: &SurfacePoint, ior: f64) -> Option<DVec3> 
     // The normal is on the viewer's side, so what the ray enters is the inside where the front is seen.
     let eta = if point.front { 1.0 / ior } else { ior };
     let bent = bend(direction, point.shading_normal, eta)?;
-    if bent.dot(point.normal) < 0.0 { Some(bent) } else { bend(direction, point.normal, eta) }
+    if bent.dot(point.horizon) < 0.0 { Some(bent) } else { bend(direction, point.horizon, eta) }
 }
 
 fn mirror(direction: DVec3, normal: DVec3) -> DVec3 {
@@ -118,6 +118,8 @@ mod tests {
             error: 0.0,
             normal: DVec3::Y,
             shading_normal,
+            lift: DVec3::ZERO,
+            horizon: DVec3::Y,
             front,
             uv: Vec2::ZERO,
             second_uv: Vec2::ZERO,
