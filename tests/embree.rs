@@ -328,6 +328,44 @@ fn rays_beyond_embrees_numbers_miss_and_leave_their_neighbours_alone() {
     }
 }
 
+/// What f32 cannot invert is refused; what it can, by rays that stay below Embree's numbers in the object, is hit.
+#[test]
+fn objects_are_placed_as_far_as_embrees_numbers_go() {
+    let world = |scale: f64| {
+        let place = |x: f64| Instance {
+            name: String::new(),
+            group: 0,
+            transform: DAffine3::from_scale_rotation_translation(
+                DVec3::splat(scale),
+                DQuat::IDENTITY,
+                DVec3::X * x * scale,
+            ),
+            transform_end: None,
+        };
+        let scene = Scene {
+            geometries: vec![Geometry::Mesh(square())],
+            groups: vec![Group { name: String::new(), geometries: 0..1 }],
+            instances: vec![place(-2.0), place(2.0)],
+            materials: vec![Default::default()],
+            ..Scene::default()
+        };
+        World::new(&scene).expect("sound")
+    };
+    let tiny = world(1e-10);
+    let tracer = build(&tiny);
+    let ray = Ray { origin: Vec3::new(-1.7e-10, 0.4e-10, 1e-10), ..down(0.0, 0.0) };
+    for (direction, hits) in [(1.0f32, true), (1e5, true), (1e9, false), (1e17, false)] {
+        let ray = Ray { direction: Vec3::NEG_Z * direction, ..ray };
+        assert_eq!(tracer.closest(&ray).is_some(), hits, "{direction}");
+        assert_eq!(occluded(&tracer, &[ray; 8], Batch { width: Width::Eight, coherent: false }), [hits; 8]);
+    }
+    let error = Embree::new(&world(1e-16), &Options::default()).err().expect("it is refused");
+    assert!(
+        matches!(&error, Error::Backend { backend: "embree", message } if message.contains("instance 0")),
+        "{error}"
+    );
+}
+
 /// Two places, one of them mirrored.
 fn places() -> [DAffine3; 2] {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);

@@ -55,7 +55,7 @@ struct Candidate {
     index: usize,
     low: f64,
     high: f64,
-    /// Whether it is met, away from its edges, and well within the range.
+    /// Whether it is met, away from its edges, and well within the range; and t is known to all digits but the last few.
     is_sure: bool,
 }
 
@@ -162,7 +162,8 @@ fn meet_roughly(ray: &Ray, primitive: &Primitive<'_>, index: usize) -> Option<Ca
     }
     let is_well_within = rounded[0] > ray.tmin.next_up() && rounded[1] < ray.tmax.next_down();
     let is_inside = signs.iter().all(|sign| sign.is_some_and(|sign| sign != 0));
-    Some(Candidate { index, low, high, is_sure: is_well_within && is_inside })
+    let is_sharp = error <= t.abs() * 1e-12;
+    Some(Candidate { index, low, high, is_sure: is_well_within && is_inside && is_sharp })
 }
 
 /// A triangle and its box.

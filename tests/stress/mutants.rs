@@ -1,6 +1,6 @@
 //! Tracers that are broken on purpose, in the ways in which tracers break: each of them must be caught.
 
-use twincast::lab::oracle::{Body, Id, primitives};
+use twincast::lab::oracle::{self, Body, Id, Primitive, primitives};
 use twincast::lab::stress::{Gate, Tally, catalogue};
 use twincast::lab::tree::Oracle;
 use twincast::math::Vec3;
@@ -125,6 +125,16 @@ impl Toy {
         }
     }
 
+    fn order_exactly(&self, ray: &Ray, a: Hit, b: Hit) -> std::cmp::Ordering {
+        let corners = |hit: Hit| self.items.iter().find(|(id, _)| *id == hit.id()).expect("it was hit").1;
+        let (a, b) = (corners(a), corners(b));
+        let t = |corners| {
+            let triangle = Primitive { body: Body::Triangle(corners), to_world: None };
+            oracle::meet(ray, &triangle).map(|meeting| meeting.t)
+        };
+        if a == b { std::cmp::Ordering::Equal } else { t(a).cmp(&t(b)) }
+    }
+
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<(f64, Hit)> = None;
         let mut stack = vec![0];
@@ -145,7 +155,12 @@ impl Toy {
                 let single = self.mutation == Mutation::SingleDistance;
                 let t = if single { f64::from(found.t as f32) } else { found.t };
                 let hit = Hit { t: t as f32, u: found.u as f32, v: found.v as f32, primitive, geometry, instance };
-                let is_better = best.is_none_or(|(nearest, other)| match t.total_cmp(&nearest) {
+                let order = |nearest: f64, other: Hit| match (t - nearest).abs() < 1e-9 * nearest.abs() && !single {
+                    // Closer than f64 can order; that this is done without rounding is not what is broken here.
+                    true => self.order_exactly(ray, hit, other),
+                    false => t.total_cmp(&nearest),
+                };
+                let is_better = best.is_none_or(|(nearest, other)| match order(nearest, other) {
                     std::cmp::Ordering::Less => true,
                     std::cmp::Ordering::Greater => false,
                     _ if self.mutation == Mutation::SwappedTies => hit.id() > other.id(),

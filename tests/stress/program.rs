@@ -72,7 +72,7 @@ fn what_is_asked_wrongly_is_refused() {
         (
             &["stress", "--method", "woop", "--backend", "embree"],
             if cfg!(feature = "embree") { 2 } else { 5 },
-            "embree",
+            if cfg!(feature = "embree") { "--backend" } else { "embree" },
         ),
         (&["stress", "--case", &number], 3, "/triangles/0: \"x\""),
         (&["stress", "--case", &ray], 3, "/rays/0: 3 numbers"),

@@ -145,7 +145,8 @@ fn wrongly_dark(attributes: Attributes) -> f64 {
     let scene = smooth_sphere();
     let world = World::new(&scene).expect("sound");
     let bvh = Bvh::build(&world);
-    let light = Vec3::X;
+    // Not along the edges between columns, where facets are as bright as what they stand for.
+    let light = Vec3::new(0.97, 0.1, 0.2);
     let (mut dark, mut seen) = (0, 0);
     for y in 0..200u8 {
         for x in 0..200u8 {

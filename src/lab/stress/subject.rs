@@ -84,7 +84,7 @@ impl Column {
         if self.is_exact() { Gate::Exact } else { of_case }
     }
 
-    /// Whether there is something in the world that it is about.
+    /// Whether there is something in the world that it is about, and that it does not refuse.
     pub fn applies(self, world: &World) -> bool {
         let any = |has: fn(&Primitives) -> bool| world.parts.iter().any(|part| has(&part.primitives));
         match self {
@@ -93,7 +93,9 @@ impl Column {
                 Primitives::Shapes(shapes) => shapes.iter().any(|shape| matches!(shape, Shape::Sphere(_))),
                 Primitives::Triangles { .. } => false,
             }),
-            _ => true,
+            #[cfg(feature = "embree")]
+            Self::Embree(_) => crate::trace::embree::Embree::check(world).is_ok(),
+            Self::Native | Self::Accel(_) => true,
         }
     }
 

@@ -1,23 +1,11 @@
 //! Four rays side by side.
 
+use super::reach::Reach;
 use crate::math::{BVec4A, Mat4, Vec3, Vec4};
 use crate::ray::Ray;
 
 /// Stands in for rays that are not traced: even if it were, it would hit nothing.
 pub(super) const NOWHERE: Ray = Ray { tmin: f32::INFINITY, tmax: 0.0, ..Ray::new(Vec3::ZERO, Vec3::Z) };
-
-/// The largest coordinate that Embree takes, its `FLT_LARGE`: Debian's package is built with an assertion that ends the process
-/// on a ray with a larger one.
-const MOST: f32 = 1.844e18;
-
-/// Its square, but for rounding of sums.
-const MOST_SQUARED: f32 = 0.999 * MOST * MOST;
-
-/// Whether a ray is [valid](Ray::is_valid) and Embree can trace it; any other misses.
-#[inline]
-pub(super) fn is_traceable(ray: &Ray) -> bool {
-    ray.is_valid() && ray.origin.abs().max(ray.direction.abs()).max_element() < MOST
-}
 
 /// Four rays, component by component.
 pub(super) struct Lanes {
@@ -47,15 +35,16 @@ impl Lanes {
         }
     }
 
-    /// Where [`is_traceable`] holds for certain. Coordinates beyond 1.7e18 or so and directions shorter than 1e-19 are left
+    /// Where [`Reach::has`] holds for certain. Coordinates close to the reach and directions shorter than 1e-19 are left
     /// undecided: the exact conditions take half as many instructions again.
     #[inline(always)]
-    pub fn surely_traceable(&self) -> BVec4A {
+    pub fn surely_traceable(&self, reach: &Reach) -> BVec4A {
         let square = |[x, y, z]: [Vec4; 3]| x * x + y * y + z * z;
-        let (reach, length) = (square(self.origin), square(self.direction));
+        let (distance, length) = (square(self.origin), square(self.direction));
+        let most = Vec4::splat(reach.square);
         // False for NaN.
-        reach.cmple(Vec4::splat(MOST_SQUARED))
-            & length.cmple(Vec4::splat(MOST_SQUARED))
+        distance.cmple(most)
+            & length.cmple(most)
             & length.cmpge(Vec4::splat(f32::MIN_POSITIVE))
             & self.tmin.cmpge(Vec4::ZERO)
             & self.tmin.cmple(self.tmax)
@@ -74,7 +63,7 @@ mod tests {
             1.0,
             -1e-15,
             1e18,
-            MOST,
+            1.844e18,
             -2e18,
             f32::MAX,
             f32::MIN,
@@ -105,13 +94,13 @@ mod tests {
             for lane in 0..4 {
                 let mut four = [good; 4];
                 four[lane] = *ray;
-                let bits = Lanes::new(&four).surely_traceable().bitmask();
+                let bits = Lanes::new(&four).surely_traceable(&Reach::WORLD).bitmask();
                 assert_eq!(bits | 1 << lane, 0b1111, "the others do not matter: {ray:?}");
                 surely += bits >> lane & 1;
-                assert!(bits >> lane & 1 == 0 || is_traceable(ray), "{ray:?}");
+                assert!(bits >> lane & 1 == 0 || Reach::WORLD.has(ray), "{ray:?}");
                 // Nothing ordinary is left undecided.
                 let numbers = [ray.origin, ray.direction].map(|v| v.to_array()).concat();
-                if is_traceable(ray) && numbers.iter().all(|x| *x == 0.0 || (1e-18..=1e18).contains(&x.abs())) {
+                if Reach::WORLD.has(ray) && numbers.iter().all(|x| *x == 0.0 || (1e-18..=1e18).contains(&x.abs())) {
                     assert!(bits >> lane & 1 != 0, "{ray:?}");
                 }
             }

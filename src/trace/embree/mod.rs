@@ -18,6 +18,7 @@ mod device;
 mod lanes;
 mod packet;
 mod query;
+mod reach;
 mod sah;
 mod scene;
 mod single;
@@ -36,6 +37,7 @@ use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
 use packet::{Active, Packet, RayHits, Rays, Recent};
 use query::{Mode, PacketQuery, Packets};
+use reach::Reach;
 use scene::{Scene, SceneBuilder};
 use single::{SingleRay, SingleRayHit};
 
@@ -83,6 +85,7 @@ pub struct Embree {
     parts: Vec<PartIds>,
     fixed: usize,
     placements: Vec<PlacementIds>,
+    reach: Reach,
     unbounded: Unbounded,
     commit_time: Duration,
     mesh_bytes: usize,
@@ -105,11 +108,12 @@ impl Embree {
     /// Hands `world` to Embree and builds its trees. Embree keeps copies of the triangles, not of the shapes.
     ///
     /// # Errors
-    /// [`Error::Backend`] for a triangle with an index past the vertices, for more primitives than 32 bits count, and
-    /// for everything that Embree reports (out of memory, an unsupported processor);
+    /// [`Error::Backend`] for a triangle with an index past the vertices, for more primitives than 32 bits count, as
+    /// [`Embree::check`] does, and for everything that Embree reports (out of memory, an unsupported processor);
     /// [`Error::Unavailable`] where the library that was loaded lays out its hits in another way than the header that
     /// this build was made with.
     pub fn new(world: &World, options: &Options) -> Result<Self> {
+        let reach = Reach::of(world)?;
         let device = Device::new(options.threads, options.avx2_at_most)?;
         let build = |parts: &[Part]| -> Result<SceneBuilder> {
             let mut builder = SceneBuilder::new(&device, options)?;
@@ -143,11 +147,20 @@ impl Embree {
             parts: world.parts.iter().map(part_ids).collect(),
             fixed: fixed.len(),
             placements: placements.collect(),
+            reach,
             unbounded: Unbounded::new(world),
             commit_time,
             mesh_bytes: world.parts.iter().map(|part| mesh_bytes(&part.primitives)).sum(),
             device,
         })
+    }
+
+    /// Whether its numbers suffice for a world.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] for an object that is placed by a transform which f32 cannot invert (scaled by 1e-13, say).
+    pub fn check(world: &World) -> Result<()> {
+        Reach::of(world).map(drop)
     }
 
     /// Bytes that Embree holds for this world: trees and copies of the triangles.
@@ -199,7 +212,7 @@ impl Embree {
 
     fn closest_singles(&self, rays: &[Ray], hits: &mut [Option<Hit>], mode: &mut Mode) {
         let mut query = SingleRayHit::new();
-        single::each(rays, hits, None, |ray| {
+        single::each(rays, hits, None, &self.reach, |ray| {
             query.load(ray);
             query::intersect(&mut query, &self.scene, mode);
             query.hit(|geometry, instance| self.ids(geometry, instance))
@@ -208,7 +221,7 @@ impl Embree {
 
     fn occluded_singles(&self, rays: &[Ray], occluded: &mut [bool], mode: &mut Mode) {
         let mut query = SingleRay::new();
-        single::each(rays, occluded, false, |ray| {
+        single::each(rays, occluded, false, &self.reach, |ray| {
             query.load(ray);
             query::occluded(&mut query, &self.scene, mode);
             query.tfar() < 0.0
@@ -221,7 +234,7 @@ impl Embree {
     {
         let (mut packet, mut active, mut recent) = (RayHits::new(), Active::new(), Recent::NONE);
         packet::each(rays, hits, |rays: &Packet<Ray, G>, hits: &mut Packet<Option<Hit>, G>| {
-            packet.load(rays, &mut active);
+            packet.load(rays, &self.reach, &mut active);
             Packets::intersect(&mut packet, &active, &self.scene, mode);
             for (group, hits) in hits.iter_mut().enumerate() {
                 packet.hits(group, hits, &mut recent, |geometry, instance| self.ids(geometry, instance));
@@ -235,7 +248,7 @@ impl Embree {
     {
         let (mut packet, mut active) = (Rays::new(), Active::new());
         packet::each(rays, occluded, |rays: &Packet<Ray, G>, occluded: &mut Packet<bool, G>| {
-            packet.load(rays, &mut active);
+            packet.load(rays, &self.reach, &mut active);
             Packets::occluded(&mut packet, &active, &self.scene, mode);
             for (group, occluded) in occluded.iter_mut().enumerate() {
                 *occluded = packet.occluded(group);

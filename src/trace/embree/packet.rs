@@ -14,7 +14,8 @@
 
 use std::mem::offset_of;
 
-use super::lanes::{Lanes, NOWHERE, is_traceable};
+use super::lanes::{Lanes, NOWHERE};
+use super::reach::Reach;
 use super::single::{SingleRay, SingleRayHit};
 use super::{PartIds, sys};
 use crate::math::{BVec4A, Mat4, Vec4};
@@ -115,17 +116,17 @@ impl<const G: usize> Rays<G> {
 
     /// Takes new rays; those that Embree cannot trace are inactive.
     #[inline(always)]
-    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+    pub fn load(&mut self, rays: &Packet<Ray, G>, reach: &Reach, active: &mut Active<G>) {
         let mut traceable = BVec4A::splat(true);
         for (g, four) in rays.iter().enumerate() {
             let lanes = Lanes::new(four);
-            traceable &= lanes.surely_traceable();
+            traceable &= lanes.surely_traceable(reach);
             self.put(g, &lanes);
             active.0[g] = Vec4::splat(ALL_BITS);
         }
         // One branch a packet.
         if !traceable.all() {
-            self.leave_out_untraceable(rays, active);
+            self.leave_out_untraceable(rays, reach, active);
         }
     }
 
@@ -143,10 +144,10 @@ impl<const G: usize> Rays<G> {
     /// Judges each ray; in the place of those that Embree cannot trace stands one that hits nothing.
     #[cold]
     #[inline(never)]
-    fn leave_out_untraceable(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
+    fn leave_out_untraceable(&mut self, rays: &Packet<Ray, G>, reach: &Reach, active: &mut Active<G>) {
         for (g, four) in rays.iter().enumerate() {
-            active.0[g] = Vec4::from_array(four.map(|ray| if is_traceable(&ray) { ALL_BITS } else { 0.0 }));
-            self.put(g, &Lanes::new(&four.map(|ray| if is_traceable(&ray) { ray } else { NOWHERE })));
+            active.0[g] = Vec4::from_array(four.map(|ray| if reach.has(&ray) { ALL_BITS } else { 0.0 }));
+            self.put(g, &Lanes::new(&four.map(|ray| if reach.has(&ray) { ray } else { NOWHERE })));
         }
     }
 
@@ -171,8 +172,8 @@ impl<const G: usize> RayHits<G> {
 
     /// Takes new rays, which have hit nothing yet; those that Embree cannot trace are inactive.
     #[inline(always)]
-    pub fn load(&mut self, rays: &Packet<Ray, G>, active: &mut Active<G>) {
-        self.rays.load(rays, active);
+    pub fn load(&mut self, rays: &Packet<Ray, G>, reach: &Reach, active: &mut Active<G>) {
+        self.rays.load(rays, reach, active);
         self.hits[hit_row::GEOMETRY] = [[sys::INVALID_ID; 4]; G];
         self.hits[hit_row::INSTANCE] = [[sys::INVALID_ID; 4]; G];
     }
@@ -287,7 +288,7 @@ mod tests {
         let (mut packet, mut active) = (Rays::<2>::new(), Active::new());
         let mut answers = [0; 7];
         each(&rays, &mut answers, |rays, answers| {
-            packet.load(rays, &mut active);
+            packet.load(rays, &Reach::WORLD, &mut active);
             *answers = [[1, 2, 3, 4], [5, 6, 7, 8]];
         });
         assert_eq!(answers, [1, 2, 3, 4, 5, 6, 7]);

@@ -3,8 +3,9 @@
 //! What is judged by four rays at a time is whether Embree can trace them: one by one, that took half of all instructions around
 //! a query.
 
-use super::lanes::{Lanes, is_traceable};
+use super::lanes::Lanes;
 use super::packet::{ALL_BITS, hit_row};
+use super::reach::Reach;
 use super::{PartIds, sys};
 use crate::math::Vec4;
 use crate::ray::{Hit, Ray};
@@ -22,11 +23,11 @@ pub(super) struct SingleRayHit {
 
 /// Calls `trace` for each ray that Embree can trace, and gives `miss` for the others.
 #[inline(always)]
-pub(super) fn each<T: Copy>(rays: &[Ray], answers: &mut [T], miss: T, mut trace: impl FnMut(&Ray) -> T) {
+pub(super) fn each<T: Copy>(rays: &[Ray], answers: &mut [T], miss: T, reach: &Reach, mut trace: impl FnMut(&Ray) -> T) {
     for (rays, answers) in rays.chunks(4).zip(answers.chunks_mut(4)) {
-        let all_traceable = rays.first_chunk::<4>().is_some_and(|four| Lanes::new(four).surely_traceable().all());
+        let all_traceable = rays.first_chunk::<4>().is_some_and(|four| Lanes::new(four).surely_traceable(reach).all());
         for (ray, answer) in rays.iter().zip(answers) {
-            *answer = if all_traceable || is_traceable(ray) { trace(ray) } else { miss };
+            *answer = if all_traceable || reach.has(ray) { trace(ray) } else { miss };
         }
     }
 }
@@ -100,7 +101,7 @@ mod tests {
             .map(|i| Ray { tmin: if i % 5 == 3 { f32::NAN } else { i as f32 }, ..Ray::new(Vec3::ONE, Vec3::X) })
             .collect();
         let mut answers = [7.0; 11];
-        each(&rays, &mut answers, -1.0, |ray| ray.tmin);
+        each(&rays, &mut answers, -1.0, &Reach::WORLD, |ray| ray.tmin);
         assert_eq!(answers, [0.0, 1.0, 2.0, -1.0, 4.0, 5.0, 6.0, 7.0, -1.0, 9.0, 10.0]);
     }
 }
