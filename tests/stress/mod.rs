@@ -29,7 +29,7 @@ fn the_matrix_is_as_it_is_on_record() {
 #[test]
 fn native_is_exact_on_other_rays() {
     let setup =
-        Setup { cases: catalogue().collect(), own: Vec::new(), columns: vec![Column::Native], rays: 6000, seed: 77 };
+        Setup { cases: catalogue().collect(), own: Vec::new(), columns: vec![Column::Native], rays: 2000, seed: 77 };
     let report = setup.run(Control::default()).expect("nothing stops it");
     report.check().unwrap_or_else(|error| panic!("{error}\n{report}"));
 }

@@ -113,7 +113,6 @@ impl Embree {
     /// [`Error::Unavailable`] where the library that was loaded lays out its hits in another way than the header that
     /// this build was made with.
     pub fn new(world: &World, options: &Options) -> Result<Self> {
-        let reach = Reach::of(world)?;
         let device = Device::new(options.threads, options.avx2_at_most)?;
         let build = |parts: &[Part]| -> Result<SceneBuilder> {
             let mut builder = SceneBuilder::new(&device, options)?;
@@ -133,6 +132,8 @@ impl Embree {
         let objects = objects.collect::<Result<Vec<_>>>()?;
         let fixed = &world.parts[world.fixed.clone()];
         let mut builder = build(fixed)?;
+        // Now that it is known that indices are.
+        let reach = Reach::of(world)?;
         for (i, placement) in world.placements.iter().enumerate() {
             let (object, end) = (&objects[placement.object as usize], placement.motion.as_ref().map(|m| &m.end));
             builder.add_instance(id(fixed.len() + i)?, object, &placement.to_world, end)?;

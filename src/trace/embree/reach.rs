@@ -32,6 +32,9 @@ impl Reach {
     /// # Errors
     /// [`Error::Backend`] where an object is placed such that rays from what is in the scene cannot be traced.
     pub fn of(world: &World) -> Result<Self> {
+        if world.placements.is_empty() {
+            return Ok(Self::new(MOST));
+        }
         let size = world.bounds();
         let size = if size.is_empty() { 0.0 } else { size.min.abs().max(size.max.abs()).max_element() };
         let mut most = MOST;
