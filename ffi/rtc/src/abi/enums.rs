@@ -9,7 +9,6 @@ pub const MAX_TIME_STEPS: u32 = 129;
 /// What a buffer holds an item of.
 pub mod format {
     pub const UINT: u32 = 0x5001;
-    pub const UINT2: u32 = 0x5002;
     pub const UINT3: u32 = 0x5003;
     pub const UINT4: u32 = 0x5004;
     pub const UCHAR: u32 = 0x1001;
@@ -51,6 +50,7 @@ pub mod geometry_type {
     pub const ORIENTED_DISC_POINT: u32 = 52;
     pub const USER: u32 = 120;
     pub const INSTANCE: u32 = 121;
+    #[cfg(feature = "v4")]
     pub const INSTANCE_ARRAY: u32 = 122;
 }
 
@@ -70,13 +70,9 @@ pub mod scene_flag {
 }
 
 /// Flags of a query.
+#[cfg(feature = "v4")]
 pub mod query_flag {
-    #[cfg(feature = "v4")]
     pub const INVOKE_ARGUMENT_FILTER: u32 = 1 << 1;
-    #[cfg(feature = "v3")]
-    pub const COHERENT: u32 = 1;
-    #[cfg(feature = "v4")]
-    pub const COHERENT: u32 = 1 << 16;
 }
 
 /// What a device can be asked about itself.

@@ -65,20 +65,6 @@ impl RTCHit {
     };
 }
 
-impl RTCRay {
-    /// A ray that hits nothing.
-    pub const NONE: Self = Self {
-        org: [0.0; 3],
-        tnear: 0.0,
-        dir: [0.0; 3],
-        time: 0.0,
-        tfar: f32::NEG_INFINITY,
-        mask: 0,
-        id: 0,
-        flags: 0,
-    };
-}
-
 /// Pointers to arrays of each component.
 #[cfg(feature = "v3")]
 #[repr(C)]

@@ -1,6 +1,7 @@
 //! Instances.
 
 use std::ffi::c_void;
+#[cfg(feature = "v4")]
 use std::sync::Arc;
 
 use super::{other, present, with};

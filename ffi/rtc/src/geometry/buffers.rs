@@ -42,6 +42,7 @@ impl Geometry {
 
     fn check_format(&self, (buffer, _): (u32, u32), given: u32) -> Result<()> {
         let is_right = match (buffer, self.kind) {
+            (_, Kind::Absent) => true,
             (buffer_type::INDEX, Kind::Triangles) => given == format::UINT3,
             (buffer_type::INDEX, Kind::Quads) => given == format::UINT4,
             (buffer_type::INDEX, _) => given == format::UINT,
@@ -67,6 +68,14 @@ impl Geometry {
 
 /// Where a buffer is kept.
 fn slot(kind: Kind, state: &mut State, (buffer, slot): (u32, u32)) -> Result<&mut Option<View>> {
+    if kind == Kind::Absent {
+        let known = state.absent.iter().position(|(name, _)| *name == (buffer, slot));
+        let place = known.unwrap_or_else(|| {
+            state.absent.push(((buffer, slot), None));
+            state.absent.len() - 1
+        });
+        return Ok(&mut state.absent[place].1);
+    }
     let steps = |views| nth(views, slot, "invalid vertex buffer slot");
     let is_curve = kind == Kind::Linear(Shape::RoundCurve);
     match buffer {

@@ -102,7 +102,7 @@ fn patch(kind: Kind, state: &State, place: &Place) -> Option<Patch> {
         Kind::Linear(_) => {
             Some(Patch { vertices: [place.primitive; 3], u: 0.0, v: 0.0, scale: [0.0; 2] })
         }
-        Kind::User | Kind::Instance | Kind::InstanceArray => None,
+        Kind::User | Kind::Instance | Kind::InstanceArray | Kind::Absent => None,
     }
 }
 

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::abi::*;
 use crate::buffer::View;
 use crate::device::{Callback, Device};
-use crate::failure::{Failure, Result};
+use crate::failure::{Code, Failure, Result};
 use crate::scene::Scene;
 
 pub use interpolate::{Place, interpolate};
@@ -34,6 +34,9 @@ pub enum Kind {
     User,
     Instance,
     InstanceArray,
+    /// What this library does not have: it takes everything and is never hit. Its making is an error, but programs that do not ask for
+    /// errors write to its buffers all the same.
+    Absent,
 }
 
 impl Kind {
@@ -101,6 +104,8 @@ pub struct State {
     pub transforms: Vec<Transform>,
     /// Of instance arrays: one a time step.
     pub transform_buffers: Vec<Option<View>>,
+    /// Buffers of a geometry that this library does not have, by type and slot.
+    pub absent: Vec<((u32, u32), Option<View>)>,
     pub is_enabled: bool,
     pub is_committed: bool,
     /// Counts commits, and all else that has a scene built again.
@@ -116,9 +121,18 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Of a kind by its number.
+    /// Of a kind by its number. A kind that this library does not have is reported, and [`Kind::Absent`].
+    ///
+    /// # Errors
+    /// Where there is no such kind in Embree.
     pub fn new(device: Arc<Device>, number: u32) -> Result<Self> {
-        let kind = Kind::new(number)?;
+        let kind = match Kind::new(number) {
+            Err(failure) if failure.code == Code::InvalidOperation => {
+                device.report(&failure);
+                Kind::Absent
+            }
+            kind => kind?,
+        };
         let state = State {
             index: None,
             vertices: vec![None],
@@ -133,6 +147,7 @@ impl Geometry {
             scenes: Vec::new(),
             transforms: vec![Transform::IDENTITY],
             transform_buffers: vec![None],
+            absent: Vec::new(),
             is_enabled: true,
             is_committed: false,
             version: 0,

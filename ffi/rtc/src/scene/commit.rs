@@ -190,6 +190,7 @@ fn record(geometry: &Arc<Geometry>) -> Result<Option<Record>> {
         Kind::Linear(shape) => Body::Linear(Linear::new(shape, &state)),
         Kind::User => Body::User(user_geometry(geometry, &state)),
         Kind::Instance | Kind::InstanceArray => Body::Instances(instances(geometry.kind, &state)?),
+        Kind::Absent => return Ok(None),
     };
     Ok(Some(Record { geometry: Arc::clone(geometry), mask: state.mask, functions: state.functions, body }))
 }

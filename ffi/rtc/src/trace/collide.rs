@@ -16,7 +16,7 @@ const MOST: usize = 16;
 pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, user: *mut c_void) -> Result<()> {
     let function = function.ok_or_else(|| Failure::argument("invalid argument"))?;
     let mut waiting: Vec<RTCCollision> = Vec::with_capacity(MOST);
-    let mut tell = |waiting: &mut Vec<RTCCollision>| {
+    let tell = |waiting: &mut Vec<RTCCollision>| {
         if !waiting.is_empty() {
             // SAFETY: the caller promised a function of this type; the list lives until it returns.
             unsafe { function(user, waiting.as_mut_ptr(), waiting.len() as u32) };
