@@ -70,8 +70,12 @@ pub mod scene_flag {
 }
 
 /// Flags of a query.
-#[cfg(feature = "v4")]
 pub mod query_flag {
+    #[cfg(feature = "v3")]
+    pub const COHERENT: u32 = 1;
+    #[cfg(feature = "v4")]
+    pub const COHERENT: u32 = 1 << 16;
+    #[cfg(feature = "v4")]
     pub const INVOKE_ARGUMENT_FILTER: u32 = 1 << 1;
 }
 

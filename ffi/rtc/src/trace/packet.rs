@@ -5,14 +5,14 @@
 
 use twincast::math::Vec3;
 use twincast::trace::bvh::TriangleFound;
-use twincast::{Batch, Ray, Tracer};
+use twincast::{Batch, Hit, Ray, Tracer};
 
 use super::Query;
 use super::cast::{Sight, cast_one, name_solid, native, sight};
 use super::lanes::Lanes;
 use super::offer::{Target, hit_of};
 use crate::abi::RTCRayHit;
-use crate::scene::Committed;
+use crate::scene::{Body, Committed, Record};
 
 /// Rays that are taken together.
 const TOGETHER: usize = 16;
@@ -60,6 +60,13 @@ impl Chunk {
     }
 }
 
+/// A hit with the corners of its triangle, fetched from the mesh.
+#[inline(always)]
+fn with_corners(committed: &Committed, hit: Hit) -> Option<TriangleFound> {
+    let Some(Record { body: Body::Surface(surface), .. }) = committed.record(hit.geometry) else { return None };
+    Some(TriangleFound { hit, corners: surface.corners_at(hit.primitive as usize, 0.0) })
+}
+
 /// Nearest hits of `count` rays, of those that are valid.
 #[inline(always)]
 pub fn intersect_lanes(
@@ -90,7 +97,16 @@ pub fn intersect_lanes(
         let (chunk, end) = Chunk::fill(lanes, next..count, &is_valid, see, alone);
         next = end;
         let mut found: [Option<TriangleFound>; TOGETHER] = [None; TOGETHER];
-        solid.closest_triangles(&chunk.rays[..chunk.count], &mut found[..chunk.count]);
+        if query.is_coherent {
+            let mut hits = [None; TOGETHER];
+            let batch = Batch { coherent: true, ..Batch::default() };
+            solid.closest_batch(&chunk.rays[..chunk.count], &mut hits[..chunk.count], batch);
+            for (found, hit) in found.iter_mut().zip(hits) {
+                *found = hit.and_then(|hit| with_corners(committed, hit));
+            }
+        } else {
+            solid.closest_triangles(&chunk.rays[..chunk.count], &mut found[..chunk.count]);
+        }
         for (&lane, found) in chunk.lanes.iter().zip(&found[..chunk.count]) {
             if let Some(found) = found {
                 if let Some((geometry, named)) = name_solid(committed, found) {
@@ -128,7 +144,7 @@ pub fn occluded_lanes(
         let (chunk, end) = Chunk::fill(lanes, next..count, &is_valid, see, alone);
         next = end;
         let mut occluded = [false; TOGETHER];
-        solid.occluded_batch(&chunk.rays[..chunk.count], &mut occluded[..chunk.count], Batch::default());
+        solid.occluded_batch(&chunk.rays[..chunk.count], &mut occluded[..chunk.count], Batch { coherent: query.is_coherent, ..Batch::default() });
         for (&lane, _) in chunk.lanes.iter().zip(&occluded[..chunk.count]).filter(|(_, occluded)| **occluded) {
             lanes.set_tfar(lane, f32::NEG_INFINITY);
         }
