@@ -13,7 +13,7 @@ use crate::device::Device;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Code {
-    /// A bug of this library.
+    /// A bug of this library, or a number that is none of the interface's.
     Unknown = 1,
     InvalidArgument = 2,
     InvalidOperation = 3,
@@ -40,6 +40,11 @@ impl Failure {
 
     pub fn operation(message: impl Into<String>) -> Self {
         Self { code: Code::InvalidOperation, message: message.into() }
+    }
+
+    /// Of numbers that are none of the interface's: a code that Embree has for these, too.
+    pub fn unknown(message: &str) -> Self {
+        Self { code: Code::Unknown, message: message.into() }
     }
 
     /// Of geometry that is not there.

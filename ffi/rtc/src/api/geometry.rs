@@ -104,7 +104,7 @@ pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32
 /// Trees are built for a scene, not for a geometry: only checked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
-    let set = |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::argument("invalid build quality")) };
+    let set = |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
     // SAFETY: the interface's rules.
     unsafe { modify(geometry, set) }
 }

@@ -46,7 +46,7 @@ pub unsafe extern "C" fn rtcSetGeometryTransform(
     let set = |geometry: &Geometry| {
         present(matrix.cast_mut())?;
         let words = transform_words(format).filter(|_| format != format::QUATERNION_DECOMPOSITION);
-        let words = words.ok_or_else(|| Failure::argument("invalid matrix format"))?;
+        let words = words.ok_or_else(|| Failure::operation("invalid matrix format"))?;
         // SAFETY: as many floats as the format has, by the interface's rules; they may be unaligned for all that is known.
         let floats: Vec<f32> = (0..words).map(|i| unsafe { matrix.cast::<f32>().add(i).read_unaligned() }).collect();
         geometry.set_transform(step, Transform::Matrix(read_transform(format, &floats)?))

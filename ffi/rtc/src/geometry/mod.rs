@@ -59,7 +59,7 @@ impl Kind {
                 return Err(Failure::unsupported("cone and flat linear curves are"));
             }
             24..=60 => return Err(Failure::unsupported("smooth curves are")),
-            _ => return Err(Failure::argument("invalid geometry type")),
+            _ => return Err(Failure::unknown("invalid geometry type")),
         })
     }
 
@@ -194,7 +194,7 @@ impl Geometry {
 
     pub fn set_time_steps(&self, steps: u32) -> Result<()> {
         if !(1..=MAX_TIME_STEPS).contains(&steps) {
-            return Err(Failure::operation("number of time steps is out of range"));
+            return Err(Failure::argument("number of time steps is out of range"));
         }
         self.modify(|state| {
             state.vertices.resize(steps as usize, None);

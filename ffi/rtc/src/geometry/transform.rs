@@ -45,7 +45,7 @@ pub fn read(given: u32, m: &[f32]) -> Result<Affine3> {
         format::FLOAT3X4_ROW_MAJOR | format::FLOAT4X4_ROW_MAJOR => {
             [column(0, 4, 8), column(1, 5, 9), column(2, 6, 10), column(3, 7, 11)]
         }
-        _ => return Err(Failure::argument("invalid matrix format")),
+        _ => return Err(Failure::operation("invalid matrix format")),
     };
     Ok(Affine3 { matrix3: Mat3::from_cols(x, y, z), translation: t })
 }
@@ -62,7 +62,7 @@ pub fn write(given: u32, matrix: &Affine3) -> Result<Vec<f32>> {
         }
         format::FLOAT3X4_ROW_MAJOR => [row(0), row(1), row(2)].concat(),
         format::FLOAT4X4_ROW_MAJOR => [row(0), row(1), row(2), last].concat(),
-        _ => return Err(Failure::argument("invalid matrix format")),
+        _ => return Err(Failure::operation("invalid matrix format")),
     })
 }
 

@@ -125,7 +125,7 @@ impl Scene {
 
     pub fn set_quality(&self, quality: u32) -> Result<()> {
         if !matches!(quality, quality::LOW | quality::MEDIUM | quality::HIGH) {
-            return Err(Failure::operation("invalid build quality"));
+            return Err(Failure::unknown("invalid build quality"));
         }
         let mut state = self.state();
         (state.quality, state.made_of) = (quality, None);
