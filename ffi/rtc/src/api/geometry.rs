@@ -340,10 +340,8 @@ unsafe fn modify(geometry: *const Geometry, change: impl FnOnce(&mut State) -> R
 unsafe fn set_function(geometry: *const Geometry, set: impl FnOnce(&mut Functions), only_user: bool) {
     let change = |geometry: &Geometry| {
         geometry.demand(!only_user || geometry.kind == Kind::User)?;
-        geometry.modify(|state| {
-            set(&mut state.functions);
-            Ok(())
-        })
+        geometry.set_functions(set);
+        Ok(())
     };
     // SAFETY: as the caller promises.
     unsafe { with(geometry, (), change) }

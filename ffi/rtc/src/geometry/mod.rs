@@ -219,10 +219,15 @@ impl Geometry {
         if matches!(self.kind, Kind::Instance | Kind::InstanceArray) {
             return Err(Failure::operation("filter functions not supported for this geometry"));
         }
-        self.modify(|state| {
-            set(&mut state.functions);
-            Ok(())
-        })
+        self.set_functions(set);
+        Ok(())
+    }
+
+    /// Sets functions, which have the scene made again, but need no commit of the geometry.
+    pub fn set_functions(&self, set: impl FnOnce(&mut Functions)) {
+        let mut state = self.state();
+        set(&mut state.functions);
+        state.version += 1;
     }
 
     /// For what only some kinds have.
