@@ -65,3 +65,12 @@ test-dropin: packages dropin ## tests of the C interface, on Embree and on our l
 verify-dropin: test-dropin ## Embree's own tests on our library, beside what Embree scores
 	@scripts/install-packages.sh embree-tools
 	@scripts/verify-dropin.sh
+
+.PHONY: pictures-dropin soak-dropin
+pictures-dropin: dropin ## pictures of Embree's example programs, on Embree and on our library
+	@scripts/install-packages.sh embree-tools
+	@scripts/pictures-dropin.py
+
+soak-dropin: test-dropin ## a million scenes on our library, and its tests under valgrind
+	@scripts/install-packages.sh valgrind
+	@scripts/soak-dropin.sh

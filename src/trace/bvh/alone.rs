@@ -103,28 +103,6 @@ impl Bvh {
         }
     }
 
-    /// The nearest of what a visitor sees: where what was noted does not tell.
-    #[cold]
-    #[inline(never)]
-    fn nearest_of_all(&self, ray: &Ray) -> Option<TriangleFound> {
-        let mut best: Option<TriangleFound> = None;
-        let nearest = self.closest_exactly(ray)?;
-        self.visit_triangles(ray, &mut |found| {
-            if found.hit.id() == nearest.id() {
-                best = Some(TriangleFound { hit: nearest, ..*found });
-                return Search::Break(());
-            }
-            Search::Continue(nearest.t.next_up())
-        });
-        best
-    }
-
-    fn closest_exactly(&self, ray: &Ray) -> Option<Hit> {
-        let mut answer = [None];
-        self.run_batch::<Closest>(std::slice::from_ref(ray), &mut answer, crate::trace::Batch::default());
-        answer[0]
-    }
-
     /// What was noted for up to four rays, computed; those that are missing are the first.
     #[inline(always)]
     fn noted_triangles<S: Simd>(&self, rays: [&Ray; 4], ids: [u32; 4]) -> [TriangleFound; 4] {
@@ -132,11 +110,23 @@ impl Bvh {
         let (_, hits) = tree.hits::<S>(&Rays::new::<S>(rays), ids);
         let mut found = hits.map(|hit| TriangleFound { hit, corners: [Vec3::ZERO; 3] });
         for (found, id) in found.iter_mut().zip(ids) {
-            let mut scratch = None;
-            let lane = tree.leaves().lane(id, &mut scratch);
-            found.corners = lane.block.triangle(lane.lane % LANES);
+            found.corners = self.corners(id);
         }
         found
+    }
+
+    /// The corners of a fixed triangle: lane `id % 8` of block `id / 8`.
+    #[inline(always)]
+    fn corners(&self, id: u32) -> [Vec3; 3] {
+        let mut scratch = None;
+        let lane = self.fixed.triangles.leaves().lane(id, &mut scratch);
+        lane.block.triangle(lane.lane % LANES)
+    }
+
+    /// What was in doubt, and computed at once.
+    #[inline(always)]
+    fn computed_triangle(&self, found: &Found) -> Option<TriangleFound> {
+        found.computed().map(|(hit, id)| TriangleFound { hit, corners: self.corners(id) })
     }
 
     /// Walks, and notes what is hit.
@@ -188,10 +178,10 @@ impl Kernel for Alone<'_> {
         let Self { bvh, ray, stack } = self;
         let found = bvh.walk_alone::<S, Closest>(ray, stack);
         if found.is_noted() {
-            let [found, ..] = bvh.noted_triangles::<S>([ray; 4], [found.noted; 4]);
-            return Some(found);
+            let (_, [hit, ..]) = bvh.fixed.triangles.hits::<S>(&Rays::new::<S>([ray; 4]), [found.noted; 4]);
+            return Some(TriangleFound { hit, corners: bvh.corners(found.noted) });
         }
-        if found.is_hit() { bvh.nearest_of_all(ray) } else { None }
+        bvh.computed_triangle(&found)
     }
 }
 
@@ -236,8 +226,8 @@ impl Kernel for Together<'_> {
                 if state.is_noted() {
                     noted[count % TOGETHER] = (i, state.noted);
                     count += 1;
-                } else if state.is_hit() {
-                    found[i] = bvh.nearest_of_all(&rays[i]);
+                } else {
+                    found[i] = bvh.computed_triangle(state);
                 }
             },
         );

@@ -8,6 +8,7 @@ mod builder;
 mod device;
 mod geometry;
 mod instance;
+mod interpolate;
 mod point;
 #[cfg(feature = "v3")]
 mod ray3;

@@ -1,8 +1,10 @@
 //! Scenes: which geometries there are, and what was last committed.
 
+mod boxes;
 mod commit;
 mod committed;
 mod near;
+mod progress;
 
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicPtr, Ordering};

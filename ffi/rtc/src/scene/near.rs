@@ -39,7 +39,7 @@ impl Near {
                 }
                 Body::Instances(instances) => {
                     for (i, instance) in instances.iter().enumerate() {
-                        add(i, super::commit::instance_bounds(instance).0);
+                        add(i, super::boxes::instance_bounds(instance).0);
                     }
                 }
             }

@@ -32,7 +32,9 @@ pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, offer: &mut dyn FnMut(f
         }
         Shape::Disc => {
             let t = (centre - org).dot(dir) / dir.length_squared();
-            if (org + dir * t - centre).length_squared() < radius * radius {
+            // From within its ball it would shade itself, whatever the ray: Embree's rule.
+            let is_apart = (org - centre).length_squared() > radius * radius;
+            if is_apart && (org + dir * t - centre).length_squared() < radius * radius {
                 offer(t as f32, &named(0.0, -dir));
             }
         }
@@ -162,8 +164,10 @@ impl Capsule {
     /// All hits, nearest first.
     fn hits(&self, org: DVec3, dir: DVec3) -> Vec<Found> {
         let own = &self.own;
+        // Where two segments meet, the ball is the first one's.
+        let start = if self.neighbours[0].is_none() { sphere(org - own.a, dir, own.radius[0]) } else { None };
         let roots = [
-            (Part::Start, sphere(org - own.a, dir, own.radius[0])),
+            (Part::Start, start),
             (Part::End, sphere(org - own.b, dir, own.radius[1])),
             (Part::Side, own.side(org, dir)),
         ];

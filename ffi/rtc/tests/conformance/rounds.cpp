@@ -36,6 +36,13 @@ static void discs() {
   RTCRayHit r = shoot(w.scene, {0.9f, 0, 10}, {0, 0, -2});
   CHECK(r.hit.geomID == 0 && near(r.ray.tfar, 5) && near(normal(r), Vec{0, 0, 2}));
   CHECK(!is_hit(shoot(w.scene, {1.1f, 0, 10}, {0, 0, -2})));
+  // Discs that face the ray do not shade themselves: they are hit from outside of the ball around them.
+  for (Vec inside : {Vec{0, 0, 0.95f}, Vec{0.5f, 0, 0.85f}, Vec{0.9f, 0, 0.4f}}) {
+    CHECK(!is_hit(shoot(w.scene, inside, {0, 0, -1})));
+    CHECK(is_hit(shoot(w.scene, inside + Vec{0, 0, 0.1f}, {0, 0, -1})));
+  }
+  r = shoot(w.scene, {5, 0.5f, 0.5f}, {0, 0, -1});
+  CHECK(r.hit.geomID == 1 && near(r.ray.tfar, 1));
   r = shoot(w.scene, {5, 0.5f, 10}, {0, 0, -2});
   CHECK(r.hit.geomID == 1 && near(r.ray.tfar, 5.25f) && near(normal(r), Vec{0, 1, 1}));
   CHECK(!is_hit(shoot(w.scene, {5, 0.8f, 10}, {0, 0, -2})));
