@@ -37,7 +37,9 @@ impl Geometry {
 
     /// The caller has written to a buffer.
     pub fn update_buffer(&self, name: (u32, u32)) -> Result<()> {
-        self.modify(|state| slot(self.kind, state, name).map(|_| ()))
+        let has_buffers = self.kind.is_mesh() || self.kind == Kind::InstanceArray;
+        // All of a geometry without buffers is new.
+        self.modify(|state| if has_buffers { slot(self.kind, state, name).map(|_| ()) } else { Ok(()) })
     }
 
     fn check_format(&self, (buffer, _): (u32, u32), given: u32) -> Result<()> {
