@@ -35,7 +35,8 @@ impl BoxTree {
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> Self {
         options.isa.demand();
-        let is_kept = |bounds: &Aabb| bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite();
+        let is_kept =
+            |bounds: &Aabb| bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite();
         let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_kept(bounds));
         let mut items: Vec<Record> = kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect();
         let tree = build::build(&mut items, 1, Child::MOST, &options);

@@ -35,8 +35,15 @@ pub(super) struct Found {
 
 impl Found {
     /// Nothing.
-    pub const NONE: Self =
-        Self { limit: 0.0, sure: 0.0, noted: NONE, place: NONE, is_computed: false, nearest: Nearest::NONE, computed: NONE };
+    pub const NONE: Self = Self {
+        limit: 0.0,
+        sure: 0.0,
+        noted: NONE,
+        place: NONE,
+        is_computed: false,
+        nearest: Nearest::NONE,
+        computed: NONE,
+    };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up.
     #[inline(always)]

@@ -17,15 +17,19 @@ const INTERNAL_PROPERTIES: u32 = 1_000_000;
 /// A new device.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcNewDevice(configuration: *const c_char) -> *const Device {
-    guard(null(), || None, || {
-        let text = if configuration.is_null() {
-            String::new()
-        } else {
-            // SAFETY: a C string, by the interface's rules.
-            unsafe { CStr::from_ptr(configuration) }.to_string_lossy().into_owned()
-        };
-        Ok(handle::new(Arc::new(Device::new(&text)?)))
-    })
+    guard(
+        null(),
+        || None,
+        || {
+            let text = if configuration.is_null() {
+                String::new()
+            } else {
+                // SAFETY: a C string, by the interface's rules.
+                unsafe { CStr::from_ptr(configuration) }.to_string_lossy().into_owned()
+            };
+            Ok(handle::new(Arc::new(Device::new(&text)?)))
+        },
+    )
 }
 
 /// One reference more.

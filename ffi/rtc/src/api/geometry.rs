@@ -104,7 +104,8 @@ pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32
 /// Trees are built for a scene, not for a geometry: only checked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
-    let set = |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
+    let set =
+        |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
     // SAFETY: the interface's rules.
     unsafe { modify(geometry, set) }
 }
@@ -113,7 +114,11 @@ pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, q
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, scale: f32) {
     let set = |_: &mut State| {
-        if scale >= 1.0 { Ok(()) } else { Err(Failure::argument("maximal radius scale has to be larger or equal to 1")) }
+        if scale >= 1.0 {
+            Ok(())
+        } else {
+            Err(Failure::argument("maximal radius scale has to be larger or equal to 1"))
+        }
     };
     // SAFETY: the interface's rules.
     unsafe { modify(geometry, set) }
@@ -196,10 +201,7 @@ pub unsafe extern "C" fn rtcUpdateGeometryBuffer(geometry: *const Geometry, kind
 
 /// The filter of nearest hits.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryIntersectFilterFunction(
-    geometry: *const Geometry,
-    filter: RTCFilterFunctionN,
-) {
+pub unsafe extern "C" fn rtcSetGeometryIntersectFilterFunction(geometry: *const Geometry, filter: RTCFilterFunctionN) {
     let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.intersect_filter = filter);
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }

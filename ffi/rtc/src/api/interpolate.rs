@@ -14,7 +14,9 @@ pub unsafe extern "C" fn rtcInterpolate(arguments: *const RTCInterpolateArgument
     let RTCInterpolateArguments { primitive, u, v, buffer_type, slot, outputs, count, .. } = *arguments;
     let place = Place { primitive, u, v, buffer_type, slot };
     // SAFETY: the interface's rules.
-    unsafe { with(arguments.geometry.cast_const().cast(), (), |geometry| interpolate(geometry, &place, &outputs, count, 1)) }
+    unsafe {
+        with(arguments.geometry.cast_const().cast(), (), |geometry| interpolate(geometry, &place, &outputs, count, 1))
+    }
 }
 
 /// Values at several places.
@@ -23,13 +25,13 @@ pub unsafe extern "C" fn rtcInterpolateN(arguments: *const RTCInterpolateNArgume
     guard((), || None, || present(arguments.cast_mut()).map(|_| ()));
     // SAFETY: the interface's rules; null was reported.
     let Some(arguments) = (unsafe { arguments.as_ref() }) else { return };
-    let RTCInterpolateNArguments { valid, primitives, u, v, places, buffer_type, slot, outputs, count, .. } = *arguments;
+    let RTCInterpolateNArguments { valid, primitives, u, v, places, buffer_type, slot, outputs, count, .. } =
+        *arguments;
     let work = |geometry: &Geometry| {
         for i in 0..places as usize {
             // SAFETY: arrays of so many, or null for `valid`, by the interface's rules.
-            let (is_valid, primitive, u, v) = unsafe {
-                (valid.is_null() || *valid.add(i) != 0, *primitives.add(i), *u.add(i), *v.add(i))
-            };
+            let (is_valid, primitive, u, v) =
+                unsafe { (valid.is_null() || *valid.add(i) != 0, *primitives.add(i), *u.add(i), *v.add(i)) };
             let at = |output: *mut f32| if output.is_null() { output } else { output.wrapping_add(i) };
             let outputs = Outputs {
                 value: at(outputs.value),

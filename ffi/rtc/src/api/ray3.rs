@@ -1,7 +1,9 @@
 //! Queries of version 3: with a context, which holds the filter.
 
 use super::{present, with};
-use crate::abi::{query_flag, RTCContext, RTCFilterFunctionNArguments, RTCRay, RTCRayHit, RTCRayHitNp, RTCUserFunctionNArguments};
+use crate::abi::{
+    RTCContext, RTCFilterFunctionNArguments, RTCRay, RTCRayHit, RTCRayHitNp, RTCUserFunctionNArguments, query_flag,
+};
 use crate::scene::{Committed, Scene};
 use crate::trace::{Packed, Pointers, Query, Target, UserCall, cast_one, intersect_lanes, occluded_lanes, run_filters};
 

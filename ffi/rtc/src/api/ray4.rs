@@ -3,7 +3,9 @@
 use super::{present, with};
 use crate::abi::*;
 use crate::scene::{Committed, Scene};
-use crate::trace::{Packed, Query, Target, UserCall, cast, cast_one, intersect_lanes, occluded_lanes, run_filters, within};
+use crate::trace::{
+    Packed, Query, Target, UserCall, cast, cast_one, intersect_lanes, occluded_lanes, run_filters, within,
+};
 
 /// Asks a committed scene.
 ///
@@ -23,7 +25,8 @@ unsafe fn ask<T>(
             #[cfg(not(feature = "compact-ray-hit"))]
             instance_primitive: INVALID_ID,
         };
-        let mut query = Query { context: &raw mut own, filter: None, filters_all: false, is_coherent: false, user: None };
+        let mut query =
+            Query { context: &raw mut own, filter: None, filters_all: false, is_coherent: false, user: None };
         // SAFETY: null or the caller's.
         if let Some(arguments) = unsafe { arguments.as_ref() } {
             if !arguments.context.is_null() {
@@ -117,8 +120,7 @@ unsafe fn forward(
         // SAFETY: what this library gave to a callback that has not returned: the call, its query and its ray.
         let (query, own) = unsafe { (&*(*call.cast::<UserCall>()).query, (*call).ray) };
         // SAFETY: as above.
-        let target =
-            unsafe { if any { Target::any(own.cast()) } else { Target::closest(own.cast::<RTCRayHit>()) } };
+        let target = unsafe { if any { Target::any(own.cast()) } else { Target::closest(own.cast::<RTCRayHit>()) } };
         // SAFETY: the interface's rules.
         let (Some(committed), new) = (unsafe { (scene.committed(), ray.read()) }) else { return Ok(()) };
         let before = target.ray();

@@ -99,9 +99,7 @@ fn patch(kind: Kind, state: &State, place: &Place) -> Option<Patch> {
             let next = first.checked_add(1)?;
             Some(Patch { vertices: [first, next, first], u, v: 0.0, scale: [1.0, 0.0] })
         }
-        Kind::Linear(_) => {
-            Some(Patch { vertices: [place.primitive; 3], u: 0.0, v: 0.0, scale: [0.0; 2] })
-        }
+        Kind::Linear(_) => Some(Patch { vertices: [place.primitive; 3], u: 0.0, v: 0.0, scale: [0.0; 2] }),
         Kind::User | Kind::Instance | Kind::InstanceArray | Kind::Absent => None,
     }
 }

@@ -152,8 +152,7 @@ impl Motion {
         }
         let count = (self.steps.len() - 1) * PLACES;
         let (begin, end) = self.range;
-        let places: Vec<_> =
-            (0..=count).map(|i| self.at(begin + (end - begin) * (i as f32 / count as f32))).collect();
+        let places: Vec<_> = (0..=count).map(|i| self.at(begin + (end - begin) * (i as f32 / count as f32))).collect();
         // The sagitta of an arc of half a turn, divided into so many places, with as much again for the changing scale.
         let angle = std::f32::consts::PI / PLACES as f32;
         let size = places.iter().map(|place| place.matrix3.abs_row_sum()).fold(0.0, f32::max);

@@ -24,9 +24,9 @@ pub use cast::cast_one;
 #[cfg(feature = "v4")]
 pub use cast::{cast, within};
 pub use collide::collide;
+pub use lanes::Packed;
 #[cfg(feature = "v3")]
 pub use lanes::Pointers;
-pub use lanes::Packed;
 pub use offer::Target;
 pub use packet::{intersect_lanes, occluded_lanes};
 pub use point::point_query;

@@ -144,7 +144,11 @@ pub fn occluded_lanes(
         let (chunk, end) = Chunk::fill(lanes, next..count, &is_valid, see, alone);
         next = end;
         let mut occluded = [false; TOGETHER];
-        solid.occluded_batch(&chunk.rays[..chunk.count], &mut occluded[..chunk.count], Batch { coherent: query.is_coherent, ..Batch::default() });
+        solid.occluded_batch(
+            &chunk.rays[..chunk.count],
+            &mut occluded[..chunk.count],
+            Batch { coherent: query.is_coherent, ..Batch::default() },
+        );
         for (&lane, _) in chunk.lanes.iter().zip(&occluded[..chunk.count]).filter(|(_, occluded)| **occluded) {
             lanes.set_tfar(lane, f32::NEG_INFINITY);
         }
