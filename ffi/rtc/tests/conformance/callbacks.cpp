@@ -201,7 +201,50 @@ static void points() {
   }
 }
 
+#ifdef EMBREE4
+// User geometry that sends rays on into another scene, 10 to the right.
+static RTCScene beyond;
+static RTCRay moved(const RTCRay& r) {
+  RTCRay m = r;
+  m.org_x -= 10;
+  return m;
+}
+static void forward() {
+  World w;
+  beyond = rtcNewScene(w.device);
+  w.add(w.floor(3), beyond);
+  rtcCommitScene(beyond);
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 1);
+  rtcSetGeometryBoundsFunction(
+      g,
+      [](const RTCBoundsFunctionArguments* a) {
+        auto* b = a->bounds_o;
+        b->lower_x = 10, b->lower_y = 0, b->lower_z = 2, b->upper_x = 11, b->upper_y = 1, b->upper_z = 4;
+      },
+      nullptr);
+  rtcSetGeometryIntersectFunction(g, [](const RTCIntersectFunctionNArguments* a) {
+    RTCRay m = moved(((RTCRayHit*)a->rayhit)->ray);
+    rtcForwardIntersect1(a, beyond, &m, 77);
+  });
+  rtcSetGeometryOccludedFunction(g, [](const RTCOccludedFunctionNArguments* a) {
+    RTCRay m = moved(*(RTCRay*)a->ray);
+    rtcForwardOccluded1(a, beyond, &m, 77);
+  });
+  rtcSetGeometryMask(g, ~0u);
+  w.add(g);
+  rtcCommitScene(w.scene);
+  RTCRayHit r = shoot(w.scene, {10.25f, 0.25f, 9}, {0, 0, -1});
+  CHECK(r.hit.instID[0] == 77 && r.hit.geomID == 0 && near(r.ray.tfar, 6) && near(r.hit.u, 0.25f));
+  CHECK(r.ray.org_x == 10.25f && !is_hit(shoot(w.scene, {10.8f, 0.8f, 9}, {0, 0, -1})));
+  rtcReleaseScene(beyond);
+}
+#endif
+
 void callbacks() {
+#ifdef EMBREE4
+  forward();
+#endif
   filters();
   half();
   per_geometry_data();

@@ -161,7 +161,43 @@ static void ranges() {
   CHECK(!is_hit(shoot(w.scene, {0.25f, 0.25f, 10}, {0, 0, -1}, INFINITY, 0.6f)));
 }
 
+#ifdef EMBREE4
+// Several places of two scenes in one geometry.
+static void arrays() {
+  World w;
+  RTCScene scenes[2];
+  for (int i = 0; i < 2; i++) {
+    scenes[i] = rtcNewScene(w.device);
+    w.add(w.floor(i ? 5 : 0), scenes[i]);
+    rtcCommitScene(scenes[i]);
+  }
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_INSTANCE_ARRAY);
+  rtcSetGeometryInstancedScenes(g, scenes, 2);
+  auto* which = (unsigned*)rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, 4, 3);
+  auto* places = (float*)rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_TRANSFORM, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, 48, 3);
+  for (unsigned i = 0; i < 3; i++) {
+    const float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 10.f * i, 0, 0};
+    std::memcpy(places + 12 * i, m, 48);
+    which[i] = i == 1;
+  }
+  rtcSetGeometryMask(g, ~0u);
+  unsigned id = w.add(g);
+  rtcCommitScene(w.scene);
+  for (unsigned i = 0; i < 3; i++) {
+    RTCRayHit r = shoot(w.scene, {10.f * i + 0.25f, 0.25f, 20}, {0, 0, -1});
+    CHECK(r.hit.instID[0] == id && r.hit.instPrimID[0] == i && r.hit.geomID == 0 && near(r.ray.tfar, i == 1 ? 15 : 20));
+    float back[12];
+    rtcGetGeometryTransformEx(rtcGetGeometry(w.scene, id), i, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, back);
+    CHECK(back[0] == 1 && back[9] == 10.f * i);
+  }
+  for (RTCScene scene : scenes) rtcReleaseScene(scene);
+}
+#endif
+
 void surfaces() {
+#ifdef EMBREE4
+  arrays();
+#endif
   triangles();
   quads();
   grids();
