@@ -64,3 +64,23 @@ install: build ## put binary, man pages and completions under PREFIX (/usr/local
 .PHONY: bench-fair
 bench-fair: build ## whether Twincast gets out of Embree what a plain C++ client does: at least 95 %
 	@scripts/bench-fair.sh
+
+.PHONY: dropin test-dropin verify-dropin
+dropin: ## build libembree3.so.3 and libembree4.so.4 over the native tracer, in target/dropin
+	@CARGO='$(CARGO)' scripts/build-dropin.sh
+
+test-dropin: packages dropin ## tests of the C interface, on Embree and on our library
+	@scripts/test-dropin.sh
+
+verify-dropin: test-dropin ## Embree's own tests on our library, beside what Embree scores
+	@scripts/install-packages.sh embree-tools
+	@scripts/verify-dropin.sh
+
+.PHONY: pictures-dropin soak-dropin
+pictures-dropin: dropin ## pictures of Embree's example programs, on Embree and on our library
+	@scripts/install-packages.sh embree-tools
+	@scripts/pictures-dropin.py
+
+soak-dropin: test-dropin ## a million scenes on our library, and its tests under valgrind
+	@scripts/install-packages.sh valgrind
+	@scripts/soak-dropin.sh

@@ -1,6 +1,7 @@
-//! All hits and closest points, against a look at every primitive.
+//! All hits, closest points and single rays, against a look at every primitive.
 
 mod all_hits;
+mod alone;
 mod closest_point;
 
 use twincast::World;

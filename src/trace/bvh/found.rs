@@ -8,7 +8,7 @@ use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
 use super::query::Query;
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 
 /// No triangle is noted.
@@ -29,12 +29,21 @@ pub(super) struct Found {
     is_computed: bool,
     /// That, if `noted` is [`NONE`].
     nearest: Nearest,
+    /// Which triangle it is: block and lane.
+    computed: u32,
 }
 
 impl Found {
     /// Nothing.
-    pub const NONE: Self =
-        Self { limit: 0.0, sure: 0.0, noted: NONE, place: NONE, is_computed: false, nearest: Nearest::NONE };
+    pub const NONE: Self = Self {
+        limit: 0.0,
+        sure: 0.0,
+        noted: NONE,
+        place: NONE,
+        is_computed: false,
+        nearest: Nearest::NONE,
+        computed: NONE,
+    };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up.
     #[inline(always)]
@@ -46,6 +55,13 @@ impl Found {
     #[inline(always)]
     pub fn is_noted(&self) -> bool {
         self.noted != NONE
+    }
+
+    /// The hit that was computed, if none is noted, and which triangle it is: block and lane.
+    #[inline(always)]
+    pub fn computed(&self) -> Option<(Hit, u32)> {
+        let hit = if self.is_computed && !self.is_noted() { self.nearest.hit() } else { None };
+        hit.map(|hit| (hit, self.computed))
     }
 
     /// Whether there is any hit.
@@ -83,16 +99,23 @@ impl Found {
                     continue;
                 }
             }
-            self.decide(bvh, place, block, lane, ray);
+            self.decide(bvh, place, index, block, lane, ray);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, bvh: &Bvh, place: u32, block: &Block, lane: usize, ray: &Ray) {
+    fn decide(&mut self, bvh: &Bvh, place: u32, index: u32, block: &Block, lane: usize, ray: &Ray) {
         let mut nearest = self.nearest(bvh, ray);
+        if self.is_noted() {
+            self.computed = self.noted;
+        }
+        let before = nearest.hit().map(|hit| hit.id());
         let (tree, through) = bvh.triangles_at(place);
         tree.offer(block, lane, ray, through, &mut nearest);
+        if nearest.hit().map(|hit| hit.id()) != before {
+            self.computed = LANES as u32 * index + lane as u32;
+        }
         self.limit = nearest.limit();
         if let Some(hit) = nearest.hit() {
             self.sure = hit.t.next_down();

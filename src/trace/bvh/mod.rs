@@ -18,6 +18,8 @@
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
+//! | `alone` | one ray at a time, with the corners of what it hits; or with a visitor that says what counts |
+//! | `boxes` | a tree over boxes of the caller's |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
@@ -33,8 +35,10 @@
 //! instruction set.
 
 mod all_hits;
+mod alone;
 mod batch;
 mod block;
+mod boxes;
 mod build;
 mod bundle;
 mod cache;
@@ -68,6 +72,8 @@ mod tile;
 mod triangles;
 mod walk;
 
+pub use alone::{Search, TriangleFound};
+pub use boxes::BoxTree;
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;

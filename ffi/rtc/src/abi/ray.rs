@@ -1,0 +1,75 @@
+//! Rays and hits.
+
+/// One ray.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Debug)]
+pub struct RTCRay {
+    pub org: [f32; 3],
+    pub tnear: f32,
+    pub dir: [f32; 3],
+    pub time: f32,
+    /// Where it ends; of a query's answer, the hit's t, or minus infinity for an occluded ray.
+    pub tfar: f32,
+    pub mask: u32,
+    pub id: u32,
+    pub flags: u32,
+}
+
+/// One hit.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Debug)]
+pub struct RTCHit {
+    /// Normal of the geometry, in its own coordinates; not of unit length.
+    pub ng: [f32; 3],
+    pub u: f32,
+    pub v: f32,
+    pub primitive: u32,
+    pub geometry: u32,
+    pub instance: u32,
+    /// Which of an instance array.
+    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+    pub instance_primitive: u32,
+}
+
+/// Words of a hit in structures of arrays.
+pub const HIT_WORDS: usize = if cfg!(all(feature = "v4", not(feature = "compact-ray-hit"))) { 9 } else { 8 };
+
+/// Words of a ray in structures of arrays.
+pub const RAY_WORDS: usize = 12;
+
+/// One ray and its hit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct RTCRayHit {
+    pub ray: RTCRay,
+    pub hit: RTCHit,
+}
+
+const _: () = {
+    assert!(size_of::<RTCRay>() == 48 && std::mem::offset_of!(RTCRay, tfar) == 32);
+    assert!(size_of::<RTCRayHit>() == if HIT_WORDS == 9 { 96 } else { 80 });
+    assert!(std::mem::offset_of!(RTCHit, instance) == 28);
+};
+
+impl RTCHit {
+    /// None.
+    pub const NONE: Self = Self {
+        ng: [0.0; 3],
+        u: 0.0,
+        v: 0.0,
+        primitive: super::INVALID_ID,
+        geometry: super::INVALID_ID,
+        instance: super::INVALID_ID,
+        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+        instance_primitive: super::INVALID_ID,
+    };
+}
+
+/// Pointers to arrays of each component.
+#[cfg(feature = "v3")]
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct RTCRayHitNp {
+    /// Those of [`RTCRay`], then those of [`RTCHit`].
+    pub words: [*mut u32; RAY_WORDS + HIT_WORDS],
+}

@@ -1,0 +1,171 @@
+//! Devices and buffers.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::ptr::null;
+use std::sync::Arc;
+
+use super::{other, release, with};
+use crate::abi::{RTCErrorFunction, RTCMemoryMonitorFunction};
+use crate::buffer::Buffer;
+use crate::device::{Callback, Device};
+use crate::failure::{Failure, guard, take_homeless};
+use crate::handle;
+
+/// Numbers from here on are Embree's own, for its tests.
+const INTERNAL_PROPERTIES: u32 = 1_000_000;
+
+/// A new device.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcNewDevice(configuration: *const c_char) -> *const Device {
+    guard(
+        null(),
+        || None,
+        || {
+            let text = if configuration.is_null() {
+                String::new()
+            } else {
+                // SAFETY: a C string, by the interface's rules.
+                unsafe { CStr::from_ptr(configuration) }.to_string_lossy().into_owned()
+            };
+            Ok(handle::new(Arc::new(Device::new(&text)?)))
+        },
+    )
+}
+
+/// One reference more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcRetainDevice(device: *const Device) {
+    // SAFETY: the interface's rules.
+    guard((), || None, || unsafe { handle::retain(device) });
+}
+
+/// One reference fewer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcReleaseDevice(device: *const Device) {
+    // SAFETY: the interface's rules.
+    unsafe { release(device) };
+}
+
+/// What a device says of itself.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetDeviceProperty(device: *const Device, property: u32) -> isize {
+    if property >= INTERNAL_PROPERTIES {
+        return 0;
+    }
+    // SAFETY: the interface's rules.
+    unsafe { with(device, 0, |device| device.property(property)) }
+}
+
+/// Nothing can be set; what Embree keeps for its own tests is passed over.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetDeviceProperty(device: *const Device, property: u32, _value: isize) {
+    let refuse = |_: &Device| {
+        if property >= INTERNAL_PROPERTIES { Ok(()) } else { Err(Failure::argument("unknown writable property")) }
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(device, (), refuse) }
+}
+
+/// The first error of this thread since it last asked.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetDeviceError(device: *const Device) -> u32 {
+    // SAFETY: the interface's rules; null asks for what went wrong without a device.
+    match unsafe { device.as_ref() } {
+        None => take_homeless(),
+        Some(device) => guard(1, || None, || Ok(device.take_error())),
+    }
+}
+
+/// The name of an error.
+#[cfg(feature = "v4")]
+#[unsafe(no_mangle)]
+pub extern "C" fn rtcGetErrorString(error: u32) -> *const c_char {
+    let name = match error {
+        0 => c"RTC_ERROR_NONE",
+        1 => c"RTC_ERROR_UNKNOWN",
+        2 => c"RTC_ERROR_INVALID_ARGUMENT",
+        3 => c"RTC_ERROR_INVALID_OPERATION",
+        4 => c"RTC_ERROR_OUT_OF_MEMORY",
+        5 => c"RTC_ERROR_UNSUPPORTED_CPU",
+        6 => c"RTC_ERROR_CANCELLED",
+        7 => c"RTC_ERROR_LEVEL_ZERO_RAYTRACING_SUPPORT_MISSING",
+        _ => c"Invalid error code",
+    };
+    name.as_ptr()
+}
+
+/// The last message of this thread.
+#[cfg(feature = "v4")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetDeviceLastErrorMessage(device: *const Device) -> *const c_char {
+    // SAFETY: the interface's rules.
+    match unsafe { device.as_ref() } {
+        None => c"".as_ptr(),
+        Some(device) => guard(c"".as_ptr(), || None, || Ok(device.last_message())),
+    }
+}
+
+/// Whom to tell of errors.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetDeviceErrorFunction(
+    device: *const Device,
+    function: RTCErrorFunction,
+    user: *mut c_void,
+) {
+    let set = |device: &Device| {
+        device.set_error_function(Callback { function, user });
+        Ok(())
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(device, (), set) }
+}
+
+/// Whom to tell of memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetDeviceMemoryMonitorFunction(
+    device: *const Device,
+    function: RTCMemoryMonitorFunction,
+    user: *mut c_void,
+) {
+    let set = |device: &Device| {
+        device.set_memory_monitor(Callback { function, user });
+        Ok(())
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(device, (), set) }
+}
+
+/// A new buffer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcNewBuffer(device: *const Device, bytes: usize) -> *const Buffer {
+    // SAFETY: the interface's rules.
+    unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Buffer::new(other(device)?, bytes)?)))) }
+}
+
+/// A new buffer over the caller's memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcNewSharedBuffer(device: *const Device, data: *mut c_void, bytes: usize) -> *const Buffer {
+    // SAFETY: the interface's rules.
+    unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Buffer::shared(other(device)?, data.cast(), bytes))))) }
+}
+
+/// Where a buffer is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetBufferData(buffer: *const Buffer) -> *mut c_void {
+    // SAFETY: the interface's rules.
+    unsafe { with(buffer, std::ptr::null_mut(), |buffer| Ok(buffer.data().cast())) }
+}
+
+/// One reference more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcRetainBuffer(buffer: *const Buffer) {
+    // SAFETY: the interface's rules.
+    guard((), || None, || unsafe { handle::retain(buffer) });
+}
+
+/// One reference fewer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcReleaseBuffer(buffer: *const Buffer) {
+    // SAFETY: the interface's rules.
+    unsafe { release(buffer) };
+}

@@ -1,0 +1,304 @@
+//! Geometries.
+
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+use std::sync::Arc;
+
+use super::{other, release, with};
+use crate::abi::*;
+use crate::buffer::{Buffer, View};
+use crate::device::{Callback, Device};
+use crate::failure::{Failure, Result, guard};
+use crate::geometry::{Functions, Geometry, Kind, State};
+use crate::handle;
+
+/// A new geometry.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcNewGeometry(device: *const Device, kind: u32) -> *const Geometry {
+    // SAFETY: the interface's rules.
+    unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Geometry::new(other(device)?, kind)?)))) }
+}
+
+/// One reference more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcRetainGeometry(geometry: *const Geometry) {
+    // SAFETY: the interface's rules.
+    guard((), || None, || unsafe { handle::retain(geometry) });
+}
+
+/// One reference fewer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcReleaseGeometry(geometry: *const Geometry) {
+    // SAFETY: the interface's rules.
+    unsafe { release(geometry) };
+}
+
+/// Makes what was set count at the next commit of the scene.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcCommitGeometry(geometry: *const Geometry) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), Geometry::commit) }
+}
+
+/// Shows the geometry.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcEnableGeometry(geometry: *const Geometry) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), |geometry| Ok(geometry.set_enabled(true))) }
+}
+
+/// Hides the geometry.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcDisableGeometry(geometry: *const Geometry) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), |geometry| Ok(geometry.set_enabled(false))) }
+}
+
+/// How many time steps there are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryTimeStepCount(geometry: *const Geometry, count: u32) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), |geometry| geometry.set_time_steps(count)) }
+}
+
+/// When the first and the last time step are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryTimeRange(geometry: *const Geometry, start: f32, end: f32) {
+    let set = |state: &mut State| {
+        // Not a number neither.
+        if start.partial_cmp(&end).is_none_or(|order| order.is_gt()) {
+            return Err(Failure::argument("startTime has to be smaller or equal to the endTime"));
+        }
+        state.time_range = (start, end);
+        Ok(())
+    };
+    // SAFETY: the interface's rules.
+    unsafe { modify(geometry, set) }
+}
+
+/// How many attributes there are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geometry, count: u32) {
+    const MOST: u32 = 1 << 16;
+    let set = |geometry: &Geometry| {
+        let is_mesh = !matches!(geometry.kind, Kind::User | Kind::Instance | Kind::InstanceArray);
+        geometry.demand(is_mesh && count <= MOST)?;
+        geometry.modify(|state| Ok(state.attributes.resize(count as usize, None)))
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// Which rays see the geometry.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32) {
+    // SAFETY: the interface's rules.
+    unsafe {
+        modify(geometry, |state| {
+            state.mask = mask;
+            Ok(())
+        });
+    }
+}
+
+/// Trees are built for a scene, not for a geometry: only checked.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
+    let set =
+        |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
+    // SAFETY: the interface's rules.
+    unsafe { modify(geometry, set) }
+}
+
+/// Curves of a minimal width on the screen are not built in, as in both Debians' Embree: nothing to scale.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, scale: f32) {
+    let set = |_: &mut State| {
+        if scale >= 1.0 {
+            Ok(())
+        } else {
+            Err(Failure::argument("maximal radius scale has to be larger or equal to 1"))
+        }
+    };
+    // SAFETY: the interface's rules.
+    unsafe { modify(geometry, set) }
+}
+
+/// Sets a buffer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryBuffer(
+    geometry: *const Geometry,
+    kind: u32,
+    slot: u32,
+    format: u32,
+    buffer: *const Buffer,
+    offset: usize,
+    stride: usize,
+    count: usize,
+) {
+    let set = |geometry: &Geometry| {
+        // SAFETY: the interface's rules.
+        let buffer = unsafe { other(buffer)? };
+        geometry.set_buffer((kind, slot), View::new(buffer, format, offset, stride, count)?)
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// Sets a buffer over the caller's memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetSharedGeometryBuffer(
+    geometry: *const Geometry,
+    kind: u32,
+    slot: u32,
+    format: u32,
+    data: *const c_void,
+    offset: usize,
+    stride: usize,
+    count: usize,
+) {
+    let set = |geometry: &Geometry| {
+        if data.is_null() && count > 0 {
+            return Err(Failure::argument("invalid argument"));
+        }
+        let bytes = stride.checked_mul(count).and_then(|bytes| bytes.checked_add(offset));
+        let bytes = bytes.ok_or_else(|| Failure::argument("buffer range out of bounds"))?;
+        let buffer = Buffer::shared(Arc::clone(&geometry.device), data.cast_mut().cast(), bytes);
+        geometry.set_buffer((kind, slot), View::new(Arc::new(buffer), format, offset, stride, count)?)
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// Sets a new buffer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetNewGeometryBuffer(
+    geometry: *const Geometry,
+    kind: u32,
+    slot: u32,
+    format: u32,
+    stride: usize,
+    count: usize,
+) -> *mut c_void {
+    let set = |geometry: &Geometry| Ok(geometry.new_buffer((kind, slot), format, stride, count)?.cast());
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, null_mut(), set) }
+}
+
+/// Where a buffer's first item is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetGeometryBufferData(geometry: *const Geometry, kind: u32, slot: u32) -> *mut c_void {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, null_mut(), |geometry| Ok(geometry.buffer_data((kind, slot))?.cast())) }
+}
+
+/// A buffer has been written to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcUpdateGeometryBuffer(geometry: *const Geometry, kind: u32, slot: u32) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), |geometry| geometry.update_buffer((kind, slot))) }
+}
+
+/// The filter of nearest hits.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryIntersectFilterFunction(geometry: *const Geometry, filter: RTCFilterFunctionN) {
+    let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.intersect_filter = filter);
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// The filter of any hits.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryOccludedFilterFunction(geometry: *const Geometry, filter: RTCFilterFunctionN) {
+    let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.occluded_filter = filter);
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// Whether filters that come with queries are run.
+#[cfg(feature = "v4")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryEnableFilterFunctionFromArguments(geometry: *const Geometry, enable: bool) {
+    let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.heeds_argument_filter = enable);
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// The pointer that callbacks are given.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryUserData(geometry: *const Geometry, user: *mut c_void) {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), |geometry| Ok(geometry.set_user(user))) }
+}
+
+/// The pointer that callbacks are given.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcGetGeometryUserData(geometry: *const Geometry) -> *mut c_void {
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, null_mut(), |geometry| Ok(geometry.user())) }
+}
+
+/// The function of point queries.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryPointQueryFunction(geometry: *const Geometry, function: RTCPointQueryFunction) {
+    // SAFETY: the interface's rules.
+    unsafe { set_function(geometry, |functions| functions.point_query = function, false) }
+}
+
+/// How many primitives user geometry has.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geometry, count: u32) {
+    let set = |geometry: &Geometry| {
+        geometry.demand(geometry.kind == Kind::User)?;
+        geometry.modify(|state| {
+            state.primitive_count = count;
+            Ok(())
+        })
+    };
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
+/// Where user geometry is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryBoundsFunction(
+    geometry: *const Geometry,
+    function: RTCBoundsFunction,
+    user: *mut c_void,
+) {
+    // SAFETY: the interface's rules.
+    unsafe { set_function(geometry, |functions| functions.bounds = Callback { function, user }, true) }
+}
+
+/// Where user geometry is hit.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryIntersectFunction(geometry: *const Geometry, function: RTCIntersectFunctionN) {
+    // SAFETY: the interface's rules.
+    unsafe { set_function(geometry, |functions| functions.intersect = function, true) }
+}
+
+/// Whether user geometry is hit.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryOccludedFunction(geometry: *const Geometry, function: RTCOccludedFunctionN) {
+    // SAFETY: the interface's rules.
+    unsafe { set_function(geometry, |functions| functions.occluded = function, true) }
+}
+
+/// # Safety
+/// As for [`handle::borrow`].
+unsafe fn modify(geometry: *const Geometry, change: impl FnOnce(&mut State) -> Result<()>) {
+    // SAFETY: as the caller promises.
+    unsafe { with(geometry, (), |geometry| geometry.modify(change)) }
+}
+
+/// # Safety
+/// As for [`handle::borrow`].
+unsafe fn set_function(geometry: *const Geometry, set: impl FnOnce(&mut Functions), only_user: bool) {
+    let change = |geometry: &Geometry| {
+        geometry.demand(!only_user || geometry.kind == Kind::User)?;
+        geometry.set_functions(set);
+        Ok(())
+    };
+    // SAFETY: as the caller promises.
+    unsafe { with(geometry, (), change) }
+}

@@ -1,0 +1,122 @@
+//! Memory that geometry is read from: the library's own or the caller's.
+
+use std::alloc::{Layout, alloc_zeroed, dealloc};
+use std::sync::Arc;
+
+use crate::abi::format;
+use crate::device::Device;
+use crate::failure::{Code, Failure, Result};
+
+/// A buffer.
+pub struct Buffer {
+    pub device: Arc<Device>,
+    data: *mut u8,
+    bytes: usize,
+    /// Of the library's own memory.
+    layout: Option<Layout>,
+}
+
+// SAFETY: the memory is written by the caller and read while a scene is committed; that these do not meet is the interface's rule.
+unsafe impl Send for Buffer {}
+// SAFETY: as above.
+unsafe impl Sync for Buffer {}
+
+/// Callers may read a whole vector at the last item.
+const PADDING: usize = 16;
+
+impl Buffer {
+    /// Of `bytes` zeros.
+    pub fn new(device: Arc<Device>, bytes: usize) -> Result<Self> {
+        let exhausted = || Failure { code: Code::OutOfMemory, message: format!("a buffer of {bytes} bytes") };
+        let padded = bytes.checked_add(PADDING).ok_or_else(exhausted)?;
+        let layout = Layout::from_size_align(padded, 64).map_err(|_| exhausted())?;
+        device.account(bytes as isize, false)?;
+        // SAFETY: the size is not zero.
+        let data = unsafe { alloc_zeroed(layout) };
+        if data.is_null() {
+            return Err(exhausted());
+        }
+        Ok(Self { device, data, bytes, layout: Some(layout) })
+    }
+
+    /// Over the caller's memory.
+    pub fn shared(device: Arc<Device>, data: *mut u8, bytes: usize) -> Self {
+        Self { device, data, bytes, layout: None }
+    }
+
+    pub fn data(&self) -> *mut u8 {
+        self.data
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        if let Some(layout) = self.layout {
+            // SAFETY: allocated with this layout in `new`, and given back once.
+            unsafe { dealloc(self.data, layout) };
+            // Giving back is never refused.
+            _ = self.device.account(-(self.bytes as isize), true);
+        }
+    }
+}
+
+/// Items in a buffer.
+#[derive(Clone)]
+pub struct View {
+    buffer: Arc<Buffer>,
+    offset: usize,
+    stride: usize,
+    pub count: usize,
+    pub format: u32,
+}
+
+impl View {
+    /// `count` items, `stride` bytes apart, from `offset` on.
+    pub fn new(buffer: Arc<Buffer>, format: u32, offset: usize, stride: usize, count: usize) -> Result<Self> {
+        let end = stride.checked_mul(count).and_then(|bytes| bytes.checked_add(offset));
+        if end.is_none_or(|end| end > buffer.bytes) {
+            return Err(Failure::argument("buffer range out of bounds"));
+        }
+        let is_of_words = format != format::UCHAR;
+        if is_of_words && ((buffer.data as usize).wrapping_add(offset) % 4 != 0 || stride % 4 != 0) {
+            return Err(Failure::operation("data must be 4 bytes aligned"));
+        }
+        Ok(Self { buffer, offset, stride, count, format })
+    }
+
+    /// Where the first item is.
+    pub fn data(&self) -> *mut u8 {
+        self.buffer.data.wrapping_add(self.offset)
+    }
+
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Words of item `index`, which may not be there.
+    #[inline]
+    pub fn words<const N: usize>(&self, index: usize) -> Option<[u32; N]> {
+        if index >= self.count || self.buffer.data.is_null() {
+            return None;
+        }
+        let item = self.data().wrapping_add(index * self.stride);
+        // SAFETY: the format that was checked when the view was set has at least N words an item; the item lies in the buffer, which
+        // the caller promised to be so large, and alive.
+        Some(unsafe { item.cast::<[u32; N]>().read_unaligned() })
+    }
+
+    /// The same as numbers.
+    #[inline]
+    pub fn floats<const N: usize>(&self, index: usize) -> Option<[f32; N]> {
+        self.words(index).map(|words| words.map(f32::from_bits))
+    }
+
+    /// The byte with this index, of items of one byte.
+    pub fn byte(&self, index: usize) -> Option<u8> {
+        if index >= self.count || self.buffer.data.is_null() {
+            return None;
+        }
+        // SAFETY: as in `words`.
+        Some(unsafe { self.data().wrapping_add(index * self.stride).read() })
+    }
+}

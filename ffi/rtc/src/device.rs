@@ -1,0 +1,165 @@
+//! Devices: where errors go, who is asked before memory is taken, and the threads that build.
+
+use std::collections::HashMap;
+use std::ffi::{CString, c_void};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::thread::{self, ThreadId};
+
+use crate::abi::{RTCErrorFunction, RTCMemoryMonitorFunction, property};
+use crate::failure::{Code, Failure, NONE, Result};
+
+/// A callback of the caller's and what it wants to be given.
+#[derive(Clone, Copy, Debug)]
+pub struct Callback<F> {
+    pub function: F,
+    pub user: *mut c_void,
+}
+
+impl<F: Default> Default for Callback<F> {
+    fn default() -> Self {
+        Self { function: F::default(), user: std::ptr::null_mut() }
+    }
+}
+
+// SAFETY: the pointer is never followed here, only handed back; that callbacks may come from any thread is part of the interface.
+unsafe impl<F: Send> Send for Callback<F> {}
+// SAFETY: as above.
+unsafe impl<F: Sync> Sync for Callback<F> {}
+
+/// What a device remembers of errors.
+#[derive(Default)]
+struct Errors {
+    /// The first code of each thread since it asked.
+    codes: HashMap<ThreadId, u32>,
+    /// The last message of each thread, for as long as it may be looked at.
+    messages: HashMap<ThreadId, CString>,
+    function: Callback<RTCErrorFunction>,
+}
+
+/// A device.
+#[derive(Default)]
+pub struct Device {
+    errors: Mutex<Errors>,
+    memory: Mutex<Callback<RTCMemoryMonitorFunction>>,
+    /// Of its own, where it was asked for so many; otherwise those of the process.
+    threads: Option<rayon::ThreadPool>,
+    verbose: bool,
+}
+
+impl Device {
+    /// From a configuration such as `threads=4,verbose=1`. Names that are not known, or mean nothing here, are passed over, as Embree does
+    /// with most.
+    pub fn new(configuration: &str) -> Result<Self> {
+        let mut device = Self::default();
+        for part in configuration.split([',', ' ', '\t', '\n']) {
+            let (name, value) = part.split_once('=').unwrap_or((part, ""));
+            match name.trim() {
+                "threads" => {
+                    let threads: usize = value.trim().parse().unwrap_or(0);
+                    if threads > 0 {
+                        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+                        let failed = |error| Failure { code: Code::OutOfMemory, message: format!("threads: {error}") };
+                        device.threads = Some(pool.map_err(failed)?);
+                    }
+                }
+                "verbose" => device.verbose = value.trim().parse().is_ok_and(|level: u32| level > 0),
+                _ => {}
+            }
+        }
+        Ok(device)
+    }
+
+    /// Runs `work` on the device's threads.
+    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match &self.threads {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+
+    /// Keeps an error, and tells the error function.
+    pub fn report(&self, failure: &Failure) {
+        let (code, thread) = (failure.code as u32, thread::current().id());
+        let message = CString::new(failure.message.replace('\0', " ")).unwrap_or_default();
+        let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = errors.codes.entry(thread).or_insert(NONE);
+        if *kept == NONE {
+            *kept = code;
+        }
+        errors.messages.insert(thread, message.clone());
+        let Callback { function, user } = errors.function;
+        // Not held while the caller's function runs, which may ask for the error.
+        drop(errors);
+        if self.verbose {
+            eprintln!("twincast-rtc: error {code}: {}", failure.message);
+        }
+        if let Some(function) = function {
+            // SAFETY: the caller promised a function of this type that may be called with its pointer; the message lives until it returns.
+            unsafe { function(user, code, message.as_ptr()) };
+        }
+    }
+
+    /// Takes the thread's error.
+    pub fn take_error(&self) -> u32 {
+        let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        errors.codes.remove(&thread::current().id()).unwrap_or(NONE)
+    }
+
+    /// The thread's last message; valid until its next error.
+    #[cfg(feature = "v4")]
+    pub fn last_message(&self) -> *const std::ffi::c_char {
+        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        errors.messages.get(&thread::current().id()).map_or(c"".as_ptr(), |message| message.as_ptr())
+    }
+
+    pub fn set_error_function(&self, function: Callback<RTCErrorFunction>) {
+        self.errors.lock().unwrap_or_else(PoisonError::into_inner).function = function;
+    }
+
+    pub fn set_memory_monitor(&self, function: Callback<RTCMemoryMonitorFunction>) {
+        *self.memory.lock().unwrap_or_else(PoisonError::into_inner) = function;
+    }
+
+    /// Tells the memory monitor that so many bytes are taken, or (negative) given back.
+    ///
+    /// # Errors
+    /// Where the monitor refuses what is about to be taken (not `done`).
+    pub fn account(&self, bytes: isize, done: bool) -> Result<()> {
+        let Callback { function, user } = *self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(function) = function else { return Ok(()) };
+        // SAFETY: the caller promised a function of this type that may be called with its pointer.
+        let goes_on = unsafe { function(user, bytes, done) };
+        if goes_on || bytes <= 0 {
+            return Ok(());
+        }
+        Err(Failure { code: Code::OutOfMemory, message: "memory monitor forced termination".into() })
+    }
+
+    /// What the device says of itself.
+    pub fn property(&self, name: u32) -> Result<isize> {
+        const VERSION: (isize, isize, isize) = if cfg!(feature = "v4") { (4, 3, 3) } else { (3, 13, 5) };
+        let (major, minor, patch) = VERSION;
+        Ok(match name {
+            property::VERSION => 10000 * major + 100 * minor + patch,
+            property::VERSION_MAJOR => major,
+            property::VERSION_MINOR => minor,
+            property::VERSION_PATCH => patch,
+            // Packets are answered, ray by ray or in flight; callbacks are given one ray at a time.
+            property::NATIVE_RAY4 | property::NATIVE_RAY8 | property::NATIVE_RAY16 => 0,
+            property::RAY_STREAM if cfg!(feature = "v3") => 0,
+            property::BACKFACE_CULLING_SPHERES | property::BACKFACE_CULLING_CURVES | property::BACKFACE_CULLING => 0,
+            property::COMPACT_POLYS | property::SUBDIVISION => 0,
+            // Round linear curves alone are not what programs mean by it; they may be asked for all the same.
+            property::CURVES => 0,
+            property::RAY_MASK | property::FILTER_FUNCTION | property::IGNORE_INVALID_RAYS => 1,
+            property::TRIANGLES | property::QUADS | property::USER | property::POINTS => 1,
+            // The internal one.
+            property::TASKING_SYSTEM => 0,
+            property::JOIN_COMMIT | property::PARALLEL_COMMIT => 1,
+            property::CPU_DEVICE if cfg!(feature = "v4") => 1,
+            property::SYCL_DEVICE if cfg!(feature = "v4") => 0,
+            _ => return Err(Failure::argument("unknown readable property")),
+        })
+    }
+}

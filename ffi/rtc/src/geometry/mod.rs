@@ -1,0 +1,268 @@
+//! Geometry as the caller describes it.
+//!
+//! Everything is behind one lock, and read once when a scene is committed; but the user pointer, which callers change at any
+//! time, is given to callbacks as it is at that moment.
+
+mod buffers;
+mod interpolate;
+mod linear;
+mod surface;
+mod transform;
+
+use std::ffi::c_void;
+use std::sync::atomic::{AtomicPtr, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::abi::*;
+use crate::buffer::View;
+use crate::device::{Callback, Device};
+use crate::failure::{Code, Failure, Result};
+use crate::scene::Scene;
+
+pub use interpolate::{Place, interpolate};
+pub use linear::{Ball, Linear, Segment, Shape};
+pub use surface::{Named, Surface, normal};
+pub use transform::{Motion, Transform, read as read_transform, words as transform_words, write as write_transform};
+
+/// What a geometry is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Triangles,
+    Quads,
+    Grids,
+    Linear(Shape),
+    User,
+    Instance,
+    InstanceArray,
+    /// What this library does not have: it takes everything and is never hit. Its making is an error, but programs that do not ask for
+    /// errors write to its buffers all the same.
+    Absent,
+}
+
+impl Kind {
+    /// Of a number of the interface.
+    fn new(number: u32) -> Result<Self> {
+        Ok(match number {
+            geometry_type::TRIANGLE => Self::Triangles,
+            geometry_type::QUAD => Self::Quads,
+            geometry_type::GRID => Self::Grids,
+            geometry_type::ROUND_LINEAR_CURVE => Self::Linear(Shape::RoundCurve),
+            geometry_type::SPHERE_POINT => Self::Linear(Shape::Sphere),
+            geometry_type::DISC_POINT => Self::Linear(Shape::Disc),
+            geometry_type::ORIENTED_DISC_POINT => Self::Linear(Shape::OrientedDisc),
+            geometry_type::USER => Self::User,
+            geometry_type::INSTANCE => Self::Instance,
+            #[cfg(feature = "v4")]
+            geometry_type::INSTANCE_ARRAY => Self::InstanceArray,
+            geometry_type::SUBDIVISION => return Err(Failure::unsupported("subdivision geometry is")),
+            geometry_type::CONE_LINEAR_CURVE | geometry_type::FLAT_LINEAR_CURVE => {
+                return Err(Failure::unsupported("cone and flat linear curves are"));
+            }
+            24..=60 => return Err(Failure::unsupported("smooth curves are")),
+            _ => return Err(Failure::unknown("invalid geometry type")),
+        })
+    }
+
+    /// Whether it has vertices.
+    fn is_mesh(self) -> bool {
+        matches!(self, Self::Triangles | Self::Quads | Self::Grids | Self::Linear(_))
+    }
+}
+
+/// Functions of the caller's for user geometry, and for filters.
+#[derive(Clone, Copy, Default)]
+pub struct Functions {
+    pub bounds: Callback<RTCBoundsFunction>,
+    pub intersect: RTCIntersectFunctionN,
+    pub occluded: RTCOccludedFunctionN,
+    pub point_query: RTCPointQueryFunction,
+    pub intersect_filter: RTCFilterFunctionN,
+    pub occluded_filter: RTCFilterFunctionN,
+    /// Version 4: whether the filter that comes with a query is run, too.
+    pub heeds_argument_filter: bool,
+}
+
+/// What the caller has set.
+#[derive(Clone)]
+pub struct State {
+    pub index: Option<View>,
+    /// One a time step.
+    pub vertices: Vec<Option<View>>,
+    /// One a time step, of oriented discs.
+    pub normals: Vec<Option<View>>,
+    pub attributes: Vec<Option<View>>,
+    pub flags: Option<View>,
+    pub grids: Option<View>,
+    pub time_range: (f32, f32),
+    pub mask: u32,
+    pub functions: Functions,
+    /// Of user geometry.
+    pub primitive_count: u32,
+    /// One of an instance, several of an instance array.
+    pub scenes: Vec<Arc<Scene>>,
+    /// One a time step.
+    pub transforms: Vec<Transform>,
+    /// Of instance arrays: one a time step.
+    pub transform_buffers: Vec<Option<View>>,
+    /// Buffers of a geometry that this library does not have, by type and slot.
+    pub absent: Vec<((u32, u32), Option<View>)>,
+    pub is_enabled: bool,
+    pub is_committed: bool,
+    /// Counts commits, and all else that has a scene built again.
+    pub version: u64,
+}
+
+/// A geometry.
+pub struct Geometry {
+    pub device: Arc<Device>,
+    pub kind: Kind,
+    user: AtomicPtr<c_void>,
+    state: Mutex<State>,
+}
+
+impl Geometry {
+    /// Of a kind by its number. A kind that this library does not have is reported, and [`Kind::Absent`].
+    ///
+    /// # Errors
+    /// Where there is no such kind in Embree.
+    pub fn new(device: Arc<Device>, number: u32) -> Result<Self> {
+        let kind = match Kind::new(number) {
+            Err(failure) if failure.code == Code::InvalidOperation => {
+                device.report(&failure);
+                Kind::Absent
+            }
+            kind => kind?,
+        };
+        let state = State {
+            index: None,
+            vertices: vec![None],
+            normals: vec![None],
+            attributes: Vec::new(),
+            flags: None,
+            grids: None,
+            time_range: (0.0, 1.0),
+            mask: if cfg!(feature = "v4") { 1 } else { u32::MAX },
+            functions: Functions::default(),
+            primitive_count: 0,
+            scenes: Vec::new(),
+            transforms: vec![Transform::IDENTITY],
+            transform_buffers: vec![None],
+            absent: Vec::new(),
+            is_enabled: true,
+            is_committed: false,
+            version: 0,
+        };
+        Ok(Self { device, kind, user: AtomicPtr::default(), state: Mutex::new(state) })
+    }
+
+    /// What is set.
+    pub fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes what is set; it then waits for a commit.
+    pub fn modify(&self, change: impl FnOnce(&mut State) -> Result<()>) -> Result<()> {
+        let mut state = self.state();
+        change(&mut state)?;
+        state.is_committed = false;
+        Ok(())
+    }
+
+    /// Has scenes that it is in built again.
+    pub fn commit(&self) -> Result<()> {
+        let mut state = self.state();
+        if matches!(self.kind, Kind::Triangles | Kind::Quads | Kind::Grids) {
+            let mut strides = state.vertices.iter().flatten().map(View::stride);
+            let first = strides.next();
+            if strides.any(|stride| Some(stride) != first) {
+                let message = "stride of vertex buffers have to be identical for each time step";
+                return Err(Failure::operation(message));
+            }
+        }
+        state.is_committed = true;
+        state.version += 1;
+        Ok(())
+    }
+
+    pub fn set_enabled(&self, is_enabled: bool) {
+        let mut state = self.state();
+        if state.is_enabled != is_enabled {
+            state.is_enabled = is_enabled;
+            state.version += 1;
+        }
+    }
+
+    pub fn set_time_steps(&self, steps: u32) -> Result<()> {
+        if !(1..=MAX_TIME_STEPS).contains(&steps) {
+            return Err(Failure::argument("number of time steps is out of range"));
+        }
+        self.modify(|state| {
+            state.vertices.resize(steps as usize, None);
+            state.normals.resize(steps as usize, None);
+            state.transforms.resize(steps as usize, Transform::IDENTITY);
+            state.transform_buffers.resize(steps as usize, None);
+            Ok(())
+        })
+    }
+
+    /// The caller's pointer.
+    pub fn user(&self) -> *mut c_void {
+        self.user.load(Ordering::Relaxed)
+    }
+
+    pub fn set_user(&self, user: *mut c_void) {
+        self.user.store(user, Ordering::Relaxed);
+    }
+
+    /// Sets one of the filters.
+    pub fn set_filter(&self, set: impl FnOnce(&mut Functions)) -> Result<()> {
+        if matches!(self.kind, Kind::Instance | Kind::InstanceArray) {
+            return Err(Failure::operation("filter functions not supported for this geometry"));
+        }
+        self.set_functions(set);
+        Ok(())
+    }
+
+    /// Sets functions, which have the scene made again, but need no commit of the geometry.
+    pub fn set_functions(&self, set: impl FnOnce(&mut Functions)) {
+        let mut state = self.state();
+        set(&mut state.functions);
+        state.version += 1;
+    }
+
+    /// For what only some kinds have.
+    pub fn demand(&self, is_so: bool) -> Result<()> {
+        if is_so { Ok(()) } else { Err(Failure::operation("operation not supported for this geometry")) }
+    }
+
+    pub fn set_scenes(&self, scenes: Vec<Arc<Scene>>) -> Result<()> {
+        self.demand(matches!(self.kind, Kind::Instance | Kind::InstanceArray))?;
+        self.modify(|state| {
+            state.scenes = scenes;
+            Ok(())
+        })
+    }
+
+    pub fn set_transform(&self, step: u32, transform: Transform) -> Result<()> {
+        self.demand(self.kind == Kind::Instance)?;
+        self.modify(|state| {
+            let slot = state.transforms.get_mut(step as usize);
+            *slot.ok_or_else(|| Failure::operation("invalid timestep"))? = transform;
+            Ok(())
+        })
+    }
+
+    /// The transform of one instance at a time.
+    pub fn transform_at(&self, primitive: u32, time: f32) -> Result<twincast::math::Affine3> {
+        self.demand(matches!(self.kind, Kind::Instance | Kind::InstanceArray))?;
+        let motion = Motion::of(self.kind, &self.state(), primitive as usize)?;
+        Ok(motion.at(time))
+    }
+}
+
+impl State {
+    /// Time steps, at least 1.
+    pub fn steps(&self) -> usize {
+        self.vertices.len()
+    }
+}

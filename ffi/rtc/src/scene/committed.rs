@@ -1,0 +1,144 @@
+//! A committed scene: what rays are traced in. It never changes.
+
+use std::sync::{Arc, OnceLock};
+
+use twincast::math::{Aabb, DAffine3};
+use twincast::trace::bvh::{BoxTree, Bvh};
+
+use crate::abi::RTCBounds;
+use crate::geometry::{Functions, Geometry, Linear, Motion, Surface};
+
+use super::Scene;
+use super::near::Near;
+
+/// A geometry, as it was when the scene was committed.
+pub struct Record {
+    pub geometry: Arc<Geometry>,
+    pub mask: u32,
+    pub functions: Functions,
+    pub body: Body,
+}
+
+/// What can be hit.
+pub enum Body {
+    Surface(Surface),
+    Linear(Linear),
+    User(UserGeometry),
+    Instances(Vec<Instance>),
+}
+
+/// A scene in its place.
+pub struct Instance {
+    pub scene: Arc<Scene>,
+    pub motion: Motion,
+    /// From the world to the scene, for what stands still.
+    to_scene: Option<DAffine3>,
+}
+
+impl Instance {
+    pub fn new(scene: Arc<Scene>, motion: Motion) -> Self {
+        let to_scene = motion.is_still().then(|| motion.at(0.0).as_daffine3().inverse());
+        Self { scene, motion, to_scene }
+    }
+
+    /// From the world to the scene at a time; not finite where the transform is singular.
+    pub fn to_scene(&self, time: f32) -> DAffine3 {
+        self.to_scene.unwrap_or_else(|| self.motion.at(time).as_daffine3().inverse())
+    }
+}
+
+/// User geometry: boxes of each primitive at each step.
+pub struct UserGeometry {
+    pub boxes: Vec<Vec<Aabb>>,
+    pub range: (f32, f32),
+}
+
+impl UserGeometry {
+    /// Whether it is there at a time at all.
+    pub fn is_at(&self, time: f32) -> bool {
+        self.boxes.len() == 1 || (self.range.0..=self.range.1).contains(&time)
+    }
+}
+
+/// What is in a box of the second tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Item {
+    pub geometry: u32,
+    /// A primitive; of a surface, a triangle.
+    pub primitive: u32,
+}
+
+/// What a query has to look at besides distances.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Heeded {
+    /// The mask of all geometries, if they have the same.
+    pub mask: Option<u32>,
+    pub intersect_filter: bool,
+    pub occluded_filter: bool,
+    /// Whether filters that come with a query are run, of all geometries or of some.
+    pub argument_filter: bool,
+}
+
+/// A committed scene.
+pub struct Committed {
+    /// By geometry id; none where nothing is attached or enabled.
+    pub records: Vec<Option<Record>>,
+    /// Triangles that stand still; none where there are none.
+    pub solid: Option<Bvh>,
+    /// Whether each triangle there is a primitive.
+    pub is_plain: bool,
+    /// Everything else; none where there is nothing.
+    pub others: Option<BoxTree>,
+    /// What its boxes are.
+    pub items: Vec<Item>,
+    pub heeded: Heeded,
+    /// At time 0 and at time 1.
+    pub bounds: [Aabb; 2],
+    /// Boxes of all primitives, made when the first point query asks for them.
+    pub near: OnceLock<Near>,
+    /// Memory that was accounted for.
+    pub bytes: usize,
+}
+
+impl Committed {
+    /// A scene in which nothing is hit.
+    pub const EMPTY: Self = Self {
+        records: Vec::new(),
+        solid: None,
+        is_plain: true,
+        others: None,
+        items: Vec::new(),
+        heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false, argument_filter: false },
+        bounds: [Aabb::EMPTY; 2],
+        near: OnceLock::new(),
+        bytes: 0,
+    };
+
+    /// The record of a geometry that was hit.
+    #[inline(always)]
+    pub fn record(&self, geometry: u32) -> Option<&Record> {
+        self.records.get(geometry as usize)?.as_ref()
+    }
+
+    /// Boxes for point queries.
+    pub fn near(&self) -> &Near {
+        self.near.get_or_init(|| Near::new(self))
+    }
+}
+
+/// A box as the interface has it.
+pub fn to_abi(bounds: &Aabb) -> RTCBounds {
+    RTCBounds { lower: bounds.min.to_array(), align0: 0.0, upper: bounds.max.to_array(), align1: 0.0 }
+}
+
+impl Committed {
+    /// The box around everything at all times.
+    pub fn whole(&self) -> RTCBounds {
+        to_abi(&self.bounds[0].union(self.bounds[1]))
+    }
+
+    /// The boxes at both ends of time.
+    pub fn linear(&self) -> [RTCBounds; 2] {
+        [to_abi(&self.bounds[0]), to_abi(&self.bounds[1])]
+    }
+}

@@ -1,0 +1,216 @@
+//! One ray: the triangles, then everything else.
+
+use twincast::math::{DVec3, Vec3};
+use twincast::trace::bvh::{Bvh, Search, TriangleFound};
+use twincast::{Ray, TriangleMethod};
+
+use super::offer::Target;
+use super::{Query, round, user};
+use crate::abi::{INVALID_ID, RTCRay};
+use crate::geometry::{Named, normal};
+use crate::scene::{Body, Committed, Instance, Item, Record};
+
+/// The ray as the native tracer knows it.
+#[inline(always)]
+pub fn native(ray: &RTCRay) -> Ray {
+    Ray {
+        origin: Vec3::from(ray.org),
+        direction: Vec3::from(ray.dir),
+        tmin: ray.tnear.max(0.0),
+        tmax: ray.tfar,
+        time: ray.time,
+    }
+}
+
+/// What a ray with a mask can meet of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    Nothing,
+    /// Everything, and no filter is run.
+    Everything,
+    /// What masks and filters let pass.
+    Some,
+}
+
+/// What a ray with this mask meets.
+#[inline(always)]
+pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sight {
+    let heeded = &committed.heeded;
+    let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
+    match heeded.mask {
+        Some(own) if own & mask == 0 => Sight::Nothing,
+        Some(_) if !has_filter && !(heeded.argument_filter && query.filter.is_some()) => Sight::Everything,
+        _ => Sight::Some,
+    }
+}
+
+/// The nearest hit, or any, of the target's ray; `ANY` as the target was made.
+#[inline(always)]
+pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
+    let ray = target.ray();
+    match sight(committed, query, ray.mask, ANY) {
+        Sight::Nothing => return,
+        Sight::Everything => {
+            if let Some(solid) = &committed.solid {
+                cast_solid::<ANY>(committed, solid, query, target, &native(&ray));
+            }
+        }
+        Sight::Some => {
+            if let Some(solid) = &committed.solid {
+                show_solid(committed, solid, query, target, &ray);
+            }
+        }
+    }
+    if committed.others.is_some() && !(ANY && target.tfar() < 0.0) {
+        cast_others::<ANY>(committed, query, target);
+    }
+}
+
+/// The same, not inlined: for callbacks and instances.
+#[inline(never)]
+pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
+    if any { cast_one::<true>(committed, query, target) } else { cast_one::<false>(committed, query, target) }
+}
+
+/// Among the triangles, of which each counts.
+#[inline(always)]
+fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query, target: &Target, ray: &Ray) {
+    if ANY {
+        if solid.occludes(ray) {
+            let named = Named { primitive: 0, u: 0.0, v: 0.0, ng: Vec3::ZERO };
+            target.take(query, 0, 0.0, &named);
+        }
+    } else if let Some(found) = solid.closest_triangle(ray) {
+        if let Some((geometry, named)) = name_solid(committed, &found) {
+            target.take(query, geometry, found.hit.t, &named);
+        }
+    }
+}
+
+/// A hit with a triangle in terms of its geometry, whose id comes first.
+#[inline(always)]
+pub fn name_solid(committed: &Committed, found: &TriangleFound) -> Option<(u32, Named)> {
+    let hit = &found.hit;
+    if committed.is_plain {
+        let ng = normal(found.corners);
+        return Some((hit.geometry, Named { primitive: hit.primitive, u: hit.u, v: hit.v, ng }));
+    }
+    let Some(Record { body: Body::Surface(surface), .. }) = committed.record(hit.geometry) else { return None };
+    Some((hit.geometry, surface.name(hit.primitive, hit.u, hit.v, found.corners)))
+}
+
+/// Among the triangles, each of which has to pass.
+fn show_solid(committed: &Committed, solid: &Bvh, query: &Query, target: &Target, ray: &RTCRay) {
+    solid.visit_triangles(&native(ray), &mut |found| {
+        let hit = &found.hit;
+        if let Some(record) = committed.record(hit.geometry)
+            && record.mask & ray.mask != 0
+            && hit.t <= target.tfar()
+            && let Body::Surface(surface) = &record.body
+        {
+            let named = surface.name(hit.primitive, hit.u, hit.v, found.corners);
+            target.offer(query, record, hit.geometry, hit.t, &named);
+        }
+        onwards(target)
+    });
+}
+
+/// How far the search still goes.
+fn onwards(target: &Target) -> Search {
+    let tfar = target.tfar();
+    // Below 0 for a ray that has found what it wanted, or that a callback has ended.
+    if tfar < 0.0 { Search::Break(()) } else { Search::Continue(tfar.next_up()) }
+}
+
+/// Among everything that is not a triangle that stands still.
+#[inline(never)]
+fn cast_others<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
+    let Some(others) = &committed.others else { return };
+    let ray = target.ray();
+    others.visit(&native(&ray), &mut |i| {
+        let Item { geometry, primitive } = committed.items[i as usize];
+        if let Some(record) = committed.record(geometry)
+            && record.mask & ray.mask != 0
+        {
+            cast_item::<ANY>(query, target, record, Item { geometry, primitive }, &ray);
+        }
+        onwards(target)
+    });
+}
+
+fn cast_item<const ANY: bool>(query: &Query, target: &Target, record: &Record, item: Item, ray: &RTCRay) {
+    let Item { geometry, primitive } = item;
+    match &record.body {
+        Body::Surface(surface) => {
+            if surface.is_at(ray.time) {
+                let corners = surface.corners_at(primitive as usize, ray.time);
+                let native = Ray { tmax: target.tfar(), ..native(ray) };
+                if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
+                    let named = surface.name(primitive, hit.u as f32, hit.v as f32, corners);
+                    target.offer(query, record, geometry, hit.t as f32, &named);
+                }
+            }
+        }
+        Body::Linear(linear) => {
+            if linear.is_at(ray.time) {
+                round::offer(linear, primitive, &native(ray), &mut |t, named| {
+                    if (ray.tnear..=target.tfar()).contains(&t) {
+                        target.offer(query, record, geometry, t, named);
+                    }
+                });
+            }
+        }
+        Body::User(user) => {
+            if user.is_at(ray.time) {
+                user::cast::<ANY>(query, target, record, item);
+            }
+        }
+        Body::Instances(instances) => {
+            if let Some(instance) = instances.get(primitive as usize) {
+                enter(query, target, instance, item, ray, ANY);
+            }
+        }
+    }
+}
+
+/// Takes the ray through an instance: one level deep, as both Debians' Embree is built.
+fn enter(query: &Query, target: &Target, instance: &Instance, item: Item, ray: &RTCRay, any: bool) {
+    // SAFETY: the context is the caller's, which lives as long as the query and is this thread's, or our own.
+    let is_inside = unsafe { (*query.context).instance } != INVALID_ID;
+    if is_inside || !instance.motion.is_at(ray.time) {
+        return;
+    }
+    // SAFETY: scenes are not committed while rays are traced: the interface's rule.
+    let Some(committed) = (unsafe { instance.scene.committed() }) else { return };
+    let to_scene = instance.to_scene(ray.time);
+    let [org, dir] = [ray.org, ray.dir].map(|v| DVec3::from(v.map(f64::from)));
+    let (org, dir) = (to_scene.transform_point3(org).as_vec3(), to_scene.transform_vector3(dir).as_vec3());
+    within(query, item.geometry, item.primitive, || {
+        target.set_place(org.to_array(), dir.to_array());
+        cast(committed, query, target, any);
+        target.set_place(ray.org, ray.dir);
+    });
+}
+
+/// Runs `work` with the context naming an instance.
+pub fn within(query: &Query, instance: u32, _primitive: u32, work: impl FnOnce()) {
+    // SAFETY: as in `enter`; no reference is kept while `work` runs, which may give the context to callbacks.
+    let before = unsafe { query.context.read() };
+    // SAFETY: as above.
+    unsafe {
+        (*query.context).instance = instance;
+        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+        {
+            (*query.context).instance_primitive = _primitive;
+        }
+    }
+    work();
+    // SAFETY: as above.
+    unsafe {
+        (*query.context).instance = before.instance;
+        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+        {
+            (*query.context).instance_primitive = before.instance_primitive;
+        }
+    }
+}

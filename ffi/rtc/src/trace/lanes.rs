@@ -1,0 +1,108 @@
+//! Rays as the caller lays them out: word by word, so many rays side by side.
+
+use std::mem::{size_of, transmute};
+
+use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay};
+
+/// Rays of the caller's, by number.
+pub trait Lanes {
+    /// Where word `word` of ray `lane` is: those of the ray, then those of its hit.
+    fn word(&self, word: usize, lane: usize) -> *mut u32;
+
+    /// A ray.
+    #[inline(always)]
+    fn ray(&self, lane: usize) -> RTCRay {
+        let mut words = [0u32; RAY_WORDS];
+        for (k, word) in words.iter_mut().enumerate() {
+            // SAFETY: who made the lanes promised that all words of all rays can be read.
+            *word = unsafe { self.word(k, lane).read() };
+        }
+        // SAFETY: both are that many words, of which each may be anything.
+        unsafe { transmute::<[u32; RAY_WORDS], RTCRay>(words) }
+    }
+
+    /// Writes where a ray ends.
+    #[inline(always)]
+    fn set_tfar(&self, lane: usize, tfar: f32) {
+        // SAFETY: who made the lanes promised that it can be written.
+        unsafe { self.word(TFAR, lane).write(tfar.to_bits()) };
+    }
+
+    /// Writes a hit.
+    #[inline(always)]
+    fn set_hit(&self, lane: usize, hit: &RTCHit) {
+        // SAFETY: a hit begins with that many words.
+        let words = unsafe { (&raw const *hit).cast::<[u32; HIT_WORDS]>().read() };
+        for (k, word) in words.into_iter().enumerate() {
+            // SAFETY: who made the lanes promised that all words of all hits can be written.
+            unsafe { self.word(RAY_WORDS + k, lane).write(word) };
+        }
+    }
+
+    /// A hit as it is.
+    #[inline(always)]
+    fn hit(&self, lane: usize) -> RTCHit {
+        let mut hit = RTCHit::NONE;
+        let words = (&raw mut hit).cast::<u32>();
+        for k in 0..HIT_WORDS {
+            // SAFETY: a hit begins with that many words; who made the lanes promised that they can be read.
+            unsafe { words.add(k).write(self.word(RAY_WORDS + k, lane).read()) };
+        }
+        hit
+    }
+}
+
+const TFAR: usize = 8;
+
+const _: () = {
+    assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);
+    assert!(std::mem::offset_of!(RTCRay, tfar) == 4 * TFAR);
+};
+
+/// A packet: all first words, all second words and so on.
+#[derive(Clone, Copy)]
+pub struct Packed {
+    base: *mut u32,
+    width: usize,
+}
+
+impl Packed {
+    /// # Safety
+    /// From `base` on there are `width` rays, with their hits where these are asked for; they are this thread's as long as the lanes are used.
+    pub unsafe fn new(base: *mut u32, width: usize) -> Self {
+        Self { base, width }
+    }
+}
+
+impl Lanes for Packed {
+    #[inline(always)]
+    fn word(&self, word: usize, lane: usize) -> *mut u32 {
+        self.base.wrapping_add(word * self.width + lane)
+    }
+}
+
+/// An array for each word.
+#[cfg(feature = "v3")]
+#[derive(Clone, Copy)]
+pub struct Pointers {
+    words: *const *mut u32,
+}
+
+#[cfg(feature = "v3")]
+impl Pointers {
+    /// # Safety
+    /// `words` are pointers to arrays of the words of rays, then of hits where these are asked for, each as long as there are rays; they are this
+    /// thread's as long as the lanes are used.
+    pub unsafe fn new(words: *const *mut u32) -> Self {
+        Self { words }
+    }
+}
+
+#[cfg(feature = "v3")]
+impl Lanes for Pointers {
+    #[inline(always)]
+    fn word(&self, word: usize, lane: usize) -> *mut u32 {
+        // SAFETY: who made the lanes promised that there are so many pointers.
+        unsafe { self.words.add(word).read() }.wrapping_add(lane)
+    }
+}

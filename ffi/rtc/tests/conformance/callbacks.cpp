@@ -1,0 +1,254 @@
+// Filters, user geometry and point queries: what callbacks are given, and what becomes of what they say.
+#include "check.h"
+
+#include <set>
+
+static std::vector<float> seen;
+static std::multiset<unsigned> seen_ids;
+
+// Notes each hit and lets none pass.
+static void collect(const RTCFilterFunctionNArguments* a) {
+  if (a->N != 1 || a->valid[0] != -1) return;
+  seen.push_back(RTCRayN_tfar(a->ray, 1, 0));
+  seen_ids.insert(RTCHitN_geomID(a->hit, 1, 0));
+  a->valid[0] = 0;
+}
+// Lets hits with u below a half pass.
+static void lower_half(const RTCFilterFunctionNArguments* a) {
+  for (unsigned i = 0; i < a->N; i++)
+    if (a->valid[i] == -1 && RTCHitN_u(a->hit, a->N, i) >= 0.5f) a->valid[i] = 0;
+}
+static void user_data(const RTCFilterFunctionNArguments* a) {
+  if (a->N == 1 && *(int*)a->geometryUserPtr == 1) a->valid[0] = 0;
+}
+
+static void filters() {
+  World w;
+  const int n = 5;
+  for (int i = 0; i < n; i++) {
+    RTCGeometry g = w.floor(i);
+    rtcSetGeometryIntersectFilterFunction(g, collect);
+    rtcSetGeometryOccludedFilterFunction(g, collect);
+    w.add(g);
+  }
+  rtcCommitScene(w.scene);
+  for (int any = 0; any < 2; any++) {
+    seen.clear(), seen_ids.clear();
+    RTCRayHit r = make_ray({0.25f, 0.25f, 10}, {0, 0, -1}, 8.5f);
+    if (any) CHECK(!occluded(w.scene, r.ray));
+    else intersect(w.scene, r);
+    CHECK(!is_hit(r) && r.ray.tfar == 8.5f);
+    std::multiset<float> expected{6, 7, 8}, got(seen.begin(), seen.end());
+    CHECK(got == expected && seen_ids == (std::multiset<unsigned>{2, 3, 4}));
+  }
+}
+
+static void half() {
+  World w;
+  for (int i = 0; i < 2; i++) {
+    RTCGeometry g = w.floor(i);
+    if (i == 1) rtcSetGeometryIntersectFilterFunction(g, lower_half), rtcSetGeometryOccludedFilterFunction(g, lower_half);
+    w.add(g);
+  }
+  rtcCommitScene(w.scene);
+  CHECK(shoot(w.scene, {0.2f, 0.2f, 5}, {0, 0, -1}).hit.geomID == 1);
+  CHECK(shoot(w.scene, {0.7f, 0.2f, 5}, {0, 0, -1}).hit.geomID == 0);
+}
+
+static void per_geometry_data() {
+  World w;
+  static int data[3] = {0, 1, 1};
+  for (int i = 0; i < 3; i++) {
+    RTCGeometry g = w.floor(i);
+    rtcSetGeometryUserData(g, &data[i]);
+    rtcSetGeometryIntersectFilterFunction(g, user_data);
+    rtcSetGeometryOccludedFilterFunction(g, user_data);
+    w.add(g);
+  }
+  rtcCommitScene(w.scene);
+  CHECK(shoot(w.scene, {0.2f, 0.2f, 5}, {0, 0, -1}).hit.geomID == 0);
+}
+
+// The filter that comes with the query.
+static void of_query() {
+  World w(1 << 3);
+  for (int i = 0; i < 3; i++) w.add(w.floor(i));
+  rtcCommitScene(w.scene);
+  Query query;
+  query.filter(collect);
+  seen.clear(), seen_ids.clear();
+  RTCRayHit r = make_ray({0.2f, 0.2f, 5}, {0, 0, -1});
+  intersect(w.scene, r, &query);
+  CHECK(!is_hit(r) && seen.size() == 3);
+  RTCRayHit o = make_ray({0.2f, 0.2f, 5}, {0, 0, -1});
+  CHECK(!occluded(w.scene, o.ray, &query) && seen.size() == 6);
+  CHECK(is_hit(shoot(w.scene, {0.2f, 0.2f, 5}, {0, 0, -1})));
+}
+
+// Spheres of radius 1 at (3 primID, 0, 0).
+static void sphere_bounds(const RTCBoundsFunctionArguments* a) {
+  const float x = 3.f * a->primID;
+  a->bounds_o->lower_x = x - 1, a->bounds_o->lower_y = a->bounds_o->lower_z = -1;
+  a->bounds_o->upper_x = x + 1, a->bounds_o->upper_y = a->bounds_o->upper_z = 1;
+}
+template <class Ray> static bool sphere(const Ray& r, unsigned prim, float roots[2]) {
+  const Vec o{r.org_x - 3.f * prim, r.org_y, r.org_z}, d{r.dir_x, r.dir_y, r.dir_z};
+  const float a = dot(d, d), b = dot(o, d), c = dot(o, o) - 1, q = b * b - a * c;
+  if (q < 0) return false;
+  roots[0] = (-b - std::sqrt(q)) / a, roots[1] = (-b + std::sqrt(q)) / a;
+  return true;
+}
+static void sphere_intersect(const RTCIntersectFunctionNArguments* a) {
+  if (a->N != 1 || !a->valid[0]) return;
+  auto* r = (RTCRayHit*)a->rayhit;
+  float roots[2];
+  if (!sphere(r->ray, a->primID, roots)) return;
+  for (float t : roots) {
+    if (t < r->ray.tnear || t > r->ray.tfar) continue;
+    RTCHit hit;
+    std::memset(&hit, 0, sizeof hit);
+    hit.primID = a->primID, hit.geomID = a->geomID, hit.instID[0] = a->context->instID[0];
+    hit.u = t;
+    const float before = r->ray.tfar;
+    int valid = -1;
+    r->ray.tfar = t;
+    RTCFilterFunctionNArguments f;
+    f.valid = &valid, f.geometryUserPtr = a->geometryUserPtr, f.context = a->context;
+    f.ray = (RTCRayN*)&r->ray, f.hit = (RTCHitN*)&hit, f.N = 1;
+#ifdef EMBREE4
+    rtcInvokeIntersectFilterFromGeometry(a, &f);
+#else
+    rtcFilterIntersection(a, &f);
+#endif
+    if (valid) r->hit = hit;
+    else r->ray.tfar = before;
+  }
+}
+static void sphere_occluded(const RTCOccludedFunctionNArguments* a) {
+  if (a->N != 1 || !a->valid[0]) return;
+  auto* r = (RTCRay*)a->ray;
+  float roots[2];
+  if (!sphere(*r, a->primID, roots)) return;
+  for (float t : roots)
+    if (t >= r->tnear && t <= r->tfar) {
+      r->tfar = -INFINITY;
+      return;
+    }
+}
+
+static void user_geometry() {
+  World w;
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 4);
+  rtcSetGeometryBoundsFunction(g, sphere_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(g, sphere_intersect);
+  rtcSetGeometryOccludedFunction(g, sphere_occluded);
+  rtcSetGeometryMask(g, ~0u);
+  rtcRetainGeometry(g);
+  unsigned id = w.add(g);
+  w.add(w.floor(-3));
+  rtcCommitScene(w.scene);
+  for (unsigned i = 0; i < 4; i++) {
+    RTCRayHit r = shoot(w.scene, {3.f * i, 0.25f, 5}, {0, 0, -2});
+    CHECK(r.hit.geomID == id && r.hit.primID == i && near(r.ray.tfar, (5 - std::sqrt(1 - 0.0625f)) / 2));
+  }
+  CHECK(!is_hit(shoot(w.scene, {1.5f, 0, 5}, {0, 0, -1})));
+  CHECK(shoot(w.scene, {0.2f, 0.2f, -2}, {0, 0, -1}).hit.geomID == 1);
+  // Along all of them: the first from either side.
+  CHECK(shoot(w.scene, {-5, 0, 0}, {1, 0, 0}).hit.primID == 0 && shoot(w.scene, {20, 0, 0}, {-1, 0, 0}).hit.primID == 3);
+  // Through the filter that the callback calls.
+  rtcSetGeometryIntersectFilterFunction(g, collect);
+  rtcCommitGeometry(g);
+  rtcCommitScene(w.scene);
+  seen.clear();
+  RTCRayHit r = make_ray({-5, 0, 0}, {1, 0, 0});
+  intersect(w.scene, r);
+  CHECK(!is_hit(r) && seen.size() == 8);
+  rtcReleaseGeometry(g);
+}
+
+struct Nearest {
+  std::set<std::pair<unsigned, unsigned>> asked;
+  unsigned best = ~0u;
+};
+static bool nearer(RTCPointQueryFunctionArguments* a) {
+  auto* n = (Nearest*)a->userPtr;
+  n->asked.insert({a->geomID, a->primID});
+  // Each triangle stands at the height of its geometry's id, in its own space; the point is above its inside.
+  const float d = std::fabs(a->query->z - float(a->geomID)) * a->similarityScale;
+  if (d >= a->query->radius) return false;
+  a->query->radius = d;
+  n->best = a->geomID;
+  return true;
+}
+
+static void points() {
+  World w;
+  for (int i = 0; i < 10; i++) w.add(w.floor(i));
+  rtcCommitScene(w.scene);
+  for (float z : {-2.f, 0.2f, 3.4f, 8.9f, 40.f}) {
+    Nearest n;
+    RTCPointQuery q;
+    q.x = q.y = 0.1f, q.z = z, q.time = 0, q.radius = INFINITY;
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    CHECK(rtcPointQuery(w.scene, &q, &context, nearer, &n));
+    const float expected = std::fmin(9, std::fmax(0, std::round(z)));
+    CHECK(n.best == unsigned(expected) && near(q.radius, std::fabs(z - expected)));
+    q.radius = 0.05f;
+    n.asked.clear();
+    if (std::fabs(z - expected) > 0.05f) CHECK(!rtcPointQuery(w.scene, &q, &context, nearer, &n));
+  }
+}
+
+#ifdef EMBREE4
+// User geometry that sends rays on into another scene, 10 to the right.
+static RTCScene beyond;
+static RTCRay moved(const RTCRay& r) {
+  RTCRay m = r;
+  m.org_x -= 10;
+  return m;
+}
+static void forward() {
+  World w;
+  beyond = rtcNewScene(w.device);
+  w.add(w.floor(3), beyond);
+  rtcCommitScene(beyond);
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 1);
+  rtcSetGeometryBoundsFunction(
+      g,
+      [](const RTCBoundsFunctionArguments* a) {
+        auto* b = a->bounds_o;
+        b->lower_x = 10, b->lower_y = 0, b->lower_z = 2, b->upper_x = 11, b->upper_y = 1, b->upper_z = 4;
+      },
+      nullptr);
+  rtcSetGeometryIntersectFunction(g, [](const RTCIntersectFunctionNArguments* a) {
+    RTCRay m = moved(((RTCRayHit*)a->rayhit)->ray);
+    rtcForwardIntersect1(a, beyond, &m, 77);
+  });
+  rtcSetGeometryOccludedFunction(g, [](const RTCOccludedFunctionNArguments* a) {
+    RTCRay m = moved(*(RTCRay*)a->ray);
+    rtcForwardOccluded1(a, beyond, &m, 77);
+  });
+  rtcSetGeometryMask(g, ~0u);
+  w.add(g);
+  rtcCommitScene(w.scene);
+  RTCRayHit r = shoot(w.scene, {10.25f, 0.25f, 9}, {0, 0, -1});
+  CHECK(r.hit.instID[0] == 77 && r.hit.geomID == 0 && near(r.ray.tfar, 6) && near(r.hit.u, 0.25f));
+  CHECK(r.ray.org_x == 10.25f && !is_hit(shoot(w.scene, {10.8f, 0.8f, 9}, {0, 0, -1})));
+  rtcReleaseScene(beyond);
+}
+#endif
+
+void callbacks() {
+#ifdef EMBREE4
+  forward();
+#endif
+  filters();
+  half();
+  per_geometry_data();
+  of_query();
+  user_geometry();
+  points();
+}

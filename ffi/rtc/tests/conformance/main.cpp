@@ -1,0 +1,27 @@
+// Tests of the C interface: they pass on Embree, and on the library that stands in for it.
+#include "check.h"
+
+int checks, failures;
+
+void surfaces();
+void changes();
+void callbacks();
+void rounds();
+void errors();
+void packets();
+
+int main() {
+  const struct {
+    const char* name;
+    void (*run)();
+  } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
+                {"rounds", rounds},     {"errors", errors},   {"packets", packets}};
+  int all = 0;
+  for (const auto& group : groups) {
+    checks = failures = 0;
+    group.run();
+    std::printf("%-10s %6d checks, %d failed\n", group.name, checks, failures);
+    all += failures;
+  }
+  return all > 0;
+}

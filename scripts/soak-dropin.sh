@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# A million scenes, one after the other, on our library: memory must stay flat. And the tests of the C interface under valgrind.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+g++ -O2 -std=c++17 ffi/rtc/tests/soak.cpp -o target/dropin/soak -lembree3
+export LD_LIBRARY_PATH=$PWD/target/dropin
+target/dropin/soak "${CYCLES:-1000000}"
+valgrind --quiet --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite --error-exitcode=9 target/dropin/conformance3

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Compiles the tests of the C interface (ffi/rtc/tests/conformance) and runs them on Embree and on our library: they must pass on both.
+#
+#   scripts/test-dropin.sh [3|4] [FOLDER]     which version (default 3), and where our library is (default target/dropin)
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+version=${1:-3}
+folder=$(realpath "${2:-target/dropin}")
+program=target/dropin/conformance$version
+define=()
+[[ $version == 3 ]] || define=(-DEMBREE4)
+g++ -O1 -g -std=c++17 -Wall "${define[@]}" ffi/rtc/tests/conformance/*.cpp -o "$program" "-lembree$version" -lpthread
+
+echo "on Embree:"
+"$program"
+echo "on $folder:"
+LD_LIBRARY_PATH=$folder "$program"

@@ -1,0 +1,140 @@
+//! Rays one at a time, and boxes of the caller's, against brute force.
+
+use std::collections::BTreeSet;
+
+use twincast::math::{Aabb, Vec3};
+use twincast::scene::{Geometry, Material, Mesh, Scene};
+use twincast::trace::brute::Brute;
+use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search};
+use twincast::{Ray, Tracer, TriangleMethod, World};
+
+use super::{Triangle, grid_sphere, triangles};
+use crate::scenes::Random;
+
+/// Two spheres of triangles, one in the other, and rays from everywhere, also through their corners.
+fn world_and_rays() -> (World, Vec<Ray>) {
+    let sphere = grid_sphere(9, 1);
+    let larger: Vec<Vec3> = sphere.positions.iter().map(|&p| p * 2.0).collect();
+    let larger = Mesh::new(larger, sphere.triangles.to_vec());
+    let mut random = Random::new(5);
+    let mut rays = Vec::new();
+    for i in 0..3000 {
+        let origin = random.vec3() * 3.0;
+        let target = match i % 3 {
+            0 => larger.positions[i % larger.positions.len()],
+            1 => sphere.positions[i % sphere.positions.len()],
+            _ => random.vec3(),
+        };
+        rays.push(Ray::new(origin, target - origin));
+    }
+    rays.push(Ray::new(Vec3::NAN, Vec3::X));
+    let geometries = vec![Geometry::Mesh(sphere), Geometry::Mesh(larger)];
+    let scene = Scene::from_geometries(geometries, vec![Material::default()]);
+    (World::new(&scene).expect("a world"), rays)
+}
+
+#[test]
+fn single_rays_meet_what_brute_force_meets_with_its_corners() {
+    let (world, rays) = world_and_rays();
+    let brute = Brute::new(&world);
+    let all = triangles(&world);
+    for preset in Preset::ALL {
+        let bvh = Bvh::build_with(&world, preset.into());
+        let mut together = vec![None; rays.len()];
+        bvh.closest_triangles(&rays, &mut together);
+        for (i, (ray, among)) in rays.iter().zip(together).enumerate() {
+            let found = bvh.closest_triangle(ray);
+            assert_eq!(found.map(|found| found.hit), brute.closest(ray));
+            assert_eq!(found, among);
+            assert_eq!(bvh.occludes(ray), found.is_some());
+            if let Some(found) = found
+                && i % 50 == 0
+            {
+                let triangle = all.iter().find(|triangle| triangle.id == found.hit.id());
+                assert_eq!(Some(found.corners), triangle.map(|triangle| triangle.corners));
+            }
+        }
+    }
+}
+
+#[test]
+fn visitors_see_every_hit_up_to_where_they_look() {
+    let (world, rays) = world_and_rays();
+    let all = triangles(&world);
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
+        for ray in rays.iter().step_by(7) {
+            let mut seen = BTreeSet::new();
+            bvh.visit_triangles(ray, &mut |found| {
+                seen.insert(found.hit.id());
+                Search::Continue(ray.tmax)
+            });
+            let is_hit = |triangle: &&Triangle| TriangleMethod::Exact.intersect(ray, triangle.corners).is_some();
+            let expected: BTreeSet<_> = all.iter().filter(is_hit).map(|triangle| triangle.id).collect();
+            assert_eq!(seen, expected);
+            let mut first = 0;
+            bvh.visit_triangles(ray, &mut |_| {
+                first += 1;
+                Search::Break(())
+            });
+            assert_eq!(first, usize::from(!expected.is_empty()));
+        }
+    }
+}
+
+#[test]
+fn boxes_on_the_way_and_near_a_point_are_named() {
+    let mut random = Random::new(3);
+    let mut boxes: Vec<Aabb> = Vec::new();
+    for _ in 0..500 {
+        let min = random.vec3() * 10.0;
+        boxes.push(Aabb { min, max: min + random.vec3().abs() });
+    }
+    boxes.push(Aabb::EMPTY);
+    boxes.push(Aabb { min: Vec3::NAN, max: Vec3::ONE });
+    let tree = BoxTree::build(&boxes, Options::default());
+    for _ in 0..300 {
+        // To the middle of a box: it is on the way, exactly or not.
+        let target = &boxes[random.below(500)];
+        let origin = random.vec3() * 12.0;
+        let ray = Ray::new(origin, (target.min + target.max) * 0.5 - origin);
+        let mut named = BTreeSet::new();
+        tree.visit(&ray, &mut |i| {
+            named.insert(i);
+            Search::Continue(f32::INFINITY)
+        });
+        for (i, bounds) in boxes[..500].iter().enumerate() {
+            // In f64, and by a margin that rounding does not reach.
+            if pierces(&ray, bounds, 1e-4) {
+                assert!(named.contains(&(i as u32)), "box {i}");
+            }
+            if named.contains(&(i as u32)) {
+                assert!(pierces(&ray, bounds, -1e-4), "box {i}");
+            }
+        }
+        let radius = 2.0;
+        let mut near = BTreeSet::new();
+        tree.visit_near(origin, radius, &mut |i| {
+            near.insert(i);
+            Search::Continue(radius)
+        });
+        let is_near =
+            |bounds: &Aabb| origin.clamp(bounds.min, bounds.max).as_dvec3().distance(origin.as_dvec3()) <= 2.0;
+        let expected: BTreeSet<_> = (0..500u32).filter(|&i| is_near(&boxes[i as usize])).collect();
+        assert_eq!(near, expected);
+    }
+}
+
+/// Whether a ray passes through a box that is smaller by `margin` on each side (larger, if that is negative).
+fn pierces(ray: &Ray, bounds: &Aabb, margin: f64) -> bool {
+    let (mut near, mut far) = (0.0f64, f64::INFINITY);
+    for axis in 0..3 {
+        let (origin, direction) = (f64::from(ray.origin[axis]), f64::from(ray.direction[axis]));
+        let a = (f64::from(bounds.min[axis]) + margin - origin) / direction;
+        let b = (f64::from(bounds.max[axis]) - margin - origin) / direction;
+        let is_turned = direction < 0.0;
+        near = near.max(if is_turned { b } else { a });
+        far = far.min(if is_turned { a } else { b });
+    }
+    near <= far
+}
