@@ -53,6 +53,13 @@ impl Bvh {
         WORKSPACE.set(Some(workspace));
     }
 
+    /// With room for a flight, that of the thread.
+    pub(super) fn with_flight(&self, fly: impl FnOnce(&mut Flight)) {
+        let mut workspace = WORKSPACE.take().unwrap_or_else(Workspace::new);
+        fly(&mut workspace.flight);
+        WORKSPACE.set(Some(workspace));
+    }
+
     /// Shapes of placed objects, for one ray.
     #[inline(always)]
     fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {

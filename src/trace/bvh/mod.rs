@@ -18,7 +18,9 @@
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
+//! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
+//! | `near` | the triangles that may be nearest to a point, eight boxes at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
@@ -38,6 +40,8 @@ mod block;
 mod build;
 mod bundle;
 mod cache;
+mod candidates;
+mod certain;
 mod closest_point;
 mod clusters;
 mod edges;
@@ -50,6 +54,7 @@ mod leaves;
 mod level;
 mod meshes;
 mod moving;
+mod near;
 mod node;
 mod noted;
 mod place;
@@ -67,6 +72,10 @@ mod steps;
 mod tile;
 mod triangles;
 mod walk;
+
+pub(super) use certain::{Certain, Wanted};
+pub(super) use near::Waiting;
+pub(super) use place::Blur;
 
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;

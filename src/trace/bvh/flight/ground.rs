@@ -5,7 +5,8 @@
 use super::traveller::Space;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::leaves::Blocks;
+use crate::trace::bvh::filter::{Candidates, Filter};
+use crate::trace::bvh::leaves::{Blocks, Leaves};
 use crate::trace::bvh::node::{Child, Node, Tree};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::triangles::TriangleTree;
@@ -13,6 +14,8 @@ use crate::trace::bvh::triangles::TriangleTree;
 /// What rays travel through.
 pub(super) trait Ground {
     const HAS_PLACEMENTS: bool;
+    /// The triangles of a block that a ray may hit.
+    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates;
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
     fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
@@ -31,6 +34,42 @@ pub(super) struct Plain<'a, L: ?Sized> {
 impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
     const HAS_PLACEMENTS: bool = false;
 
+    #[inline(always)]
+    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
+        // The bounds of a ray in the world cost less, and are tighter.
+        filter.candidates::<S, false>(block, limit)
+    }
+    #[inline(always)]
+    fn node(&self, _: Space, child: Child) -> &Node {
+        self.tree.node(child)
+    }
+    #[inline(always)]
+    fn block<'a>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.leaves.block(index, scratch)
+    }
+    #[inline(always)]
+    fn node_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
+        S::address(self.tree.nodes(), next.node())
+    }
+    #[inline(always)]
+    fn leaf_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
+        self.leaves.address::<S>(next.first())
+    }
+}
+
+/// The triangles of the world, rounded from others; and rays likewise.
+pub(super) struct Rounded<'a> {
+    pub tree: &'a Tree,
+    pub leaves: &'a Leaves,
+}
+
+impl Ground for Rounded<'_> {
+    const HAS_PLACEMENTS: bool = false;
+
+    #[inline(always)]
+    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
+        filter.rounded_candidates::<S>(block, limit)
+    }
     #[inline(always)]
     fn node(&self, _: Space, child: Child) -> &Node {
         self.tree.node(child)
@@ -88,6 +127,10 @@ impl<'a> Region<'a> {
 impl Ground for Placed<'_> {
     const HAS_PLACEMENTS: bool = true;
 
+    #[inline(always)]
+    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
+        filter.candidates::<S, true>(block, limit)
+    }
     #[inline(always)]
     fn node(&self, space: Space, child: Child) -> &Node {
         &self.0[space.0 as usize].nodes[child.node() as usize]

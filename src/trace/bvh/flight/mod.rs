@@ -20,10 +20,11 @@ mod waiting;
 use super::Bvh;
 use super::found::Found;
 use super::leaves::Leaves;
+use super::place::Blur;
 use super::query::Query;
 use super::simd::Simd;
 use crate::ray::Ray;
-use ground::{Ground, Placed, Plain};
+use ground::{Ground, Placed, Plain, Rounded};
 use std::hint::select_unpredictable;
 use traveller::{Step, Traveller};
 use waiting::{List, Waiting};
@@ -51,11 +52,29 @@ pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[R
     let fixed = &bvh.fixed.triangles;
     let tree = fixed.tree();
     if bvh.placements.has_triangles() {
-        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, done);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, Blur::NONE, done);
     }
     match fixed.leaves() {
-        Leaves::Blocks(blocks) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, done),
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves }, rays, done),
+        Leaves::Blocks(blocks) => {
+            run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, Blur::NONE, done);
+        }
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves }, rays, Blur::NONE, done),
+    }
+}
+
+/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant.
+#[inline(always)]
+pub(super) fn trace_rounded<S: Simd, Q: Query>(
+    flight: &mut Flight,
+    bvh: &Bvh,
+    rays: &[Ray],
+    blur: Blur,
+    done: impl FnMut(usize, &Found),
+) {
+    let fixed = &bvh.fixed.triangles;
+    if !fixed.tree().is_empty() {
+        let ground = Rounded { tree: fixed.tree(), leaves: fixed.leaves() };
+        run::<S, Q, _>(flight, bvh, &ground, rays, blur, done);
     }
 }
 
@@ -73,6 +92,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     bvh: &Bvh,
     ground: &G,
     rays: &[Ray],
+    blur: Blur,
     mut done: impl FnMut(usize, &Found),
 ) {
     let fixed = bvh.fixed.triangles.tree();
@@ -81,7 +101,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     if G::HAS_PLACEMENTS {
         bounds = bounds.union(bvh.placements.tree().bounds());
     }
-    let mut waiting = Waiting::new(rays, bounds.min.abs().max(bounds.max.abs()));
+    let mut waiting = Waiting::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
     let mut lists = [List::EMPTY; Step::COUNT];
     for k in 0..RAYS {
         let Some(ray) = waiting.next::<S>() else { break };
