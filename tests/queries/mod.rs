@@ -2,6 +2,7 @@
 
 mod all_hits;
 mod closest_point;
+mod precise;
 
 use twincast::World;
 use twincast::lab::exact::{Ring, Vector, dot, vector};

@@ -7,7 +7,7 @@
 //! | `pool` | the threads that queries run on, without the interpreter's lock |
 //! | `scene` | meshes, and what can be asked of them |
 //! | `crossings` | all hits of many rays, as flat arrays |
-//! | `points` | what can be asked of points |
+//! | `points`, `curve` | what can be asked of points, and in which order it is done |
 //! | `render` | pictures |
 //!
 //! There is no unsafe code here: a panic becomes a Python exception in PyO3's wrappers, so it never crosses the boundary. An array
@@ -16,6 +16,7 @@
 
 mod arrays;
 mod crossings;
+mod curve;
 mod points;
 mod pool;
 mod render;

@@ -2,16 +2,12 @@
 
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
-use rayon::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::{NearestPoint, PreciseRay};
 
 use crate::arrays::Points;
-use crate::pool;
 use crate::scene::{INVALID, Scene, table};
-
-/// Points that a thread takes at a time.
-const CHUNK: usize = 256;
+use crate::{curve, pool};
 
 /// The nearest points: where they are, primitive, geometry, (u, v), unit normal, distance.
 type Nearest<'py> = (
@@ -42,12 +38,7 @@ impl Scene {
         let rows = points.rows("points")?;
         let count = rows.len();
         let found: Vec<Option<NearestPoint>> = pool::run(py, threads, || {
-            let mut found = vec![None; count];
-            found.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, found)| {
-                let list: Vec<DVec3> = (0..found.len()).map(|i| rows.at(chunk * CHUNK + i)).collect();
-                self.precise.nearest_point_batch(&list, found);
-            });
-            found
+            curve::along(&rows, None, |points, found| self.precise.nearest_point_batch(points, found))
         })?;
         let id = |id: fn(&NearestPoint) -> u32| -> Vec<u32> {
             found.iter().map(|found| found.as_ref().map_or(INVALID, id)).collect()
@@ -79,13 +70,11 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rows = points.rows("points")?;
         let distances = pool::run(py, threads, || {
-            let mut distances = vec![f64::NAN; rows.len()];
-            distances.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, distances)| {
-                let list: Vec<DVec3> = (0..distances.len()).map(|i| rows.at(chunk * CHUNK + i)).collect();
-                let (mut found, mut inside) = ([None; CHUNK], [false; CHUNK]);
-                self.precise.nearest_point_batch(&list, &mut found[..list.len()]);
+            curve::along(&rows, f64::NAN, |points, distances| {
+                let (mut found, mut inside) = (vec![None; points.len()], vec![false; points.len()]);
+                self.precise.nearest_point_batch(points, &mut found);
                 if samples > 0 {
-                    self.are_inside(&list, samples, false, &mut inside[..list.len()]);
+                    self.are_inside(points, samples, false, &mut inside);
                 }
                 for (distance, (found, inside)) in distances.iter_mut().zip(found.iter().zip(inside)) {
                     if let Some(found) = found {
@@ -93,8 +82,7 @@ impl Scene {
                         *distance = if inside { -magnitude } else { magnitude };
                     }
                 }
-            });
-            distances
+            })
         })?;
         Ok(distances.into_pyarray(py))
     }
@@ -112,12 +100,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rows = points.rows("points")?;
         let inside = pool::run(py, threads, || {
-            let mut inside = vec![false; rows.len()];
-            inside.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, inside)| {
-                let list: Vec<DVec3> = (0..inside.len()).map(|i| rows.at(chunk * CHUNK + i)).collect();
-                self.are_inside(&list, samples, both_ways, inside);
-            });
-            inside
+            curve::along(&rows, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
         })?;
         Ok(inside.into_pyarray(py))
     }

@@ -151,9 +151,8 @@ impl Scene {
                     t[i] = hit.t;
                     uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
                     (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
-                    let n = self.normal(hit.geometry, hit.primitive, normalize);
-                    normal[3 * i..3 * i + 3].copy_from_slice(&n.as_vec3().to_array());
                 });
+                self.normals_of(primitive, geometry, normalize, normal);
             });
             (t, uv, primitive, geometry, normal)
         })?;
@@ -219,6 +218,27 @@ impl Scene {
         let [a, b, c] = self.precise.corners(geometry, primitive);
         let normal = (b - a).cross(c - a);
         if normalize { normal.normalize_or_zero() } else { normal }
+    }
+
+    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, so that the
+    /// processor fetches the indices of many triangles together, and then their corners.
+    fn normals_of(&self, primitive: &[u32], geometry: &[u32], normalize: bool, normals: &mut [f32]) {
+        let meshes = self.precise.meshes();
+        let mut corners = [[0; 3]; CHUNK];
+        for (corners, (&primitive, &geometry)) in corners.iter_mut().zip(primitive.iter().zip(geometry)) {
+            if primitive != INVALID {
+                *corners = meshes[geometry as usize].triangles[primitive as usize];
+            }
+        }
+        for ((normal, corners), &geometry) in normals.chunks_exact_mut(3).zip(corners).zip(geometry) {
+            if geometry != INVALID {
+                let positions = &meshes[geometry as usize].positions;
+                let [a, b, c] = corners.map(|i| positions[i as usize]);
+                let n = (b - a).cross(c - a);
+                let n = if normalize { n.normalize_or_zero() } else { n };
+                normal.copy_from_slice(&n.as_vec3().to_array());
+            }
+        }
     }
 
     /// Calls `take` with the hits of the rays from `first` on, numbered from 0. Rays and meshes in f32 need no more.

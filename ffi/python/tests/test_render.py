@@ -105,8 +105,14 @@ def test_the_command_line():
     assert version.returncode == 0 and twincast.__version__ in version.stdout and "native" in version.stdout
     assert run("render").returncode == 2
     assert run("render", "no-such.glb", "-o", "x.png").returncode == 3
-    script = subprocess.run([str(Path(sys.executable).parent / "twincast"), "--version"], capture_output=True, text=True, check=False)
-    assert script.stdout == version.stdout
+
+
+def test_the_console_script():
+    script = Path(sys.executable).parent / "twincast"
+    if not script.exists():
+        pytest.skip("the package is not installed, only on the path")
+    done = subprocess.run([str(script), "--version"], capture_output=True, text=True, check=True)
+    assert twincast.__version__ in done.stdout
 
 
 def test_warnings_of_a_file_are_pythons(tmp_path):

@@ -18,8 +18,9 @@ use super::node::{Child, Node, WIDTH};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 
-/// What is done with a triangle, its geometry and its primitive; says beyond which distance none is wanted any more.
-pub(in crate::trace) type Measure<'a> = &'a mut dyn FnMut(u32, u32) -> f64;
+/// What is done with a triangle: its geometry, its primitive, and its corners in the tree. Says beyond which distance none is wanted
+/// any more.
+pub(in crate::trace) type Measure<'a> = &'a mut dyn FnMut(u32, u32, &[Vec3; 3]) -> f64;
 
 /// Every level of the tree leaves at most seven siblings waiting.
 const STACK: usize = (MAX_DEPTH * (WIDTH - 1) + 1).next_power_of_two();
@@ -38,17 +39,18 @@ impl Waiting {
 }
 
 impl Bvh {
-    /// Offers every fixed triangle that may be the nearest to `point`, or as near. The point and the corners may be off by `error` in
-    /// each component, both together.
+    /// Offers every fixed triangle that may be the nearest to `point`, or as near, and no farther than `wanted`. The point and the
+    /// corners may be off by `error` in each component, both together.
     pub(in crate::trace) fn near_triangles(
         &self,
         point: Vec3,
         error: f32,
+        wanted: f64,
         waiting: &mut Waiting,
         measure: Measure<'_>,
     ) {
         if point.is_finite() && !self.fixed.triangles.tree().is_empty() {
-            isa::dispatch(self.isa, Near { bvh: self, point, error, waiting, measure });
+            isa::dispatch(self.isa, Near { bvh: self, point, error, wanted, waiting, measure });
         }
     }
 }
@@ -57,6 +59,7 @@ struct Near<'a> {
     bvh: &'a Bvh,
     point: Vec3,
     error: f32,
+    wanted: f64,
     waiting: &'a mut Waiting,
     measure: Measure<'a>,
 }
@@ -66,12 +69,14 @@ impl Kernel for Near<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, point, error, waiting, measure } = self;
+        let Self { bvh, point, error, wanted, waiting, measure } = self;
         let triangles = &bvh.fixed.triangles;
         let tree = triangles.tree();
         let span = (point.abs() + tree.reach()).max_element();
         let boxes = Boxes { point, pad: error + 4.0 * UNIT_ROUNDOFF * span };
-        let mut limit = f32::INFINITY;
+        // For the rounding of what was measured.
+        let rounded_up = |wanted: f64| (wanted as f32) * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * error + f32::MIN_POSITIVE;
+        let mut limit = rounded_up(wanted);
         let mut len = 1;
         (waiting.children[0], waiting.near[0]) = (Child::ROOT, 0);
         while len > 0 {
@@ -100,11 +105,9 @@ impl Kernel for Near<'_> {
                     let lane = lower.nearest(open);
                     open &= !(1 << lane);
                     let part = triangles.part(block.part[lane]);
-                    let wanted = measure(part.geometry, block.primitive[lane]);
-                    // For the rounding of what was measured.
-                    let wanted = (wanted as f32) * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * error + f32::MIN_POSITIVE;
-                    if wanted < limit {
-                        limit = wanted;
+                    let wanted = measure(part.geometry, block.primitive[lane], &block.triangle(lane));
+                    if rounded_up(wanted) < limit {
+                        limit = rounded_up(wanted);
                         open &= lower.within(limit);
                     }
                 }
@@ -140,33 +143,25 @@ impl Boxes {
 }
 
 /// Of each triangle of a block what its distance is no less than.
-struct Lower {
+struct Lower<V> {
     /// The squared distance, roughly: what comes first.
     square: [f32; LANES],
-    /// By how much the distance may be less, over 1.
-    error: [f32; LANES],
-    /// The least distance from the plane times the normal, and the normal squared; 0 where the plane has no say.
-    height: [f32; LANES],
-    normal: [f32; LANES],
-    /// A bit for each where the plane counts instead of the edges.
-    above: u32,
+    /// By how much the distance may be less.
+    error: V,
+    /// A triangle is out of reach where this,
+    bound: V,
+    /// is more than the squared reach times this: 1 for an edge, for a plane the squared normal.
+    weight: V,
 }
 
-impl Lower {
+impl<V: Vector> Lower<V> {
     /// A bit for each lane whose triangle may be within `limit`.
     #[inline(always)]
     fn within(&self, limit: f32) -> u32 {
-        let mut mask = 0;
-        for lane in 0..LANES {
-            let reach = limit + self.error[lane];
-            let far = if self.above >> lane & 1 != 0 {
-                self.height[lane] * self.height[lane] > reach * reach * self.normal[lane] * (1.0 + 1e-5)
-            } else {
-                self.square[lane] > reach * reach * (1.0 + 1e-5)
-            };
-            mask |= u32::from(!far) << lane;
-        }
-        mask
+        let reach = V::splat(limit).add(self.error);
+        let most = reach.mul(reach).mul(self.weight).mul(V::splat(1.0 + 1e-5));
+        // Written so that NaN is within.
+        !most.less(self.bound).bits()
     }
 
     /// The nearest of some lanes.
@@ -213,7 +208,7 @@ fn segment<V: Vector>(a: V3<V>, edge: V3<V>) -> V {
 }
 
 #[inline(always)]
-fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower {
+fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower<S::V8> {
     let zero = S::V8::splat(0.0);
     let p = [S::V8::splat(point.x), S::V8::splat(point.y), S::V8::splat(point.z)];
     let [xs, ys, zs] = &block.corners;
@@ -248,9 +243,8 @@ fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower {
     let size = normal_error.mul(area).mul(S::V8::splat(4.0)).add(square);
     Lower {
         square: S::V8::select(above, plane.min(edges), edges).to_array(),
-        error: off.to_array(),
-        height: least.to_array(),
-        normal: size.to_array(),
-        above: above.bits(),
+        error: off,
+        bound: S::V8::select(above, least.mul(least), edges),
+        weight: S::V8::select(above, size, S::V8::splat(1.0)),
     }
 }

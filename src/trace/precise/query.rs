@@ -1,11 +1,11 @@
 //! What rays ask of meshes in f64: the nearest hit, any hit, all hits.
 //!
-//! Each batch goes through flights first, which name what is hit for sure; t, u and v come from the corners in f64. Then those that are
-//! in doubt go one by one.
+//! Each batch goes through flights first, which name what is hit for sure; t, u and v come from the corners in f64, in a step of its own
+//! ([`Sure`]). Then those that are in doubt go one by one.
 
 use super::frame::LocalRay;
 use super::{Precise, PreciseHit, PreciseRay};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 use crate::shape::crossing::crossing_line;
 use crate::shape::triangle::intersect_line;
@@ -26,17 +26,22 @@ impl Precise {
     /// Unless there is one answer a ray.
     pub fn closest_batch(&self, rays: &[PreciseRay], hits: &mut [Option<PreciseHit>]) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        let mut sure = Sure::default();
         for (rays, hits) in rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)) {
             hits.fill(None);
             let mut open = Vec::new();
+            sure.clear();
             self.certain(Wanted::First, rays, |i, certain| match certain {
                 Certain::Hits([]) => {}
-                Certain::Hits([id, ..]) => match self.hit(&rays[i], *id) {
-                    Some(hit) => hits[i] = Some(hit),
-                    None => open.push(i),
-                },
+                Certain::Hits([id, ..]) => sure.push(i, *id),
                 Certain::Doubt => open.push(i),
             });
+            for (i, hit) in sure.hits(self, rays) {
+                match hit {
+                    Some(hit) => hits[i] = Some(hit),
+                    None => open.push(i),
+                }
+            }
             for i in open {
                 hits[i] = self.closest(&rays[i]);
             }
@@ -95,31 +100,33 @@ impl Precise {
     pub fn all_hits_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, hits: &mut Vec<PreciseHit>) {
         ends.clear();
         hits.clear();
-        let mut crossings = Crossings::default();
-        // Of each ray where its hits are among those that came in order of arrival.
+        let (mut crossings, mut sure) = (Crossings::default(), Sure::default());
+        // All hits in order of arrival, and of each ray where its hits are among them.
         let (mut arrived, mut places) = (Vec::new(), Vec::new());
         for rays in rays.chunks(CHUNK) {
-            arrived.clear();
             places.clear();
             places.resize(rays.len(), 0..0);
             let mut open = Vec::new();
+            sure.clear();
             self.certain(Wanted::All, rays, |i, certain| match certain {
-                Certain::Hits([]) => {}
                 Certain::Hits(ids) => {
-                    let first = arrived.len();
-                    arrived.extend(ids.iter().filter_map(|&id| self.hit(&rays[i], id)));
-                    arrived[first..].sort_unstable_by(PreciseHit::order);
-                    places[i] = first..arrived.len();
+                    let first = sure.len();
+                    ids.iter().for_each(|&id| sure.push(i, id));
+                    places[i] = first..sure.len();
                 }
                 Certain::Doubt => open.push(i),
             });
+            arrived.clear();
+            arrived.extend(sure.hits(self, rays).map(|(_, hit)| hit));
             for i in open {
                 let first = arrived.len();
-                arrived.extend_from_slice(self.all(&rays[i], &mut crossings));
+                arrived.extend(self.all(&rays[i], &mut crossings).iter().copied().map(Some));
                 places[i] = first..arrived.len();
             }
             for place in &places {
-                hits.extend_from_slice(&arrived[place.clone()]);
+                let first = hits.len();
+                hits.extend(arrived[place.clone()].iter().flatten());
+                hits[first..].sort_unstable_by(PreciseHit::order);
                 ends.push(hits.len());
             }
         }
@@ -160,9 +167,7 @@ impl Precise {
 
     #[inline]
     fn hit_of(&self, ray: &PreciseRay, geometry: u32, primitive: u32) -> Option<PreciseHit> {
-        let hit = intersect_line(ray.origin, ray.direction, &self.corners(geometry, primitive))?;
-        let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance: 0 };
-        ray.has(hit.t).then_some(hit)
+        hit_of(ray, &self.corners(geometry, primitive), geometry, primitive)
     }
 
     /// The nearest hit, every candidate decided.
@@ -209,6 +214,59 @@ impl Precise {
         }
         crossings.finish()
     }
+}
+
+/// Triangles that rays of a chunk hit for sure.
+///
+/// Corners are looked up for all of them at once, one step of the way at a time: the processor then waits for many cache lines together,
+/// where ray by ray it would wait for each.
+#[derive(Default)]
+struct Sure {
+    /// Ray, and block and lane.
+    found: Vec<(u32, u32)>,
+    names: Vec<(u32, u32)>,
+    corners: Vec<[u32; 3]>,
+}
+
+impl Sure {
+    fn clear(&mut self) {
+        self.found.clear();
+    }
+
+    fn len(&self) -> usize {
+        self.found.len()
+    }
+
+    fn push(&mut self, ray: usize, id: u32) {
+        self.found.push((ray as u32, id));
+    }
+
+    /// Of each the ray and the hit, in their order; none where that is out of range.
+    fn hits<'a>(
+        &'a mut self,
+        precise: &'a Precise,
+        rays: &'a [PreciseRay],
+    ) -> impl Iterator<Item = (usize, Option<PreciseHit>)> + 'a {
+        let Self { found, names, corners } = self;
+        names.clear();
+        names.extend(found.iter().map(|&(_, id)| precise.bvh.triangle(id)));
+        corners.clear();
+        corners.extend(names.iter().map(|&(mesh, i)| precise.meshes[mesh as usize].triangles[i as usize]));
+        let named = names.iter().zip(&*corners);
+        found.iter().zip(named).map(|(&(ray, _), (&(geometry, primitive), corners))| {
+            let ray = ray as usize;
+            let positions = &precise.meshes[geometry as usize].positions;
+            let corners = corners.map(|i| positions[i as usize]);
+            (ray, hit_of(&rays[ray], &corners, geometry, primitive))
+        })
+    }
+}
+
+#[inline]
+fn hit_of(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32) -> Option<PreciseHit> {
+    let hit = intersect_line(ray.origin, ray.direction, corners)?;
+    let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance: 0 };
+    ray.has(hit.t).then_some(hit)
 }
 
 /// Whether its range is all there is ahead.

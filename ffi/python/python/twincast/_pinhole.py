@@ -18,11 +18,11 @@ def rays_looking_at(
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
     center, eye, up = (_vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
     ahead = center - eye
-    right = np.cross(ahead, up)
-    if not np.linalg.norm(right) > 0:
+    # Open3D's camera has x to the left and y up, so that its pictures are turned by half a turn; who is used to that turns them back.
+    left = np.cross(up, ahead)
+    if not np.linalg.norm(left) > 0:
         raise ValueError("center, eye and up: they must be finite, and not lie on one line")
-    down = np.cross(ahead, right)
-    axes = np.array([axis / np.linalg.norm(axis) for axis in (right, down, ahead)])
+    axes = np.array([axis / np.linalg.norm(axis) for axis in (left, np.cross(ahead, left), ahead)])
     extrinsic = np.eye(4)
     extrinsic[:3, :3] = axes
     extrinsic[:3, 3] = -axes @ eye

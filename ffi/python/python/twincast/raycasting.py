@@ -237,9 +237,10 @@ class RaycastingScene:
 
     @staticmethod
     def create_rays_pinhole(*args: Any, **kwargs: Any) -> Result:
-        """The rays of a pinhole camera: (height_px, width_px, 6) float32, rows from the top.
+        """The rays of a pinhole camera: (height_px, width_px, 6) float32.
 
-        Directions reach to depth 1: ``t_hit`` is the depth along the view.
+        Directions reach to depth 1: ``t_hit`` is the depth along the view. With ``fov_deg`` the picture is Open3D's: turned by half a
+        turn, the first row at the bottom and seen from the right; ``rays[::-1, ::-1]`` is upright.
 
         Parameters
         ----------
@@ -251,7 +252,7 @@ class RaycastingScene:
         intrinsic_matrix : (3, 3) float
             Or, instead of the first four: the upper triangular matrix from camera coordinates to pixels,
         extrinsic_matrix : (4, 4) float
-            and that from the world to the camera, whose x is to the right, y down and z ahead.
+            and that from the world to the camera, which looks along its z.
         """
         from ._pinhole import rays_from_matrices, rays_looking_at
 
