@@ -1,21 +1,23 @@
 //! What rays hit for sure, in flights, where triangles and rays are rounded from those that are meant.
 //!
 //! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has bounds for that
-//! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Only the ids of what
-//! is hit are told; the caller computes t in f64. As soon as a ray comes to a triangle that is in doubt it is given up, and the caller
-//! decides it by [`super::candidates`]. To decide each doubt on the way, as flights in f32 do, would bring the corners in f64
-//! into every kernel; a ray in a thousand is in doubt.
+//! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Where it does not, the
+//! caller is asked at once, who has the corners in f64; to give the ray up and walk it again, tried first, took a quarter of the time, for one ray in ten
+//! comes to such a triangle on its way. Only the ids of what is hit are told; the caller computes t.
+//!
+//! What no single triangle can tell is left open, and the caller decides the ray by [`super::candidates`]: which of several hits at nearly
+//! the same t is first, and how often a ray crosses at an edge.
 
 use std::marker::PhantomData;
 
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
-use super::flight;
+use super::flight::{self, Decide};
 use super::found::{Found, NONE};
 use super::isa::{self, Kernel};
 use super::place::Blur;
-use super::query::Query;
+use super::query::{Query, Verdict};
 use super::simd::Simd;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
@@ -47,18 +49,25 @@ impl Bvh {
         wanted: Wanted,
         rays: &[Ray],
         blur: Blur,
+        decide: Decide<'_>,
         done: &mut dyn FnMut(usize, Certain<'_>),
     ) {
         match wanted {
-            Wanted::First => self.run_certain::<First>(rays, blur, done),
-            Wanted::Any => self.run_certain::<Any>(rays, blur, done),
-            Wanted::All => self.run_certain::<All>(rays, blur, done),
+            Wanted::First => self.run_certain::<First>(rays, blur, decide, done),
+            Wanted::Any => self.run_certain::<Any>(rays, blur, decide, done),
+            Wanted::All => self.run_certain::<All>(rays, blur, decide, done),
         }
     }
 
-    fn run_certain<Q: Query>(&self, rays: &[Ray], blur: Blur, done: &mut dyn FnMut(usize, Certain<'_>)) {
+    fn run_certain<Q: Query>(
+        &self,
+        rays: &[Ray],
+        blur: Blur,
+        decide: Decide<'_>,
+        done: &mut dyn FnMut(usize, Certain<'_>),
+    ) {
         self.with_flight(|flight| {
-            isa::dispatch(self.isa, Fly { bvh: self, rays, blur, flight, done, query: PhantomData::<Q> });
+            isa::dispatch(self.isa, Fly { bvh: self, rays, blur, flight, decide, done, query: PhantomData::<Q> });
         });
     }
 
@@ -76,6 +85,7 @@ struct Fly<'a, Q> {
     rays: &'a [Ray],
     blur: Blur,
     flight: &'a mut flight::Flight,
+    decide: Decide<'a>,
     done: &'a mut dyn FnMut(usize, Certain<'_>),
     query: PhantomData<Q>,
 }
@@ -85,12 +95,13 @@ impl<Q: Query> Kernel for Fly<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, rays, blur, flight, done, .. } = self;
+        let Self { bvh, rays, blur, flight, decide, done, .. } = self;
         flight::trace_rounded::<S, Q>(
             flight,
             bvh,
             rays,
             blur,
+            decide,
             #[inline(always)]
             |ray, found| {
                 let (noted, is_noted) = ([found.noted], found.noted != NONE);
@@ -111,16 +122,30 @@ enum Any {}
 /// All hits.
 enum All {}
 
-/// The triangles of `candidates`, and a bit for each that is hit for sure.
+/// Calls `take` with the id of each triangle of `candidates` that is hit, with bounds on its t, or that is in doubt even when
+/// `decide` was asked; until it says that this is enough.
 #[inline(always)]
-fn each(index: u32, candidates: &Candidates, mut take: impl FnMut(u32, bool, [f32; 2]) -> bool) {
+fn each(
+    index: u32,
+    candidates: &Candidates,
+    decide: impl Fn(usize) -> Verdict,
+    mut take: impl FnMut(u32, Option<[f32; 2]>) -> bool,
+) {
     let mut open = candidates.lanes;
     while open != 0 {
         let lane = open.trailing_zeros() as usize % LANES;
         open &= open - 1;
-        let id = LANES as u32 * index + lane as u32;
         let is_sure = candidates.sure >> lane & 1 != 0;
-        if !take(id, is_sure, [candidates.low[lane], candidates.high[lane]]) {
+        let t = if is_sure {
+            Some([candidates.low[lane], candidates.high[lane]])
+        } else {
+            match decide(lane) {
+                Verdict::Miss => continue,
+                Verdict::Hit(t) => Some(t),
+                Verdict::Doubt => None,
+            }
+        };
+        if !take(LANES as u32 * index + lane as u32, t) {
             return;
         }
     }
@@ -141,22 +166,31 @@ macro_rules! query {
                 false
             }
             #[inline(always)]
-            fn take(found: &mut Found, _: &Bvh, _: u32, index: u32, _: &Block, candidates: &Candidates, ray: &Ray) {
-                let take: fn(&mut Found, u32, bool, [f32; 2], &Ray) -> bool = $take;
+            fn take(
+                found: &mut Found,
+                _: &Bvh,
+                _: u32,
+                index: u32,
+                _: &Block,
+                candidates: &Candidates,
+                ray: &Ray,
+                decide: impl Fn(usize) -> Verdict,
+            ) {
+                let take: fn(&mut Found, u32, Option<[f32; 2]>, &Ray) -> bool = $take;
                 each(
                     index,
                     candidates,
+                    decide,
                     #[inline(always)]
-                    |id, is_sure, t| take(found, id, is_sure, t, ray),
+                    |id, t| take(found, id, t, ray),
                 );
             }
         }
     };
 }
 
-query!(First, false, |found, id, is_sure, t, ray| {
-    let is_behind = is_sure && t[0] > found.limit;
-    let is_clear = is_behind || is_sure && found.note(id, t, ray.tmin);
+query!(First, false, |found, id, t, ray| {
+    let is_clear = t.is_some_and(|t| t[0] > found.limit || found.note(id, t, ray.tmin));
     if !is_clear {
         found.sure_hits.doubt();
     }
@@ -164,20 +198,19 @@ query!(First, false, |found, id, is_sure, t, ray| {
 });
 
 // A doubt matters only if nothing else is hit.
-query!(Any, true, |found, id, is_sure, t, ray| {
-    let is_hit = is_sure && found.note(id, t, ray.tmin);
+query!(Any, true, |found, id, t, ray| {
+    let is_hit = t.is_some_and(|t| found.note(id, t, ray.tmin));
     if !is_hit {
         found.sure_hits.doubt();
     }
     !is_hit
 });
 
-query!(All, false, |found, id, is_sure, [low, high], ray| {
-    let is_outside = is_sure && (high < ray.tmin || ray.tmax < low);
-    if is_sure && ray.tmin <= low && high <= ray.tmax {
-        found.sure_hits.push(id);
-    } else if !is_outside {
-        found.sure_hits.doubt();
+query!(All, false, |found, id, t, ray| {
+    match t {
+        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.sure_hits.push(id),
+        Some([low, high]) if high < ray.tmin || ray.tmax < low => {}
+        _ => found.sure_hits.doubt(),
     }
     !found.is_in_doubt()
 });

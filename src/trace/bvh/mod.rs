@@ -76,6 +76,7 @@ mod walk;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use near::Waiting;
 pub(super) use place::Blur;
+pub(super) use query::Verdict;
 
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;

@@ -2,7 +2,7 @@
 //!
 //! Meshes are moved so that their middle is zero, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
 //! then keeps of them what it can, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
-//! 2 u at most, and by what f64 rounds at the distance from zero where they were: by that, c, in sum. The filter wants 3 c more than the
+//! u at most, and by what f64 rounds at the distance from zero where they were: by that, c, in sum. The filter wants 3 c more than the
 //! origin of a ray is off by ([`super::super::bvh`]).
 //!
 //! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
@@ -67,7 +67,7 @@ impl Frame {
         }
         let scale = power_of_two_below(radius.max(SMALLEST)).recip();
         let moving_error = 4.0 * UNIT_ROUNDOFF_64 * (centre.abs().max_element() + radius) * scale;
-        let corner_error = 2.0 * f64::from(UNIT_ROUNDOFF) + moving_error;
+        let corner_error = f64::from(UNIT_ROUNDOFF) + moving_error;
         Self { centre, scale, reach: 2.0, corner_error, moving_error }
     }
 
@@ -104,8 +104,8 @@ impl Frame {
         if self.is_identity() && rays_are_f32 {
             return Blur::NONE;
         }
-        // As a ray that is moved is off by what f64 rounds, no more than u R.
-        let base = 3.0 * self.corner_error + self.moving_error + f64::from(UNIT_ROUNDOFF) * self.reach;
+        // As a ray that is moved is off by what f64 rounds, no more than a quarter of u R.
+        let base = 3.0 * self.corner_error + self.moving_error + 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach;
         Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: ROUNDING }
     }
 
@@ -117,6 +117,13 @@ impl Frame {
         let is_same = is_f32 && f64::from(tmin) == ray.tmin && f64::from(tmax) == ray.tmax;
         let local = Ray { origin, direction, tmin, tmax, time: 0.0 };
         (self.is_identity() && is_same && local.is_valid()).then_some(local)
+    }
+
+    /// Bounds on the local t of a hit.
+    pub fn bounds(&self, ray: &PreciseRay, t: f64) -> Option<[f32; 2]> {
+        let LocalRay { start, stretch, .. } = self.ray(ray)?;
+        let whole = t / stretch;
+        bounds(whole - start, (whole.abs() + start) * T_ROUNDING)
     }
 
     /// The ray, rounded; none for one that hits nothing.
@@ -152,12 +159,25 @@ impl Frame {
             time: 0.0,
         };
         let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
-        let is_common = off <= f64::from(UNIT_ROUNDOFF) * self.reach && local.is_valid();
+        let is_common = off <= 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach && local.is_valid();
         let common = self.blur(false);
         let rounded = ROUNDING * local.origin.abs().max_element();
         let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: ROUNDING };
         Some(LocalRay { ray: local, blur, is_common, start, stretch })
     }
+}
+
+/// f32 below and above a number that may be off by the rounding of t; none where that is not finite.
+pub(super) fn around(t: f64) -> Option<[f32; 2]> {
+    bounds(t, t.abs() * T_ROUNDING)
+}
+
+/// Relative to the numbers that t is computed from.
+const T_ROUNDING: f64 = 1e-11;
+
+fn bounds(t: f64, error: f64) -> Option<[f32; 2]> {
+    let [low, high] = [((t - error) as f32).next_down(), ((t + error) as f32).next_up()];
+    (low.is_finite() && high.is_finite()).then_some([low.max(0.0), high])
 }
 
 impl LocalRay {

@@ -3,13 +3,13 @@
 //! Each batch goes through flights first, which name what is hit for sure; t, u and v come from the corners in f64, in a step of its own
 //! ([`Sure`]). Then those that are in doubt go one by one.
 
-use super::frame::LocalRay;
+use super::frame::{self, LocalRay};
 use super::{Precise, PreciseHit, PreciseRay};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
-use crate::shape::crossing::crossing_line;
+use crate::shape::crossing::{Crossing, crossing_line};
 use crate::shape::triangle::intersect_line;
-use crate::trace::bvh::{Certain, Wanted};
+use crate::trace::bvh::{Certain, Verdict, Wanted};
 use crate::trace::crossings::Crossings;
 
 /// Rays of a batch that are traced together.
@@ -155,7 +155,19 @@ impl Precise {
                 };
             }
         }
-        self.bvh.certain(wanted, local, self.frame.blur(exact), &mut done);
+        let decide = |i: usize, geometry: u32, primitive: u32| {
+            let ray: &PreciseRay = &rays[i];
+            let corners = self.corners(geometry, primitive);
+            match crossing_line(ray.origin, ray.direction, &corners) {
+                Some(Crossing { touch: Some(_), .. }) if wanted == Wanted::All => Verdict::Doubt,
+                Some(Crossing { hit, .. }) if ray.has(hit.t) => {
+                    let bounds = if exact { frame::around(hit.t) } else { self.frame.bounds(ray, hit.t) };
+                    bounds.map_or(Verdict::Doubt, Verdict::Hit)
+                }
+                _ => Verdict::Miss,
+            }
+        };
+        self.bvh.certain(wanted, local, self.frame.blur(exact), &decide, &mut done);
     }
 
     /// The hit with one triangle, which the ray hits for sure; none where that is out of range.

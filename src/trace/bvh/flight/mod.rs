@@ -24,6 +24,7 @@ use super::place::Blur;
 use super::query::Query;
 use super::simd::Simd;
 use crate::ray::Ray;
+pub(in crate::trace) use ground::Decide;
 use ground::{Ground, Placed, Plain, Rounded};
 use std::hint::select_unpredictable;
 use traveller::{Step, Traveller};
@@ -62,18 +63,19 @@ pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[R
     }
 }
 
-/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant.
+/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant; `decide` knows these.
 #[inline(always)]
 pub(super) fn trace_rounded<S: Simd, Q: Query>(
     flight: &mut Flight,
     bvh: &Bvh,
     rays: &[Ray],
     blur: Blur,
+    decide: Decide<'_>,
     done: impl FnMut(usize, &Found),
 ) {
-    let fixed = &bvh.fixed.triangles;
-    if !fixed.tree().is_empty() {
-        let ground = Rounded { tree: fixed.tree(), leaves: fixed.leaves() };
+    let triangles = &bvh.fixed.triangles;
+    if !triangles.tree().is_empty() {
+        let ground = Rounded { triangles, decide };
         run::<S, Q, _>(flight, bvh, &ground, rays, blur, done);
     }
 }

@@ -149,7 +149,18 @@ impl Traveller {
         let candidates = G::candidates::<S>(&filter, block, limit);
         if candidates.lanes != 0 {
             let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
-            Q::take(&mut self.found, bvh, place, index, block, &candidates, &rays[self.ray]);
+            let number = self.ray;
+            Q::take(
+                &mut self.found,
+                bvh,
+                place,
+                index,
+                block,
+                &candidates,
+                &rays[number],
+                #[inline(always)]
+                |lane| ground.decide(number, block, lane),
+            );
             if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.found.is_in_doubt() {
                 (self.next, self.space) = (Child::NONE, Space::UPPER);
                 return;
