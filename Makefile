@@ -61,6 +61,16 @@ install: build ## put binary, man pages and completions under PREFIX (/usr/local
 	$(TWINCAST) completions zsh > '$(DESTDIR)$(PREFIX)/share/zsh/site-functions/_twincast'
 	$(TWINCAST) completions fish > '$(DESTDIR)$(PREFIX)/share/fish/vendor_completions.d/twincast.fish'
 
+.PHONY: wheel test-python bench-python
+wheel: ## the Python package as a wheel for any Linux (manylinux_2_28), in target/wheels
+	@scripts/wheel.sh
+
+test-python: ## build the Python package and run its tests; OPEN3D=1 compares with Open3D as well
+	@scripts/test-python.sh
+
+bench-python: ## the Python package against embreex, trimesh and, where it is installed, Open3D; after test-python
+	@target/python/bin/python ffi/python/bench.py
+
 .PHONY: bench-fair
 bench-fair: build ## whether Twincast gets out of Embree what a plain C++ client does: at least 95 %
 	@scripts/bench-fair.sh

@@ -35,6 +35,7 @@ mod stress;
 mod summary;
 mod trace;
 
+use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
@@ -104,11 +105,24 @@ Exit codes:
 
 /// Runs the program on the process's own arguments.
 pub fn main() -> ExitCode {
-    match Cli::parse().command.run() {
-        Ok(()) => ExitCode::SUCCESS,
+    ExitCode::from(main_with(std::env::args_os()))
+}
+
+/// Runs the program on these arguments, of which the first is its name, and returns its exit code.
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let outcome = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli.command.run(),
+        Err(error) => {
+            // Nobody is left to be told that stderr is closed.
+            let _ = error.print();
+            return error.exit_code() as u8;
+        }
+    };
+    match outcome {
+        Ok(()) => 0,
         Err(error) => {
             complain("error", &error);
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
     }
 }

@@ -11,7 +11,8 @@
 //! that touches an edge or a corner from one side crosses twice (in and out), or not at all. To keep one of the hits whose t
 //! differ by little, the simpler alternative, needs a tolerance, counts a touched silhouette once, and loses thin walls.
 
-use super::triangle::{Corners, TriangleHit, intersect};
+use super::triangle::{Corners, TriangleHit, intersect, intersect_line};
+use crate::math::DVec3;
 use crate::math::expansion::{Expansion, count_decision, cross, dot};
 use crate::ray::Ray;
 
@@ -42,17 +43,28 @@ const NEAR: f64 = 1e-12;
 /// What [`intersect`] answers, with the place.
 pub fn crossing(ray: &Ray, corners: &impl Corners) -> Option<Crossing> {
     let hit = intersect(ray, corners)?;
+    Some(with_place(ray.origin.as_dvec3(), ray.direction.as_dvec3(), corners, hit))
+}
+
+/// What [`intersect_line`] answers, with the place.
+pub fn crossing_line(origin: DVec3, d: DVec3, corners: &impl Corners) -> Option<Crossing> {
+    let hit = intersect_line(origin, d, corners)?;
+    Some(with_place(origin, d, corners, hit))
+}
+
+#[inline]
+fn with_place(origin: DVec3, d: DVec3, corners: &impl Corners, hit: TriangleHit) -> Crossing {
     let may_touch = hit.u == 0.0 || hit.v == 0.0 || (1.0 - hit.u - hit.v).abs() <= NEAR;
-    let touch = if may_touch { touch(ray, corners) } else { None };
-    Some(Crossing { hit, touch })
+    let touch = if may_touch { touch(origin, d, corners) } else { None };
+    Crossing { hit, touch }
 }
 
 #[cold]
 #[inline(never)]
-fn touch(ray: &Ray, corners: &impl Corners) -> Option<Touch> {
+fn touch(origin: DVec3, d: DVec3, corners: &impl Corners) -> Option<Touch> {
     count_decision();
-    let origin = ray.origin.to_array().map(Expansion::from);
-    let d = ray.direction.to_array().map(Expansion::from);
+    let origin = origin.to_array().map(Expansion::from);
+    let d = d.to_array().map(Expansion::from);
     let p = corners.exact().map(|p| [0, 1, 2].map(|i| &p[i] - &origin[i]));
     let mut between = [true; 3];
     let (mut signs, mut sum) = ([0; 3], 0);

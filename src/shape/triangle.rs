@@ -31,6 +31,8 @@ pub struct TriangleHit {
 pub(crate) trait Corners {
     /// Whether `rounded` has an error at all.
     const IS_ROUNDED: bool;
+    /// The relative error of t that is let pass before exact arithmetic is asked.
+    const T_PRECISION: f64 = T_PRECISION;
     /// The corners, each component off by at most `gamma64(8)` times its [`slack`](Corners::slack).
     fn rounded(&self) -> [DVec3; 3];
     /// What the error of `rounded` is relative to; zero where it has none.
@@ -57,6 +59,28 @@ impl Corners for [Vec3; 3] {
     #[inline]
     fn support(&self) -> Support {
         Support::Triangle(*self)
+    }
+}
+
+/// Corners that are not rounded to f32: of a scene in f64.
+impl Corners for [DVec3; 3] {
+    const IS_ROUNDED: bool = false;
+    const T_PRECISION: f64 = 1.0 / (1u64 << 40) as f64;
+    #[inline]
+    fn rounded(&self) -> [DVec3; 3] {
+        *self
+    }
+    #[inline]
+    fn slack(&self) -> [DVec3; 3] {
+        [DVec3::ZERO; 3]
+    }
+    fn exact(&self) -> [[Expansion; 3]; 3] {
+        self.map(|p| p.to_array().map(Expansion::from))
+    }
+    /// Their rays are in f64, too, and t has 40 bits at least.
+    #[inline]
+    fn support(&self) -> Support {
+        Support::Itself
     }
 }
 
@@ -103,7 +127,14 @@ impl Corners for Placed<'_> {
 /// A function of the ray's line and the corners alone: whoever calls it, in whatever order, gets the same bits.
 #[inline]
 pub fn intersect<Co: Corners>(ray: &Ray, corners: &Co) -> Option<TriangleHit> {
-    let (origin, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let hit = intersect_line(ray.origin.as_dvec3(), ray.direction.as_dvec3(), corners)?;
+    let t = hit.t as f32;
+    (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
+}
+
+/// The intersection with the line from `origin` along `d`, at any t. Whether there is one is exact for these f64, too.
+#[inline]
+pub fn intersect_line<Co: Corners>(origin: DVec3, d: DVec3, corners: &Co) -> Option<TriangleHit> {
     let seen = Seen::new(origin, d, corners.rounded());
     let [sa, sb, sc] = corners.slack();
     let difference = |of: DVec3, slack: DVec3| Difference { size: of.abs(), slack };
@@ -130,10 +161,8 @@ pub fn intersect<Co: Corners>(ray: &Ray, corners: &Co) -> Option<TriangleHit> {
     // |t| (relative error of both) against an eighth of f32's precision; false for NaN too.
     let height_error = a.size.dot(normal_error) + a.slack.dot(normal + ROUNDING * normal_error);
     let t_error = ROUNDING * (height_error + absolute.dot(normal_error) * (seen.height / seen.slope).abs());
-    let is_precise = t_error <= seen.height.abs() * T_PRECISION;
-    let hit = if is_precise && !undecided { seen.hit() } else { intersect_exactly(origin, d, corners)? };
-    let t = hit.t as f32;
-    (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
+    let is_precise = t_error <= seen.height.abs() * Co::T_PRECISION;
+    if is_precise && !undecided { Some(seen.hit()) } else { intersect_exactly(origin, d, corners) }
 }
 
 /// The magnitude of a difference of corners, or of a corner and the origin, and of what its error is relative to besides: with

@@ -7,12 +7,14 @@
 pub mod accel;
 pub mod brute;
 pub mod bvh;
+mod crossings;
 #[cfg(feature = "embree")]
 pub mod embree;
 mod leaf;
 mod limits;
 mod motion;
 mod nearest;
+pub mod precise;
 mod unbounded;
 mod world;
 

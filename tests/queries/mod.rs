@@ -3,6 +3,7 @@
 mod all_hits;
 mod alone;
 mod closest_point;
+mod precise;
 
 use twincast::World;
 use twincast::lab::exact::{Ring, Vector, dot, vector};

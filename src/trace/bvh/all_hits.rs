@@ -1,10 +1,7 @@
 //! All hits of a ray, in one traversal.
 //!
-//! Hits in the interior of triangles count as they come. Those on edges and in corners are gathered, and of the triangles of
-//! a part that touch there, in the same place and in the same sense, as many count as the ray crosses when it is moved
-//! aside ([`crate::shape::crossing`]): the lowest ids. The place is the edge or the corner itself, by the positions of
-//! its ends, not the t, which is rounded differently in each triangle; so no tolerance is needed, walls may be arbitrarily
-//! thin, and meshes whose triangles share positions but no indices are served alike.
+//! Every candidate is decided in f64, or exactly, and gathered; which of the triangles that touch at an edge or a corner is
+//! crossed, [`Crossings`] says when all are there.
 
 use super::Bvh;
 use super::block::LANES;
@@ -20,10 +17,10 @@ use super::slab::SlabRay;
 use super::triangles::TriangleTree;
 use super::walk::Stack;
 use super::walk::{self, Visit};
-use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
-use crate::shape::crossing::{self, Crossing, Touch};
+use crate::shape::crossing;
 use crate::shape::triangle::Placed;
+use crate::trace::crossings::Crossings;
 
 impl Bvh {
     /// All hits of `ray` with `tmin <= t <= tmax`, into `hits`, which is cleared first: ordered by t (in f64, before it
@@ -48,74 +45,21 @@ impl Bvh {
     }
 }
 
-/// What was found, with t in f64.
+/// What was found.
 #[derive(Default)]
 struct Gathered {
-    interior: Vec<(f64, Hit)>,
-    /// On edges and in corners of triangles.
-    touching: Vec<Touching>,
+    triangles: Crossings,
+    /// With t in f64.
     shapes: Vec<(f64, Hit)>,
 }
 
-/// A hit on an edge or in a corner.
-struct Touching {
-    t: f64,
-    hit: Hit,
-    /// The bits of the corner's position, twice, or of the positions of the edge's ends, the lower first; in the
-    /// coordinates of the part.
-    place: [[u32; 3]; 2],
-    is_leaving: bool,
-    is_crossed: bool,
-}
-
-impl Touching {
-    /// Equal for those that share a crossing.
-    fn group(&self) -> (u32, u32, [[u32; 3]; 2], bool) {
-        (self.hit.instance, self.hit.geometry, self.place, self.is_leaving)
-    }
-}
-
-/// The ends of an edge, or a corner, as keys.
-fn place(corners: &[Vec3; 3], touch: &Touch) -> [[u32; 3]; 2] {
-    // Adding 0 makes one zero of the two.
-    let key = |k: usize| (corners[k] + Vec3::ZERO).to_array().map(f32::to_bits);
-    let mut ends = (0..3).filter(|&k| touch.between[k]).map(key);
-    let first = ends.next().unwrap_or_default();
-    let second = ends.next().unwrap_or(first);
-    [first.min(second), first.max(second)]
-}
-
 impl Gathered {
-    fn take(&mut self, corners: &[Vec3; 3], crossing: Crossing, (primitive, geometry, instance): (u32, u32, u32)) {
-        let Crossing { hit: found, touch } = crossing;
-        let t = found.t;
-        let hit = Hit { t: t as f32, u: found.u as f32, v: found.v as f32, primitive, geometry, instance };
-        match touch {
-            None => self.interior.push((t, hit)),
-            Some(touch) => {
-                let Touch { is_leaving, is_crossed, .. } = touch;
-                self.touching.push(Touching { t, hit, place: place(corners, &touch), is_leaving, is_crossed });
-            }
-        }
-    }
-
-    /// Of each group of touching triangles as many as are crossed; then all in order.
+    /// All in order.
     fn finish(mut self, hits: &mut Vec<Hit>) {
-        let by_place = |a: &Touching, b: &Touching| (a.group(), a.hit.id()).cmp(&(b.group(), b.hit.id()));
-        self.touching.sort_unstable_by(by_place);
-        // Triangles that were cut come once from each of their boxes.
-        self.touching.dedup_by_key(|touching| touching.hit.id());
-        let mut all = self.interior;
-        for group in self.touching.chunk_by(|a, b| a.group() == b.group()) {
-            let crossings = group.iter().filter(|touching| touching.is_crossed).count();
-            all.extend(group[..crossings].iter().map(|touching| (touching.t, touching.hit)));
-        }
-        let in_order = |a: &(f64, Hit), b: &(f64, Hit)| a.0.total_cmp(&b.0).then(a.1.id().cmp(&b.1.id()));
-        all.sort_unstable_by(in_order);
-        all.dedup_by_key(|(_, hit)| hit.id());
+        let mut all: Vec<(f64, Hit)> = self.triangles.finish().iter().map(|hit| (hit.t, hit.rounded())).collect();
         // After that: a sphere is hit twice under one id.
         all.append(&mut self.shapes);
-        all.sort_by(in_order);
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.id().cmp(&b.1.id())));
         hits.extend(all.iter().map(|(_, hit)| *hit));
     }
 }
@@ -213,7 +157,8 @@ impl TriangleTree {
                     }
                 };
                 if let Some(found) = found {
-                    gathered.take(&corners, found, (block.primitive[lane], part.geometry, instance));
+                    let corners = corners.map(|corner| corner.as_dvec3());
+                    gathered.triangles.take(&corners, found, (block.primitive[lane], part.geometry, instance));
                 }
             }
         }

@@ -53,6 +53,13 @@ impl Bvh {
         WORKSPACE.set(Some(workspace));
     }
 
+    /// With room for a flight, that of the thread.
+    pub(super) fn with_flight(&self, fly: impl FnOnce(&mut Flight)) {
+        let mut workspace = WORKSPACE.take().unwrap_or_else(Workspace::new);
+        fly(&mut workspace.flight);
+        WORKSPACE.set(Some(workspace));
+    }
+
     /// Shapes of placed objects, for one ray.
     #[inline(always)]
     fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
@@ -202,7 +209,7 @@ impl Bvh {
                 if !nearest.is_open() {
                     break;
                 }
-                nearest = self.closest_triangle::<S>(ray, stacks);
+                nearest = self.triangles_again::<S>(ray, stacks);
             }
             *answer = Q::answer(nearest.hit());
         }
@@ -211,7 +218,7 @@ impl Bvh {
     /// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.
     #[cold]
     #[inline(never)]
-    fn closest_triangle<S: Simd>(&self, ray: &Ray, stacks: &mut Stacks) -> Nearest {
+    fn triangles_again<S: Simd>(&self, ray: &Ray, stacks: &mut Stacks) -> Nearest {
         let mut nearest = Nearest::new(ray);
         let Stacks { upper, level: lower } = stacks;
         self.fixed.trace_triangles::<S, Closest>(ray, None, lower, &mut nearest);

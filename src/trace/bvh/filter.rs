@@ -15,6 +15,9 @@
 //! of the direction by r times the largest, r <= 2^-10: the shear is off by (1 + k) r / (1 - r), so that a sheared component errs by 2 b + 2.1 r L
 //! besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
 //! but for their errors; and t |along| by r.
+//!
+//! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
+//! by 2 c. Only the distance from a plane ([`height`]) counts on edges that are exact, and is not asked for such corners.
 
 use super::block::{Block, LANES};
 use super::bundle::axes;
@@ -109,6 +112,17 @@ impl Filter {
     /// The triangles that the ray may hit up to `limit`. If it is not `BLURRED`, it is the ray that is meant.
     #[inline(always)]
     pub fn candidates<S: Simd, const BLURRED: bool>(&self, block: &Block, limit: f32) -> Candidates {
+        self.test::<S, BLURRED, false>(block, limit)
+    }
+
+    /// The same where the blur's origin has room for corners that are rounded, too.
+    #[inline(always)]
+    pub fn rounded_candidates<S: Simd>(&self, block: &Block, limit: f32) -> Candidates {
+        self.test::<S, true, true>(block, limit)
+    }
+
+    #[inline(always)]
+    fn test<S: Simd, const BLURRED: bool, const ROUNDED: bool>(&self, block: &Block, limit: f32) -> Candidates {
         let splat = S::V8::splat;
         let [kx, ky, kz] = self.axes;
         let (cx, cy, cz) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
@@ -156,7 +170,7 @@ impl Filter {
         let mut lanes = passed & !far.less(begin).or(end.less(near)).bits();
         let four = splat(4.0);
         let is_precise = depth_error.mul(four).less(depth);
-        if lanes & !is_precise.bits() != 0 {
+        if !ROUNDED && lanes & !is_precise.bits() != 0 {
             // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
             // That rarely, corners are better loaded again than kept: the black box keeps them from being kept.
             let corners = std::hint::black_box(&block.corners);

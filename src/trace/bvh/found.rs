@@ -31,6 +31,43 @@ pub(super) struct Found {
     nearest: Nearest,
     /// Which triangle it is: block and lane.
     computed: u32,
+    /// For queries that leave doubts to the caller.
+    pub sure_hits: SureHits,
+}
+
+/// All that a ray hits for sure, and whether there is doubt about more.
+#[derive(Clone, Copy)]
+pub(super) struct SureHits {
+    /// Block and lane of each.
+    ids: [u32; Self::MOST],
+    count: usize,
+    is_in_doubt: bool,
+}
+
+impl SureHits {
+    /// As many as are kept; a ray with more is in doubt.
+    const MOST: usize = 24;
+    const NONE: Self = Self { ids: [NONE; Self::MOST], count: 0, is_in_doubt: false };
+
+    #[inline(always)]
+    pub fn push(&mut self, id: u32) {
+        if self.count < Self::MOST {
+            self.ids[self.count] = id;
+            self.count += 1;
+        } else {
+            self.is_in_doubt = true;
+        }
+    }
+
+    #[inline(always)]
+    pub fn ids(&self) -> &[u32] {
+        &self.ids[..self.count.min(Self::MOST)]
+    }
+
+    #[inline(always)]
+    pub fn doubt(&mut self) {
+        self.is_in_doubt = true;
+    }
 }
 
 impl Found {
@@ -43,12 +80,32 @@ impl Found {
         is_computed: false,
         nearest: Nearest::NONE,
         computed: NONE,
+        sure_hits: SureHits::NONE,
     };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up.
     #[inline(always)]
     pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
         (self.sure, self.limit, self.noted, self.is_computed) = (tmax, limit, NONE, false);
+        (self.sure_hits.count, self.sure_hits.is_in_doubt) = (0, false);
+    }
+
+    /// Whether the ray is left to the caller.
+    #[inline(always)]
+    pub fn is_in_doubt(&self) -> bool {
+        self.sure_hits.is_in_doubt
+    }
+
+    /// Notes a triangle that is hit for sure between `low` and `high`, if it is for sure within the range, and nearer than what was
+    /// noted before. Whether it was.
+    #[inline(always)]
+    pub fn note(&mut self, id: u32, [low, high]: [f32; 2], tmin: f32) -> bool {
+        let is_nearest = tmin <= low && high <= self.sure;
+        if is_nearest {
+            self.noted = id;
+            (self.sure, self.limit) = (low, high);
+        }
+        is_nearest
     }
 
     /// Whether a hit is noted, but not computed.

@@ -20,7 +20,9 @@
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `alone` | one ray at a time, with the corners of what it hits; or with a visitor that says what counts |
 //! | `boxes` | a tree over boxes of the caller's |
+//! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
+//! | `near` | the triangles that may be nearest to a point, eight boxes at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
@@ -42,6 +44,8 @@ mod boxes;
 mod build;
 mod bundle;
 mod cache;
+mod candidates;
+mod certain;
 mod closest_point;
 mod clusters;
 mod edges;
@@ -54,6 +58,7 @@ mod leaves;
 mod level;
 mod meshes;
 mod moving;
+mod near;
 mod node;
 mod noted;
 mod place;
@@ -74,6 +79,11 @@ mod walk;
 
 pub use alone::{Search, TriangleFound};
 pub use boxes::BoxTree;
+pub(super) use certain::{Certain, Wanted};
+pub(super) use near::Waiting;
+pub(super) use place::Blur;
+pub(super) use query::Verdict;
+
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;

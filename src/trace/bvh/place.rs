@@ -20,7 +20,7 @@ use crate::trace::Placement;
 
 /// How far a ray may be from the one that is meant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Blur {
+pub(in crate::trace) struct Blur {
     /// In each component of the origin.
     pub origin: f32,
     /// In each component of the direction, relative to the largest of them; at most [`Blur::MOST`].

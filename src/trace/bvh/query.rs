@@ -1,17 +1,51 @@
 //! The two questions a ray asks, as types: kernels are compiled once for each.
 
-use crate::ray::Hit;
+use super::Bvh;
+use super::block::Block;
+use super::filter::Candidates;
+use super::found::Found;
+use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 
 /// A question and its answer.
 pub(super) trait Query {
     /// Whether any hit will do.
     const ANY: bool;
+    /// Whether a ray that is in doubt stops there, and is left to the caller.
+    const DOUBTS: bool = false;
     type Answer: Copy;
     const MISS: Self::Answer;
     fn answer(hit: Option<Hit>) -> Self::Answer;
     /// What is found so far, where a hit of another kind of primitive had the exact `t`; none where no more is wanted.
     fn resume(nearest: &mut Nearest, t: f64, answer: Self::Answer) -> bool;
+    /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided by who asked for the flight.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)] // What a step of a flight has.
+    fn take(
+        found: &mut Found,
+        bvh: &Bvh,
+        place: u32,
+        index: u32,
+        block: &Block,
+        candidates: &Candidates,
+        ray: &Ray,
+        _decide: impl Fn(usize) -> Verdict,
+    ) where
+        Self: Sized,
+    {
+        found.offer::<Self>(bvh, place, index, block, candidates, ray);
+    }
+}
+
+/// Whether a ray hits a triangle, as who asked for the flight says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::trace) enum Verdict {
+    /// It does not, or not within its range.
+    Miss,
+    /// It does, at a t between these.
+    Hit([f32; 2]),
+    /// Not by this triangle alone can it be said.
+    Doubt,
 }
 
 /// The nearest hit.

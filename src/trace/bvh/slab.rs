@@ -184,10 +184,11 @@ const fn axis(number: usize) -> f32 {
     f32::from_bits(number as u32)
 }
 
-/// As [`SlabRay::new`] and [`Filter::new`] for eight rays, with no blur; and a bit for each that
-/// [is valid](Ray::is_valid).
+/// As [`SlabRay::new`] and [`Filter::new`] for eight rays; and a bit for each that [is valid](Ray::is_valid). Origins are off by what
+/// the blur says, and besides, as directions are, by its second part of their largest component: that is [`Blur::NONE`],
+/// or rays were rounded.
 #[inline(always)]
-pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> ([ReadyRay; 8], u32) {
+pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3, blur: Blur) -> ([ReadyRay; 8], u32) {
     let splat = S::V8::splat;
     let zero = splat(0.0);
     let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
@@ -195,7 +196,10 @@ pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> ([ReadyRay; 8], u3
     let largest = dx.abs().max(dy.abs()).max(dz.abs());
     let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
     let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
-    let stray = smallest.div(largest).mul(splat(4.0)).mul(span[0].max(span[1]).max(span[2]));
+    let farthest = x.abs().max(y.abs()).max(z.abs());
+    let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
+    let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * blur.direction));
+    let stray = stray.mul_add(span[0].max(span[1]).max(span[2]), off.mul(splat(1.1)));
     let mut finite = zero;
     let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
     for axis in 0..3 {
@@ -229,7 +233,7 @@ pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3) -> ([ReadyRay; 8], u3
     // Rounded up, for t is rounded before it is held against it.
     let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
     let third = S::transpose([p, q, filter.along, kx, ky, kz, tmax, limit]);
-    let fourth = S::transpose([sides[0], sides[1], sides[2], zero, zero, zero, zero, zero]);
+    let fourth = S::transpose([sides[0], sides[1], sides[2], off, splat(blur.direction), zero, zero, zero]);
     let mut ready = [ReadyRay::NONE; 8];
     for i in 0..8 {
         let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];

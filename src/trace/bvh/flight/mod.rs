@@ -20,10 +20,12 @@ mod waiting;
 use super::Bvh;
 use super::found::Found;
 use super::leaves::Leaves;
+use super::place::Blur;
 use super::query::Query;
 use super::simd::Simd;
 use crate::ray::Ray;
-use ground::{Ground, Placed, Plain};
+pub(in crate::trace) use ground::Decide;
+use ground::{Ground, Placed, Plain, Rounded};
 use std::hint::select_unpredictable;
 use traveller::{Step, Traveller};
 use waiting::{List, Waiting};
@@ -51,11 +53,30 @@ pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[R
     let fixed = &bvh.fixed.triangles;
     let tree = fixed.tree();
     if bvh.placements.has_triangles() {
-        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, done);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, Blur::NONE, done);
     }
     match fixed.leaves() {
-        Leaves::Blocks(blocks) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, done),
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves }, rays, done),
+        Leaves::Blocks(blocks) => {
+            run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, Blur::NONE, done);
+        }
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves }, rays, Blur::NONE, done),
+    }
+}
+
+/// The same among the fixed triangles alone, where they, or the rays, are rounded from those that are meant; `decide` knows these.
+#[inline(always)]
+pub(super) fn trace_rounded<S: Simd, Q: Query>(
+    flight: &mut Flight,
+    bvh: &Bvh,
+    rays: &[Ray],
+    blur: Blur,
+    decide: Decide<'_>,
+    done: impl FnMut(usize, &Found),
+) {
+    let triangles = &bvh.fixed.triangles;
+    if !triangles.tree().is_empty() {
+        let ground = Rounded { triangles, decide };
+        run::<S, Q, _>(flight, bvh, &ground, rays, blur, done);
     }
 }
 
@@ -73,6 +94,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     bvh: &Bvh,
     ground: &G,
     rays: &[Ray],
+    blur: Blur,
     mut done: impl FnMut(usize, &Found),
 ) {
     let fixed = bvh.fixed.triangles.tree();
@@ -81,7 +103,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     if G::HAS_PLACEMENTS {
         bounds = bounds.union(bvh.placements.tree().bounds());
     }
-    let mut waiting = Waiting::new(rays, bounds.min.abs().max(bounds.max.abs()));
+    let mut waiting = Waiting::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
     let mut lists = [List::EMPTY; Step::COUNT];
     for k in 0..RAYS {
         let Some(ray) = waiting.next::<S>() else { break };

@@ -146,16 +146,22 @@ impl Traveller {
         let mut scratch = None;
         let block = ground.block(self.space, index, &mut scratch);
         let filter = self.ready::<G>().filter();
-        // The bounds of a ray in the world cost less, and are tighter.
-        let candidates = if G::HAS_PLACEMENTS {
-            filter.candidates::<S, true>(block, limit)
-        } else {
-            filter.candidates::<S, false>(block, limit)
-        };
+        let candidates = G::candidates::<S>(&filter, block, limit);
         if candidates.lanes != 0 {
             let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
-            self.found.offer::<Q>(bvh, place, index, block, &candidates, &rays[self.ray]);
-            if Q::ANY && self.found.is_hit() {
+            let number = self.ray;
+            Q::take(
+                &mut self.found,
+                bvh,
+                place,
+                index,
+                block,
+                &candidates,
+                &rays[number],
+                #[inline(always)]
+                |lane| ground.decide(number, block, lane),
+            );
+            if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.found.is_in_doubt() {
                 (self.next, self.space) = (Child::NONE, Space::UPPER);
                 return;
             }

@@ -3,6 +3,7 @@
 use super::RAYS;
 use crate::math::Vec3;
 use crate::ray::Ray;
+use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::slab::{self, ReadyRay};
 
@@ -37,14 +38,15 @@ impl List {
 pub(super) struct Waiting<'a> {
     rays: &'a [Ray],
     reach: Vec3,
+    blur: Blur,
     ready: [ReadyRay; 8],
     valid: u32,
     next: usize,
 }
 
 impl<'a> Waiting<'a> {
-    pub fn new(rays: &'a [Ray], reach: Vec3) -> Self {
-        Self { rays, reach, ready: [ReadyRay::NONE; 8], valid: 0, next: 0 }
+    pub fn new(rays: &'a [Ray], reach: Vec3, blur: Blur) -> Self {
+        Self { rays, reach, blur, ready: [ReadyRay::NONE; 8], valid: 0, next: 0 }
     }
 
     /// The number of the next valid ray.
@@ -54,12 +56,12 @@ impl<'a> Waiting<'a> {
             let index = self.next;
             if index.is_multiple_of(8) {
                 match self.rays[index..].first_chunk() {
-                    Some(eight) => (self.ready, self.valid) = slab::ready::<S>(eight, self.reach),
+                    Some(eight) => (self.ready, self.valid) = slab::ready::<S>(eight, self.reach, self.blur),
                     None => {
                         let some = &self.rays[index..];
                         let mut eight = [some[0]; 8];
                         eight[..some.len()].copy_from_slice(some);
-                        (self.ready, self.valid) = slab::ready::<S>(&eight, self.reach);
+                        (self.ready, self.valid) = slab::ready::<S>(&eight, self.reach, self.blur);
                     }
                 }
             }

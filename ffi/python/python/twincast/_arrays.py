@@ -1,0 +1,82 @@
+"""What arguments become before the native part sees them: arrays of f32 or f64, of the right shape, not copied where that can be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def floats(name: str, value: Any, columns: int | None = None) -> np.ndarray:
+    """``value`` as an array of float32 or float64, of shape (..., columns).
+
+    float32 and float64 stay what they are, and stay where they are; other real numbers become float64. Anything that
+    answers ``__dlpack__`` and is on the CPU, or ``__array__``, is an array.
+
+    Raises
+    ------
+    TypeError
+        Where ``value`` is no array of real numbers, with its name.
+    ValueError
+        Where its last dimension is not ``columns``, with its name.
+    """
+    array = _array(name, value)
+    if array.dtype not in (np.float32, np.float64):
+        if array.dtype.kind not in "fiub":
+            raise TypeError(f"{name} must hold real numbers, not {array.dtype}")
+        array = array.astype(np.float64)
+    if columns is not None and (array.ndim == 0 or array.shape[-1] != columns):
+        # An empty list has no columns to count.
+        if array.size == 0 and array.ndim <= 1:
+            return array.reshape(0, columns)
+        raise ValueError(f"{name} must have the shape (..., {columns}), not {array.shape}")
+    # Numbers in the other byte order, and those that are not aligned, are copied.
+    return np.require(array, dtype=array.dtype.newbyteorder("="), requirements="A")
+
+
+def vectors(name: str, value: Any) -> np.ndarray:
+    """``value`` as an (n, 3) array of float32 or float64; raises as :func:`floats` does."""
+    array = floats(name, value, 3)
+    if array.ndim != 2:
+        raise ValueError(f"{name} must have the shape (n, 3), not {array.shape}")
+    return array
+
+
+def indices(name: str, value: Any, columns: int = 3) -> np.ndarray:
+    """``value`` as an (n, columns) array of uint32.
+
+    Raises
+    ------
+    TypeError
+        Where it holds no integers.
+    ValueError
+        Where its shape is another, or a number is below 0 or above 2**32 - 1.
+    """
+    array = _array(name, value)
+    if array.size == 0:
+        return np.zeros((0, columns), dtype=np.uint32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"{name} must hold integers, not {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name} must have the shape (n, {columns}), not {array.shape}")
+    if array.dtype == np.uint32:
+        return np.require(array, dtype=np.uint32, requirements="A")
+    if array.min() < 0 or array.max() > 0xFFFF_FFFE:
+        raise ValueError(f"{name} must be numbers of vertices, from 0 on; found {array.min()} to {array.max()}")
+    return array.astype(np.uint32)
+
+
+def _array(name: str, value: Any) -> np.ndarray:
+    if isinstance(value, np.ndarray):
+        # Of a subclass, such as trimesh's that watches for changes, the plain array.
+        return value.view(np.ndarray)
+    if hasattr(value, "__dlpack__") and hasattr(np, "from_dlpack"):
+        try:
+            return np.from_dlpack(value)
+        except (BufferError, RuntimeError, TypeError):
+            # Not on the CPU, or of a kind that NumPy has not: it may still turn itself into an array.
+            pass
+    try:
+        return np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise TypeError(f"{name} must be an array of numbers: {error}") from error

@@ -1,0 +1,153 @@
+//! Rays and points as NumPy holds them: f32 or f64, of any strides, read in place.
+
+use numpy::ndarray::{ArrayView1, ArrayView2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use twincast::Ray;
+use twincast::math::{DVec3, Vec3};
+use twincast::trace::precise::PreciseRay;
+
+/// An array of three columns.
+#[derive(FromPyObject)]
+pub enum Points<'py> {
+    F32(PyReadonlyArray2<'py, f32>),
+    F64(PyReadonlyArray2<'py, f64>),
+}
+
+/// Where a ray ends: for all the same, or each its own.
+#[derive(FromPyObject)]
+pub enum Ends<'py> {
+    F32(PyReadonlyArray1<'py, f32>),
+    F64(PyReadonlyArray1<'py, f64>),
+    All(f64),
+}
+
+/// Vectors, one a row.
+#[derive(Clone, Copy)]
+pub enum Rows<'a> {
+    F32(ArrayView2<'a, f32>),
+    F64(ArrayView2<'a, f64>),
+}
+
+#[derive(Clone, Copy)]
+enum Range<'a> {
+    F32(ArrayView1<'a, f32>),
+    F64(ArrayView1<'a, f64>),
+    All(f64),
+}
+
+impl Points<'_> {
+    /// The rows.
+    ///
+    /// # Errors
+    /// `ValueError` with the argument's name, unless there are three columns.
+    pub fn rows(&self, name: &str) -> PyResult<Rows<'_>> {
+        let shape = match self {
+            Self::F32(array) => array.shape(),
+            Self::F64(array) => array.shape(),
+        };
+        if shape[1] != 3 {
+            return Err(PyValueError::new_err(format!("{name} must have the shape (n, 3), not {shape:?}")));
+        }
+        Ok(match self {
+            Self::F32(array) => Rows::F32(array.as_array()),
+            Self::F64(array) => Rows::F64(array.as_array()),
+        })
+    }
+}
+
+impl Rows<'_> {
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(rows) => rows.nrows(),
+            Self::F64(rows) => rows.nrows(),
+        }
+    }
+
+    pub fn is_f32(&self) -> bool {
+        matches!(self, Self::F32(_))
+    }
+
+    #[inline]
+    pub fn at(&self, row: usize) -> DVec3 {
+        match self {
+            Self::F32(rows) => Vec3::new(rows[[row, 0]], rows[[row, 1]], rows[[row, 2]]).as_dvec3(),
+            Self::F64(rows) => DVec3::new(rows[[row, 0]], rows[[row, 1]], rows[[row, 2]]),
+        }
+    }
+}
+
+/// Rays of a query.
+pub struct Rays<'a> {
+    origins: Rows<'a>,
+    /// As many, or one for all.
+    directions: Rows<'a>,
+    tmin: f64,
+    tmax: Range<'a>,
+}
+
+impl<'a> Rays<'a> {
+    /// # Errors
+    /// `ValueError` with the argument's name where lengths do not match.
+    pub fn new(origins: &'a Points<'_>, directions: &'a Points<'_>, tmin: f64, tmax: &'a Ends<'_>) -> PyResult<Self> {
+        let (origins, directions) = (origins.rows("origins")?, directions.rows("directions")?);
+        let (tmax, ends) = match tmax {
+            Ends::F32(array) => (Range::F32(array.as_array()), Some(array.len())),
+            Ends::F64(array) => (Range::F64(array.as_array()), Some(array.len())),
+            Ends::All(tmax) => (Range::All(*tmax), None),
+        };
+        let count = origins.len();
+        for (name, len) in [("directions", (directions.len() != 1).then_some(directions.len())), ("tmax", ends)] {
+            if let Some(len) = len.filter(|&len| len != count) {
+                let message = format!("{name}: {len} of them, but {count} origins");
+                return Err(PyValueError::new_err(message));
+            }
+        }
+        Ok(Self { origins, directions, tmin, tmax })
+    }
+
+    pub fn len(&self) -> usize {
+        self.origins.len()
+    }
+
+    /// Whether they are in f32, and their range, too.
+    pub fn are_f32(&self) -> bool {
+        let range_is_f32 = match self.tmax {
+            Range::F32(_) => true,
+            Range::F64(_) => false,
+            Range::All(tmax) => f64::from(tmax as f32) == tmax,
+        };
+        self.origins.is_f32() && self.directions.is_f32() && range_is_f32 && f64::from(self.tmin as f32) == self.tmin
+    }
+
+    #[inline]
+    pub fn at(&self, i: usize) -> PreciseRay {
+        let tmax = match self.tmax {
+            Range::F32(tmax) => tmax[i].into(),
+            Range::F64(tmax) => tmax[i],
+            Range::All(tmax) => tmax,
+        };
+        let direction = self.directions.at(i.min(self.directions.len() - 1));
+        PreciseRay { origin: self.origins.at(i), direction, tmin: self.tmin, tmax }
+    }
+
+    /// The same in f32; for those that [are](Self::are_f32).
+    #[inline]
+    pub fn rounded(&self, i: usize) -> Ray {
+        let PreciseRay { origin, direction, tmin, tmax } = self.at(i);
+        Ray {
+            origin: origin.as_vec3(),
+            direction: direction.as_vec3(),
+            tmin: tmin as f32,
+            tmax: tmax as f32,
+            time: 0.0,
+        }
+    }
+
+    /// Those from `first` on, at most `count`, into `rays`, which is cleared first.
+    pub fn chunk(&self, first: usize, count: usize, rays: &mut Vec<PreciseRay>) {
+        rays.clear();
+        rays.extend((first..self.len().min(first + count)).map(|i| self.at(i)));
+    }
+}

@@ -1,0 +1,48 @@
+//! `twincast._native`: the native tracer for Python. Arrays in, arrays out; what users see is the Python package over it
+//! (`python/twincast/`), which checks shapes, converts types and has the documentation.
+//!
+//! | file | what |
+//! | --- | --- |
+//! | `arrays` | rays and points as NumPy holds them, read in place |
+//! | `pool` | the threads that queries run on, without the interpreter's lock |
+//! | `scene` | meshes, and what can be asked of them |
+//! | `crossings` | all hits of many rays, as flat arrays |
+//! | `points`, `curve` | what can be asked of points, and in which order it is done |
+//! | `render` | pictures |
+//!
+//! There is no unsafe code here: a panic becomes a Python exception in PyO3's wrappers, so it never crosses the boundary. An array
+//! that another thread writes to while it is read gives numbers that are neither the old nor the new ones; its length cannot change.
+#![forbid(unsafe_code)]
+
+mod arrays;
+mod crossings;
+mod curve;
+mod points;
+mod pool;
+mod render;
+mod scene;
+
+use pyo3::prelude::*;
+
+/// The native part of the package `twincast`.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::scene::Scene;
+
+    #[pymodule_export]
+    use super::render::{main, render_file, render_meshes};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("ISA", twincast::trace::bvh::Isa::detect().name())
+    }
+}
+
+/// What the library says is wrong with the arguments.
+fn value_error(error: twincast::Error) -> PyErr {
+    pyo3::exceptions::PyValueError::new_err(error.to_string())
+}

@@ -1,0 +1,208 @@
+//! Pictures: of a scene file, or of meshes that Python has; and the command line.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use twincast::io::{self, LoadOptions, Normals, Unit, UpAxis};
+use twincast::math::{DVec3, Vec3};
+use twincast::render::Control;
+use twincast::scene::{Camera, Geometry, Integrator, Material, Mesh};
+use twincast::trace::Batch;
+use twincast::trace::bvh::Bvh;
+use twincast::{Image, Renderer, Scene, Settings, World};
+
+use crate::arrays::Points;
+use crate::{pool, value_error};
+
+/// How often a render looks whether Ctrl-C was pressed.
+const BEAT: Duration = Duration::from_millis(5);
+
+/// Linear RGBA, rows from the top: (height, width, 4).
+type Picture<'py> = Bound<'py, PyArray3<f32>>;
+
+/// Where the camera is, what it looks at, what is up, and its vertical field of view in degrees.
+type View = ([f64; 3], [f64; 3], [f64; 3], f64);
+
+/// What is to be made of a scene; what is not given the scene says, or is usual.
+#[derive(FromPyObject)]
+pub struct Wishes {
+    #[pyo3(item)]
+    size: Option<(u32, u32)>,
+    #[pyo3(item)]
+    spp: Option<u32>,
+    #[pyo3(item)]
+    seed: Option<u64>,
+    #[pyo3(item)]
+    view: Option<View>,
+    #[pyo3(item)]
+    camera: Option<String>,
+    #[pyo3(item)]
+    integrator: Option<String>,
+    #[pyo3(item)]
+    max_depth: Option<u32>,
+    #[pyo3(item)]
+    background: Option<[f32; 3]>,
+    #[pyo3(item)]
+    threads: usize,
+}
+
+impl Wishes {
+    fn settings(&self, scene: &Scene) -> PyResult<Settings> {
+        let (usual, request) = (Settings::default(), &scene.request);
+        let size = self.size.map(|(width, height)| [width, height]).or(request.size);
+        let [width, height] = size.unwrap_or([usual.width, usual.height]);
+        let integrator = match self.integrator.as_deref() {
+            None => request.integrator,
+            Some("auto") => None,
+            Some(name) => Some(by_name("integrator", name, Integrator::ALL.map(|it| (it.name(), it)))?),
+        };
+        Ok(Settings {
+            width,
+            height,
+            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
+            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            integrator,
+            max_depth: self.max_depth.or(request.max_depth),
+            background: self.background.map(Vec3::from),
+            batch: Batch { coherent: true, ..Batch::default() },
+            ..usual
+        })
+    }
+
+    fn camera(&self, scene: &Scene, settings: &Settings) -> PyResult<Camera> {
+        if let Some((eye, target, up, fov)) = self.view {
+            let [eye, target, up] = [eye, target, up].map(DVec3::from);
+            let camera = Camera::look_at(eye, target, up, fov.to_radians());
+            return camera.ok_or_else(|| {
+                PyValueError::new_err("eye, look_at and up: they must be finite, and not lie on one line")
+            });
+        }
+        if let Some(name) = &self.camera {
+            let found = scene.cameras.iter().find(|camera| camera.name == *name);
+            let names: Vec<&str> = scene.cameras.iter().map(|camera| &camera.name[..]).collect();
+            let unknown = || PyValueError::new_err(format!("camera {name:?} is not one of {names:?}"));
+            return found.cloned().ok_or_else(unknown);
+        }
+        let aspect = f64::from(settings.width) / f64::from(settings.height.max(1));
+        Ok(scene.cameras.first().cloned().unwrap_or_else(|| Camera::framing(&scene.bounds(), aspect)))
+    }
+
+    fn render<'py>(&self, py: Python<'py>, scene: &Scene) -> PyResult<Picture<'py>> {
+        let settings = self.settings(scene)?;
+        let camera = self.camera(scene, &settings)?;
+        let image = interruptible(py, self.threads, |cancel| {
+            let world = World::new(scene)?;
+            let renderer = Renderer::new(scene, &world, camera, settings)?;
+            renderer.render(&Bvh::build(&world), Control { cancel: Some(cancel), ..Control::default() })
+        })?;
+        let Image { width, height, pixels } = image;
+        let flat: Vec<f32> = pixels.into_iter().flat_map(|pixel| pixel.to_array()).collect();
+        flat.into_pyarray(py).reshape([height as usize, width as usize, 4])
+    }
+}
+
+/// Runs `work` on other threads, and stops it when Python has a signal to handle.
+fn interruptible<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce(&AtomicBool) -> twincast::Result<T> + Send,
+) -> PyResult<T> {
+    let cancel = &AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let worker = scope.spawn(move || Python::attach(|py| pool::run(py, threads, || work(cancel))));
+        let mut signal = None;
+        while !worker.is_finished() {
+            py.detach(|| std::thread::sleep(BEAT));
+            if let Err(error) = py.check_signals() {
+                cancel.store(true, Ordering::Relaxed);
+                signal = Some(error);
+            }
+        }
+        // Joined without the lock, which the worker needs to end.
+        let done = py.detach(|| worker.join());
+        match (signal, done) {
+            (Some(signal), _) => Err(signal),
+            (None, Ok(done)) => done?.map_err(value_error),
+            (None, Err(_)) => Err(PyRuntimeError::new_err("the render ended without a picture")),
+        }
+    })
+}
+
+fn by_name<T: Copy, const N: usize>(argument: &str, name: &str, known: [(&str, T); N]) -> PyResult<T> {
+    let found = known.iter().find(|(known, _)| *known == name);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        PyValueError::new_err(format!("{argument} must be one of {}, not {name:?}", names.join(", ")))
+    })
+}
+
+/// Renders a scene file; also the warnings about it.
+#[pyfunction]
+#[pyo3(signature = (path, wishes, up_axis = "y", unit = "m", normals = "file"))]
+pub fn render_file<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    wishes: Wishes,
+    up_axis: &str,
+    unit: &str,
+    normals: &str,
+) -> PyResult<(Picture<'py>, Vec<String>)> {
+    let options = LoadOptions {
+        up_axis: by_name("up_axis", up_axis, [("y", UpAxis::Y), ("z", UpAxis::Z)])?,
+        unit: by_name(
+            "unit",
+            unit,
+            [("m", Unit::Metre), ("cm", Unit::Centimetre), ("mm", Unit::Millimetre), ("in", Unit::Inch)],
+        )?,
+        normals: by_name(
+            "normals",
+            normals,
+            [("file", Normals::File), ("flat", Normals::Flat), ("smooth", Normals::Smooth)],
+        )?,
+        ..LoadOptions::default()
+    };
+    let loaded = pool::run(py, wishes.threads, || io::load(&path, &options))?;
+    let (scene, warnings) = loaded.map_err(value_error)?;
+    Ok((wishes.render(py, &scene)?, warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// Renders meshes: vertices, triangles, and their diffuse colour, linear.
+#[pyfunction]
+#[pyo3(signature = (meshes, wishes, normals = "flat"))]
+pub fn render_meshes<'py>(
+    py: Python<'py>,
+    meshes: Vec<(Points<'py>, PyReadonlyArray2<'py, u32>, [f32; 3])>,
+    wishes: Wishes,
+    normals: &str,
+) -> PyResult<Picture<'py>> {
+    let is_smooth = by_name("normals", normals, [("flat", false), ("smooth", true)])?;
+    let (mut geometries, mut materials) = (Vec::new(), Vec::new());
+    for (number, (vertices, triangles, color)) in meshes.iter().enumerate() {
+        let (vertices, triangles) = (vertices.rows("vertices")?, triangles.as_array());
+        let positions: Vec<DVec3> = (0..vertices.len()).map(|i| vertices.at(i)).collect();
+        let triangles: Vec<[u32; 3]> = triangles.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect();
+        if let Some(i) = triangles.iter().position(|t| t.iter().any(|&i| i as usize >= positions.len())) {
+            let message = format!("triangle {i} of mesh {number} names a vertex that is not there: {:?}", triangles[i]);
+            return Err(PyValueError::new_err(message));
+        }
+        let mut mesh = Mesh { material: number as u32, ..Mesh::new(Vec::new(), triangles) };
+        mesh.set_positions(&positions);
+        if is_smooth {
+            mesh.smooth_normals();
+        }
+        geometries.push(Geometry::Mesh(mesh));
+        materials.push(Material { diffuse: Vec3::from(*color), ..Material::default() });
+    }
+    wishes.render(py, &Scene::from_geometries(geometries, materials))
+}
+
+/// The command line, on these arguments, of which the first is the program's name; returns the exit code.
+#[pyfunction]
+pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| twincast::cli::main_with(arguments))
+}

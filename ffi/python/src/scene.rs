@@ -1,0 +1,273 @@
+//! Meshes, and what rays can ask of them.
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use twincast::math::DVec3;
+use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
+use twincast::{Batch, Hit, Ray, Tracer};
+
+use crate::arrays::{Ends, Points, Rays};
+use crate::{pool, value_error};
+
+/// Rays that a thread takes at a time.
+pub const CHUNK: usize = 1024;
+
+/// No triangle, or no mesh, in arrays of unsigned numbers.
+pub const INVALID: u32 = u32::MAX;
+
+/// Triangle meshes, ready to be asked; never changes.
+#[pyclass(frozen, module = "twincast._native")]
+pub struct Scene {
+    pub precise: Precise,
+}
+
+/// Hits in f32: t, (u, v), primitive, geometry, normal.
+type Cast<'py> = (
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray2<f32>>,
+);
+
+/// Hits in f64: t, (u, v), primitive, geometry.
+type Closest<'py> =
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
+/// A mesh: vertices (v, 3), triangles (t, 3).
+type Mesh<'py> = (Points<'py>, PyReadonlyArray2<'py, u32>);
+
+/// `flat`, `columns` a row.
+pub fn table<'py, T: numpy::Element>(
+    py: Python<'py>,
+    flat: Vec<T>,
+    columns: usize,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = flat.len() / columns;
+    flat.into_pyarray(py).reshape([rows, columns])
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (meshes, threads = 0))]
+    fn new(py: Python<'_>, meshes: Vec<Mesh<'_>>, threads: usize) -> PyResult<Self> {
+        let read = |(vertices, triangles): &Mesh<'_>| -> PyResult<PreciseMesh> {
+            let vertices = vertices.rows("vertices")?;
+            let triangles = triangles.as_array();
+            if triangles.ncols() != 3 {
+                let message = format!("triangles must have the shape (n, 3), not {:?}", triangles.shape());
+                return Err(pyo3::exceptions::PyValueError::new_err(message));
+            }
+            Ok(PreciseMesh {
+                positions: (0..vertices.len()).map(|i| vertices.at(i)).collect(),
+                triangles: triangles.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect(),
+            })
+        };
+        let meshes: Vec<PreciseMesh> = meshes.iter().map(read).collect::<PyResult<_>>()?;
+        let precise = pool::run(py, threads, || Precise::new(meshes))?.map_err(value_error)?;
+        Ok(Self { precise })
+    }
+
+    /// The triangle that each ray hits first, int64, -1 for none.
+    #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), threads = 0))]
+    fn first<'py>(
+        &self,
+        py: Python<'py>,
+        origins: Points<'py>,
+        directions: Points<'py>,
+        tmin: f64,
+        tmax: Ends<'py>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let first = pool::run(py, threads, || {
+            let mut first = vec![-1; rays.len()];
+            first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
+                self.each_hit(&rays, chunk * CHUNK, first.len(), |i, hit| first[i] = hit.primitive.into());
+            });
+            first
+        })?;
+        Ok(first.into_pyarray(py))
+    }
+
+    /// Whether each ray hits anything.
+    #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), threads = 0))]
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        origins: Points<'py>,
+        directions: Points<'py>,
+        tmin: f64,
+        tmax: Ends<'py>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let exact = self.precise.exact().filter(|_| rays.are_f32());
+        let occluded = pool::run(py, threads, || {
+            let mut occluded = vec![false; rays.len()];
+            occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
+                let first = chunk * CHUNK;
+                if let Some(bvh) = exact {
+                    let rays: Vec<Ray> = (first..first + occluded.len()).map(|i| rays.rounded(i)).collect();
+                    bvh.occluded_batch(&rays, occluded, Batch::default());
+                } else {
+                    let mut list = Vec::new();
+                    rays.chunk(first, occluded.len(), &mut list);
+                    self.precise.occluded_batch(&list, occluded);
+                }
+            });
+            occluded
+        })?;
+        Ok(occluded.into_pyarray(py))
+    }
+
+    /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
+    /// `normalize`.
+    #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), normalize = true, threads = 0))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords.
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        origins: Points<'py>,
+        directions: Points<'py>,
+        tmin: f64,
+        tmax: Ends<'py>,
+        normalize: bool,
+        threads: usize,
+    ) -> PyResult<Cast<'py>> {
+        let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let count = rays.len();
+        let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
+            let (mut t, mut uv) = (vec![f32::INFINITY; count], vec![0f32; 2 * count]);
+            let (mut primitive, mut geometry) = (vec![INVALID; count], vec![INVALID; count]);
+            let mut normal = vec![0f32; 3 * count];
+            let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
+            let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
+            let tasks = tasks.into_par_iter().zip(ids).enumerate();
+            tasks.for_each(|(chunk, ((t, uv, normal), (primitive, geometry)))| {
+                self.each_hit(&rays, chunk * CHUNK, t.len(), |i, hit| {
+                    t[i] = hit.t;
+                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                    (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
+                });
+                self.normals_of(primitive, geometry, normalize, normal);
+            });
+            (t, uv, primitive, geometry, normal)
+        })?;
+        let (primitive, geometry) = (primitive.into_pyarray(py), geometry.into_pyarray(py));
+        Ok((t.into_pyarray(py), table(py, uv, 2)?, primitive, geometry, table(py, normal, 3)?))
+    }
+
+    /// The nearest hits in f64; a miss has t infinite, ids -1 and zeros.
+    #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), threads = 0))]
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        origins: Points<'py>,
+        directions: Points<'py>,
+        tmin: f64,
+        tmax: Ends<'py>,
+        threads: usize,
+    ) -> PyResult<Closest<'py>> {
+        let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let count = rays.len();
+        let (t, uv, primitive, geometry) = pool::run(py, threads, || {
+            let (mut t, mut uv) = (vec![f64::INFINITY; count], vec![0f64; 2 * count]);
+            let (mut primitive, mut geometry) = (vec![-1; count], vec![-1; count]);
+            let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
+            let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
+            tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
+                self.each_precise_hit(&rays, chunk * CHUNK, t.len(), |i, hit| {
+                    t[i] = hit.t;
+                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                    (primitive[i], geometry[i]) = (hit.primitive.into(), hit.geometry.into());
+                });
+            });
+            (t, uv, primitive, geometry)
+        })?;
+        Ok((t.into_pyarray(py), table(py, uv, 2)?, primitive.into_pyarray(py), geometry.into_pyarray(py)))
+    }
+
+    /// The normals of triangles, of unit length; zero for `INVALID`, and for triangles without an area.
+    fn normals<'py>(
+        &self,
+        py: Python<'py>,
+        geometry: PyReadonlyArray1<'py, u32>,
+        primitive: PyReadonlyArray1<'py, u32>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let meshes = self.precise.meshes();
+        let exists = |geometry: u32, primitive: u32| {
+            meshes.get(geometry as usize).is_some_and(|mesh| (primitive as usize) < mesh.triangles.len())
+        };
+        let (geometry, primitive) = (geometry.as_array(), primitive.as_array());
+        let normal = |(&geometry, &primitive): (&u32, &u32)| {
+            let is_there = exists(geometry, primitive);
+            let normal = if is_there { self.normal(geometry, primitive, true) } else { DVec3::ZERO };
+            normal.to_array()
+        };
+        let flat: Vec<f64> = geometry.iter().zip(primitive).flat_map(normal).collect();
+        table(py, flat, 3)
+    }
+}
+
+impl Scene {
+    /// The normal by the right-hand rule; zero for a triangle without an area.
+    pub fn normal(&self, geometry: u32, primitive: u32, normalize: bool) -> DVec3 {
+        let [a, b, c] = self.precise.corners(geometry, primitive);
+        let normal = (b - a).cross(c - a);
+        if normalize { normal.normalize_or_zero() } else { normal }
+    }
+
+    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, so that the
+    /// processor fetches the indices of many triangles together, and then their corners.
+    fn normals_of(&self, primitive: &[u32], geometry: &[u32], normalize: bool, normals: &mut [f32]) {
+        let meshes = self.precise.meshes();
+        let mut corners = [[0; 3]; CHUNK];
+        for (corners, (&primitive, &geometry)) in corners.iter_mut().zip(primitive.iter().zip(geometry)) {
+            if primitive != INVALID {
+                *corners = meshes[geometry as usize].triangles[primitive as usize];
+            }
+        }
+        for ((normal, corners), &geometry) in normals.chunks_exact_mut(3).zip(corners).zip(geometry) {
+            if geometry != INVALID {
+                let positions = &meshes[geometry as usize].positions;
+                let [a, b, c] = corners.map(|i| positions[i as usize]);
+                let n = (b - a).cross(c - a);
+                let n = if normalize { n.normalize_or_zero() } else { n };
+                normal.copy_from_slice(&n.as_vec3().to_array());
+            }
+        }
+    }
+
+    /// Calls `take` with the hits of the rays from `first` on, numbered from 0. Rays and meshes in f32 need no more.
+    fn each_hit(&self, rays: &Rays<'_>, first: usize, count: usize, mut take: impl FnMut(usize, Hit)) {
+        let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) else {
+            return self.each_precise_hit(rays, first, count, |i, hit| {
+                let PreciseHit { t, u, v, primitive, geometry, instance } = hit;
+                take(i, Hit { t: t as f32, u: u as f32, v: v as f32, primitive, geometry, instance });
+            });
+        };
+        let rays: Vec<Ray> = (first..first + count).map(|i| rays.rounded(i)).collect();
+        let mut hits = [None; CHUNK];
+        bvh.closest_batch(&rays, &mut hits[..count], Batch::default());
+        hits[..count].iter().enumerate().for_each(|(i, hit)| {
+            if let Some(hit) = hit {
+                take(i, *hit);
+            }
+        });
+    }
+
+    fn each_precise_hit(&self, rays: &Rays<'_>, first: usize, count: usize, mut take: impl FnMut(usize, PreciseHit)) {
+        let mut list = Vec::with_capacity(count);
+        rays.chunk(first, count, &mut list);
+        let mut hits = [None; CHUNK];
+        self.precise.closest_batch(&list, &mut hits[..count]);
+        hits[..count].iter().enumerate().for_each(|(i, hit)| {
+            if let Some(hit) = hit {
+                take(i, *hit);
+            }
+        });
+    }
+}

@@ -1,0 +1,118 @@
+"""What is wrong with arguments is told with their names; what can be read where it lies is not copied."""
+
+import numpy as np
+import pytest
+
+import twincast
+from twincast import _arrays
+from twincast.compat.embreex import mesh_construction, rtcore_scene
+
+TRIANGLE = (np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.uint32([[0, 1, 2]]))
+
+
+class Mesh:
+    vertices, faces = TRIANGLE
+
+
+def scene():
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(*TRIANGLE)
+    return scene
+
+
+def embree():
+    scene = rtcore_scene.EmbreeScene()
+    mesh_construction.TriangleMesh(scene, *TRIANGLE)
+    return scene
+
+
+GOOD = np.zeros((2, 3))
+
+
+@pytest.mark.parametrize(
+    "error, words, call",
+    [
+        (ValueError, "ray_origins", lambda: twincast.RayMeshIntersector(Mesh()).intersects_first(np.zeros((2, 2)), GOOD)),
+        (ValueError, "ray_origins", lambda: twincast.RayMeshIntersector(Mesh()).intersects_first(np.zeros(3), np.zeros(3))),
+        (ValueError, "don't match", lambda: twincast.RayMeshIntersector(Mesh()).intersects_id(GOOD, np.ones((3, 3)))),
+        (ValueError, "don't match", lambda: twincast.RayMeshIntersector(Mesh()).intersects_any(GOOD, np.ones((1, 3)))),
+        (TypeError, "ray_directions", lambda: twincast.RayMeshIntersector(Mesh()).intersects_any(GOOD, np.array([["a"] * 3] * 2))),
+        (TypeError, "ray_origins", lambda: twincast.RayMeshIntersector(Mesh()).intersects_any(GOOD.astype(complex), GOOD)),
+        (ValueError, "points", lambda: twincast.RayMeshIntersector(Mesh()).contains_points(np.zeros((2, 4)))),
+        (ValueError, "max_hits", lambda: twincast.RayMeshIntersector(Mesh()).intersects_id(GOOD, GOOD, max_hits=-1)),
+        (ValueError, "rays", lambda: scene().cast_rays(np.zeros((2, 5), np.float32))),
+        (TypeError, "rays", lambda: scene().cast_rays([[None] * 6])),
+        (ValueError, "nthreads", lambda: scene().cast_rays(np.zeros((2, 6)), nthreads=-1)),
+        (ValueError, "query_points", lambda: scene().compute_distance(np.zeros((2, 6)))),
+        (ValueError, "nsamples", lambda: scene().compute_occupancy(GOOD, nsamples=2)),
+        (ValueError, "triangle_indices", lambda: twincast.RaycastingScene().add_triangles(TRIANGLE[0], [[0, 1, 3]])),
+        (ValueError, "triangle_indices", lambda: twincast.RaycastingScene().add_triangles(TRIANGLE[0], [[0, 1, -1]])),
+        (TypeError, "triangle_indices", lambda: twincast.RaycastingScene().add_triangles(TRIANGLE[0], [[0.0, 1, 2]])),
+        (ValueError, "vertex_positions", lambda: twincast.RaycastingScene().add_triangles(np.zeros((3, 2)), [[0, 1, 2]])),
+        (TypeError, "vertex_positions", lambda: twincast.RaycastingScene().add_triangles(np.zeros((3, 3)))),
+        (ValueError, "device", lambda: twincast.RaycastingScene(device="CUDA:0")),
+        (ValueError, "fov_deg", lambda: twincast.RaycastingScene.create_rays_pinhole(0, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4)),
+        (ValueError, "up", lambda: twincast.RaycastingScene.create_rays_pinhole(60, [0, 0, 0], [0, 0, 1], [0, 0, 1], 4, 4)),
+        (ValueError, "intrinsic_matrix", lambda: twincast.RaycastingScene.create_rays_pinhole(np.eye(4), np.eye(4), 4, 4)),
+        (ValueError, "vec_directions", lambda: embree().run(np.zeros((4, 3)), np.zeros((2, 3)))),
+        (ValueError, "vec_origins", lambda: embree().run(np.zeros((4, 2)), np.zeros((4, 3)))),
+        (ValueError, "dists", lambda: embree().run(np.zeros((4, 3)), np.zeros((4, 3)), dists=np.zeros(3, np.float32))),
+        (ValueError, "NEAREST", lambda: embree().run(GOOD, GOOD, query="NEAREST")),
+        (ValueError, "vertices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0])),
+        (ValueError, "indices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, 7]])),
+        (ValueError, "indices", lambda: mesh_construction.ElementMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, 2]])),
+        (TypeError, "scene", lambda: mesh_construction.TriangleMesh(None, *TRIANGLE)),
+        (TypeError, "scene", lambda: twincast.render(7)),
+        (ValueError, "size", lambda: twincast.render(TRIANGLE, size=(0, 4))),
+        (ValueError, "integrator", lambda: twincast.render(TRIANGLE, size=(4, 4), integrator="magic")),
+        (ValueError, "camera", lambda: twincast.render(TRIANGLE, size=(4, 4), camera="none")),
+        (ValueError, "eye", lambda: twincast.render(TRIANGLE, size=(4, 4), look_at=(0, 0, 0))),
+        (ValueError, "line", lambda: twincast.render(TRIANGLE, size=(4, 4), eye=(0, 0, 0), look_at=(0, 0, 0))),
+        (FileNotFoundError, "no-such", lambda: twincast.render("no-such.glb")),
+    ],
+)
+def test_errors_name_the_argument(error, words, call):
+    with pytest.raises(error, match=words):
+        call()
+
+
+def test_nothing_is_copied_that_need_not_be():
+    for dtype in (np.float32, np.float64):
+        rays = np.zeros((4, 6), dtype)
+        for part in (rays[:, :3], rays[::2, 3:], np.asfortranarray(rays[:, :3])):
+            assert np.shares_memory(_arrays.vectors("x", part), part)
+    indices = np.zeros((4, 3), np.uint32)
+    assert np.shares_memory(_arrays.indices("x", indices), indices)
+
+
+def test_arrays_of_all_kinds():
+    ray = [[0.25, 0.25, 1, 0, 0, -1]]
+    for rays in (
+        ray,
+        np.array(ray, dtype=">f8"),
+        np.array(ray, dtype=np.float16),
+        np.array(np.array(ray) * 4, dtype=np.int8) / 4,
+        np.asfortranarray(np.float32(ray)),
+        np.repeat(np.float64(ray), 2, axis=0)[::2],
+        np.frombuffer(b"x" + np.float64(ray).tobytes(), np.float64, offset=1).reshape(1, 6),
+    ):
+        assert scene().cast_rays(rays)["primitive_ids"].tolist() == [0]
+
+
+def test_dlpack():
+    class Foreign:
+        """Only what the protocol demands."""
+
+        def __init__(self, array):
+            self.array = array
+
+        def __dlpack__(self, **arguments):
+            return self.array.__dlpack__(**arguments)
+
+        def __dlpack_device__(self):
+            return self.array.__dlpack_device__()
+
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(Foreign(TRIANGLE[0]), Foreign(TRIANGLE[1]))
+    rays = Foreign(np.float32([[0.25, 0.25, 1, 0, 0, -1]]))
+    assert scene.cast_rays(rays)["t_hit"].numpy().tolist() == [1.0]

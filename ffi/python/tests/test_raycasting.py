@@ -1,0 +1,160 @@
+"""Open3D's contract; and Open3D itself, where it is installed."""
+
+import numpy as np
+import pytest
+from test_points import cube
+
+import twincast
+
+
+@pytest.fixture
+def scene():
+    scene = twincast.RaycastingScene()
+    assert scene.add_triangles(*cube()) == 0
+    far = cube()
+    assert scene.add_triangles(far[0] + np.float32([5, 0, 0]), far[1]) == 1
+    return scene
+
+
+def test_shapes_and_types(scene):
+    rays = np.zeros((2, 4, 6), np.float32)
+    rays[..., 0], rays[..., 1], rays[..., 3] = -3, [-2, -0.5, 0.25, 2], 2
+    cast = scene.cast_rays(rays)
+    assert {key: (value.shape, value.dtype.name) for key, value in cast.items()} == {
+        "t_hit": ((2, 4), "float32"),
+        "geometry_ids": ((2, 4), "uint32"),
+        "primitive_ids": ((2, 4), "uint32"),
+        "primitive_uvs": ((2, 4, 2), "float32"),
+        "primitive_normals": ((2, 4, 3), "float32"),
+    }
+    assert cast["t_hit"].numpy()[0].tolist() == [np.inf, 1, 1, np.inf]
+    assert type(cast["t_hit"].numpy()) is np.ndarray
+    assert cast["geometry_ids"][1].tolist() == [scene.INVALID_ID, 0, 0, scene.INVALID_ID]
+    assert cast["primitive_normals"][0].tolist() == [[0, 0, 0], [-1, 0, 0], [-1, 0, 0], [0, 0, 0]]
+    assert scene.count_intersections(rays).tolist() == [[0, 4, 4, 0]] * 2
+    assert scene.count_intersections(rays).dtype == np.int32
+    assert scene.test_occlusions(rays).tolist() == [[False, True, True, False]] * 2
+    assert scene.test_occlusions(rays, tfar=0.5).tolist() == [[False] * 4] * 2
+    assert scene.test_occlusions(rays, tnear=5).tolist() == [[False] * 4] * 2
+    one = scene.cast_rays(rays[0, 1])
+    assert one["t_hit"].shape == () and one["t_hit"].item() == 1
+
+
+def test_lists(scene):
+    rays = np.float32([[-3, 2, 0, 1, 0, 0], [-3, 0.5, 0.25, 1, 0, 0], [2, 0.5, 0.25, -2, 0, 0]])
+    crossings = scene.list_intersections(rays)
+    assert crossings["ray_splits"].tolist() == [0, 0, 4, 6]
+    assert crossings["ray_ids"].tolist() == [1] * 4 + [2] * 2
+    assert crossings["t_hit"].tolist() == [2, 4, 7, 9, 0.5, 1.5]
+    assert crossings["geometry_ids"].tolist() == [0, 0, 1, 1, 0, 0]
+    assert {key: value.dtype.name for key, value in crossings.items()} == {
+        "ray_splits": "uint32",
+        "ray_ids": "uint32",
+        "t_hit": "float32",
+        "geometry_ids": "uint32",
+        "primitive_ids": "uint32",
+        "primitive_uvs": "float32",
+    }
+
+
+def test_meshes_that_come_later(scene):
+    ray = np.float32([[0, 9, 0, 0, -1, 0]])
+    assert scene.cast_rays(ray)["t_hit"].tolist() == [8]
+    corners, faces = cube()
+    assert scene.add_triangles(corners + np.float32([0, 3, 0]), faces) == 2
+    assert scene.cast_rays(ray)["t_hit"].tolist() == [5]
+    assert scene.cast_rays(ray)["geometry_ids"].tolist() == [2]
+
+
+def test_arrays_of_the_caller_stay_the_callers(scene):
+    corners, faces = cube()
+    other = twincast.RaycastingScene()
+    other.add_triangles(corners, faces)
+    corners[:] = 0
+    assert other.cast_rays(np.float32([[-3, 0.5, 0.25, 1, 0, 0]]))["t_hit"].tolist() == [2]
+
+
+def test_rays_of_a_pinhole():
+    rays = twincast.RaycastingScene.create_rays_pinhole(90, [0, 0, 0], [0, 0, 4], [0, 1, 0], 4, 2)
+    assert rays.shape == (2, 4, 6) and rays.dtype == np.float32
+    assert np.allclose(rays[..., :3], [0, 0, 4])
+    # Open3D's pictures are turned by half a turn: the first pixel is at the lower right.
+    assert np.allclose(rays[0, 0, 3:], [0.75, -0.25, -1])
+    assert np.allclose(rays[1, 3, 3:], [-0.75, 0.25, -1])
+
+
+@pytest.fixture
+def open3d():
+    try:
+        import open3d
+    except ImportError as error:
+        pytest.skip(f"Open3D is not there to compare with: {error}")
+    return open3d
+
+
+class Both:
+    """A bumpy sphere, in both packages."""
+
+    def __init__(self, open3d, rng):
+        sphere = open3d.geometry.TriangleMesh.create_sphere(resolution=40)
+        vertices = np.asarray(sphere.vertices) * (1 + 0.2 * rng.random((len(sphere.vertices), 1)))
+        self.vertices, self.faces = vertices.astype(np.float32), np.asarray(sphere.triangles).astype(np.uint32)
+        tensor = open3d.core.Tensor
+        self.ours, self.theirs = twincast.RaycastingScene(), open3d.t.geometry.RaycastingScene()
+        # DLPack on the way.
+        self.ours.add_triangles(tensor(self.vertices), tensor(self.faces))
+        self.theirs.add_triangles(tensor(self.vertices), tensor(self.faces))
+        origins = rng.normal(size=(20000, 3)) * 1.5
+        self.rays = np.hstack([origins, rng.normal(size=(20000, 3)) * 0.5 - origins]).astype(np.float32)
+
+
+def test_the_same_as_open3d(open3d, rng):
+    both = Both(open3d, rng)
+    rays = open3d.core.Tensor(both.rays)
+    ours, theirs = both.ours.cast_rays(rays), both.theirs.cast_rays(rays)
+    assert ours.keys() == theirs.keys()
+    # Embree's own verdicts are not exact at edges.
+    same = ours["primitive_ids"] == theirs["primitive_ids"].numpy()
+    assert same.mean() > 0.999
+    for key, value in theirs.items():
+        value = value.numpy()
+        assert ours[key].dtype == value.dtype and ours[key].shape == value.shape, key
+        assert np.allclose(ours[key][same], value[same], rtol=1e-4, atol=1e-4), key
+    assert (both.ours.test_occlusions(rays) == both.theirs.test_occlusions(rays).numpy()).mean() > 0.999
+    assert (both.ours.count_intersections(rays) == both.theirs.count_intersections(rays).numpy()).mean() > 0.999
+    ours, theirs = both.ours.list_intersections(rays), both.theirs.list_intersections(rays)
+    assert ours.keys() == theirs.keys()
+    for key, value in theirs.items():
+        assert ours[key].dtype == value.numpy().dtype, key
+        assert abs(len(ours[key]) - len(value.numpy())) <= len(value.numpy()) * 1e-3
+
+
+def test_the_same_distances_as_open3d(open3d, rng):
+    both = Both(open3d, rng)
+    points = open3d.core.Tensor(both.rays[:5000, :3].copy())
+    ours, theirs = both.ours.compute_closest_points(points), both.theirs.compute_closest_points(points)
+    assert ours.keys() == theirs.keys()
+    # An f32 step of the distance moves a point by its root, where two sides of an edge are as near.
+    apart = np.linalg.norm(ours["points"] - theirs["points"].numpy(), axis=1)
+    assert (apart < 1e-5).mean() > 0.99 and apart.max() < 1e-2
+    ours_distance, theirs_distance = (
+        np.linalg.norm(both.rays[:5000, :3] - np.asarray(it["points"].numpy(), np.float64), axis=1) for it in (ours, theirs)
+    )
+    assert np.allclose(ours_distance, theirs_distance, atol=2e-6)
+    for name in ("compute_distance", "compute_signed_distance", "compute_occupancy"):
+        a, b = getattr(both.ours, name)(points), getattr(both.theirs, name)(points).numpy()
+        assert a.dtype == b.dtype and a.shape == b.shape
+        assert np.isclose(a, b, atol=1e-4).mean() > 0.999, name
+
+
+def test_the_same_pinhole_as_open3d(open3d):
+    make = (twincast.RaycastingScene.create_rays_pinhole, open3d.t.geometry.RaycastingScene.create_rays_pinhole)
+    look = dict(fov_deg=50, center=[1, 2, 3], eye=[4, -5, 6], up=[0.1, 0.2, 1], width_px=8, height_px=6)
+    ours, theirs = make[0](**look), make[1](**look).numpy()
+    assert np.allclose(ours, theirs, atol=1e-4)
+    intrinsic = np.array([[10, 0.5, 4], [0, 11, 3], [0, 0, 1.0]])
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3], extrinsic[:3, 3] = turn, [1, 2, 3]
+    ours, theirs = make[0](intrinsic, extrinsic, 8, 6), make[1](intrinsic, extrinsic, 8, 6).numpy()
+    assert np.allclose(ours, theirs, atol=1e-4)

@@ -1,0 +1,70 @@
+//! The triangles that one ray may hit, offered to whoever decides.
+//!
+//! A walk by itself, for what flights leave open: rounding, or what the caller knows about triangles and the tree does not.
+
+use super::Bvh;
+use super::block::LANES;
+use super::filter::Filter;
+use super::isa::{self, Kernel};
+use super::place::Blur;
+use super::query::Closest;
+use super::simd::Simd;
+use super::slab::SlabRay;
+use super::walk::{self, Stack, Visit};
+use crate::ray::Ray;
+
+/// What is done with a candidate: its geometry and its primitive; says up to which t more are wanted, none where no more are.
+pub(in crate::trace) type Offer<'a> = &'a mut dyn FnMut(u32, u32) -> Option<f32>;
+
+impl Bvh {
+    /// Offers every fixed triangle that `ray` may hit up to its tmax, near ones first but for the order within a leaf; some several times.
+    /// The ray, and the triangles, may be off from those that are meant by the blur.
+    pub(in crate::trace) fn candidates(&self, ray: &Ray, blur: Blur, offer: Offer<'_>) {
+        if ray.is_valid() && !self.fixed.triangles.tree().is_empty() {
+            isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, offer });
+        }
+    }
+}
+
+struct Candidates<'a> {
+    bvh: &'a Bvh,
+    ray: &'a Ray,
+    blur: Blur,
+    offer: Offer<'a>,
+}
+
+impl Kernel for Candidates<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, ray, blur, offer } = self;
+        let triangles = &bvh.fixed.triangles;
+        let tree = triangles.tree();
+        let (slab, filter) = (SlabRay::new(ray, tree.reach(), blur), Filter::new(ray, blur));
+        let mut limit = ray.tmax.next_up();
+        walk::single::<S, Closest>(
+            &mut Stack::new(),
+            tree,
+            &slab,
+            limit,
+            #[inline(always)]
+            |leaf| {
+                for index in leaf.blocks() {
+                    let mut scratch = None;
+                    let block = triangles.block(index, &mut scratch);
+                    let mut open = filter.rounded_candidates::<S>(block, limit).lanes;
+                    while open != 0 {
+                        let lane = open.trailing_zeros() as usize % LANES;
+                        open &= open - 1;
+                        match offer(triangles.part(block.part[lane]).geometry, block.primitive[lane]) {
+                            Some(wanted) => limit = wanted,
+                            None => return Visit::Stop,
+                        }
+                    }
+                }
+                Visit::Until(limit)
+            },
+        );
+    }
+}

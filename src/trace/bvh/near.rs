@@ -1,0 +1,250 @@
+//! The triangles that may be nearest to a point, offered to whoever measures.
+//!
+//! The nearest child is gone down to first, the others wait on a stack with the distance of their boxes (Roussopoulos, Kelley, Vincent 1995,
+//! *Nearest neighbor queries*), eight boxes at a time. [`closest_point`](super::closest_point) opens boxes strictly by distance: it
+//! opens fewer, and pays for a queue. Of the eight triangles of a block those are left out whose distance, in f32 with a bound on its error, is
+//! larger than what was measured.
+//!
+//! The distance from a triangle is that of its nearest edge, or of its plane where the point may stand above it. With u = 2^-24, L the farthest corner
+//! and S the longest edge, a point of an edge that is computed to be nearest is off by less than 16 u L, for products are not divided by anything small;
+//! the height above the plane, times the normal N, by 32 u L S S, and the side of an edge that the point is on, likewise multiplied, by 32 u L L S S.
+//! What cancels in a sliver thus leaves the plane without a say, and its distance counts as 0.
+
+use super::Bvh;
+use super::block::{Block, LANES};
+use super::build::MAX_DEPTH;
+use super::isa::{self, Kernel};
+use super::node::{Child, Node, WIDTH};
+use super::simd::{Array, Mask, Simd, Vector};
+use crate::math::{UNIT_ROUNDOFF, Vec3};
+
+/// What is done with a triangle: its geometry, its primitive, and its corners in the tree. Says beyond which distance none is wanted
+/// any more.
+pub(in crate::trace) type Measure<'a> = &'a mut dyn FnMut(u32, u32, &[Vec3; 3]) -> f64;
+
+/// Every level of the tree leaves at most seven siblings waiting.
+const STACK: usize = (MAX_DEPTH * (WIDTH - 1) + 1).next_power_of_two();
+
+/// Children that wait; filling it costs as much as some nodes, so it is kept from point to point.
+pub(in crate::trace) struct Waiting {
+    children: [Child; STACK + WIDTH],
+    /// The squared distance of each box: the bits of an f32, of which the lowest three are not part of it.
+    near: [u32; STACK + WIDTH],
+}
+
+impl Waiting {
+    pub fn new() -> Self {
+        Self { children: [Child::NONE; STACK + WIDTH], near: [0; STACK + WIDTH] }
+    }
+}
+
+impl Bvh {
+    /// Offers every fixed triangle that may be the nearest to `point`, or as near, and no farther than `wanted`. The point and the
+    /// corners may be off by `error` in each component, both together.
+    pub(in crate::trace) fn near_triangles(
+        &self,
+        point: Vec3,
+        error: f32,
+        wanted: f64,
+        waiting: &mut Waiting,
+        measure: Measure<'_>,
+    ) {
+        if point.is_finite() && !self.fixed.triangles.tree().is_empty() {
+            isa::dispatch(self.isa, Near { bvh: self, point, error, wanted, waiting, measure });
+        }
+    }
+}
+
+struct Near<'a> {
+    bvh: &'a Bvh,
+    point: Vec3,
+    error: f32,
+    wanted: f64,
+    waiting: &'a mut Waiting,
+    measure: Measure<'a>,
+}
+
+impl Kernel for Near<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, point, error, wanted, waiting, measure } = self;
+        let triangles = &bvh.fixed.triangles;
+        let tree = triangles.tree();
+        let span = (point.abs() + tree.reach()).max_element();
+        let boxes = Boxes { point, pad: error + 4.0 * UNIT_ROUNDOFF * span };
+        // For the rounding of what was measured.
+        let rounded_up = |wanted: f64| (wanted as f32) * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * error + f32::MIN_POSITIVE;
+        let mut limit = rounded_up(wanted);
+        let mut len = 1;
+        (waiting.children[0], waiting.near[0]) = (Child::ROOT, 0);
+        while len > 0 {
+            len -= 1;
+            let (child, near) = (waiting.children[len % STACK], f32::from_bits(waiting.near[len % STACK] & !7));
+            if near > limit * limit {
+                continue;
+            }
+            if !child.is_leaf() {
+                let node = tree.node(child);
+                let (mask, near) = boxes.enter::<S>(node, limit * limit);
+                let at = len % STACK;
+                let (nears, stack) = (waiting.near[at..].first_chunk_mut(), waiting.children[at..].first_chunk_mut());
+                if let (Some(nears), Some(stack)) = (nears, stack) {
+                    S::far_to_near(near, mask, &node.child, nears, stack);
+                }
+                len = at + mask.bits().count_ones() as usize;
+                continue;
+            }
+            for index in child.blocks() {
+                let mut scratch = None;
+                let block = triangles.block(index, &mut scratch);
+                let lower = lower_bounds::<S>(block, point, error);
+                let mut open = lower.within(limit) & block.lanes;
+                while open != 0 {
+                    let lane = lower.nearest(open);
+                    open &= !(1 << lane);
+                    let part = triangles.part(block.part[lane]);
+                    let wanted = measure(part.geometry, block.primitive[lane], &block.triangle(lane));
+                    if rounded_up(wanted) < limit {
+                        limit = rounded_up(wanted);
+                        open &= lower.within(limit);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A point made ready for boxes.
+struct Boxes {
+    point: Vec3,
+    /// By how much a box is nearer than it seems, along each axis.
+    pad: f32,
+}
+
+impl Boxes {
+    /// The children that are no farther than the square root of `limit`, and at least the squared distance of each.
+    #[inline(always)]
+    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        let (zero, pad) = (S::V8::splat(0.0), S::V8::splat(self.pad));
+        let mut square = zero;
+        for axis in 0..3 {
+            let p = S::V8::splat(self.point[axis]);
+            let below = S::V8::load(&node.bounds[2 * axis]).sub(p);
+            let above = p.sub(S::V8::load(&node.bounds[2 * axis + 1]));
+            let outside = below.max(above).sub(pad).max(zero);
+            square = outside.mul_add(outside, square);
+        }
+        // Empty slots are infinitely far away.
+        let near = square.mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF));
+        (near.at_most(S::V8::splat(limit.min(f32::MAX))), near)
+    }
+}
+
+/// Of each triangle of a block what its distance is no less than.
+struct Lower<V> {
+    /// The squared distance, roughly: what comes first.
+    square: [f32; LANES],
+    /// By how much the distance may be less.
+    error: V,
+    /// A triangle is out of reach where this,
+    bound: V,
+    /// is more than the squared reach times this: 1 for an edge, for a plane the squared normal.
+    weight: V,
+}
+
+impl<V: Vector> Lower<V> {
+    /// A bit for each lane whose triangle may be within `limit`.
+    #[inline(always)]
+    fn within(&self, limit: f32) -> u32 {
+        let reach = V::splat(limit).add(self.error);
+        let most = reach.mul(reach).mul(self.weight).mul(V::splat(1.0 + 1e-5));
+        // Written so that NaN is within.
+        !most.less(self.bound).bits()
+    }
+
+    /// The nearest of some lanes.
+    #[inline(always)]
+    fn nearest(&self, open: u32) -> usize {
+        let mut best = open.trailing_zeros() as usize % LANES;
+        let mut rest = open & (open - 1);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize % LANES;
+            rest &= rest - 1;
+            if self.square[lane] < self.square[best] {
+                best = lane;
+            }
+        }
+        best
+    }
+}
+
+type V3<V> = [V; 3];
+
+#[inline(always)]
+fn sub<V: Vector>(a: V3<V>, b: V3<V>) -> V3<V> {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+
+#[inline(always)]
+fn dot<V: Vector>(a: V3<V>, b: V3<V>) -> V {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
+}
+
+#[inline(always)]
+fn cross<V: Vector>(a: V3<V>, b: V3<V>) -> V3<V> {
+    [a[1].mul_sub(b[2], a[2].mul(b[1])), a[2].mul_sub(b[0], a[0].mul(b[2])), a[0].mul_sub(b[1], a[1].mul(b[0]))]
+}
+
+/// The squared distance of zero from the segment from `a` along `edge`.
+#[inline(always)]
+fn segment<V: Vector>(a: V3<V>, edge: V3<V>) -> V {
+    let (zero, one) = (V::splat(0.0), V::splat(1.0));
+    let length = dot(edge, edge).max(V::splat(f32::MIN_POSITIVE));
+    let share = zero.sub(dot(a, edge)).div(length).max(zero).min(one);
+    let q = [edge[0].mul_add(share, a[0]), edge[1].mul_add(share, a[1]), edge[2].mul_add(share, a[2])];
+    dot(q, q)
+}
+
+#[inline(always)]
+fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower<S::V8> {
+    let zero = S::V8::splat(0.0);
+    let p = [S::V8::splat(point.x), S::V8::splat(point.y), S::V8::splat(point.z)];
+    let [xs, ys, zs] = &block.corners;
+    let a = [S::V8::load(&xs[0]), S::V8::load(&ys[0]), S::V8::load(&zs[0])];
+    let b = [S::V8::load(&xs[1]), S::V8::load(&ys[1]), S::V8::load(&zs[1])];
+    let c = [S::V8::load(&xs[2]), S::V8::load(&ys[2]), S::V8::load(&zs[2])];
+    // Before the point is the origin: their rounding is then as small as they are.
+    let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
+    let (a, b, c) = (sub(a, p), sub(b, p), sub(c, p));
+    let edges = segment(a, ab).min(segment(b, bc)).min(segment(c, ca));
+
+    let normal = cross(ab, bc);
+    let square = dot(normal, normal);
+    let height = dot(normal, a).abs();
+    // On the inner side of each edge, seen along the normal.
+    let sides = dot(normal, cross(b, bc)).min(dot(normal, cross(c, ca))).min(dot(normal, cross(a, ab)));
+    let farthest = a[0].abs().max(a[1].abs()).max(a[2].abs()).add(S::V8::splat(block.size));
+    // What the corners and the point are off by counts as rounding does.
+    let relative = S::V8::splat(32.0 * UNIT_ROUNDOFF);
+    let off = farthest.mul_add(relative, S::V8::splat(8.0 * error));
+    let area = S::V8::splat(3.0 * block.size * block.size);
+    // A plane that is tilted is farther off the farther away it is.
+    let tilt = S::V8::splat(24.0 * error * block.size).mul(farthest);
+    let height_error = off.mul(area).mul(S::V8::splat(3.0)).add(tilt);
+    let side_error = off.mul(area).mul(S::V8::splat(9.0)).mul(farthest);
+    // Not surely outside.
+    let above = zero.sub(side_error).at_most(sides);
+    let least = height.sub(height_error).max(zero);
+    let plane = height.mul(height).div(square.max(S::V8::splat(f32::MIN_POSITIVE)));
+    // The normal is off as well, each component by 4 (error + u S) S, and with it the square.
+    let normal_error = S::V8::splat((16.0 * error + 32.0 * UNIT_ROUNDOFF * block.size) * block.size);
+    let size = normal_error.mul(area).mul(S::V8::splat(4.0)).add(square);
+    Lower {
+        square: S::V8::select(above, plane.min(edges), edges).to_array(),
+        error: off,
+        bound: S::V8::select(above, least.mul(least), edges),
+        weight: S::V8::select(above, size, S::V8::splat(1.0)),
+    }
+}

@@ -1,0 +1,194 @@
+//! The coordinates in which f64 meshes are traced, and how far rays and corners are off there.
+//!
+//! Meshes are moved so that their middle is zero, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
+//! then keeps of them what it can, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
+//! u at most, and by what f64 rounds at the distance from zero where they were: by that, c, in sum. The filter wants 3 c more than the
+//! origin of a ray is off by ([`super::super::bvh`]).
+//!
+//! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
+//! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
+
+use super::{PreciseMesh, PreciseRay};
+use crate::math::{DAabb, DVec3, LARGEST_COORDINATE, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
+use crate::ray::Ray;
+use crate::scene::choose_origin;
+use crate::trace::bvh::Blur;
+
+/// From the coordinates of the meshes to those of the tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    centre: DVec3,
+    /// A power of two.
+    scale: f64,
+    /// R, of everything in the tree.
+    reach: f64,
+    /// c.
+    corner_error: f64,
+    /// What f64 rounds a point by that is as far away as the meshes are, in the tree's coordinates.
+    moving_error: f64,
+}
+
+/// A ray in the coordinates of the tree.
+pub(super) struct LocalRay {
+    pub ray: Ray,
+    /// The blur of this one ray.
+    pub blur: Blur,
+    /// Whether [`Frame::blur`] covers it, as one of many.
+    pub is_common: bool,
+    /// t is that of the local ray and this,
+    start: f64,
+    /// times this.
+    stretch: f64,
+}
+
+/// More than the rounding of a component to f32, relative to the largest.
+const ROUNDING: f32 = 1.01 * UNIT_ROUNDOFF;
+
+/// Less than this many times R is a ray's origin away, or it is moved.
+const NEAR: f64 = 4.0;
+
+/// Smaller meshes are not scaled to 1, so that products with the scale stay finite.
+const SMALLEST: f64 = 1e-140;
+
+/// Rounding of t, in f64 and to f32.
+const RANGE: f64 = 1e-6;
+
+impl Frame {
+    pub fn around(meshes: &[PreciseMesh]) -> Self {
+        let positions = || meshes.iter().flat_map(|mesh| &mesh.positions);
+        let is_traceable = |p: &&DVec3| p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan();
+        let bounds = positions().filter(is_traceable).fold(DAabb::EMPTY, |all, &p| all.include(p));
+        let is_f32 = |p: &DVec3| p.as_vec3().as_dvec3() == *p || p.is_nan();
+        let (centre, radius) = if bounds.is_empty() { (DVec3::ZERO, 0.0) } else { (bounds.centre(), bounds.radius()) };
+        let is_handy = bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&radius);
+        if is_handy && positions().all(is_f32) {
+            let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+            return Self { centre: DVec3::ZERO, scale: 1.0, reach, corner_error: 0.0, moving_error: 0.0 };
+        }
+        let scale = power_of_two_below(radius.max(SMALLEST)).recip();
+        let moving_error = 4.0 * UNIT_ROUNDOFF_64 * (centre.abs().max_element() + radius) * scale;
+        let corner_error = f64::from(UNIT_ROUNDOFF) + moving_error;
+        Self { centre, scale, reach: 2.0, corner_error, moving_error }
+    }
+
+    /// Whether everything is traced as it is.
+    pub fn is_identity(&self) -> bool {
+        self.corner_error == 0.0
+    }
+
+    /// A corner; NaN for one that is too large to trace.
+    pub fn point(&self, p: DVec3) -> Vec3 {
+        if p.abs().max_element() <= f64::from(LARGEST_COORDINATE) { self.local(p).as_vec3() } else { Vec3::NAN }
+    }
+
+    fn local(&self, p: DVec3) -> DVec3 {
+        (p - self.centre) * self.scale
+    }
+
+    /// A point, and by how much each component is off from what is meant, corners included.
+    pub fn blurred_point(&self, p: DVec3) -> (Vec3, f64) {
+        let local = self.local(p);
+        let rounded = local.as_vec3();
+        let moved = 4.0 * UNIT_ROUNDOFF_64 * (p.abs().max_element() + self.centre.abs().max_element()) * self.scale;
+        let error = (local - rounded.as_dvec3()).abs().max_element() + if self.is_identity() { 0.0 } else { moved };
+        (rounded, error + self.corner_error)
+    }
+
+    /// Lengths there are so many times those of the meshes.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Of many rays, to be used as [`slab::ready`](super::super::bvh) does: in the second part relative to their own size.
+    pub fn blur(&self, rays_are_f32: bool) -> Blur {
+        if self.is_identity() && rays_are_f32 {
+            return Blur::NONE;
+        }
+        // As a ray that is moved is off by what f64 rounds, no more than a quarter of u R.
+        let base = 3.0 * self.corner_error + self.moving_error + 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach;
+        Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: ROUNDING }
+    }
+
+    /// The ray as it is, if it can be traced so.
+    pub fn exact_ray(&self, ray: &PreciseRay) -> Option<Ray> {
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+        let (tmin, tmax) = (ray.tmin as f32, ray.tmax as f32);
+        let is_f32 = origin.as_dvec3() == ray.origin && direction.as_dvec3() == ray.direction;
+        let is_same = is_f32 && f64::from(tmin) == ray.tmin && f64::from(tmax) == ray.tmax;
+        let local = Ray { origin, direction, tmin, tmax, time: 0.0 };
+        (self.is_identity() && is_same && local.is_valid()).then_some(local)
+    }
+
+    /// Bounds on the local t of a hit.
+    pub fn bounds(&self, ray: &PreciseRay, t: f64) -> Option<[f32; 2]> {
+        let LocalRay { start, stretch, .. } = self.ray(ray)?;
+        let whole = t / stretch;
+        bounds(whole - start, (whole.abs() + start) * T_ROUNDING)
+    }
+
+    /// The ray, rounded; none for one that hits nothing.
+    pub fn ray(&self, ray: &PreciseRay) -> Option<LocalRay> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let size = power_of_two_below(ray.direction.abs().max_element());
+        let direction = ray.direction / size;
+        let stretch = (size * self.scale).recip();
+        let mut origin = self.local(ray.origin);
+        let far = origin.abs().max_element();
+        let mut start = 0.0;
+        if far > NEAR * self.reach {
+            let along = -origin.dot(direction) / direction.length_squared();
+            // Everything is within sqrt(3) R of zero, so within 1.8 R of where the ray is nearest to zero.
+            let before = along - 2.5 * self.reach / direction.length();
+            if before > 0.0 {
+                start = before;
+                origin += direction * before;
+            }
+        }
+        let begin = (ray.tmin / stretch * (1.0 - RANGE) - start * (1.0 + RANGE)).max(0.0);
+        let end = ray.tmax / stretch * (1.0 + RANGE) - start * (1.0 - RANGE);
+        if end < begin {
+            return None;
+        }
+        let local = Ray {
+            origin: origin.as_vec3(),
+            direction: direction.as_vec3(),
+            tmin: begin as f32,
+            tmax: (end as f32).next_up(),
+            time: 0.0,
+        };
+        let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
+        let is_common = off <= 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach && local.is_valid();
+        let common = self.blur(false);
+        let rounded = ROUNDING * local.origin.abs().max_element();
+        let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: ROUNDING };
+        Some(LocalRay { ray: local, blur, is_common, start, stretch })
+    }
+}
+
+/// f32 below and above a number that may be off by the rounding of t; none where that is not finite.
+pub(super) fn around(t: f64) -> Option<[f32; 2]> {
+    bounds(t, t.abs() * T_ROUNDING)
+}
+
+/// Relative to the numbers that t is computed from.
+const T_ROUNDING: f64 = 1e-11;
+
+fn bounds(t: f64, error: f64) -> Option<[f32; 2]> {
+    let [low, high] = [((t - error) as f32).next_down(), ((t + error) as f32).next_up()];
+    (low.is_finite() && high.is_finite()).then_some([low.max(0.0), high])
+}
+
+impl LocalRay {
+    /// At least the local t of one that is given.
+    pub fn limit(&self, t: f64) -> f32 {
+        let local = t / self.stretch;
+        ((local * (1.0 + RANGE) - self.start * (1.0 - RANGE)) as f32).next_up()
+    }
+}
+
+/// The largest power of two that is no larger; 1 for what is not a positive number.
+fn power_of_two_below(x: f64) -> f64 {
+    if x.is_normal() && x > 0.0 { f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000) } else { 1.0 }
+}

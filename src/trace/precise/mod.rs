@@ -1,0 +1,159 @@
+//! Meshes and rays in f64, decided in f64.
+//!
+//! The trees are those of the native tracer, over the same triangles recentred, scaled by a power of two and rounded to f32; and rays
+//! are rounded likewise ([`frame`]). How far all that may be off is known, so a tree only ever rejects what is not hit, and what it
+//! knows to be hit is hit ([`certain`](super::bvh)). What is in doubt is decided on the corners and the ray as they were given, in
+//! f64 with an error bound and where that does not suffice in exact arithmetic; and so is every t. So a hit depends on the
+//! f64 values alone: two triangles with a common edge leave no gap between them at 1e9 either, where steps of f32 are 64.
+//!
+//! Trees over f64 boxes, the simpler alternative, would take twice the memory and half of the lanes.
+//!
+//! Where all coordinates are f32 to begin with, and lie well ([`Precise::exact`]), the rounding is none, and rays in f32 may ask
+//! the [`Bvh`] itself.
+
+mod frame;
+mod nearest_point;
+mod query;
+
+use crate::error::{Error, Result};
+use crate::math::{DVec3, Vec3};
+use crate::ray::Hit;
+use crate::scene::{Geometry, Material, Mesh, Scene};
+use crate::trace::World;
+use crate::trace::bvh::Bvh;
+use frame::Frame;
+pub use nearest_point::NearestPoint;
+
+/// A half-line in f64 with a valid range. A hit counts for `tmin <= t <= tmax`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreciseRay {
+    /// Start, in the coordinates of the meshes.
+    pub origin: DVec3,
+    /// Direction; need not be a unit vector.
+    pub direction: DVec3,
+    /// Nearest valid t, at least 0.
+    pub tmin: f64,
+    /// Farthest valid t; may be infinite.
+    pub tmax: f64,
+}
+
+/// A hit, with numbers in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreciseHit {
+    /// Distance in units of the ray's direction; finite.
+    pub t: f64,
+    /// Weight of the triangle's second corner.
+    pub u: f64,
+    /// Weight of the triangle's third corner.
+    pub v: f64,
+    /// Index of the triangle in its mesh.
+    pub primitive: u32,
+    /// Index of the mesh.
+    pub geometry: u32,
+    /// Index into [`Scene::instances`]; 0 in a scene of meshes.
+    pub instance: u32,
+}
+
+impl PreciseRay {
+    /// A ray over [0, infinity].
+    pub const fn new(origin: DVec3, direction: DVec3) -> Self {
+        Self { origin, direction, tmin: 0.0, tmax: f64::INFINITY }
+    }
+
+    /// Whether it can hit anything: finite origin, a direction whose largest component is neither below 1e-140 nor above 1e140, so that
+    /// products with it hold in f64, and a range that is not empty. Any other ray misses.
+    pub fn is_valid(&self) -> bool {
+        let directed = (1e-140..=1e140).contains(&self.direction.abs().max_element()) && !self.direction.is_nan();
+        self.origin.is_finite() && directed && self.tmin >= 0.0 && self.tmin <= self.tmax
+    }
+
+    fn has(&self, t: f64) -> bool {
+        self.tmin <= t && t <= self.tmax && t.is_finite()
+    }
+}
+
+impl PreciseHit {
+    /// The order that decides between hits at equal t: the lowest wins.
+    pub const fn id(&self) -> (u32, u32, u32) {
+        (self.instance, self.geometry, self.primitive)
+    }
+
+    /// By t, then by id.
+    pub(super) fn order(&self, other: &Self) -> std::cmp::Ordering {
+        self.t.total_cmp(&other.t).then(self.id().cmp(&other.id()))
+    }
+
+    pub(super) fn rounded(&self) -> Hit {
+        let &Self { t, u, v, primitive, geometry, instance } = self;
+        Hit { t: t as f32, u: u as f32, v: v as f32, primitive, geometry, instance }
+    }
+}
+
+/// A mesh in f64.
+#[derive(Clone, Debug, Default)]
+pub struct PreciseMesh {
+    /// Corners; triangles with one that is NaN, infinite or larger than 1.8e18 cannot be hit.
+    pub positions: Vec<DVec3>,
+    /// Indices of each triangle's corners.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Meshes in f64, ready to be asked.
+pub struct Precise {
+    meshes: Vec<PreciseMesh>,
+    bvh: Bvh,
+    frame: Frame,
+}
+
+impl Precise {
+    /// Builds the tree, on rayon's current thread pool.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] for a triangle that names a vertex that is not there, with its number; and for too many triangles.
+    pub fn new(meshes: Vec<PreciseMesh>) -> Result<Self> {
+        for (number, mesh) in meshes.iter().enumerate() {
+            check_indices(number, mesh)?;
+        }
+        let frame = Frame::around(&meshes);
+        let rounded = |mesh: &PreciseMesh| {
+            let positions: Vec<Vec3> = mesh.positions.iter().map(|&p| frame.point(p)).collect();
+            Geometry::Mesh(Mesh::new(positions, mesh.triangles.clone()))
+        };
+        let scene = Scene::from_geometries(meshes.iter().map(rounded).collect(), vec![Material::default()]);
+        let world = World::new(&scene)?;
+        debug_assert_eq!(world.centre, DVec3::ZERO, "the frame lies around zero");
+        Ok(Self { bvh: Bvh::build(&world), meshes, frame })
+    }
+
+    /// The meshes as they were given.
+    pub fn meshes(&self) -> &[PreciseMesh] {
+        &self.meshes
+    }
+
+    /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers.
+    pub fn exact(&self) -> Option<&Bvh> {
+        self.frame.is_identity().then_some(&self.bvh)
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
+        let mesh = &self.meshes[geometry as usize];
+        mesh.triangles[primitive as usize].map(|i| mesh.positions[i as usize])
+    }
+}
+
+fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {
+    let count = mesh.positions.len();
+    let wrong = mesh.triangles.iter().position(|corners| corners.iter().any(|&i| i as usize >= count));
+    match wrong {
+        None => Ok(()),
+        Some(i) => {
+            let message = format!(
+                "triangle {i} of mesh {number} names the vertices {:?}, of which there are {count}",
+                mesh.triangles[i]
+            );
+            Err(Error::Backend { backend: "scene", message })
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The point of the meshes that is nearest to a given one.
+//!
+//! The tree offers what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
+
+use super::Precise;
+use crate::math::DVec3;
+use crate::shape::closest::{TrianglePoint, closest_point};
+use crate::trace::bvh::Waiting;
+
+/// A point on a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearestPoint {
+    /// Where it is, in the coordinates of the meshes.
+    pub point: DVec3,
+    /// How far from the point that was asked for, squared.
+    pub distance_squared: f64,
+    /// Weight of the triangle's second corner.
+    pub u: f64,
+    /// Weight of the triangle's third corner.
+    pub v: f64,
+    /// Index of the triangle in its mesh.
+    pub primitive: u32,
+    /// Index of the mesh.
+    pub geometry: u32,
+}
+
+impl NearestPoint {
+    const fn id(&self) -> (u32, u32) {
+        (self.geometry, self.primitive)
+    }
+
+    /// The point of one triangle.
+    #[inline]
+    fn on(point: DVec3, corners: [DVec3; 3], geometry: u32, primitive: u32) -> Self {
+        let TrianglePoint { offset, distance_squared, u, v } = closest_point(point, corners);
+        Self { point: point + offset, distance_squared, u, v, primitive, geometry }
+    }
+}
+
+impl Precise {
+    /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry, primitive). Triangles
+    /// without an area count too. None for a point that is not finite, and where there are no triangles.
+    pub fn nearest_point(&self, point: DVec3) -> Option<NearestPoint> {
+        self.nearest(point, None, &mut Waiting::new())
+    }
+
+    /// The same for many points, into `nearest` of the same length. Sooner where one point is near the next: the triangle that was
+    /// nearest to the last one is looked at first.
+    ///
+    /// # Panics
+    /// Unless there is one answer a point.
+    pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
+        assert_eq!(points.len(), nearest.len(), "one answer a point");
+        let mut waiting = Waiting::new();
+        let mut last = None;
+        for (&point, nearest) in points.iter().zip(nearest) {
+            *nearest = self.nearest(point, last, &mut waiting);
+            last = nearest.or(last);
+        }
+    }
+
+    fn nearest(&self, point: DVec3, last: Option<NearestPoint>, waiting: &mut Waiting) -> Option<NearestPoint> {
+        if !point.is_finite() {
+            return None;
+        }
+        let (local, error) = self.frame.blurred_point(point);
+        let is_exact = self.frame.is_identity();
+        let distance = |best: &NearestPoint| best.distance_squared.sqrt() * self.frame.scale();
+        let mut best = last.map(|last| {
+            let (geometry, primitive) = last.id();
+            NearestPoint::on(point, self.corners(geometry, primitive), geometry, primitive)
+        });
+        let wanted = best.as_ref().map_or(f64::INFINITY, distance);
+        self.bvh.near_triangles(local, error as f32 * 1.01, wanted, waiting, &mut |geometry, primitive, rounded| {
+            let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
+            let answer = NearestPoint::on(point, corners, geometry, primitive);
+            let is_better = |best: &NearestPoint| {
+                answer.distance_squared < best.distance_squared
+                    || answer.distance_squared == best.distance_squared && answer.id() < best.id()
+            };
+            if best.as_ref().is_none_or(is_better) {
+                best = Some(answer);
+            }
+            best.as_ref().map_or(f64::INFINITY, distance)
+        });
+        best
+    }
+}

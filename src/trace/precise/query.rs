@@ -1,0 +1,287 @@
+//! What rays ask of meshes in f64: the nearest hit, any hit, all hits.
+//!
+//! Each batch goes through flights first, which name what is hit for sure; t, u and v come from the corners in f64, in a step of its own
+//! ([`Sure`]). Then those that are in doubt go one by one.
+
+use super::frame::{self, LocalRay};
+use super::{Precise, PreciseHit, PreciseRay};
+use crate::math::{DVec3, Vec3};
+use crate::ray::Ray;
+use crate::shape::crossing::{Crossing, crossing_line};
+use crate::shape::triangle::intersect_line;
+use crate::trace::bvh::{Certain, Verdict, Wanted};
+use crate::trace::crossings::Crossings;
+
+/// Rays of a batch that are traced together.
+const CHUNK: usize = 1024;
+
+/// Misses.
+const INVALID: Ray = Ray { origin: Vec3::NAN, direction: Vec3::ZERO, tmin: 0.0, tmax: 0.0, time: 0.0 };
+
+impl Precise {
+    /// The nearest hit of each ray, into `hits` of the same length; at equal t that of the lowest id. On the calling thread, as all
+    /// queries.
+    ///
+    /// # Panics
+    /// Unless there is one answer a ray.
+    pub fn closest_batch(&self, rays: &[PreciseRay], hits: &mut [Option<PreciseHit>]) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        let mut sure = Sure::default();
+        for (rays, hits) in rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)) {
+            hits.fill(None);
+            let mut open = Vec::new();
+            sure.clear();
+            self.certain(Wanted::First, rays, |i, certain| match certain {
+                Certain::Hits([]) => {}
+                Certain::Hits([id, ..]) => sure.push(i, *id),
+                Certain::Doubt => open.push(i),
+            });
+            for (i, hit) in sure.hits(self, rays) {
+                match hit {
+                    Some(hit) => hits[i] = Some(hit),
+                    None => open.push(i),
+                }
+            }
+            for i in open {
+                hits[i] = self.closest(&rays[i]);
+            }
+        }
+    }
+
+    /// Whether each ray has any hit, into `occluded` of the same length.
+    ///
+    /// # Panics
+    /// Unless there is one answer a ray.
+    pub fn occluded_batch(&self, rays: &[PreciseRay], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
+            occluded.fill(false);
+            let mut open = Vec::new();
+            self.certain(Wanted::Any, rays, |i, certain| match certain {
+                Certain::Hits([]) => {}
+                // The range was widened: within it for sure is not within the range.
+                Certain::Hits([id, ..]) if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
+                    occluded[i] = true;
+                }
+                Certain::Hits(_) | Certain::Doubt => open.push(i),
+            });
+            for i in open {
+                occluded[i] = self.occluded(&rays[i]);
+            }
+        }
+    }
+
+    /// How often each ray crosses a triangle, into `counts` of the same length; what counts is said at
+    /// [`Bvh::all_hits`](super::super::bvh::Bvh::all_hits).
+    ///
+    /// # Panics
+    /// Unless there is one answer a ray.
+    pub fn count_batch(&self, rays: &[PreciseRay], counts: &mut [u32]) {
+        assert_eq!(rays.len(), counts.len(), "one count a ray");
+        let mut crossings = Crossings::default();
+        for (rays, counts) in rays.chunks(CHUNK).zip(counts.chunks_mut(CHUNK)) {
+            counts.fill(0);
+            let mut open = Vec::new();
+            self.certain(Wanted::All, rays, |i, certain| match certain {
+                Certain::Hits(ids) if ids.is_empty() || is_whole(&rays[i]) => counts[i] = ids.len() as u32,
+                Certain::Hits(ids) => {
+                    counts[i] = ids.iter().filter(|&&id| self.hit(&rays[i], id).is_some()).count() as u32;
+                }
+                Certain::Doubt => open.push(i),
+            });
+            for i in open {
+                counts[i] = self.all(&rays[i], &mut crossings).len() as u32;
+            }
+        }
+    }
+
+    /// All hits of each ray, by t and then by id: those of ray i are the `ends[i]` less the end before it, from there on in `hits`. What
+    /// counts is said at [`Bvh::all_hits`](super::super::bvh::Bvh::all_hits). Both are cleared first.
+    pub fn all_hits_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, hits: &mut Vec<PreciseHit>) {
+        ends.clear();
+        hits.clear();
+        let (mut crossings, mut sure) = (Crossings::default(), Sure::default());
+        // All hits in order of arrival, and of each ray where its hits are among them.
+        let (mut arrived, mut places) = (Vec::new(), Vec::new());
+        for rays in rays.chunks(CHUNK) {
+            places.clear();
+            places.resize(rays.len(), 0..0);
+            let mut open = Vec::new();
+            sure.clear();
+            self.certain(Wanted::All, rays, |i, certain| match certain {
+                Certain::Hits(ids) => {
+                    let first = sure.len();
+                    ids.iter().for_each(|&id| sure.push(i, id));
+                    places[i] = first..sure.len();
+                }
+                Certain::Doubt => open.push(i),
+            });
+            arrived.clear();
+            arrived.extend(sure.hits(self, rays).map(|(_, hit)| hit));
+            for i in open {
+                let first = arrived.len();
+                arrived.extend(self.all(&rays[i], &mut crossings).iter().copied().map(Some));
+                places[i] = first..arrived.len();
+            }
+            for place in &places {
+                let first = hits.len();
+                hits.extend(arrived[place.clone()].iter().flatten());
+                hits[first..].sort_unstable_by(PreciseHit::order);
+                ends.push(hits.len());
+            }
+        }
+    }
+
+    /// Tells `done` what is certain of each ray of a chunk that may hit something; rays are numbered as in `rays`.
+    fn certain(&self, wanted: Wanted, rays: &[PreciseRay], mut done: impl FnMut(usize, Certain<'_>)) {
+        let mut local = [INVALID; CHUNK];
+        let local = &mut local[..rays.len()];
+        let exact = rays.iter().zip(local.iter_mut()).all(|(ray, local)| match self.frame.exact_ray(ray) {
+            Some(exact) => {
+                *local = exact;
+                true
+            }
+            None => false,
+        });
+        if !exact {
+            for (i, (ray, local)) in rays.iter().zip(local.iter_mut()).enumerate() {
+                *local = match self.frame.ray(ray) {
+                    Some(LocalRay { ray, is_common: true, .. }) => ray,
+                    Some(_) => {
+                        done(i, Certain::Doubt);
+                        INVALID
+                    }
+                    None => INVALID,
+                };
+            }
+        }
+        let decide = |i: usize, geometry: u32, primitive: u32| {
+            let ray: &PreciseRay = &rays[i];
+            let corners = self.corners(geometry, primitive);
+            match crossing_line(ray.origin, ray.direction, &corners) {
+                Some(Crossing { touch: Some(_), .. }) if wanted == Wanted::All => Verdict::Doubt,
+                Some(Crossing { hit, .. }) if ray.has(hit.t) => {
+                    let bounds = if exact { frame::around(hit.t) } else { self.frame.bounds(ray, hit.t) };
+                    bounds.map_or(Verdict::Doubt, Verdict::Hit)
+                }
+                _ => Verdict::Miss,
+            }
+        };
+        self.bvh.certain(wanted, local, self.frame.blur(exact), &decide, &mut done);
+    }
+
+    /// The hit with one triangle, which the ray hits for sure; none where that is out of range.
+    #[inline]
+    fn hit(&self, ray: &PreciseRay, id: u32) -> Option<PreciseHit> {
+        let (geometry, primitive) = self.bvh.triangle(id);
+        self.hit_of(ray, geometry, primitive)
+    }
+
+    #[inline]
+    fn hit_of(&self, ray: &PreciseRay, geometry: u32, primitive: u32) -> Option<PreciseHit> {
+        hit_of(ray, &self.corners(geometry, primitive), geometry, primitive)
+    }
+
+    /// The nearest hit, every candidate decided.
+    fn closest(&self, ray: &PreciseRay) -> Option<PreciseHit> {
+        let local = self.frame.ray(ray)?;
+        let (mut best, mut limit) = (None::<PreciseHit>, local.ray.tmax.next_up());
+        self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+            if let Some(hit) = self.hit_of(ray, geometry, primitive)
+                && best.is_none_or(|best| hit.order(&best).is_lt())
+            {
+                best = Some(hit);
+                limit = local.limit(hit.t).min(limit);
+            }
+            Some(limit)
+        });
+        best
+    }
+
+    /// Whether there is a hit, every candidate decided until there is.
+    fn occluded(&self, ray: &PreciseRay) -> bool {
+        let Some(local) = self.frame.ray(ray) else { return false };
+        let (mut is_hit, limit) = (false, local.ray.tmax.next_up());
+        self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+            is_hit = self.hit_of(ray, geometry, primitive).is_some();
+            (!is_hit).then_some(limit)
+        });
+        is_hit
+    }
+
+    /// All hits, every candidate decided.
+    fn all<'a>(&self, ray: &PreciseRay, crossings: &'a mut Crossings) -> &'a [PreciseHit] {
+        crossings.clear();
+        if let Some(local) = self.frame.ray(ray) {
+            let limit = local.ray.tmax.next_up();
+            self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+                let corners = self.corners(geometry, primitive);
+                if let Some(crossing) = crossing_line(ray.origin, ray.direction, &corners)
+                    && ray.has(crossing.hit.t)
+                {
+                    crossings.take(&corners, crossing, (primitive, geometry, 0));
+                }
+                Some(limit)
+            });
+        }
+        crossings.finish()
+    }
+}
+
+/// Triangles that rays of a chunk hit for sure.
+///
+/// Corners are looked up for all of them at once, one step of the way at a time: the processor then waits for many cache lines together,
+/// where ray by ray it would wait for each.
+#[derive(Default)]
+struct Sure {
+    /// Ray, and block and lane.
+    found: Vec<(u32, u32)>,
+    names: Vec<(u32, u32)>,
+    corners: Vec<[u32; 3]>,
+}
+
+impl Sure {
+    fn clear(&mut self) {
+        self.found.clear();
+    }
+
+    fn len(&self) -> usize {
+        self.found.len()
+    }
+
+    fn push(&mut self, ray: usize, id: u32) {
+        self.found.push((ray as u32, id));
+    }
+
+    /// Of each the ray and the hit, in their order; none where that is out of range.
+    fn hits<'a>(
+        &'a mut self,
+        precise: &'a Precise,
+        rays: &'a [PreciseRay],
+    ) -> impl Iterator<Item = (usize, Option<PreciseHit>)> + 'a {
+        let Self { found, names, corners } = self;
+        names.clear();
+        names.extend(found.iter().map(|&(_, id)| precise.bvh.triangle(id)));
+        corners.clear();
+        corners.extend(names.iter().map(|&(mesh, i)| precise.meshes[mesh as usize].triangles[i as usize]));
+        let named = names.iter().zip(&*corners);
+        found.iter().zip(named).map(|(&(ray, _), (&(geometry, primitive), corners))| {
+            let ray = ray as usize;
+            let positions = &precise.meshes[geometry as usize].positions;
+            let corners = corners.map(|i| positions[i as usize]);
+            (ray, hit_of(&rays[ray], &corners, geometry, primitive))
+        })
+    }
+}
+
+#[inline]
+fn hit_of(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32) -> Option<PreciseHit> {
+    let hit = intersect_line(ray.origin, ray.direction, corners)?;
+    let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance: 0 };
+    ray.has(hit.t).then_some(hit)
+}
+
+/// Whether its range is all there is ahead.
+fn is_whole(ray: &PreciseRay) -> bool {
+    ray.tmin == 0.0 && ray.tmax == f64::INFINITY
+}

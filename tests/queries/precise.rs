@@ -1,0 +1,118 @@
+//! Meshes in f64 against every triangle in whole numbers: 128 bits hold every volume, so the verdicts are exact.
+
+use twincast::math::DVec3;
+use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh, PreciseRay};
+
+use crate::scenes::Random;
+
+type Whole = [i128; 3];
+
+fn sub(a: Whole, b: Whole) -> Whole {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn volume(d: Whole, a: Whole, b: Whole) -> i128 {
+    d[0] * (a[1] * b[2] - a[2] * b[1]) + d[1] * (a[2] * b[0] - a[0] * b[2]) + d[2] * (a[0] * b[1] - a[1] * b[0])
+}
+
+/// Whether the ray hits, whether it does so in the interior, and t.
+fn hit(origin: Whole, d: Whole, corners: [Whole; 3]) -> Option<(bool, f64)> {
+    let [a, b, c] = corners.map(|p| sub(p, origin));
+    let volumes = [volume(d, b, c), volume(d, c, a), volume(d, a, b)];
+    let sum: i128 = volumes.iter().sum();
+    if volumes.iter().any(|v| *v > 0) == volumes.iter().any(|v| *v < 0) {
+        return None;
+    }
+    let t = volume(a, b, c) as f64 / sum as f64;
+    (t >= 0.0).then_some((!volumes.contains(&0), t))
+}
+
+struct Case {
+    corners: Vec<[Whole; 3]>,
+    rays: Vec<(Whole, Whole)>,
+    precise: Precise,
+    traced: Vec<PreciseRay>,
+}
+
+/// Triangles and rays on a grid, among them rays through corners and along axes, then placed far away and scaled.
+fn case(random: &mut Random, away: i64, scale: f64) -> Case {
+    let mut point =
+        |size: i32| -> Whole { [0; 3].map(|_| i128::from((random.unit() * size as f32) as i32 - size / 2)) };
+    let corners: Vec<[Whole; 3]> = (0..200)
+        .map(|_| {
+            let first = point(400);
+            let mut near = || {
+                let step = point(100);
+                [0, 1, 2].map(|i| first[i] + step[i])
+            };
+            [first, near(), near()]
+        })
+        .collect();
+    let rays = (0..400).map(|i| {
+        let origin = point(800);
+        let target = if i % 3 == 0 { corners[i / 3][i % 2] } else { point(400) };
+        let along = [[1, 0, 0], [0, -1, 0], [0, 0, 1]][i % 3];
+        (origin, if i % 7 == 0 { along } else { sub(target, origin) })
+    });
+    let rays: Vec<(Whole, Whole)> = rays.filter(|(_, d)| *d != [0; 3]).collect();
+    let place = |p: Whole| DVec3::from(p.map(|x| (x as i64 + away) as f64 * scale));
+    let mesh = PreciseMesh {
+        positions: corners.iter().flatten().map(|&p| place(p)).collect(),
+        triangles: (0..corners.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+    };
+    let traced =
+        rays.iter().map(|&(o, d)| PreciseRay::new(place(o), DVec3::from(d.map(|x| x as f64 * scale)))).collect();
+    Case { precise: Precise::new(vec![mesh]).expect("a mesh"), corners, rays, traced }
+}
+
+#[test]
+fn every_hit_is_that_of_exact_arithmetic() {
+    let mut random = Random::new(5);
+    for (away, scale) in
+        [(0, 1.0), (0, 2f64.powi(-10)), (1 << 40, 1.0), (-(1 << 30), 2f64.powi(-90)), (0, 2f64.powi(50))]
+    {
+        let Case { corners, rays, precise, traced } = case(&mut random, away, scale);
+        let mut first = vec![None; rays.len()];
+        precise.closest_batch(&traced, &mut first);
+        let mut any = vec![false; rays.len()];
+        precise.occluded_batch(&traced, &mut any);
+        let (mut ends, mut all) = (Vec::new(), Vec::new());
+        precise.all_hits_batch(&traced, &mut ends, &mut all);
+        let mut counts = vec![0; rays.len()];
+        precise.count_batch(&traced, &mut counts);
+        let mut hits = 0;
+        for (i, &(origin, d)) in rays.iter().enumerate() {
+            let expected: Vec<Option<(bool, f64)>> = corners.iter().map(|&c| hit(origin, d, c)).collect();
+            let least = expected.iter().flatten().map(|&(_, t)| t).reduce(f64::min);
+            let from = if i == 0 { 0 } else { ends[i - 1] };
+            let crossed: &[PreciseHit] = &all[from..ends[i]];
+            assert_eq!(counts[i] as usize, crossed.len());
+            assert_eq!(any[i], least.is_some(), "ray {i} at {away} times {scale}");
+            match (first[i], least) {
+                (Some(found), Some(least)) => {
+                    let (_, t) = expected[found.primitive as usize].expect("what is named is hit");
+                    assert!((t - least).abs() <= 1e-13 * least && (found.t - least).abs() <= 1e-11 * least);
+                    hits += 1;
+                }
+                (found, least) => assert!(found.is_none() && least.is_none(), "{found:?}, {least:?}"),
+            }
+            assert!(crossed.is_sorted_by(|a, b| a.t <= b.t));
+            for (primitive, expected) in expected.iter().enumerate() {
+                let times = crossed.iter().filter(|hit| hit.primitive as usize == primitive).count();
+                match expected {
+                    None => assert_eq!(times, 0),
+                    Some((true, _)) => assert_eq!(times, 1, "passed in the interior"),
+                    Some((false, _)) => assert!(times <= 1),
+                }
+            }
+        }
+        assert!(hits > 100, "{hits}");
+    }
+}
+
+#[test]
+fn indices_that_are_not_there_are_an_error() {
+    let mesh = PreciseMesh { positions: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2], [0, 1, 3]] };
+    let error = Precise::new(vec![mesh]).err().expect("no fourth vertex");
+    assert!(error.to_string().contains("triangle 1 of mesh 0"), "{error}");
+}
