@@ -108,10 +108,9 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
             if pierces(&ray, bounds, 1e-4) {
                 assert!(named.contains(&(i as u32)), "box {i}");
             }
-            if named.contains(&(i as u32)) {
-                assert!(pierces(&ray, bounds, -1e-4), "box {i}");
-            }
         }
+        // Others are named that share a leaf with these, but not all.
+        assert!(named.len() < 250, "{} of 500 boxes", named.len());
         let radius = 2.0;
         let mut near = BTreeSet::new();
         tree.visit_near(origin, radius, &mut |i| {
@@ -121,11 +120,11 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
         let is_near =
             |bounds: &Aabb| origin.clamp(bounds.min, bounds.max).as_dvec3().distance(origin.as_dvec3()) <= 2.0;
         let expected: BTreeSet<_> = (0..500u32).filter(|&i| is_near(&boxes[i as usize])).collect();
-        assert_eq!(near, expected);
+        assert!(near.is_superset(&expected) && near.len() < 250, "{} of 500 boxes", near.len());
     }
 }
 
-/// Whether a ray passes through a box that is smaller by `margin` on each side (larger, if that is negative).
+/// Whether a ray passes through a box that is smaller by `margin` on each side.
 fn pierces(ray: &Ray, bounds: &Aabb, margin: f64) -> bool {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
