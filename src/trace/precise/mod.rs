@@ -1,8 +1,8 @@
 //! Meshes and rays in f64, decided in f64.
 //!
 //! The trees are those of the native tracer, over the same triangles recentred, scaled by a power of two and rounded to f32; and rays
-//! are rounded likewise ([`frame`]). How far all that may be off is known, so a tree only ever rejects what is not hit, and what it
-//! knows to be hit is hit ([`certain`](super::bvh)). What is in doubt is decided on the corners and the ray as they were given, in
+//! are rounded likewise (`frame`). How far all that may be off is known, so a tree only ever rejects what is not hit, and what it
+//! knows to be hit is hit (`bvh/certain.rs`). What is in doubt is decided on the corners and the ray as they were given, in
 //! f64 with an error bound and where that does not suffice in exact arithmetic; and so is every t. So a hit depends on the
 //! f64 values alone: two triangles with a common edge leave no gap between them at 1e9 either, where steps of f32 are 64.
 //!
