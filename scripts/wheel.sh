@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the Python package's wheel into target/wheels, for CPython 3.9 and later: for any Linux as old as Debian 10 (manylinux_2_28), linked by
-# zig, which knows that system's symbols. `--local` builds for this machine's system instead, without zig. What is compiled is the same.
+# zig, which knows that system's symbols. `--local` builds for this machine's system instead, without zig. Another linker
+# has cargo compile everything once more.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 arguments=(build --manifest-path ffi/python/Cargo.toml --out target/wheels --strip)

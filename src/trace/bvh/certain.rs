@@ -2,8 +2,7 @@
 //!
 //! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has bounds for that
 //! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Where it does not, the
-//! caller is asked at once, who has the corners in f64; to give the ray up and walk it again, tried first, took a quarter of the time, for one ray in ten
-//! comes to such a triangle on its way. Only the ids of what is hit are told; the caller computes t.
+//! caller is asked at once, who has the corners in f64; to give the ray up and walk it again, tried first, took a quarter of the time. Only the ids of what is hit are told; the caller computes t.
 //!
 //! What no single triangle can tell is left open, and the caller decides the ray by [`super::candidates`]: which of several hits at nearly
 //! the same t is first, and how often a ray crosses at an edge.
