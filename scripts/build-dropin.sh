@@ -1,22 +1,17 @@
 #!/usr/bin/env bash
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
-#
-# DROPIN_PROFILE=test builds with what `cargo test --no-default-features` has compiled already: slower libraries, for tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 cargo=${CARGO:-cargo}
-profile=${DROPIN_PROFILE:-foreign}
-built=target/$profile
-[[ $profile != test ]] || built=target/debug
 mkdir -p target/dropin
 
 # One version at a time: the library is compiled once, the interface for each.
 build() {
     local version=$1 features=$2 name=libembree$1.so.$1
-    $cargo build --locked --profile "$profile" -p twincast-rtc --no-default-features --features "$features"
-    cp "$built/libtwincast_rtc.so" "target/dropin/$name"
+    $cargo build --locked --profile foreign -p twincast-rtc --no-default-features --features "$features"
+    cp target/foreign/libtwincast_rtc.so "target/dropin/$name"
     nm -D --defined-only "target/dropin/$name" | awk '$3 ~ /^rtc/ { print $3 }' | sort >"target/dropin/exported-$version"
     sort "ffi/rtc/symbols-$version.txt" | diff - "target/dropin/exported-$version" || {
         echo "$name: exports other functions than Embree $version does (< missing, > too many)" >&2
