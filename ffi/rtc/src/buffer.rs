@@ -78,7 +78,8 @@ impl View {
             return Err(Failure::argument("buffer range out of bounds"));
         }
         let is_of_words = format != format::UCHAR;
-        if is_of_words && ((buffer.data as usize).wrapping_add(offset) % 4 != 0 || stride % 4 != 0) {
+        let is_aligned = (buffer.data as usize).wrapping_add(offset).is_multiple_of(4) && stride.is_multiple_of(4);
+        if is_of_words && !is_aligned {
             return Err(Failure::operation("data must be 4 bytes aligned"));
         }
         Ok(Self { buffer, offset, stride, count, format })

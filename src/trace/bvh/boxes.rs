@@ -67,7 +67,7 @@ impl BoxTree {
     }
 
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
-    /// ones mostly first, until it has seen enough.
+    /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves.
     pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> Search) {
         let mut radius = f64::from(radius);
         let mut open = vec![(0.0, Child::ROOT)];

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 use std::sync::Arc;
 
-use super::{other, release, with};
+use super::{other, release, tell, with};
 use crate::abi::*;
 use crate::buffer::{Buffer, View};
 use crate::device::{Callback, Device};
@@ -44,14 +44,14 @@ pub unsafe extern "C" fn rtcCommitGeometry(geometry: *const Geometry) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcEnableGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
-    unsafe { with(geometry, (), |geometry| Ok(geometry.set_enabled(true))) }
+    unsafe { tell(geometry, |geometry| geometry.set_enabled(true)) }
 }
 
 /// Hides the geometry.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcDisableGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
-    unsafe { with(geometry, (), |geometry| Ok(geometry.set_enabled(false))) }
+    unsafe { tell(geometry, |geometry| geometry.set_enabled(false)) }
 }
 
 /// How many time steps there are.
@@ -83,7 +83,10 @@ pub unsafe extern "C" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geo
     let set = |geometry: &Geometry| {
         let is_mesh = !matches!(geometry.kind, Kind::User | Kind::Instance | Kind::InstanceArray);
         geometry.demand(is_mesh && count <= MOST)?;
-        geometry.modify(|state| Ok(state.attributes.resize(count as usize, None)))
+        geometry.modify(|state| {
+            state.attributes.resize(count as usize, None);
+            Ok(())
+        })
     };
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -228,7 +231,7 @@ pub unsafe extern "C" fn rtcSetGeometryEnableFilterFunctionFromArguments(geometr
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetGeometryUserData(geometry: *const Geometry, user: *mut c_void) {
     // SAFETY: the interface's rules.
-    unsafe { with(geometry, (), |geometry| Ok(geometry.set_user(user))) }
+    unsafe { tell(geometry, |geometry| geometry.set_user(user)) }
 }
 
 /// The pointer that callbacks are given.

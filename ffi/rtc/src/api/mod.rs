@@ -67,6 +67,19 @@ unsafe fn with<T: Owned, R>(handle: *const T, default: R, work: impl FnOnce(&T) 
     guard(default, || device, || work(object?))
 }
 
+/// Does what cannot fail with the object behind a handle.
+///
+/// # Safety
+/// As for [`handle::borrow`].
+unsafe fn tell<T: Owned>(handle: *const T, work: impl FnOnce(&T)) {
+    let work = |object: &T| {
+        work(object);
+        Ok(())
+    };
+    // SAFETY: as the caller promises.
+    unsafe { with(handle, (), work) }
+}
+
 /// Gives up the caller's reference to an object, whose device lives on for the message.
 ///
 /// # Safety

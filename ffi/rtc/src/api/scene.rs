@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::ptr::null;
 use std::sync::Arc;
 
-use super::{other, present, release, with};
+use super::{other, present, release, tell, with};
 use crate::abi::{INVALID_ID, RTCBounds, RTCCollideFunc, RTCLinearBounds, RTCProgressMonitorFunction};
 use crate::device::Device;
 use crate::failure::{Failure, guard};
@@ -108,7 +108,7 @@ pub unsafe extern "C" fn rtcSetSceneProgressMonitorFunction(
     user: *mut c_void,
 ) {
     // SAFETY: the interface's rules.
-    unsafe { with(scene, (), |scene| Ok(scene.set_progress(function, user))) }
+    unsafe { tell(scene, |scene| scene.set_progress(function, user)) }
 }
 
 /// How much work goes into trees.
@@ -122,7 +122,7 @@ pub unsafe extern "C" fn rtcSetSceneBuildQuality(scene: *const Scene, quality: u
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetSceneFlags(scene: *const Scene, flags: u32) {
     // SAFETY: the interface's rules.
-    unsafe { with(scene, (), |scene| Ok(scene.set_flags(flags))) }
+    unsafe { tell(scene, |scene| scene.set_flags(flags)) }
 }
 
 /// What the scene is for.

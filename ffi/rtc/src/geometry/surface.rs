@@ -158,7 +158,7 @@ impl Surface {
         if self.is_plain() {
             return Named { primitive: triangle, u, v, ng };
         }
-        let (u, v) = if triangle % 2 == 0 { (u, v) } else { (1.0 - u, 1.0 - v) };
+        let (u, v) = if triangle.is_multiple_of(2) { (u, v) } else { (1.0 - u, 1.0 - v) };
         match &self.pairs {
             Pairs::None => Named { primitive: triangle, u, v, ng },
             Pairs::Quads => Named { primitive: triangle / 2, u, v, ng },

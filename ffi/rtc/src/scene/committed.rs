@@ -102,17 +102,19 @@ pub struct Committed {
 
 impl Committed {
     /// A scene in which nothing is hit.
-    pub const EMPTY: Self = Self {
-        records: Vec::new(),
-        solid: None,
-        is_plain: true,
-        others: None,
-        items: Vec::new(),
-        heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false, argument_filter: false },
-        bounds: [Aabb::EMPTY; 2],
-        near: OnceLock::new(),
-        bytes: 0,
-    };
+    pub fn empty() -> Self {
+        Self {
+            records: Vec::new(),
+            solid: None,
+            is_plain: true,
+            others: None,
+            items: Vec::new(),
+            heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false, argument_filter: false },
+            bounds: [Aabb::EMPTY; 2],
+            near: OnceLock::new(),
+            bytes: 0,
+        }
+    }
 
     /// The record of a geometry that was hit.
     #[inline(always)]

@@ -156,7 +156,7 @@ impl Scene {
                 Ok(())
             }
             Err(failure) => {
-                self.replace(Committed::EMPTY);
+                self.replace(Committed::empty());
                 self.state().made_of = None;
                 Err(failure)
             }

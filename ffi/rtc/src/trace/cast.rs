@@ -39,7 +39,7 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
     let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
     match heeded.mask {
         Some(own) if own & mask == 0 => Sight::Nothing,
-        Some(_) if !has_filter && !(heeded.argument_filter && query.filter.is_some()) => Sight::Everything,
+        Some(_) if !(has_filter || heeded.argument_filter && query.filter.is_some()) => Sight::Everything,
         _ => Sight::Some,
     }
 }
@@ -80,10 +80,10 @@ fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query
             let named = Named { primitive: 0, u: 0.0, v: 0.0, ng: Vec3::ZERO };
             target.take(query, 0, 0.0, &named);
         }
-    } else if let Some(found) = solid.closest_triangle(ray) {
-        if let Some((geometry, named)) = name_solid(committed, &found) {
-            target.take(query, geometry, found.hit.t, &named);
-        }
+    } else if let Some(found) = solid.closest_triangle(ray)
+        && let Some((geometry, named)) = name_solid(committed, &found)
+    {
+        target.take(query, geometry, found.hit.t, &named);
     }
 }
 

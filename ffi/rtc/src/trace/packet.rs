@@ -108,11 +108,11 @@ pub fn intersect_lanes(
             solid.closest_triangles(&chunk.rays[..chunk.count], &mut found[..chunk.count]);
         }
         for (&lane, found) in chunk.lanes.iter().zip(&found[..chunk.count]) {
-            if let Some(found) = found {
-                if let Some((geometry, named)) = name_solid(committed, found) {
-                    lanes.set_tfar(lane, found.hit.t);
-                    lanes.set_hit(lane, &hit_of(query, geometry, &named));
-                }
+            if let Some(found) = found
+                && let Some((geometry, named)) = name_solid(committed, found)
+            {
+                lanes.set_tfar(lane, found.hit.t);
+                lanes.set_hit(lane, &hit_of(query, geometry, &named));
             }
         }
     }
