@@ -50,7 +50,7 @@ fn instances(rays: usize, random: &mut Random) -> Vec<Probe> {
                 1 => a.lerp(b, 0.5),
                 _ => (a + b + c) / 3.0,
             };
-            towards(place(random.vector() * if i / 6 % 2 == 0 { 0.3 } else { 3.0 }), place(target))
+            towards(place(random.vector() * if (i / 6).is_multiple_of(2) { 0.3 } else { 3.0 }), place(target))
         };
         let rays = (0..rays / 5).map(ray).filter(crate::ray::Ray::is_valid).collect();
         Probe::new(label, &scene, rays)

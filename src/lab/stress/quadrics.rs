@@ -183,7 +183,7 @@ fn polygon(rays: usize, random: &mut Random) -> Vec<Probe> {
             1 => a + (b - a) * (random.below(13) as f32 / 4.0 - 1.0),
             _ => a.lerp(b, 0.5),
         };
-        if i % 2 == 0 {
+        if i.is_multiple_of(2) {
             target.x = nudged(target.x, random);
         }
         match i % 4 {

@@ -44,10 +44,7 @@ impl Gate {
 
     /// Whether a fault counts.
     pub const fn forbids(self, fault: Fault) -> bool {
-        match (self, fault) {
-            (Self::Hits, Fault::SwappedTie | Fault::WrongPrimitive) => false,
-            _ => true,
-        }
+        !matches!((self, fault), (Self::Hits, Fault::SwappedTie | Fault::WrongPrimitive))
     }
 }
 
