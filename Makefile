@@ -31,9 +31,12 @@ test: packages ## run every test
 	$(CARGO) test --locked
 
 check: packages ## formatting, lints, documentation, and everything once more without default features
-	$(CARGO) fmt --check
+	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
+	$(CARGO) clippy --locked -p twincast-python --all-targets -- -D warnings
+	$(CARGO) clippy --locked -p twincast-rtc --all-targets -- -D warnings
+	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
 	$(CARGO) test --locked --no-default-features
 
