@@ -2,7 +2,7 @@
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
 #
-# DROPIN_PROFILE=test builds with what `cargo test --no-default-features` has compiled already: slower libraries, for tests.
+# DROPIN_PROFILE=test builds slower libraries with every debug assertion, in less time: for tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -2,11 +2,9 @@
 # Builds the Python package's wheel into target/wheels, for CPython 3.9 and later: for any Linux as old as Debian 10 (manylinux_2_28), linked by
 # zig, which knows that system's symbols. `--local` builds for this machine's system instead, without zig. Another linker
 # has cargo compile everything once more.
-#
-# WHEEL_PROFILE=test builds with what `cargo test --no-default-features` has compiled already: slower, for tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-arguments=(build --manifest-path ffi/python/Cargo.toml --out target/wheels --strip --profile "${WHEEL_PROFILE:-foreign}")
+arguments=(build --manifest-path ffi/python/Cargo.toml --out target/wheels --strip)
 if [ "${1:-}" = --local ]; then
     venv=$(scripts/python-environment.sh)
     arguments+=(--compatibility linux)
