@@ -177,11 +177,13 @@ impl World {
 
     /// The bounds of everything fixed, and of every object where it stands; exact for meshes.
     pub fn bounds(&self) -> Aabb {
-        let fixed = self.parts[self.fixed.clone()].iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union);
-        self.placements.iter().fold(fixed, |all, placement| {
-            let parts = &self.parts[self.objects[placement.object as usize].clone()];
-            all.union(placement.bounds(parts.iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union)))
-        })
+        let of =
+            |parts: &Range<usize>| self.parts[parts.clone()].iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union);
+        // Once for each object, however often it is placed.
+        let objects: Vec<Aabb> = self.objects.iter().map(of).collect();
+        self.placements
+            .iter()
+            .fold(of(&self.fixed), |all, placement| all.union(placement.bounds(objects[placement.object as usize])))
     }
 
     /// Whether something moves.
