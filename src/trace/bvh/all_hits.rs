@@ -15,8 +15,7 @@ use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::Stack;
-use super::walk::{self, Visit};
+use super::walk::{self, Stack, Visit, with_stack};
 use crate::ray::{Hit, Ray};
 use crate::shape::crossing;
 use crate::shape::triangle::Placed;
@@ -39,7 +38,11 @@ impl Bvh {
         hits.clear();
         if ray.is_valid() {
             let mut gathered = Gathered::default();
-            isa::dispatch(self.isa, Gather { bvh: self, ray, gathered: &mut gathered });
+            with_stack(|upper| {
+                with_stack(|level| {
+                    isa::dispatch(self.isa, Gather { bvh: self, ray, upper, level, gathered: &mut gathered });
+                });
+            });
             gathered.finish(hits);
         }
     }
@@ -68,6 +71,8 @@ impl Gathered {
 struct Gather<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
+    upper: &'a mut Stack,
+    level: &'a mut Stack,
     gathered: &'a mut Gathered,
 }
 
@@ -76,24 +81,23 @@ impl Kernel for Gather<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, ray, gathered } = self;
-        let (mut upper, mut level) = (Stack::new(), Stack::new());
-        bvh.fixed.gather::<S>(ray, None, &mut level, gathered);
+        let Self { bvh, ray, upper, level, gathered } = self;
+        bvh.fixed.gather::<S>(ray, None, level, gathered);
         bvh.unbounded.gather(ray, &mut gathered.shapes);
         let limit = limit(ray);
         if !bvh.moving.is_empty() {
-            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, &mut upper, |object, place| {
-                object.gather::<S>(ray, Some(place), &mut level, gathered);
+            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, upper, |object, place| {
+                object.gather::<S>(ray, Some(place), level, gathered);
                 Visit::Until(limit)
             });
         }
         if bvh.placements.is_empty() {
             return;
         }
-        walk_over::<S, Closest>(bvh.placements.tree(), ray, limit, &mut upper, |number| {
+        walk_over::<S, Closest>(bvh.placements.tree(), ray, limit, upper, |number| {
             let place = bvh.placements.at(number);
             let object = &bvh.objects[place.placement.object as usize];
-            object.gather::<S>(ray, Some(place), &mut level, gathered);
+            object.gather::<S>(ray, Some(place), level, gathered);
             Visit::Until(limit)
         });
     }

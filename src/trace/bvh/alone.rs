@@ -9,11 +9,11 @@
 //!
 //! Only the fixed triangles are asked: shapes and placements are those of [`Tracer`](crate::Tracer).
 
-use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use super::Bvh;
 use super::block::LANES;
+use super::candidates;
 use super::filter::Filter;
 use super::flight::{self, Flight};
 use super::found::Found;
@@ -24,7 +24,7 @@ use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
 use super::simd::Simd;
 use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::walk::{self, Stack, Visit, with_stack};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
@@ -43,23 +43,6 @@ pub type Search = ControlFlow<(), f32>;
 
 /// Rays that travel together at most.
 const TOGETHER: usize = 16;
-
-thread_local! {
-    /// Stacks that are not in use: a visitor may cast rays of its own.
-    #[expect(clippy::vec_box, reason = "boxes are moved in and out, stacks of some kilobytes are not")]
-    static STACKS: RefCell<Vec<Box<Stack>>> = const { RefCell::new(Vec::new()) };
-    /// The same of flights, of which one at a time is in use.
-    static FLIGHT: RefCell<Option<Box<Flight>>> = const { RefCell::new(None) };
-}
-
-/// Lends a stack to `work`.
-#[inline]
-pub(super) fn with_stack<R>(work: impl FnOnce(&mut Stack) -> R) -> R {
-    let mut stack = STACKS.with_borrow_mut(Vec::pop).unwrap_or_else(|| Box::new(Stack::new()));
-    let result = work(&mut stack);
-    STACKS.with_borrow_mut(|stacks| stacks.push(stack));
-    result
-}
 
 impl Bvh {
     /// The nearest fixed triangle that `ray` hits.
@@ -88,11 +71,11 @@ impl Bvh {
         if self.fixed.triangles.tree().is_empty() {
             return;
         }
-        let mut flight = FLIGHT.take().unwrap_or_else(|| Box::new(Flight::new()));
-        for (rays, found) in rays.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
-            isa::dispatch(self.isa, Together { bvh: self, rays, found, flight: &mut flight });
-        }
-        FLIGHT.set(Some(flight));
+        self.with_flight(|flight| {
+            for (rays, found) in rays.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
+                isa::dispatch(self.isa, Together { bvh: self, rays, found, flight });
+            }
+        });
     }
 
     /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
@@ -257,41 +240,30 @@ impl Kernel for VisitAll<'_, '_> {
     fn run<S: Simd>(self) {
         let Self { bvh, ray, stack, visitor } = self;
         let triangles = &bvh.fixed.triangles;
-        let slab = SlabRay::new(ray, triangles.tree().reach(), Blur::NONE);
-        let filter = Filter::new(ray, Blur::NONE);
-        let mut limit = ray.tmax.next_up();
-        walk::single::<S, Closest>(
+        candidates::walk::<S>(
+            triangles,
+            ray,
+            Blur::NONE,
             stack,
-            triangles.tree(),
-            &slab,
-            limit,
             #[inline(always)]
-            |leaf| {
-                for index in leaf.blocks() {
-                    let mut scratch = None;
-                    let block = triangles.block(index, &mut scratch);
-                    let mut open = filter.candidates::<S, false>(block, limit).lanes;
-                    while open != 0 {
-                        let lane = open.trailing_zeros() as usize % LANES;
-                        open &= open - 1;
-                        let corners = block.triangle(lane);
-                        let Some(found) = triangle::intersect(ray, &corners) else { continue };
-                        let part = triangles.part(block.part[lane]);
-                        let hit = Hit {
-                            t: found.t as f32,
-                            u: found.u as f32,
-                            v: found.v as f32,
-                            primitive: block.primitive[lane],
-                            geometry: part.geometry,
-                            instance: part.instance,
-                        };
-                        match visitor(&TriangleFound { hit, corners }) {
-                            Search::Continue(t) => limit = t,
-                            Search::Break(()) => return Visit::Stop,
-                        }
-                    }
+            |filter, block, limit| filter.candidates::<S, false>(block, limit),
+            #[inline(always)]
+            |block, lane, limit| {
+                let corners = block.triangle(lane);
+                let Some(found) = triangle::intersect(ray, &corners) else { return Some(limit) };
+                let part = triangles.part(block.part[lane]);
+                let hit = Hit {
+                    t: found.t as f32,
+                    u: found.u as f32,
+                    v: found.v as f32,
+                    primitive: block.primitive[lane],
+                    geometry: part.geometry,
+                    instance: part.instance,
+                };
+                match visitor(&TriangleFound { hit, corners }) {
+                    Search::Continue(t) => Some(t),
+                    Search::Break(()) => None,
                 }
-                Visit::Until(limit)
             },
         );
     }

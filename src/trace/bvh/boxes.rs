@@ -4,7 +4,7 @@
 //! (Embree's user geometry, instances of other scenes, curves). The caller names a box by its index, and is told which
 //! of them a ray enters, or are near a point.
 
-use super::alone::{Search, with_stack};
+use super::alone::Search;
 use super::build::{self, Record};
 use super::isa::{self, Isa, Kernel};
 use super::node::{Child, Tree};
@@ -13,7 +13,7 @@ use super::preset::Options;
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::walk::{self, Stack, Visit, with_stack};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::Ray;
 

@@ -3,14 +3,15 @@
 //! A walk by itself, for what flights leave open: rounding, or what the caller knows about triangles and the tree does not.
 
 use super::Bvh;
-use super::block::LANES;
-use super::filter::Filter;
+use super::block::{Block, LANES};
+use super::filter::{self, Filter};
 use super::isa::{self, Kernel};
 use super::place::Blur;
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::triangles::TriangleTree;
+use super::walk::{self, Stack, Visit, with_stack};
 use crate::ray::Ray;
 
 /// What is done with a candidate: its geometry and its primitive; says up to which t more are wanted, none where no more are.
@@ -21,7 +22,7 @@ impl Bvh {
     /// The ray, and the triangles, may be off from those that are meant by the blur.
     pub(in crate::trace) fn candidates(&self, ray: &Ray, blur: Blur, offer: Offer<'_>) {
         if ray.is_valid() && !self.fixed.triangles.tree().is_empty() {
-            isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, offer });
+            with_stack(|stack| isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, stack, offer }));
         }
     }
 }
@@ -30,6 +31,7 @@ struct Candidates<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
     blur: Blur,
+    stack: &'a mut Stack,
     offer: Offer<'a>,
 }
 
@@ -38,33 +40,56 @@ impl Kernel for Candidates<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, ray, blur, offer } = self;
+        let Self { bvh, ray, blur, stack, offer } = self;
         let triangles = &bvh.fixed.triangles;
-        let tree = triangles.tree();
-        let (slab, filter) = (SlabRay::new(ray, tree.reach(), blur), Filter::new(ray, blur));
-        let mut limit = ray.tmax.next_up();
-        walk::single::<S, Closest>(
-            &mut Stack::new(),
-            tree,
-            &slab,
-            limit,
+        walk::<S>(
+            triangles,
+            ray,
+            blur,
+            stack,
             #[inline(always)]
-            |leaf| {
-                for index in leaf.blocks() {
-                    let mut scratch = None;
-                    let block = triangles.block(index, &mut scratch);
-                    let mut open = filter.rounded_candidates::<S>(block, limit).lanes;
-                    while open != 0 {
-                        let lane = open.trailing_zeros() as usize % LANES;
-                        open &= open - 1;
-                        match offer(triangles.part(block.part[lane]).geometry, block.primitive[lane]) {
-                            Some(wanted) => limit = wanted,
-                            None => return Visit::Stop,
-                        }
-                    }
-                }
-                Visit::Until(limit)
-            },
+            |filter, block, limit| filter.rounded_candidates::<S>(block, limit),
+            #[inline(always)]
+            |block, lane, _| offer(triangles.part(block.part[lane]).geometry, block.primitive[lane]),
         );
     }
+}
+
+/// Calls `each` with every triangle that `test` leaves of the blocks that the ray comes to, by block and lane, and with how far it looks
+/// so far; it gives how far it looks from there on, none where it has seen enough.
+#[inline(always)]
+pub(super) fn walk<S: Simd>(
+    triangles: &TriangleTree,
+    ray: &Ray,
+    blur: Blur,
+    stack: &mut Stack,
+    test: impl Fn(&Filter, &Block, f32) -> filter::Candidates,
+    mut each: impl FnMut(&Block, usize, f32) -> Option<f32>,
+) {
+    let tree = triangles.tree();
+    let (slab, filter) = (SlabRay::new(ray, tree.reach(), blur), Filter::new(ray, blur));
+    let mut limit = ray.tmax.next_up();
+    walk::single::<S, Closest>(
+        stack,
+        tree,
+        &slab,
+        limit,
+        #[inline(always)]
+        |leaf| {
+            for index in leaf.blocks() {
+                let mut scratch = None;
+                let block = triangles.block(index, &mut scratch);
+                let mut open = test(&filter, block, limit).lanes;
+                while open != 0 {
+                    let lane = open.trailing_zeros() as usize % LANES;
+                    open &= open - 1;
+                    match each(block, lane, limit) {
+                        Some(wanted) => limit = wanted,
+                        None => return Visit::Stop,
+                    }
+                }
+            }
+            Visit::Until(limit)
+        },
+    );
 }

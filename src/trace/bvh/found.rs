@@ -144,9 +144,8 @@ impl Found {
             open &= open - 1;
             let (low, high) = (candidates.low[lane], candidates.high[lane]);
             if candidates.sure >> lane & 1 != 0 {
-                if ray.tmin <= low && high <= self.sure {
-                    (self.noted, self.place) = (LANES as u32 * index + lane as u32, place);
-                    (self.sure, self.limit) = (low, high);
+                if self.note(LANES as u32 * index + lane as u32, [low, high], ray.tmin) {
+                    self.place = place;
                     if Q::ANY {
                         return;
                     }

@@ -3,6 +3,8 @@
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
+use std::cell::RefCell;
+
 use super::build::MAX_DEPTH;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::query::Query;
@@ -81,6 +83,21 @@ impl Stack {
         self.entries[at] = entry;
         self.len += 1;
     }
+}
+
+thread_local! {
+    /// Stacks that are not in use: who visits a leaf may cast rays of its own.
+    #[expect(clippy::vec_box, reason = "boxes are moved in and out, stacks of some kilobytes are not")]
+    static STACKS: RefCell<Vec<Box<Stack>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Lends a stack to `work`, for callers with a single ray.
+#[inline]
+pub(super) fn with_stack<R>(work: impl FnOnce(&mut Stack) -> R) -> R {
+    let mut stack = STACKS.with_borrow_mut(Vec::pop).unwrap_or_else(|| Box::new(Stack::new()));
+    let result = work(&mut stack);
+    STACKS.with_borrow_mut(|stacks| stacks.push(stack));
+    result
 }
 
 /// Visits the leaves that the ray enters before `limit`; near ones first, if that matters to the query.
