@@ -4,7 +4,7 @@
 //! for memory. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
 
 use twincast::math::Vec3;
-use twincast::trace::bvh::TriangleFound;
+use twincast::trace::bvh::{Bvh, TriangleFound};
 use twincast::{Batch, Hit, Ray, Tracer};
 
 use super::Query;
@@ -28,6 +28,10 @@ struct Chunk {
 }
 
 impl Chunk {
+    fn rays(&self) -> &[Ray] {
+        &self.rays[..self.count]
+    }
+
     /// Fills the chunk with rays from lane `next` on, and returns where it stopped; `alone` is told of lanes that must go by themselves.
     #[inline(always)]
     fn fill(
@@ -67,6 +71,39 @@ fn with_corners(committed: &Committed, hit: Hit) -> Option<TriangleFound> {
     Some(TriangleFound { hit, corners: surface.corners_at(hit.primitive as usize, 0.0) })
 }
 
+/// The lanes of a query that are asked for.
+struct Asked<'a, L, V> {
+    lanes: &'a L,
+    count: usize,
+    is_valid: V,
+}
+
+impl<L: Lanes, V: Fn(usize) -> bool> Asked<'_, L, V> {
+    /// Calls `together` with the triangles and those rays, a chunk at a time, that see all of them and nothing else, and `alone` with
+    /// every other lane.
+    #[inline(always)]
+    fn each(
+        &self,
+        committed: &Committed,
+        query: &Query,
+        any: bool,
+        alone: impl Fn(usize) + Copy,
+        mut together: impl FnMut(&Bvh, &Chunk),
+    ) {
+        let Self { lanes, count, is_valid } = self;
+        let Some(solid) = committed.solid.as_ref().filter(|_| committed.others.is_none()) else {
+            return (0..*count).filter(|&lane| is_valid(lane)).for_each(alone);
+        };
+        let mut next = 0;
+        while next < *count {
+            let see = |mask| sight(committed, query, mask, any);
+            let (chunk, end) = Chunk::fill(*lanes, next..*count, is_valid, see, alone);
+            next = end;
+            together(solid, &chunk);
+        }
+    }
+}
+
 /// Nearest hits of `count` rays, of those that are valid.
 #[inline(always)]
 pub fn intersect_lanes(
@@ -87,25 +124,17 @@ pub fn intersect_lanes(
         // SAFETY: as above.
         lanes.set_hit(lane, unsafe { &(*own).hit });
     };
-    let Some(solid) = committed.solid.as_ref().filter(|_| committed.others.is_none()) else {
-        (0..count).filter(|&lane| is_valid(lane)).for_each(alone);
-        return;
-    };
-    let mut next = 0;
-    while next < count {
-        let see = |mask| sight(committed, query, mask, false);
-        let (chunk, end) = Chunk::fill(lanes, next..count, &is_valid, see, alone);
-        next = end;
+    Asked { lanes, count, is_valid }.each(committed, query, false, alone, |solid, chunk| {
         let mut found: [Option<TriangleFound>; TOGETHER] = [None; TOGETHER];
         if query.is_coherent {
             let mut hits = [None; TOGETHER];
             let batch = Batch { coherent: true, ..Batch::default() };
-            solid.closest_batch(&chunk.rays[..chunk.count], &mut hits[..chunk.count], batch);
+            solid.closest_batch(chunk.rays(), &mut hits[..chunk.count], batch);
             for (found, hit) in found.iter_mut().zip(hits) {
                 *found = hit.and_then(|hit| with_corners(committed, hit));
             }
         } else {
-            solid.closest_triangles(&chunk.rays[..chunk.count], &mut found[..chunk.count]);
+            solid.closest_triangles(chunk.rays(), &mut found[..chunk.count]);
         }
         for (&lane, found) in chunk.lanes.iter().zip(&found[..chunk.count]) {
             if let Some(found) = found
@@ -115,7 +144,7 @@ pub fn intersect_lanes(
                 lanes.set_hit(lane, &hit_of(query, geometry, &named));
             }
         }
-    }
+    });
 }
 
 /// Whether each of `count` rays hits anything, of those that are valid.
@@ -134,23 +163,12 @@ pub fn occluded_lanes(
         cast_one::<true>(committed, query, &target);
         lanes.set_tfar(lane, target.tfar());
     };
-    let Some(solid) = committed.solid.as_ref().filter(|_| committed.others.is_none()) else {
-        (0..count).filter(|&lane| is_valid(lane)).for_each(alone);
-        return;
-    };
-    let mut next = 0;
-    while next < count {
-        let see = |mask| sight(committed, query, mask, true);
-        let (chunk, end) = Chunk::fill(lanes, next..count, &is_valid, see, alone);
-        next = end;
+    Asked { lanes, count, is_valid }.each(committed, query, true, alone, |solid, chunk| {
         let mut occluded = [false; TOGETHER];
-        solid.occluded_batch(
-            &chunk.rays[..chunk.count],
-            &mut occluded[..chunk.count],
-            Batch { coherent: query.is_coherent, ..Batch::default() },
-        );
+        let batch = Batch { coherent: query.is_coherent, ..Batch::default() };
+        solid.occluded_batch(chunk.rays(), &mut occluded[..chunk.count], batch);
         for (&lane, _) in chunk.lanes.iter().zip(&occluded[..chunk.count]).filter(|(_, occluded)| **occluded) {
             lanes.set_tfar(lane, f32::NEG_INFINITY);
         }
-    }
+    });
 }
