@@ -7,7 +7,7 @@ use twincast::trace::precise::{PreciseHit, PreciseRay};
 
 use crate::arrays::{Ends, Points, Rays};
 use crate::pool;
-use crate::scene::{CHUNK, Scene, table};
+use crate::scene::{CHUNK, Scene, for_each_ray, table};
 
 /// All hits, by ray, then by t: ray, primitive, geometry, t, (u, v), location.
 type Crossings<'py> = (
@@ -41,17 +41,12 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let counts = pool::run(py, threads, || {
-            let mut counts = vec![0i32; rays.len()];
-            counts.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, counts)| {
-                let (mut list, mut found) = (Vec::new(), [0; CHUNK]);
-                rays.chunk(chunk * CHUNK, counts.len(), &mut list);
-                self.precise.count_batch(&list, &mut found[..counts.len()]);
-                counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
-            });
-            counts
-        })?;
-        Ok(counts.into_pyarray(py))
+        for_each_ray(py, threads, rays.len(), 0i32, |from, counts| {
+            let (mut list, mut found) = (Vec::new(), [0; CHUNK]);
+            rays.chunk(from, counts.len(), &mut list);
+            self.precise.count_batch(&list, &mut found[..counts.len()]);
+            counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
+        })
     }
 
     /// All hits; of each ray the first `most`. Locations only where they are asked for, else without rows.

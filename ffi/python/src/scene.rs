@@ -48,6 +48,23 @@ pub fn table<'py, T: numpy::Element>(
     flat.into_pyarray(py).reshape([rows, columns])
 }
 
+/// An array with a value for each of `count` rays, at first `nothing`; `answer` is given the number of the first ray of a task, and the
+/// values of its rays.
+pub fn for_each_ray<T: numpy::Element + Copy>(
+    py: Python<'_>,
+    threads: usize,
+    count: usize,
+    nothing: T,
+    answer: impl Fn(usize, &mut [T]) + Sync,
+) -> PyResult<Bound<'_, PyArray1<T>>> {
+    let values = pool::run(py, threads, || {
+        let mut values = vec![nothing; count];
+        values.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, values)| answer(chunk * CHUNK, values));
+        values
+    })?;
+    Ok(values.into_pyarray(py))
+}
+
 #[pymethods]
 impl Scene {
     #[new]
@@ -82,14 +99,9 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let first = pool::run(py, threads, || {
-            let mut first = vec![-1; rays.len()];
-            first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
-                self.each_hit(&rays, chunk * CHUNK, first.len(), |i, hit| first[i] = hit.primitive.into());
-            });
-            first
-        })?;
-        Ok(first.into_pyarray(py))
+        for_each_ray(py, threads, rays.len(), -1, |from, first| {
+            self.each_hit(&rays, from, first.len(), |i, hit| first[i] = hit.primitive.into());
+        })
     }
 
     /// Whether each ray hits anything.
@@ -105,22 +117,16 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
-        let occluded = pool::run(py, threads, || {
-            let mut occluded = vec![false; rays.len()];
-            occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
-                let first = chunk * CHUNK;
-                if let Some(bvh) = exact {
-                    let rays: Vec<Ray> = (first..first + occluded.len()).map(|i| rays.rounded(i)).collect();
-                    bvh.occluded_batch(&rays, occluded, Batch::default());
-                } else {
-                    let mut list = Vec::new();
-                    rays.chunk(first, occluded.len(), &mut list);
-                    self.precise.occluded_batch(&list, occluded);
-                }
-            });
-            occluded
-        })?;
-        Ok(occluded.into_pyarray(py))
+        for_each_ray(py, threads, rays.len(), false, |from, occluded| {
+            if let Some(bvh) = exact {
+                let rays: Vec<Ray> = (from..from + occluded.len()).map(|i| rays.rounded(i)).collect();
+                bvh.occluded_batch(&rays, occluded, Batch::default());
+            } else {
+                let mut list = Vec::new();
+                rays.chunk(from, occluded.len(), &mut list);
+                self.precise.occluded_batch(&list, occluded);
+            }
+        })
     }
 
     /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
