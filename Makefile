@@ -45,9 +45,12 @@ stress: build ## every method on the cases on which ray casters fail: out/stress
 	$(TWINCAST) stress -o out/stress
 	$(TWINCAST) stress --search 20 -o out/stress
 
-stress-long: build ## a hundred million rays on the native tracer, and an hour of looking for more
+stress-long: build ## a hundred million random rays and ten million difficult ones on the native tracer, and an hour of looking for more
 	@mkdir -p out/stress
-	$(TWINCAST) stress --method native --rays 4000000 --seed 1 -o out/stress
+	for seed in $$(seq 25); do \
+	    $(TWINCAST) stress --method native --in-turns --case soups --rays 4000000 --seed $$seed || exit; \
+	done
+	$(TWINCAST) stress --method native --in-turns --rays 400000 --seed 1 -o out/stress
 	$(TWINCAST) stress --search 3600 --seed 1 -o out/stress
 
 test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5

@@ -49,6 +49,10 @@ pub(super) struct StressArgs {
     #[arg(long, value_name = "N", default_value_t = Setup::SEED)]
     seed: u64,
 
+    /// Share the rays out among the forms of a method (builds, instruction sets, packets), instead of asking each form all of them
+    #[arg(long)]
+    in_turns: bool,
+
     /// Look for new cases for so long: change rays and triangles towards where f32 fails, and ask the methods there (default: native)
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["cases", "list"], value_parser = clap::value_parser!(u64).range(1..))]
     search: Option<u64>,
@@ -109,8 +113,14 @@ impl StressArgs {
     }
 
     fn setup(&self, columns: Vec<Column>) -> Result<Setup> {
-        let mut setup =
-            Setup { cases: Vec::new(), own: Vec::new(), columns, rays: self.rays as usize, seed: self.seed };
+        let mut setup = Setup {
+            cases: Vec::new(),
+            own: Vec::new(),
+            columns,
+            rays: self.rays as usize,
+            seed: self.seed,
+            in_turns: self.in_turns,
+        };
         for name in &self.cases {
             if file::is_case_file(Path::new(name)) {
                 setup.own.push(file::read(Path::new(name))?);

@@ -14,7 +14,8 @@ use twincast::{Hit, Tracer, TriangleMethod};
 #[test]
 fn the_matrix_is_as_it_is_on_record() {
     let (rays, seed) = (Setup::RAYS, Setup::SEED);
-    let setup = Setup { cases: catalogue().collect(), own: Vec::new(), columns: columns(), rays, seed };
+    let setup =
+        Setup { cases: catalogue().collect(), own: Vec::new(), columns: columns(), rays, seed, in_turns: false };
     let report = setup.run(Control::default()).expect("nothing stops it");
     report.check().unwrap_or_else(|error| panic!("{error}\n{report}"));
     assert_eq!(report.rows.len(), catalogue().count());
@@ -25,13 +26,20 @@ fn the_matrix_is_as_it_is_on_record() {
     }
 }
 
-/// Other rays than those on record.
+/// A million other rays than those on record, each asked of one of the ways in which the native tracer answers.
 #[test]
-fn native_is_exact_on_other_rays() {
-    let setup =
-        Setup { cases: catalogue().collect(), own: Vec::new(), columns: vec![Column::Native], rays: 2000, seed: 77 };
+fn native_is_exact_on_a_million_other_rays() {
+    let setup = Setup {
+        cases: catalogue().collect(),
+        own: Vec::new(),
+        columns: vec![Column::Native],
+        rays: 35_500,
+        seed: 77,
+        in_turns: true,
+    };
     let report = setup.run(Control::default()).expect("nothing stops it");
     report.check().unwrap_or_else(|error| panic!("{error}\n{report}"));
+    assert!(report.rows.iter().map(|row| row.rays).sum::<u64>() >= 1_000_000);
 }
 
 fn search(columns: Vec<Column>, most: u64) -> Vec<Found> {
@@ -61,7 +69,7 @@ fn a_search_finds_what_textbooks_miss_and_nothing_of_the_native_tracer() {
     found.column.each(&probe.world, &mut ask).expect("it builds");
     assert!(faults.contains(&(0, found.fault)), "{faults:?} {}", found.text);
     let own = vec![(name, probe)];
-    let setup = Setup { cases: Vec::new(), own, columns: vec![Column::Native], rays: 1, seed: 0 };
+    let setup = Setup { cases: Vec::new(), own, columns: vec![Column::Native], rays: 1, seed: 0, in_turns: false };
     setup.run(Control::default()).expect("nothing stops it").check().expect("native is right");
 
     assert!(search(vec![Column::Native], 6000).is_empty());

@@ -1,6 +1,7 @@
 //! The matrix: every column on every case.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -33,6 +34,8 @@ pub struct Setup {
     pub rays: usize,
     /// Chooses the rays.
     pub seed: u64,
+    /// Whether the forms of a column share the rays out among them, for very many rays; otherwise each answers all of them.
+    pub in_turns: bool,
 }
 
 /// What one form of a column made of a case.
@@ -54,7 +57,7 @@ impl Setup {
     /// [`Error::Interrupted`], and those of Embree.
     pub fn run(&self, control: Control<'_>) -> Result<Report> {
         let mut rows = Vec::new();
-        let is_recorded = self.rays == Self::RAYS && self.seed == Self::SEED;
+        let is_recorded = self.rays == Self::RAYS && self.seed == Self::SEED && !self.in_turns;
         for case in &self.cases {
             let row = Row::new(case.name, case.about, case.source, case.gate, case.t_relative);
             let expected = |column: Column| if is_recorded { expected(case.name, column) } else { None };
@@ -98,16 +101,21 @@ impl Setup {
                     continue;
                 }
                 let gate = column.gate(row.gate);
+                let shares = if self.in_turns { column.forms() } else { 1 };
+                let mut turn = 0;
                 column.each(&probe.world, &mut |name, tracer, batch| {
-                    let (found, occluded) = answers(tracer, &probe.rays, batch);
+                    let share = share(exact.len(), turn % shares, shares);
+                    turn += 1;
+                    let (rays, exact) = (&probe.rays[share.clone()], &exact[share]);
+                    let (found, occluded) = answers(tracer, rays, batch);
                     let form = forms.entry(name.to_owned()).or_default();
-                    let failing = form.tally.add(gate, &probe.rays, &exact, &found, &occluded);
+                    let failing = form.tally.add(gate, rays, exact, &found, &occluded);
                     let room = KEPT.saturating_sub(form.replay.len());
                     let replay = |(i, fault): (usize, Fault)| Replay {
                         form: name.to_owned(),
                         fault,
                         scene: scene.clone(),
-                        ray: hex::ray_to_hex(&probe.rays[i]),
+                        ray: hex::ray_to_hex(&rays[i]),
                     };
                     form.replay.extend(failing.into_iter().take(room).map(replay));
                     Ok(())
@@ -119,6 +127,11 @@ impl Setup {
         }
         Ok(row)
     }
+}
+
+/// Which of so many rays are those of a turn.
+fn share(rays: usize, turn: usize, turns: usize) -> Range<usize> {
+    rays * turn / turns..rays * (turn + 1) / turns
 }
 
 /// Nearest hits, and whether there is any, of all rays.
@@ -172,4 +185,33 @@ fn cell(
         verdict,
         replay: form.replay,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::stress::{catalogue, columns};
+
+    #[test]
+    fn turns_leave_no_ray_out_and_none_twice() {
+        for (rays, turns) in [(0, 3), (2, 3), (7, 3), (1000, 7), (61, 60)] {
+            let all: Vec<usize> = (0..turns).flat_map(|turn| share(rays, turn, turns)).collect();
+            assert_eq!(all, (0..rays).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn forms_are_as_many_as_are_asked() {
+        let case = catalogue().find(|case| case.name == "soups").expect("it is in the catalogue");
+        let probe = &case.probes(1, 0)[0];
+        for column in columns() {
+            let mut asked = 0;
+            let mut count = |_: &str, _: &dyn Tracer, _| {
+                asked += 1;
+                Ok(())
+            };
+            column.each(&probe.world, &mut count).expect("it can be built");
+            assert_eq!(asked, column.forms(), "{}", column.name());
+        }
+    }
 }

@@ -99,6 +99,21 @@ impl Column {
         }
     }
 
+    /// How many forms it has in this build, on this processor.
+    pub fn forms(self) -> usize {
+        let classics = || Accel::ALL.into_iter().filter(|accel| accel.has_methods()).count();
+        match self {
+            Self::Native => {
+                let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available()).count();
+                Preset::ALL.len() * isas * (Width::ALL.len() + 1)
+            }
+            Self::Accel(_) => 1,
+            Self::Triangle(_) | Self::Sphere(_) => classics(),
+            #[cfg(feature = "embree")]
+            Self::Embree(_) => Width::ALL.len(),
+        }
+    }
+
     /// Builds each of its forms, one after the other, and calls `ask` with its name for every way of batches.
     ///
     /// # Errors
