@@ -61,7 +61,7 @@ impl Image {
         Ok(Self { width: self.width, height: self.height, pixels })
     }
 
-    fn check_size(&self, other: &Self) -> Result<()> {
+    pub(super) fn check_size(&self, other: &Self) -> Result<()> {
         if (self.width, self.height) == (other.width, other.height) && self.pixels.len() == other.pixels.len() {
             return Ok(());
         }

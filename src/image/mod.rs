@@ -8,6 +8,7 @@
 mod channels;
 mod compare;
 mod file;
+pub mod flip;
 mod metadata;
 #[cfg(feature = "oiio")]
 mod oiio;

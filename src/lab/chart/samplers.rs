@@ -9,6 +9,7 @@ use super::scatter::{Panel, Point, Scatter};
 use super::{Figure, Setup, csv};
 use crate::error::Result;
 use crate::image::Image;
+use crate::image::flip::PIXELS_PER_DEGREE;
 use crate::lab::bench::Spread;
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::render::{Adaptive, Control, Filter, Renderer, Sampling, Settings};
@@ -43,6 +44,8 @@ struct Errors {
     rmse: f64,
     /// Mean of (x - r)^2 / (r + 0.01)^2.
     relative: f64,
+    /// Mean of LDR-FLIP.
+    flip: f64,
 }
 
 struct Stage<'a> {
@@ -62,7 +65,7 @@ impl Stage<'_> {
     fn reference(&self, settings: &Settings, spp: u32) -> Result<Reference> {
         let of_seed = |seed| self.render(&Settings { spp, seed, sampling: Sampling::Sobol, ..settings.clone() });
         let [mut image, other] = [of_seed(SEEDS[0])?, of_seed(SEEDS[1])?];
-        let error = errors(&image, &other).rmse / 2.0;
+        let error = errors(&image, &other)?.rmse / 2.0;
         image.pixels.iter_mut().zip(&other.pixels).for_each(|(a, b)| *a = a.midpoint(*b));
         Ok(Reference { image, error })
     }
@@ -87,6 +90,7 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
     let mut seconds = vec![Vec::new(); ways.len()];
     let mut rmses = vec![Vec::new(); ways.len()];
     let mut relatives = vec![Vec::new(); ways.len()];
+    let mut flips = vec![Vec::new(); ways.len()];
     for turn in 0..=turns {
         setup.step(&format!("samplers: turn {turn} of {turns}"))?;
         for (i, way) in ways.iter().enumerate() {
@@ -96,9 +100,10 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
             // The first turn warms up.
             if turn > 0 {
                 seconds[i].push(start.elapsed().as_secs_f64());
-                let Errors { rmse, relative } = errors(&image, &references[way.filter].image);
+                let Errors { rmse, relative, flip } = errors(&image, &references[way.filter].image)?;
                 rmses[i].push(rmse);
                 relatives[i].push(relative);
+                flips[i].push(flip);
             }
         }
     }
@@ -107,14 +112,15 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
     let mut panels = PANELS.map(|title| Panel { title: title.to_owned(), points: Vec::new() });
     let mut rows = Vec::new();
     for (i, way) in ways.iter().enumerate() {
-        let (x, y, relative) = (Spread::of(&seconds[i]), Spread::of(&rmses[i]), Spread::of(&relatives[i]).median);
+        let (x, y) = (Spread::of(&seconds[i]), Spread::of(&rmses[i]));
+        let [relative, flip] = [&relatives[i], &flips[i]].map(|errors| Spread::of(errors).median);
         let efficiency = 1.0 / (y.median * y.median * x.median);
-        let numbers = [x.median, x.min, x.max, y.median, y.min, y.max, relative, efficiency];
-        let [s, s_min, s_max, e, e_min, e_max, relative, efficiency] = numbers.map(|x| format!("{x:.6e}"));
+        let numbers = [x.median, x.min, x.max, y.median, y.min, y.max, relative, flip, efficiency];
+        let [s, s_min, s_max, e, e_min, e_max, relative, flip, efficiency] = numbers.map(|x| format!("{x:.6e}"));
         let reference = format!("{:.3e}", references[way.filter].error);
         let names = [PANELS[way.panel].to_owned(), legend[way.group].to_owned(), way.label.clone()];
         let [panel, name, label] = names;
-        rows.push([panel, name, label, s, s_min, s_max, e, e_min, e_max, relative, efficiency, reference]);
+        rows.push([panel, name, label, s, s_min, s_max, e, e_min, e_max, relative, flip, efficiency, reference]);
         panels[way.panel].points.push(Point { group: way.group, label: way.label.clone(), x, y });
     }
     let scatter = Scatter {
@@ -139,6 +145,7 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
         "rmse_min",
         "rmse_max",
         "relmse",
+        "flip",
         "efficiency",
         "reference_error",
     ];
@@ -150,8 +157,8 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
             "A sphereflake of mirrors under a square light, {width} x {height} pixels, linear RGB; numbers beside points are samples a \
              pixel, of adaptive sampling the noise threshold. The reference has seeds of its own and {} samples a pixel by Sobol's points, \
              each filter its own; it is off by {off:.1e} itself. Medians of {turns} turns, each with another seed, in which all \
-             alternate; bars from the smallest to the largest. The numbers hold the relative error and the efficiency 1 / (MSE x seconds) \
-             too. {}",
+             alternate; bars from the smallest to the largest. The numbers hold the relative error, the mean of LDR-FLIP and the \
+             efficiency 1 / (MSE x seconds) too. {}",
             2 * reference_spp,
             setup.made_by()
         ),
@@ -219,7 +226,7 @@ fn scene() -> Scene {
 }
 
 /// Of the colours of a picture.
-fn errors(image: &Image, reference: &Image) -> Errors {
+fn errors(image: &Image, reference: &Image) -> Result<Errors> {
     let (mut squares, mut relative) = (0.0, 0.0);
     for (x, r) in image.pixels.iter().zip(&reference.pixels) {
         for (x, r) in rgb(*x).into_iter().zip(rgb(*r)) {
@@ -228,7 +235,8 @@ fn errors(image: &Image, reference: &Image) -> Errors {
         }
     }
     let count = 3.0 * image.pixels.len().max(1) as f64;
-    Errors { rmse: (squares / count).sqrt(), relative: relative / count }
+    let flip = reference.mean_flip(image, PIXELS_PER_DEGREE)?;
+    Ok(Errors { rmse: (squares / count).sqrt(), relative: relative / count, flip })
 }
 
 fn rgb(pixel: Vec4) -> [f64; 3] {
@@ -246,9 +254,10 @@ mod tests {
             image.pixels = vec![Vec4::new(value, 0.0, 0.0, 1.0), Vec4::ZERO];
             image
         };
-        let Errors { rmse, relative } = errors(&image(0.5), &image(0.25));
+        let Errors { rmse, relative, flip } = errors(&image(0.5), &image(0.25)).expect("of one size");
         assert!((rmse - (0.0625f64 / 6.0).sqrt()).abs() < 1e-12);
         assert!((relative - 0.0625 / 0.26f64.powi(2) / 6.0).abs() < 1e-12);
+        assert_eq!(flip, image(0.25).mean_flip(&image(0.5), PIXELS_PER_DEGREE).expect("of one size"));
     }
 
     #[test]
@@ -259,10 +268,17 @@ mod tests {
         let stage = Stage { scene: &scene, world: &world, bvh: &bvh, camera: &camera, control: Control::default() };
         let usual = Settings { width: 16, height: 12, ..Settings::default() };
         let reference = stage.reference(&usual, 256).expect("rendered");
-        let of =
-            |spp| errors(&stage.render(&Settings { spp, ..usual.clone() }).expect("rendered"), &reference.image).rmse;
+        let of = |spp| {
+            let image = stage.render(&Settings { spp, ..usual.clone() }).expect("rendered");
+            errors(&image, &reference.image).expect("of one size")
+        };
         let (few, more) = (of(1), of(16));
-        assert!(few > 2.0 * more && more > 2.0 * reference.error, "{few} {more} {}", reference.error);
+        assert!(
+            few.rmse > 2.0 * more.rmse && more.rmse > 2.0 * reference.error,
+            "{few:?} {more:?} {}",
+            reference.error
+        );
+        assert!(few.flip > 1.5 * more.flip, "{few:?} {more:?}");
     }
 
     #[test]

@@ -1,0 +1,261 @@
+//! How different two pictures look to someone who flips between them: LDR-FLIP (Andersson et al. 2020, *FLIP: A difference evaluator for
+//! alternating images*).
+//!
+//! Colours are compared after the eye's contrast sensitivity has blurred them, in a space where equal distances look equally large;
+//! edges and points that one picture has and the other lacks make the difference larger. 0 is the same, 1 the largest difference there
+//! is. Root mean square errors, the simpler alternative, count a speck that everyone sees like noise that no one does.
+//!
+//! Light is clamped to 0 .. 1, as a screen shows it; further [`Response`](super::Response) is the caller's. The weights of the filters are
+//! applied as they stand, in two dimensions: pictures of charts are small.
+
+use super::Image;
+use crate::error::Result;
+use crate::math::Vec4;
+
+/// Pixels in a degree of the field of view, for who sits 0.7 m before a screen 0.7 m wide with 3840 pixels, as the paper has it.
+pub const PIXELS_PER_DEGREE: f64 = 0.7 * (3840.0 / 0.7) * std::f64::consts::PI / 180.0;
+
+/// Three numbers of a pixel, in whichever space.
+type Color = [f64; 3];
+
+/// The exponent of colour differences.
+const COLOR_EXPONENT: f64 = 0.7;
+/// The exponent of differences of features.
+const FEATURE_EXPONENT: f64 = 0.5;
+/// Colour differences up to this share of the largest take up to [`BEND_AT`] of the result.
+const BEND: f64 = 0.4;
+const BEND_AT: f64 = 0.95;
+/// The width of an edge or a point, in degrees.
+const FEATURE_WIDTH: f64 = 0.082;
+
+/// Contrast sensitivity of achromatic, red-green and blue-yellow: two Gaussians each, by weight and width (Movshon and Kiorpes 1988; Mullen 1985).
+const SENSITIVITY: [[(f64, f64); 2]; 3] =
+    [[(1.0, 0.0047), (0.0, 1e-5)], [(1.0, 0.0053), (0.0, 1e-5)], [(34.1, 0.04), (13.5, 0.025)]];
+
+/// XYZ of linear Rec. 709 light, row by row.
+const XYZ: [[f64; 3]; 3] = [
+    [10_135_552.0 / 24_577_794.0, 8_788_810.0 / 24_577_794.0, 4_435_075.0 / 24_577_794.0],
+    [2_613_072.0 / 12_288_897.0, 8_788_810.0 / 12_288_897.0, 887_015.0 / 12_288_897.0],
+    [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
+];
+
+impl Image {
+    /// The mean of LDR-FLIP over all pixels, 0 to 1, of this picture as the reference; alpha is left out.
+    ///
+    /// `pixels_per_degree` says how large a pixel is seen, usually [`PIXELS_PER_DEGREE`].
+    ///
+    /// # Errors
+    /// [`Error::Check`](crate::Error::Check) where the sizes differ.
+    pub fn mean_flip(&self, test: &Self, pixels_per_degree: f64) -> Result<f64> {
+        self.check_size(test)?;
+        let size = (self.width as usize, self.height as usize);
+        let [(colors, features), (others, other_features)] =
+            [self, test].map(|image| seen(image, size, pixels_per_degree));
+        let largest = distance(&hunt([0.0, 1.0, 0.0]), &hunt([0.0, 0.0, 1.0])).powf(COLOR_EXPONENT);
+        let colors = colors.iter().zip(&others).map(|(a, b)| bend(distance(a, b).powf(COLOR_EXPONENT), largest));
+        let features = features.iter().zip(&other_features).map(|(a, b)| {
+            let most = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+            (most / std::f64::consts::SQRT_2).powf(FEATURE_EXPONENT)
+        });
+        let sum: f64 = colors.zip(features).map(|(color, feature)| color.powf(1.0 - feature)).sum();
+        Ok(sum / self.pixels.len().max(1) as f64)
+    }
+}
+
+/// Each pixel's colour as it is seen, and how much of an edge and of a point there is.
+fn seen(image: &Image, size: (usize, usize), pixels_per_degree: f64) -> (Vec<Color>, Vec<[f64; 2]>) {
+    let opponent: Vec<Color> = image.pixels.iter().map(|pixel| opponent(xyz(displayed(*pixel)))).collect();
+    let blurs = SENSITIVITY.map(|gaussians| Kernel::sensitivity(gaussians, pixels_per_degree));
+    let [edge, point] = Kernel::features(pixels_per_degree);
+    let achromatic = |pixel: &Color| (pixel[0] + 16.0) / 116.0;
+    let at = |index: usize| {
+        let place = (index % size.0, index / size.0);
+        let blurred: Color = std::array::from_fn(|i| blurs[i].apply(&opponent, size, place, |pixel| pixel[i])[0]);
+        let [edge, point] = [&edge, &point].map(|kernel| kernel.apply(&opponent, size, place, achromatic));
+        let light = linear(unopponent(blurred)).map(|x| x.clamp(0.0, 1.0));
+        (hunt(light), [edge[0].hypot(edge[1]), point[0].hypot(point[1])])
+    };
+    (0..opponent.len()).map(at).unzip()
+}
+
+/// The part of light that a screen shows.
+fn displayed(pixel: Vec4) -> Color {
+    [pixel.x, pixel.y, pixel.z].map(|x| if x > 0.0 { f64::from(x.min(1.0)) } else { 0.0 })
+}
+
+fn xyz(linear: Color) -> Color {
+    XYZ.map(|row| row[0] * linear[0] + row[1] * linear[1] + row[2] * linear[2])
+}
+
+/// Linear light of XYZ, by Cramer's rule.
+fn linear(xyz: Color) -> Color {
+    let [x, y, z] = [0, 1, 2].map(|column| XYZ.map(|row| row[column]));
+    let det = |a: Color, b: Color, c: Color| {
+        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
+    };
+    [det(xyz, y, z), det(x, xyz, z), det(x, y, xyz)].map(|d| d / det(x, y, z))
+}
+
+/// XYZ as shares of those of white.
+fn of_white(color: Color) -> Color {
+    let white = xyz([1.0; 3]);
+    std::array::from_fn(|i| color[i] / white[i])
+}
+
+/// YCxCz: the eye's opponent colours, linear in light.
+fn opponent(xyz: Color) -> Color {
+    let [x, y, z] = of_white(xyz);
+    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+}
+
+fn unopponent([achromatic, red_green, blue_yellow]: Color) -> Color {
+    let y = (achromatic + 16.0) / 116.0;
+    let white = xyz([1.0; 3]);
+    [white[0] * (y + red_green / 500.0), white[1] * y, white[2] * (y - blue_yellow / 200.0)]
+}
+
+/// CIELAB of linear light, with colours paler the darker they are (Hunt 1952).
+fn hunt(linear: Color) -> Color {
+    const DELTA: f64 = 6.0 / 29.0;
+    let root = |t: f64| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
+    let [x, y, z] = of_white(xyz(linear)).map(root);
+    let lightness = 116.0 * y - 16.0;
+    let paler = 0.01 * lightness;
+    [lightness, paler * 500.0 * (x - y), paler * 200.0 * (y - z)]
+}
+
+/// HyAB (Abasi et al. 2020): of lightness and of colour apart, for large differences.
+fn distance(a: &Color, b: &Color) -> f64 {
+    (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
+}
+
+/// A colour difference up to `largest` as 0 to 1, most of it for the smaller ones.
+fn bend(difference: f64, largest: f64) -> f64 {
+    let knee = BEND * largest;
+    if difference < knee {
+        difference * BEND_AT / knee
+    } else {
+        BEND_AT + (difference - knee) / (largest - knee) * (1.0 - BEND_AT)
+    }
+}
+
+/// A square of weights, for what lies across and for what lies down.
+struct Kernel {
+    radius: isize,
+    /// Row by row.
+    weights: Vec<[f64; 2]>,
+}
+
+impl Kernel {
+    fn new(radius: f64, weight: impl Fn(f64, f64) -> f64) -> Self {
+        let radius = radius.ceil() as isize;
+        let places = (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| (x as f64, y as f64)));
+        Self { radius, weights: places.map(|(x, y)| [weight(x, y), weight(y, x)]).collect() }
+    }
+
+    /// Divides by the sum of the weights, those above and those below 0 each by their own.
+    fn normalized(mut self) -> Self {
+        for side in 0..2 {
+            let sum = |sign: f64| self.weights.iter().map(|w| (w[side] * sign).max(0.0)).sum::<f64>();
+            let (above, below) = (sum(1.0), sum(-1.0));
+            for weight in &mut self.weights {
+                weight[side] /= if weight[side] > 0.0 {
+                    above
+                } else if weight[side] < 0.0 {
+                    below
+                } else {
+                    1.0
+                };
+            }
+        }
+        self
+    }
+
+    /// What the eye resolves.
+    fn sensitivity(gaussians: [(f64, f64); 2], pixels_per_degree: f64) -> Self {
+        use std::f64::consts::PI;
+        let widest = SENSITIVITY.iter().flatten().map(|gaussian| gaussian.1).fold(0.0, f64::max);
+        let radius = 3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree;
+        let weight = |x: f64, y: f64| {
+            let squared = (x * x + y * y) / pixels_per_degree.powi(2);
+            gaussians.iter().map(|(a, b)| a * (PI / b).sqrt() * (-PI * PI * squared / b).exp()).sum::<f64>()
+        };
+        Self::new(radius, weight).normalized()
+    }
+
+    /// First and second derivatives of a Gaussian: what finds edges, and what finds points.
+    fn features(pixels_per_degree: f64) -> [Self; 2] {
+        let deviation = 0.5 * FEATURE_WIDTH * pixels_per_degree;
+        let gaussian = |x: f64, y: f64| (-(x * x + y * y) / (2.0 * deviation * deviation)).exp();
+        let edge = Self::new(3.0 * deviation, |x, y| -x * gaussian(x, y));
+        let point = Self::new(3.0 * deviation, |x, y| (x * x / (deviation * deviation) - 1.0) * gaussian(x, y));
+        [edge.normalized(), point.normalized()]
+    }
+
+    /// The weighted sums around a place; beyond the borders, the pictures go on as they end.
+    fn apply(
+        &self,
+        pixels: &[Color],
+        (width, height): (usize, usize),
+        (x, y): (usize, usize),
+        value: impl Fn(&Color) -> f64,
+    ) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        let mut weights = self.weights.iter();
+        for down in -self.radius..=self.radius {
+            let row = y.saturating_add_signed(down).min(height - 1) * width;
+            for across in -self.radius..=self.radius {
+                let value = value(&pixels[row + x.saturating_add_signed(across).min(width - 1)]);
+                let Some(weight) = weights.next() else { return sums };
+                sums[0] += weight[0] * value;
+                sums[1] += weight[1] * value;
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(width: u32, height: u32, color: impl Fn(u32, u32) -> [f32; 3]) -> Image {
+        let mut image = Image::new(width, height);
+        for (index, pixel) in (0u32..).zip(&mut image.pixels) {
+            let [r, g, b] = color(index % width, index / width);
+            *pixel = Vec4::new(r, g, b, 1.0);
+        }
+        image
+    }
+
+    #[test]
+    fn means_are_those_of_the_authors_program() {
+        // By flip-evaluator 1.7 of Andersson et al. It computes in f32, in which features that are equal differ by 1e-7, of which it then takes
+        // the root.
+        let of = |color: &dyn Fn(u32, u32) -> [f32; 3]| picture(40, 30, color);
+        let ramp = |x: u32, y: u32| [x as f32 / 64.0, y as f32 / 32.0, (x + y) as f32 / 128.0];
+        let dots =
+            |x: u32, y: u32| [ramp(x, y)[0], ramp(x, y)[1], if (x % 8, y % 8) == (3, 5) { 1.0 } else { ramp(x, y)[2] }];
+        let checks = |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 1 { [0.25, 0.5, 0.125] } else { [0.5, 0.25, 0.0625] };
+        let pairs = [
+            (of(&|_, _| [0.0; 3]), of(&|_, _| [1.0; 3]), 0.967_397),
+            (of(&|_, _| [0.0, 1.0, 0.0]), of(&|_, _| [0.0, 0.0, 1.0]), 1.0),
+            (of(&ramp), of(&dots), 0.074_584),
+            (of(&checks), of(&|x, y| checks(x + 1, y)), 0.188_505),
+            (of(&ramp), of(&|x, y| [ramp(x, y)[0] + 0.03125, ramp(x, y)[1], ramp(x, y)[2]]), 0.105_003),
+        ];
+        for (reference, test, expected) in pairs {
+            let mean = reference.mean_flip(&test, PIXELS_PER_DEGREE).unwrap();
+            assert!((mean - expected).abs() < 1e-4, "{mean} {expected}");
+            assert_eq!(reference.mean_flip(&reference, PIXELS_PER_DEGREE).unwrap(), 0.0);
+        }
+    }
+
+    #[test]
+    fn what_a_screen_cannot_show_does_not_count_and_sizes_must_agree() {
+        let [bright, brighter] = [1.0, f32::INFINITY].map(|x| picture(4, 3, |_, _| [x, -1.0, f32::NAN]));
+        assert_eq!(bright.mean_flip(&brighter, PIXELS_PER_DEGREE).unwrap(), 0.0);
+        assert!(bright.mean_flip(&picture(3, 4, |_, _| [0.0; 3]), PIXELS_PER_DEGREE).is_err());
+    }
+}
