@@ -7,7 +7,7 @@
 //! | `scales` | where ways to meet a triangle fail, by size and distance |
 //! | `samplers` | samplers, filters and adaptive sampling: time against error |
 //! | `rate` | how often something happens, and how well that is known |
-//! | `scatter`, `axis` | points with error bars and the Pareto front |
+//! | `scatter`, `axis`, `labels` | points with error bars and the Pareto front |
 //! | `heat` | numbers as colours |
 //! | `page` | all charts as one page |
 //!
@@ -18,6 +18,7 @@
 mod axis;
 mod engines;
 mod heat;
+mod labels;
 mod page;
 mod rate;
 mod samplers;

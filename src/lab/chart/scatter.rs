@@ -1,6 +1,7 @@
 //! Points in panels side by side: cost to the right, error upwards, so that the best are at the bottom left.
 
 use super::axis::Axis;
+use super::labels;
 use crate::lab::bench::Spread;
 use crate::lab::drawing::{Anchor, Drawing, Font};
 
@@ -125,10 +126,17 @@ impl Scatter<'_> {
             drawing.line((plot.across(point.x.min), y), (plot.across(point.x.max), y), color);
             drawing.line((x, plot.down(point.y.min)), (x, plot.down(point.y.max)), color);
         }
+        let at = |point: &Point| (plot.across(point.x.median), plot.down(point.y.median));
+        let labels: Vec<_> = panel.points.iter().map(|point| (at(point), point.label.as_str())).collect();
+        let placed = labels::place(&labels, [plot.x, plot.y, plot.x + plot.width, plot.y + HEIGHT]);
+        for [from, to] in placed.iter().filter_map(|label| label.lead) {
+            drawing.line(from, to, GREY);
+        }
         for point in &panel.points {
-            let at = (plot.across(point.x.median), plot.down(point.y.median));
-            drawing.dot(at, 5.0, color(point.group));
-            drawing.text((at.0 + 6.0, at.1 - 5.0), Anchor::Start, NOTE, &point.label);
+            drawing.dot(at(point), 5.0, color(point.group));
+        }
+        for label in placed {
+            drawing.text(label.at, Anchor::Start, NOTE, &panel.points[label.index].label);
         }
     }
 }
