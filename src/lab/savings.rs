@@ -137,9 +137,7 @@ mod tests {
     use crate::image::Image;
     use crate::math::{DAffine3, DVec3, Vec2, Vec3};
     use crate::plan::{Census, Plan};
-    use crate::scene::{
-        Absorption, Alpha, AreaShape, Attenuation, Fog, Geometry, Instance, Integrator, Light, Material, Mesh,
-    };
+    use crate::scene::{Alpha, AreaShape, Attenuation, Geometry, Instance, Integrator, Light, Material, Mesh};
     use crate::trace::World;
 
     /// A floor, and above it a tilted square of another material, before a blue sky, lit by the sun and a lamp; without anything but flat, matte surfaces.
@@ -203,9 +201,6 @@ mod tests {
                 scene.instances[0].transform_end = Some(DAffine3::from_translation(DVec3::Y * 0.5));
             }
             Reduction::Recursion => scene.materials[0].reflection = Vec3::splat(0.5),
-            Reduction::Media => {
-                scene.fog = Some(Fog { absorption: Vec3::splat(0.1), color: Vec3::X, reach: f32::INFINITY });
-            }
             Reduction::Alpha => {
                 (scene.materials[1].alpha, scene.materials[1].opacity) = (Alpha::Blend, 0.4);
             }
@@ -223,7 +218,6 @@ mod tests {
             Reduction::Surfaces => plan.attributes.normals,
             Reduction::Motion => plan.motion,
             Reduction::Recursion => plan.depth > 0,
-            Reduction::Media => plan.fog.is_some() || plan.absorption,
             Reduction::Alpha => plan.alpha,
             Reduction::Faint => plan.faint == 0.0,
         }
@@ -237,9 +231,8 @@ mod tests {
             assert!(reduction == Reduction::Lights || !is_planned(&lean, reduction), "{reduction:?}");
             let (image, plan) = picture(&plain(), &complete(Complete::NOTHING.with(reduction)));
             assert_eq!(image, expected, "{reduction:?}");
-            // There is no third light, and media are those of rays that are sent on.
-            let nothing_to_put_back = matches!(reduction, Reduction::Lights | Reduction::Media);
-            assert!(nothing_to_put_back || is_planned(&plan, reduction), "{reduction:?}");
+            // There is no third light to put back.
+            assert!(reduction == Reduction::Lights || is_planned(&plan, reduction), "{reduction:?}");
         }
         assert_eq!(picture(&plain(), &complete(Complete::ALL)).0, expected);
     }
@@ -297,19 +290,6 @@ mod tests {
         // Mirrors that matter to the last are followed as far either way.
         let bright = needing(Reduction::Recursion);
         assert_eq!(picture(&bright, &settings()).0, picture(&bright, &complete(Complete::ALL)).0);
-    }
-
-    #[test]
-    fn absorption_is_put_back_for_rays_that_are_sent_on() {
-        let mut glass = plain();
-        glass.materials[1] = Material { absorption: None, ..Material::glass(1.5) };
-        let (lean, _) = picture(&glass, &settings());
-        let (full, plan) = picture(&glass, &complete(Complete::NOTHING.with(Reduction::Media)));
-        assert!(plan.absorption);
-        assert_eq!(lean, full);
-        let mut colored = glass;
-        colored.materials[1].absorption = Some(Absorption { color: Vec3::new(0.1, 0.5, 0.9), distance: 0.1 });
-        assert!(picture(&colored, &settings()).1.absorption);
     }
 
     /// Paths choose among the lights there are, so that the noise is another and the mean is the same.

@@ -62,8 +62,6 @@ pub struct Materials {
     pub lit: u64,
     /// Mirrors and glass.
     pub sending_on: u64,
-    /// That take light from rays on their way through.
-    pub absorbing: u64,
     /// That are not all there.
     pub alpha: u64,
     /// With any texture.
@@ -171,7 +169,6 @@ impl Materials {
             (&mut self.used, true),
             (&mut self.lit, m.is_lit()),
             (&mut self.sending_on, m.sends_on()),
-            (&mut self.absorbing, m.absorption.is_some()),
             (&mut self.alpha, m.alpha != Alpha::Opaque),
             (&mut self.textured, textured),
             (&mut self.normal_mapped, m.normal_texture.is_some()),

@@ -100,8 +100,6 @@ pub struct Plan {
     pub depth: u32,
     /// Mirrored and refracted rays of no larger share are not followed: [`FAINT`], or 0.
     pub faint: f32,
-    /// Whether anything takes light from rays on their way through it.
-    pub absorption: bool,
     /// Whether textures bend normals.
     pub normal_maps: bool,
     /// Whether rays pass through surfaces that are not all there.
@@ -185,7 +183,6 @@ impl Plan {
         };
         // What ambient light stands for, paths find.
         let ambient = !is_path && census.ambient && materials.ambient > 0;
-        let has_fog = scene.fog.filter(|_| census.fog);
         let alpha = materials.alpha > 0;
         let surfaces = complete.has(Reduction::Surfaces);
         let attributes = Attributes {
@@ -209,11 +206,10 @@ impl Plan {
             why,
             depth,
             faint: if complete.has(Reduction::Faint) { 0.0 } else { FAINT },
-            absorption: depth > 0 && (materials.absorbing > 0 || complete.has(Reduction::Media)),
             alpha: alpha || complete.has(Reduction::Alpha),
             normal_maps: (lit || depth > 0) && materials.normal_mapped > 0 || surfaces,
             environment,
-            fog: if complete.has(Reduction::Media) { scene.fog } else { has_fog },
+            fog: scene.fog.filter(|_| census.fog),
             background: wishes.background.or(scene.background),
             primitives: world.primitive_count(),
             materials: materials.used as usize,
@@ -370,21 +366,21 @@ mod tests {
         let full = wished(&scene, &all);
         assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, USUAL_DEPTH, 0.0));
         assert_eq!(full.attributes, Attributes::ALL);
-        assert!(full.motion && full.alpha && full.absorption && full.normal_maps);
+        assert!(full.motion && full.alpha && full.normal_maps);
         let asked = Wishes { integrator: Some(Integrator::RayCast), ..all };
         assert_eq!(wished(&scene, &asked).integrator, Integrator::RayCast, "what is asked for stays");
 
         let world = World::new(&scene).unwrap();
         let census = Census::new(&scene, &world);
         let wishes = Wishes::default();
-        use Reduction::{Alpha, Levels, Media, Motion, Recursion, Surfaces};
-        // The headlight is all the light there is, nothing is faint where nothing mirrors, and there is no fog.
+        use Reduction::{Alpha, Faint, Levels, Motion, Recursion, Surfaces};
+        // The headlight is all the light there is, and nothing is faint where nothing mirrors.
         let left_out = plan(&scene).left_out(&scene, &world, &wishes, &census);
         assert_eq!(left_out, [Levels, Surfaces, Motion, Recursion, Alpha]);
         let mut mirror = scene.clone();
         mirror.materials[0].reflection = Vec3::X;
         let left_out = plan(&mirror).left_out(&mirror, &world, &wishes, &Census::new(&mirror, &world));
-        assert_eq!(left_out, [Levels, Surfaces, Motion, Media, Alpha, Reduction::Faint]);
+        assert_eq!(left_out, [Levels, Surfaces, Motion, Alpha, Faint]);
         assert!(full.left_out(&scene, &world, &all, &census).is_empty());
     }
 }

@@ -16,8 +16,6 @@ pub enum Reduction {
     Motion,
     /// Rays that are sent on where nothing mirrors or refracts.
     Recursion,
-    /// Absorption within things, and fog.
-    Media,
     /// Rays through surfaces that are not all there.
     Alpha,
     /// Mirrored and refracted rays that matter less than half a step of 8 bits.
@@ -26,16 +24,8 @@ pub enum Reduction {
 
 impl Reduction {
     /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::Levels,
-        Self::Lights,
-        Self::Surfaces,
-        Self::Motion,
-        Self::Recursion,
-        Self::Media,
-        Self::Alpha,
-        Self::Faint,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Levels, Self::Lights, Self::Surfaces, Self::Motion, Self::Recursion, Self::Alpha, Self::Faint];
 
     /// As flags and reports have it.
     pub const fn name(self) -> &'static str {
@@ -45,7 +35,6 @@ impl Reduction {
             Self::Surfaces => "surfaces",
             Self::Motion => "motion",
             Self::Recursion => "recursion",
-            Self::Media => "media",
             Self::Alpha => "alpha",
             Self::Faint => "faint",
         }
@@ -59,7 +48,6 @@ impl Reduction {
             Self::Surfaces => "normals, texture coordinates and colours that nothing reads",
             Self::Motion => "the time of each ray",
             Self::Recursion => "rays sent on where nothing mirrors or refracts",
-            Self::Media => "absorption and fog",
             Self::Alpha => "rays through surfaces that are not all there",
             Self::Faint => "mirrored and refracted rays too faint to be seen",
         }

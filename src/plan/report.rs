@@ -115,7 +115,6 @@ impl Plan {
             (self.motion, "motion"),
             (self.ambient, "ambient light"),
             (self.environment, "an environment"),
-            (self.absorption, "absorption"),
             (self.fog.is_some(), "fog"),
             (self.alpha, "alpha"),
             (self.normal_maps, "normal maps"),

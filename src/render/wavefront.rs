@@ -246,7 +246,7 @@ impl Renderer<'_> {
 
     /// What is left of the light of a ray that ends at `point`, on its way there.
     pub(super) fn transmittance(&self, path: &Path, direction: Vec3, point: &SurfacePoint) -> Vec3 {
-        if !self.plan.absorption {
+        if self.plan.depth == 0 {
             return Vec3::ONE;
         }
         let medium = match self.absorbs(point) {
