@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Renders the pictures of embree-tools' programs on Embree and on our libembree3.so.3, and compares them.
+"""Renders the pictures of embree-tools' programs on Embree and on our libembree3.so.3, and compares them. Where Blender is installed
+(Debian 12's is linked to that library), its Cycles renders a scene as well, without and with motion blur.
 
     scripts/pictures-dropin.py [FOLDER]     where our library is (default target/dropin)
 
@@ -9,9 +10,12 @@ side, so a few may; more than one in 250 fails, and so does a program that does 
 
 import os
 import re
+import shutil
+import struct
 import subprocess
 import sys
 import tempfile
+from functools import partial
 
 MODEL = ["-c", "/usr/share/doc/embree3/models/cornell_box.ecs"]
 PROGRAMS = {
@@ -31,36 +35,55 @@ PROGRAMS = {
 MOST = 1 / 250
 
 
-def render(program, arguments, folder, path):
-    """The picture's size and its bytes; none where the program fails."""
+def run(command, folder, path):
+    """The file that a command writes; none where it fails."""
     environment = dict(os.environ, LD_LIBRARY_PATH=folder or "")
-    command = [program, *arguments, "--size", "320", "240", "-o", path]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     if run.returncode != 0 or not os.path.exists(path):
         print(run.stderr.strip() or run.stdout.strip(), file=sys.stderr)
         return None
     with open(path, "rb") as file:
-        data = file.read()
-    head = re.match(rb"P6\s+(\d+)\s+(\d+)\s+255\s", data)
-    return (int(head[1]), int(head[2])), data[head.end() :]
+        return file.read()
+
+
+def example(program, arguments, folder, scratch):
+    """The picture of one of embree-tools' programs: its size and its bytes."""
+    path = f"{scratch}/picture.ppm"
+    data = run([program, *arguments, "--size", "320", "240", "-o", path], folder, path)
+    head = re.match(rb"P6\s+(\d+)\s+(\d+)\s+255\s", data or b"")
+    return head and ((int(head[1]), int(head[2])), data[head.end() :])
+
+
+def cycles(way, folder, scratch):
+    """The picture of Blender: its size and its bytes, from a TGA file without compression."""
+    path = f"{scratch}/picture.tga"
+    scene = os.path.join(os.path.dirname(__file__), "blender-scene.py")
+    data = run(["blender", "-b", "--factory-startup", "--python", scene, "--", path, way], folder, path)
+    return data and (struct.unpack("<2H", data[12:16]), data[18 + data[0] :])
 
 
 def main():
     folder = os.path.realpath(sys.argv[1] if len(sys.argv) > 1 else "target/dropin")
+    ways = {program: partial(example, program, arguments) for program, arguments in PROGRAMS.items()}
+    if shutil.which("blender"):
+        ways |= {f"blender, {way}": partial(cycles, way) for way in ("still", "blurred")}
+    else:
+        print("blender is not installed, and left out")
     is_good = True
-    for program, arguments in PROGRAMS.items():
+    for name, picture in ways.items():
         with tempfile.TemporaryDirectory() as scratch:
-            theirs = render(program, arguments, None, f"{scratch}/embree.ppm")
-            ours = render(program, arguments, folder, f"{scratch}/ours.ppm")
-        if theirs is None or ours is None or theirs[0] != ours[0]:
-            print(f"{program:24} no picture on {'Embree' if theirs is None else 'our library'}")
+            theirs = picture(None, scratch)
+        with tempfile.TemporaryDirectory() as scratch:
+            ours = picture(folder, scratch)
+        if not theirs or not ours or theirs[0] != ours[0]:
+            print(f"{name:24} no picture on {'our library' if theirs else 'Embree'}")
             is_good = False
             continue
         channels = list(zip(theirs[1], ours[1]))
         pixels = [channels[i : i + 3] for i in range(0, len(channels), 3)]
         differ = sum(any(abs(a - b) > 8 for a, b in pixel) for pixel in pixels)
         verdict = "" if differ <= MOST * len(pixels) else "  too many"
-        print(f"{program:24} {differ:6} of {len(pixels)} pixels differ{verdict}")
+        print(f"{name:24} {differ:6} of {len(pixels)} pixels differ{verdict}")
         is_good &= not verdict
     return 0 if is_good else 1
 
