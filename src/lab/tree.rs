@@ -10,7 +10,7 @@
 
 use super::exact::{Approx, Ring, cross, det, dot, vector};
 use super::oracle::{self, Body, Id, Meeting, Primitive};
-use crate::math::is_traceable;
+use crate::math::{DVec3, UNIT_ROUNDOFF_64, Vec3, is_traceable};
 use crate::ray::Ray;
 use crate::trace::World;
 
@@ -129,7 +129,11 @@ impl<'a> Oracle<'a> {
                 };
             } else {
                 for index in node.first as usize..(node.first + node.count) as usize {
-                    if let Some(candidate) = meet_roughly(ray, &self.triangles[index].1, index) {
+                    let primitive = &self.triangles[index].1;
+                    if passes_by(&line, primitive) {
+                        continue;
+                    }
+                    if let Some(candidate) = meet_roughly(ray, primitive, index) {
                         if candidate.is_sure {
                             limit = limit.min(candidate.high);
                         }
@@ -146,17 +150,34 @@ impl<'a> Oracle<'a> {
 
 /// A ray's line, as boxes are met.
 struct Line {
-    origin: [f64; 3],
-    direction: [f64; 3],
+    origin: DVec3,
+    direction: DVec3,
     /// 1 / direction.
-    inverse: [f64; 3],
+    inverse: DVec3,
 }
 
 impl Line {
     fn new(ray: &Ray) -> Self {
-        let [origin, direction] = [ray.origin, ray.direction].map(|v| v.to_array().map(f64::from));
-        Self { origin, direction, inverse: direction.map(f64::recip) }
+        let [origin, direction] = [ray.origin, ray.direction].map(Vec3::as_dvec3);
+        Self { origin, direction, inverse: direction.recip() }
     }
+}
+
+/// Whether plain f64 tells already that a line passes a triangle by: most that are asked, at a twentieth of the time.
+fn passes_by(line: &Line, primitive: &Primitive<'_>) -> bool {
+    // Corners, products and sums are rounded by 2^-53 each; in units of the largest components that is 42 at most, and this is 64. The
+    // products of three f32 neither overflow nor underflow.
+    const BOUND: f64 = 64.0 * UNIT_ROUNDOFF_64;
+    let (Body::Triangle(corners), None) = (primitive.body, primitive.to_world) else { return false };
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3() - line.origin);
+    let side = |p: DVec3, q: DVec3| {
+        let edge = line.direction.dot(p.cross(q));
+        let is_sure =
+            edge.abs() > BOUND * [line.direction, p, q].map(|v| v.abs().max_element()).iter().product::<f64>();
+        if is_sure { edge.signum() } else { 0.0 }
+    };
+    let sides = [side(b, c), side(c, a), side(a, b)];
+    sides.contains(&1.0) && sides.contains(&-1.0)
 }
 
 /// Where a ray meets a triangle, within bounds; None where it surely does not, or out of its range.
