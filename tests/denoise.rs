@@ -5,8 +5,6 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use twincast::image::{self, Channels};
-
 fn twincast(library: Option<&str>, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_twincast"));
     if let Some(library) = library {
@@ -66,17 +64,12 @@ fn what_cannot_go_together_ends_with_2() {
     }
 }
 
-/// A library that is there; none, with a word, where there is none.
-#[cfg(feature = "oidn")]
-fn denoiser() -> Option<image::denoise::Denoiser> {
-    image::denoise::Denoiser::find().inspect_err(|error| eprintln!("left off: {error}")).ok()
-}
-
 #[cfg(feature = "oidn")]
 mod with_the_library {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use twincast::image::denoise::Guides;
+    use twincast::image::denoise::{Denoiser, Guides};
+    use twincast::image::{self, Channels};
     use twincast::io::{LoadOptions, load};
     use twincast::math::Vec4;
     use twincast::render::{Aov, Control, Picture};
@@ -84,6 +77,11 @@ mod with_the_library {
     use twincast::{Image, Renderer, Settings, World};
 
     use super::*;
+
+    /// A library that is there; none, with a word, where there is none.
+    fn denoiser() -> Option<Denoiser> {
+        Denoiser::find().inspect_err(|error| eprintln!("left off: {error}")).ok()
+    }
 
     /// The room, as it is seen with so many samples.
     fn picture(spp: u32, seed: u64) -> Picture {
