@@ -1,12 +1,14 @@
 //! How many samples a pixel gets: as many as bring the picture's error below a threshold with the fewest in all.
 //!
-//! A pixel gets them in proportion to how far a single one of its samples is off, its deviation (Neyman 1934, *On the two
-//! different aspects of the representative method*): of all ways to spend a number of samples, that leaves the least mean square error. To go on with every pixel until its own error is below the
-//! threshold, the usual way, takes samples in proportion to the square of the deviation, and where a whole picture is noisy that is no better than the same number for each pixel:
-//! both leave the mean of the squares over the mean number. Measured at equal numbers on a room lit by a lamp, its root mean square error was 1.01 to 1.07 of even sampling's, and is 0.93 to 0.95 now.
+//! A pixel gets them in proportion to its deviation: how far a single one of its samples is off. Of all ways to spend a number of
+//! samples that one leaves the least mean square error (Neyman 1934, *On the two different aspects of the representative
+//! method*). To go on with each pixel until its own error is below the threshold, the usual way, takes samples in
+//! proportion to the square of the deviation. Where all of a picture is noisy that is worth no more than the same number for each pixel,
+//! for both leave the mean of the squares over the mean number. On `scenes/box`, with 20 to 64 samples a pixel, it left
+//! 1.02 to 1.07 of the error of even sampling; this leaves 0.94.
 //!
-//! The threshold is that of the pixels which the fewest samples leave above it: it is their root mean square error, while all others are below it anyway. Taken
-//! over the whole picture it would depend on how much of that is empty.
+//! The threshold is for those pixels that the fewest samples leave above it: it is their root mean square error, and all others are
+//! below it anyway. For the whole picture's error it would mean something else in front of more background.
 //!
 //! The samples of a pixel are parted into two, and how far the two means differ tells how far the mean of all is off
 //! (Dammertz, Hanika, Keller and Lensch 2010, *A hierarchical automatic stopping condition for Monte Carlo global
