@@ -29,6 +29,8 @@ const UNSAFE: &[&str] = &[
     "trace/bvh/build/lanes.rs",
     "trace/bvh/room.rs",
     "image/oiio.rs",
+    "image/denoise/device.rs",
+    "image/denoise/library.rs",
     "memory/",
 ];
 

@@ -7,6 +7,7 @@ mod cache;
 mod camera_flags;
 mod cli;
 mod compare;
+mod denoise;
 #[cfg(feature = "embree")]
 mod embree;
 mod image;

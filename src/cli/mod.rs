@@ -14,6 +14,7 @@ mod checkpoint;
 mod common;
 mod compare;
 mod completions;
+mod denoise;
 mod display;
 mod engine;
 mod explain;

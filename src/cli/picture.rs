@@ -24,8 +24,8 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     spp: Option<u32>,
 
-    /// Take samples where they are needed: until the standard error of a pixel is below this, as a screen shows it, 1 being
-    /// white (0.01 is about 2 of 255); no pixel has fewer than --spp and 16, nor more than --max-spp
+    /// Take samples where they are needed: until the error of the pixels that are noisy is this, root mean square, as a screen shows it, 1
+    /// being white (0.01 is about 2 of 255); no pixel has fewer than --spp and 16, nor more than --max-spp
     #[arg(long, value_name = "X", value_parser = parse_noise)]
     noise: Option<f32>,
 

@@ -12,6 +12,7 @@ use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
 use super::checkpoint::{CheckpointArgs, Kept};
 use super::common::{SceneArgs, parse_vector};
+use super::denoise::{DenoiseArgs, Denoising};
 use super::display::{Display, parse_address};
 use super::engine::{BackendArg, Job, Outcome};
 use super::explain::ExplainArgs;
@@ -46,6 +47,7 @@ Examples:
   twincast render part.stl --eye 1,2,3 --look-at 0,0,0 --fov 30 -o part.png --stats part.json
   twincast render fox.glb --animation Walk --time 0.5 --shutter 0,0.5 -o fox.png
   twincast render fox.glb --animation Walk --frames 0-23 --skip-existing -o walk.%04d.png
+  twincast render room.glb --integrator path --spp 64 --denoise -o room.png
   twincast render room.glb --integrator path --noise 0.01 --aov all --checkpoint 60s -o room.exr")]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -68,6 +70,9 @@ pub(super) struct RenderArgs {
 
     #[command(flatten)]
     aov: AovArgs,
+
+    #[command(flatten)]
+    denoise: DenoiseArgs,
 
     #[command(flatten)]
     checkpoint: CheckpointArgs,
@@ -150,6 +155,7 @@ fn render(args: &RenderArgs) -> Result<()> {
         return Err(no_picture());
     }
     outputs::check(&args.output, &args.stats, args.inputs())?;
+    let denoising = args.denoise.open(&args.aov.aovs())?;
     let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(image::read).transpose()?;
     let title = || args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -172,7 +178,7 @@ fn render(args: &RenderArgs) -> Result<()> {
 
         let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
         let mut settings = args.picture.settings(&scene.request, args.backend.best_width());
-        settings.aovs = args.aov.aovs();
+        settings.aovs = denoising.as_ref().map_or_else(|| args.aov.aovs(), Denoising::aovs);
         let (width, height) = settings.crop.map_or((settings.width, settings.height), |crop| (crop.width, crop.height));
         args.check_reference(reference.as_ref(), width, height)?;
         if settings.adaptive.is_some() && args.backend == BackendArg::Both {
@@ -223,9 +229,14 @@ fn render(args: &RenderArgs) -> Result<()> {
             display: display.as_ref(),
             kept: kept.as_ref(),
         };
-        let outcome = job.run(args.backend);
+        let outcome = job.run(args.backend).and_then(|mut outcome| {
+            let denoise =
+                |denoising: &Denoising| denoising.run(&mut outcome.passes[0], cancel, display.as_ref(), args.quiet);
+            let denoised = denoising.as_ref().map(denoise).transpose()?;
+            Ok((outcome, denoised))
+        });
         warn(display.and_then(Display::finish).as_slice());
-        let outcome = outcome?;
+        let (outcome, denoised) = outcome?;
         let pass = &outcome.passes[0];
         let picture = &pass.picture;
         let mean_spp = picture.samples as f64 / pixels as f64;
@@ -253,6 +264,7 @@ fn render(args: &RenderArgs) -> Result<()> {
             prepare_seconds,
             write_seconds,
             peak_memory: process::peak(),
+            denoise: denoised,
             engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
         };
         if let Some(path) = &args.stats {

@@ -5,6 +5,7 @@ use std::fmt::{self, Write};
 use serde::Serialize;
 
 use super::cache::CacheStats;
+use super::denoise::DenoiseStats;
 use super::engine::Pass;
 
 /// What `--stats` writes. Times are seconds, sizes bytes.
@@ -24,6 +25,9 @@ pub(super) struct Stats {
     pub(super) write_seconds: f64,
     /// The most memory the process has held.
     pub(super) peak_memory: Option<u64>,
+    /// Of the first engine's picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) denoise: Option<DenoiseStats>,
     pub(super) engines: Vec<EngineStats>,
 }
 

@@ -70,6 +70,9 @@ impl Rendered<'_> {
                 summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
             }
         }
+        if let Some(denoise) = &self.stats.denoise {
+            summary.line("denoised", format_args!("{}: {}", denoise.library, time(denoise.seconds)));
+        }
         if let (true, Some(peak)) = (verbose, self.stats.peak_memory) {
             summary.line("peak", format_args!("{} of memory for everything", size(peak)));
         }

@@ -3,10 +3,11 @@
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
 //! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light (`response`). `samples.rs` turns pixels into a file's samples, and a
 //! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
-//! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`).
+//! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
 
 mod channels;
 mod compare;
+pub mod denoise;
 mod file;
 pub mod flip;
 mod metadata;

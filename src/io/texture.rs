@@ -1,4 +1,4 @@
-//! Pictures for textures: PNG and JPEG, from files or from bytes within another file.
+//! Pictures for textures: PNG, JPEG and WebP, from files or from bytes within another file.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -41,7 +41,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     let reader = || {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         reader.limits(limits());
-        if reader.format().is_none() { Err("is not a PNG or JPEG picture".to_string()) } else { Ok(reader) }
+        if reader.format().is_none() { Err("is not a PNG, JPEG or WebP picture".to_string()) } else { Ok(reader) }
     };
     // The size first, and without limits of the library's, whose message would not say it.
     let mut sizing = reader()?;
@@ -74,7 +74,7 @@ fn limits() -> Limits {
 
 fn broken(error: &ImageError) -> String {
     match error {
-        ImageError::Unsupported(_) => format!("is not a PNG or JPEG picture that can be read: {error}"),
+        ImageError::Unsupported(_) => format!("is not a PNG, JPEG or WebP picture that can be read: {error}"),
         _ => format!("is a broken picture: {error}"),
     }
 }

@@ -146,10 +146,12 @@ impl Renderer<'_> {
         let Some(adaptive) = self.settings.adaptive.filter(|adaptive| adaptive.judges(done, self.settings.spp)) else {
             return true;
         };
-        let errors = adaptive::errors(canvas.window.width as usize, canvas.sums.len(), |i| canvas.estimate(i));
+        let estimate = |i: usize| canvas.estimate(i);
+        let deviations = adaptive::deviations(canvas.window.width as usize, canvas.sums.len(), estimate);
+        let rate = adaptive.rate(self.settings.spp, &deviations);
         let counts = &canvas.counts;
         canvas.active.par_iter_mut().enumerate().for_each(|(i, active)| {
-            *active = *active && counts[i] == done && errors[i] > adaptive.noise;
+            *active = *active && counts[i] == done && f64::from(deviations[i]) * rate > f64::from(done);
         });
         canvas.active.contains(&true)
     }

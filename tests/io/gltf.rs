@@ -224,6 +224,43 @@ fn extensions_of_materials() {
     assert_eq!((flat.unlit, flat.diffuse, flat.emission), (true, Vec3::new(1.0, 0.5, 0.25), Vec3::ZERO));
 }
 
+/// 16 x 8 pixels, the left half (230, 26, 51), the right one (26, 77, 204), by libwebp, which loses a little.
+#[rustfmt::skip]
+const WEBP: [u8; 76] = [
+    0x52, 0x49, 0x46, 0x46, 0x44, 0x00, 0x00, 0x00, 0x57, 0x45, 0x42, 0x50, 0x56, 0x50, 0x38, 0x20, 0x38, 0x00, 0x00,
+    0x00, 0x10, 0x02, 0x00, 0x9d, 0x01, 0x2a, 0x10, 0x00, 0x08, 0x00, 0x00, 0x00, 0x00, 0x25, 0xa0, 0x02, 0x74, 0xba,
+    0x01, 0xf8, 0x01, 0xfa, 0x00, 0x03, 0xc8, 0x00, 0xfe, 0xff, 0x07, 0xbf, 0xff, 0xe7, 0x89, 0xff, 0xff, 0x1c, 0xd7,
+    0xfa, 0x98, 0xc5, 0xff, 0xf3, 0xd7, 0xdf, 0xff, 0xce, 0x69, 0xbe, 0xcd, 0x48, 0x08, 0xff, 0xbd, 0xff, 0x00, 0x00,
+];
+
+#[test]
+fn a_webp_picture_comes_before_the_one_beside_it() {
+    let extension = json!([{"sampler": 0, "source": 0, "extensions": {"EXT_texture_webp": {"source": 1}}}]);
+    let images = json!([{"uri": data_uri("image/png", &obj::picture())}, {"uri": data_uri("image/webp", &WEBP)}]);
+    let mut changes = vec![
+        ("/textures", extension),
+        ("/images", images),
+        ("/extensionsUsed", json!(["EXT_texture_webp"])),
+        ("/extensionsRequired", json!(["EXT_texture_webp"])),
+    ];
+    let (scene, warnings) = changed(&changes).load("a.gltf");
+    let texture = &scene.textures[0];
+    assert_eq!((texture.width, texture.height, warnings.len()), (16, 8, 0));
+    for (i, pixel) in texture.pixels.iter().enumerate() {
+        // Away from the edge, along which colours run together.
+        let expected = match i % 16 {
+            0..6 => [230, 26, 51, 255],
+            10..16 => [26, 77, 204, 255],
+            _ => continue,
+        };
+        assert!(pixel.iter().zip(expected).all(|(&a, b)| a.abs_diff(b) < 12), "{i}: {pixel:?}");
+    }
+    changes[0].1 = json!([{"sampler": 0, "source": 0, "extensions": {"EXT_texture_webp": {"source": 7}}}]);
+    refused(&changed(&changes), "a.gltf", "/textures/0/extensions/EXT_texture_webp/source", "no image 7");
+    changes[0].1 = json!([{"sampler": 0, "source": 0}]);
+    assert_eq!(changed(&changes).scene("a.gltf").textures[0].width, 2, "the other one, where that is all there is");
+}
+
 #[test]
 fn files_beside_it() {
     let uris = [("/buffers/0/uri", json!("my%20data.bin")), ("/images/0/uri", json!("pic%2Epng"))];

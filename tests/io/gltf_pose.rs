@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use serde_json::{Value, json};
 use twincast::Scene;
 use twincast::io::{Animation, LoadOptions, load};
-use twincast::math::{DMat3, DVec3, Vec3};
+use twincast::math::{DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use super::gltf_maker::{Maker, U8};
 use super::{Files, corners, meshes, model};
@@ -275,6 +275,33 @@ fn morph_targets_add_up() {
     assert_eq!(shape(&maker.files(), at(0.5)), both, "by the animation's");
     maker.json["nodes"][0]["weights"] = json!([1.0]);
     fault(&maker.files(), Animation::default(), "/nodes/0/weights", "1 weights for 2 morph targets");
+}
+
+/// By half of a target; colours stay within theirs, and what no target displaces stays.
+#[test]
+fn coordinates_and_colours_are_displaced_too() {
+    let mut maker = morphing();
+    let uvs = maker.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
+    let colors = maker.floats("VEC3", &[0.25, 0.5, 0.75, 0., 0., 0., 1., 1., 1.]);
+    let drift = maker.floats("VEC2", &[0.5, 0.25, 0., 0., 0., -1.]);
+    let glow = maker.floats("VEC3", &[0.5, 0., -4., 0., 0.5, 0., 1., 0., -1.]);
+    let primitive = &mut maker.json["meshes"][0]["primitives"][0];
+    primitive["attributes"]["TEXCOORD_0"] = json!(uvs);
+    primitive["attributes"]["COLOR_0"] = json!(colors);
+    let still = posed(&maker.files(), Animation::default());
+    maker.json["meshes"][0]["primitives"][0]["targets"][0]["TEXCOORD_0"] = json!(drift);
+    maker.json["meshes"][0]["primitives"][0]["targets"][0]["COLOR_0"] = json!(glow);
+    let moved = posed(&maker.files(), Animation::default());
+    let [still, moved] = [&still, &moved].map(|scene| meshes(scene)[0].clone());
+    // With v up.
+    assert_eq!(still.uvs, [[0., 1.], [1., 1.], [0., 0.]].map(Vec2::from));
+    assert_eq!(moved.uvs, [[0.25, 0.875], [1., 1.], [0., 0.5]].map(Vec2::from));
+    assert_eq!(still.colors, [[0.25, 0.5, 0.75, 1.], [0., 0., 0., 1.], [1., 1., 1., 1.]].map(Vec4::from));
+    assert_eq!(moved.colors, [[0.5, 0.5, 0., 1.], [0., 0.25, 0., 1.], [1., 1., 0.5, 1.]].map(Vec4::from));
+    assert_eq!(still.positions, moved.positions);
+    let short = maker.floats("VEC2", &[0., 0.]);
+    maker.json["meshes"][0]["primitives"][0]["targets"][0]["TEXCOORD_0"] = json!(short);
+    fault(&maker.files(), Animation::default(), "/accessors/", "TEXCOORD_0 has 1 elements for 3 positions");
 }
 
 #[test]

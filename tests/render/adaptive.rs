@@ -37,12 +37,17 @@ fn error(picture: &Image, reference: &Image) -> f64 {
     (sum / picture.pixels.len() as f64).sqrt()
 }
 
-/// A floor under a small lamp behind a wall's edge: light, dark, and a penumbra between.
+/// A floor under a small lamp, and a small square above it: light, dark, and a penumbra between.
 fn penumbra() -> Scene {
-    let mut scene = Scene::from_geometries(vec![floor(1.0, 0), floor(0.35, 0)], vec![matte(0.8)]);
+    under_a_lamp(0.35, DVec3::new(0.4, 0.6, 0.0))
+}
+
+/// The same with a square of this half side in this place.
+fn under_a_lamp(half: f32, place: DVec3) -> Scene {
+    let mut scene = Scene::from_geometries(vec![floor(1.0, 0), floor(half, 0)], vec![matte(0.8)]);
     scene.groups[0].geometries = 0..1;
     scene.groups.push(twincast::scene::Group { name: String::new(), geometries: 1..2 });
-    let above = twincast::math::DAffine3::from_translation(DVec3::new(0.4, 0.6, 0.0));
+    let above = twincast::math::DAffine3::from_translation(place);
     scene.instances.push(twincast::scene::Instance {
         name: String::new(),
         group: 1,
@@ -53,6 +58,32 @@ fn penumbra() -> Scene {
     scene.lights = vec![Light::Area { shape: lamp, radiance: Vec3::splat(40.0) }];
     scene.cameras = vec![from_above()];
     scene
+}
+
+/// A closed room that its lamp lights by paths: noisy everywhere.
+fn room() -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/box/box.toml");
+    twincast::io::load(path.as_ref(), &twincast::io::LoadOptions::default()).expect("the project's scenes load").0
+}
+
+/// Compared with as many samples for each pixel, or a few more: far better where little of the picture is noisy, and better even where all of
+/// it is.
+#[test]
+fn as_many_samples_buy_less_error() {
+    let small = under_a_lamp(0.1, DVec3::new(0.4, 0.2, 0.0));
+    let scenes = [("penumbra", small, 0.004, 8192, 0.5), ("room", room(), 0.07, 1024, 0.99)];
+    for (name, scene, noise, many, share) in scenes {
+        let integrator = (name == "room").then_some(Integrator::Path);
+        let base = Settings { integrator, ..settings(48, 48, 4) };
+        let reference = picture(&scene, &Settings { spp: many, seed: 99, ..base.clone() }).image;
+        let found = picture(&scene, &Settings { adaptive: to(noise, 1024), ..base.clone() });
+        let spp = found.samples.div_ceil(48 * 48) as u32;
+        let even = picture(&scene, &Settings { spp, ..base.clone() }).image;
+        let (own, even) = (error(&found.image, &reference), error(&even, &reference));
+        eprintln!("{name}: {spp} samples a pixel, error {own:.5} against {even:.5}");
+        assert!(spp > 16 && own < share * even, "{name}: {spp} samples, {own} against {even}");
+        assert!(own < f64::from(noise), "{name}: {own} of {noise}");
+    }
 }
 
 #[test]

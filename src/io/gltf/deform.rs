@@ -1,6 +1,4 @@
 //! Vertices that do not lie where they are stored: morph targets first, then the skin.
-//!
-//! Texture coordinates and colours, whose morph targets the specification leaves to choice, stay as they are.
 
 use std::sync::Arc;
 

@@ -10,6 +10,7 @@ use super::attributes::Attributes;
 use super::deform::{Deformation, Deformer};
 use super::document::Document;
 use super::material::Materials;
+use super::morph::Displacements;
 use super::pose::Pose;
 use super::schema::Primitive;
 use super::{draco, skin, triangles, variants};
@@ -153,6 +154,7 @@ impl<'a> Groups<'a> {
         });
         let [uvs, second_uvs] = uvs;
         let (uvs, second_uvs) = (uvs?, second_uvs?);
+        let [uv_name, second_uv_name] = uv_names.map(Option::unwrap_or_default);
         let lacks = |set: Option<u32>, view: &Option<View<'_>>| set.is_some() && view.is_none();
         self.bare += usize::from(lacks(sets.0[0], &uvs) || lacks(sets.0[1], &second_uvs));
 
@@ -164,16 +166,27 @@ impl<'a> Groups<'a> {
 
         // glTF's v points down, ours up.
         let uv = |uv: [f32; 2]| Vec2::from(uv) * Vec2::new(1.0, -1.0) + Vec2::new(0.0, 1.0);
-        let with_alpha = |v: &View<'_>| v.components() == 4;
+        let targets = (primitive, deformation.weights);
+        let uvs_of = |view: Option<View<'_>>, name: &str| match view {
+            Some(view) => Displacements::read(&attributes, targets, (name, &["VEC2"]), &view, uv),
+            None => Ok(Vec::new()),
+        };
+        let colors = match colors {
+            Some(view) => {
+                let alpha = if view.components() == 4 { Vec4::ZERO } else { Vec4::W };
+                // Where there are targets these may leave the range of colours.
+                let most = if deformation.weights.is_empty() { Vec4::INFINITY } else { Vec4::ONE };
+                let color = |color| (Vec4::from(color) + alpha).clamp(Vec4::ZERO, most);
+                Displacements::read(&attributes, targets, ("COLOR_0", &["VEC3", "VEC4"]), &view, color)?
+            }
+            None => Vec::new(),
+        };
         let mut mesh = Mesh {
             positions: Arc::default(),
             normals: Vec::new(),
-            uvs: uvs.map_or(Vec::new(), |v| attributes.read(&v, uv)),
-            second_uvs: second_uvs.map_or(Vec::new(), |v| attributes.read(&v, uv)),
-            colors: colors.map_or(Vec::new(), |v| {
-                let alpha = if with_alpha(&v) { 0.0 } else { 1.0 };
-                attributes.read(&v, |color| Vec4::from(color) + Vec4::W * alpha)
-            }),
+            uvs: uvs_of(uvs, &uv_name)?,
+            second_uvs: uvs_of(second_uvs, &second_uv_name)?,
+            colors,
             triangles: Arc::new(triangles),
             material,
             ..Mesh::default()

@@ -43,9 +43,10 @@ use crate::memory::Mapped;
 use crate::scene::Scene;
 
 /// The extensions that are honoured; a file that requires another is refused.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 14] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
+    "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",

@@ -26,6 +26,22 @@ impl<'v> Displacements<'v> {
         Ok(if targets.is_empty() { None } else { Some(Self(targets)) })
     }
 
+    /// What becomes of an attribute at each vertex that is used, displaced where a target does so.
+    pub(super) fn read<const N: usize, T: Send>(
+        attributes: &Attributes<'v>,
+        targets: (&Primitive, &[f32]),
+        (name, kinds): (&str, &[&str]),
+        view: &View<'_>,
+        make: impl Fn([f32; N]) -> T + Sync,
+    ) -> Result<Vec<T>> {
+        let (primitive, weights) = targets;
+        let Some(displacements) = Self::of(attributes, primitive, weights, name, kinds)? else {
+            return Ok(attributes.read(view, make));
+        };
+        let displaced = |vertex| displacements.apply(vertex, view.floats::<N>(vertex).map(f64::from));
+        Ok(attributes.each(|vertex| make(displaced(vertex).map(|x| x as f32))))
+    }
+
     /// A vertex's value, displaced.
     pub(super) fn apply<const N: usize>(&self, vertex: usize, value: [f64; N]) -> [f64; N] {
         self.0.iter().fold(value, |value, (weight, target)| {

@@ -166,12 +166,12 @@ impl<'a> Textures<'a> {
         let document = self.document;
         let root = &document.root;
         document.check_index(pointer, index, root.textures.len(), "texture")?;
-        let Some(image) = root.textures[index].source else {
+        let Some((image, told_by)) = root.textures[index].image() else {
             let message = "the texture has no image that can be read; the material is rendered without it";
             self.warnings.push(document.warning(format!("/textures/{index}"), message));
             return Ok(None);
         };
-        document.check_index(&format!("/textures/{index}/source"), image, root.images.len(), "image")?;
+        document.check_index(&format!("/textures/{index}/{told_by}"), image, root.images.len(), "image")?;
         Ok(match self.pictures.entry(image) {
             Entry::Occupied(known) => known.get().clone(),
             Entry::Vacant(free) => free.insert(decoded(document, image, &mut self.warnings)?).clone(),

@@ -58,7 +58,30 @@ pub(in crate::io::gltf) struct TextureInfo {
 #[derive(Deserialize)]
 pub(in crate::io::gltf) struct Texture {
     pub(in crate::io::gltf) sampler: Option<usize>,
-    pub(in crate::io::gltf) source: Option<usize>,
+    source: Option<usize>,
+    #[serde(default)]
+    extensions: TextureExtensions,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct TextureExtensions {
+    #[serde(rename = "EXT_texture_webp")]
+    webp: Option<WebpSource>,
+}
+
+#[derive(Deserialize)]
+struct WebpSource {
+    source: usize,
+}
+
+impl Texture {
+    /// The image it shows, and where in the texture that is said; none where it is of a kind that is not known. A WebP picture comes before another, which is for those who
+    /// cannot read it.
+    pub(in crate::io::gltf) fn image(&self) -> Option<(usize, &'static str)> {
+        let webp = self.extensions.webp.as_ref().map(|webp| (webp.source, "extensions/EXT_texture_webp/source"));
+        webp.or(self.source.map(|source| (source, "source")))
+    }
 }
 
 #[derive(Deserialize)]
