@@ -3,6 +3,7 @@
 mod all_hits;
 mod alone;
 mod closest_point;
+mod packets;
 mod precise;
 
 use twincast::World;

@@ -116,7 +116,7 @@ impl Level {
         let limit = limit(ray);
         if !self.triangles.tree().is_empty() {
             let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
-            let slab = SlabRay::new(&local, self.triangles.tree().reach(), blur);
+            let slab = SlabRay::new::<S>(&local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(&local, blur);
             walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |leaf| {
                 self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
@@ -126,7 +126,7 @@ impl Level {
         // The rounding of the ray is part of what shapes are asked.
         let local = place.map_or(*ray, |place| place.placement.object_ray(ray));
         if !self.shapes.tree().is_empty() && local.is_valid() {
-            let slab = SlabRay::new(&local, self.shapes.tree().reach(), Blur::NONE);
+            let slab = SlabRay::new::<S>(&local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |leaf| {
                 self.shapes.gather_leaf(leaf, &local, through, &mut gathered.shapes);
                 Visit::Until(limit)

@@ -15,15 +15,14 @@ use super::Bvh;
 use super::block::LANES;
 use super::candidates;
 use super::filter::Filter;
-use super::flight::{self, Flight};
 use super::found::Found;
 use super::isa::{self, Kernel};
-use super::noted::Rays;
 use super::place::Blur;
 use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
-use super::simd::Simd;
-use super::slab::SlabRay;
+use super::scratch::{Scratch, with_scratch};
+use super::simd::{Mask, Simd, Vector};
+use super::slab::{self, SlabRay};
 use super::walk::{self, Stack, Visit, with_stack};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
@@ -38,44 +37,33 @@ pub struct TriangleFound {
     pub corners: [Vec3; 3],
 }
 
+impl TriangleFound {
+    /// The triangle's normal, (b - a) x (c - a), not of unit length.
+    #[inline(always)]
+    pub fn normal(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a)
+    }
+}
+
 /// Whether a search goes on, up to some t.
 pub type Search = ControlFlow<(), f32>;
-
-/// Rays that travel together at most.
-const TOGETHER: usize = 16;
 
 impl Bvh {
     /// The nearest fixed triangle that `ray` hits.
     pub fn closest_triangle(&self, ray: &Ray) -> Option<TriangleFound> {
-        if self.fixed.triangles.tree().is_empty() || !ray.is_valid() {
+        if self.fixed.triangles.tree().is_empty() {
             return None;
         }
-        with_stack(|stack| isa::dispatch(self.isa, Alone { bvh: self, ray, stack }))
+        with_scratch(|scratch| isa::dispatch(self.isa, Alone { bvh: self, ray, scratch }))
     }
 
     /// Whether `ray` hits any fixed triangle.
     pub fn occludes(&self, ray: &Ray) -> bool {
-        if self.fixed.triangles.tree().is_empty() || !ray.is_valid() {
+        if self.fixed.triangles.tree().is_empty() {
             return false;
         }
-        with_stack(|stack| isa::dispatch(self.isa, AnyAlone { bvh: self, ray, stack }))
-    }
-
-    /// [`Bvh::closest_triangle`] of each ray, into `found` of the same length; some of them at a time.
-    ///
-    /// # Panics
-    /// Unless there is one answer a ray.
-    pub fn closest_triangles(&self, rays: &[Ray], found: &mut [Option<TriangleFound>]) {
-        assert_eq!(rays.len(), found.len(), "one answer a ray");
-        found.fill(None);
-        if self.fixed.triangles.tree().is_empty() {
-            return;
-        }
-        self.with_flight(|flight| {
-            for (rays, found) in rays.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
-                isa::dispatch(self.isa, Together { bvh: self, rays, found, flight });
-            }
-        });
+        with_scratch(|scratch| isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch }))
     }
 
     /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
@@ -86,18 +74,6 @@ impl Bvh {
         }
     }
 
-    /// What was noted for up to four rays, computed; those that are missing are the first.
-    #[inline(always)]
-    fn noted_triangles<S: Simd>(&self, rays: [&Ray; 4], ids: [u32; 4]) -> [TriangleFound; 4] {
-        let tree = &self.fixed.triangles;
-        let (_, hits) = tree.hits::<S>(&Rays::new::<S>(rays), ids);
-        let mut found = hits.map(|hit| TriangleFound { hit, corners: [Vec3::ZERO; 3] });
-        for (found, id) in found.iter_mut().zip(ids) {
-            found.corners = self.corners(id);
-        }
-        found
-    }
-
     /// The corners of a fixed triangle: lane `id % 8` of block `id / 8`.
     #[inline(always)]
     fn corners(&self, id: u32) -> [Vec3; 3] {
@@ -106,22 +82,36 @@ impl Bvh {
         lane.block.triangle(lane.lane % LANES)
     }
 
+    /// What was noted for a ray, computed: alone that is done sooner than four at a time.
+    #[inline(always)]
+    fn sure_triangle(&self, ray: &Ray, id: u32) -> TriangleFound {
+        let mut scratch = None;
+        let triangle = self.fixed.triangles.leaves().lane(id, &mut scratch);
+        let corners = triangle.block.triangle(triangle.lane % LANES);
+        let sure = triangle::intersect_surely(ray, &corners);
+        let hit = self.fixed.triangles.hit(&triangle, sure.t as f32, sure.u as f32, sure.v as f32);
+        TriangleFound { hit, corners }
+    }
+
     /// What was in doubt, and computed at once.
     #[inline(always)]
-    fn computed_triangle(&self, found: &Found) -> Option<TriangleFound> {
+    pub(super) fn computed_triangle(&self, found: &Found) -> Option<TriangleFound> {
         found.computed().map(|(hit, id)| TriangleFound { hit, corners: self.corners(id) })
     }
 
-    /// Walks, and notes what is hit.
+    /// Walks, and notes what is hit; nothing for a ray that is not valid.
     #[inline(always)]
-    fn walk_alone<S: Simd, Q: Query>(&self, ray: &Ray, stack: &mut Stack) -> Found {
+    fn walk_alone<S: Simd, Q: Query>(&self, ray: &Ray, scratch: &mut Scratch) {
+        let Scratch { stack, found: [found, ..] } = scratch;
         let triangles = &self.fixed.triangles;
         let tree = triangles.tree();
-        let slab = SlabRay::new(ray, tree.reach(), Blur::NONE);
-        let filter = Filter::new(ray, Blur::NONE);
         let limit = ray.tmax.next_up();
-        let mut found = Found::NONE;
         found.start([ray.tmax, limit]);
+        if !is_valid::<S>(ray) {
+            return;
+        }
+        let slab = SlabRay::new::<S>(ray, tree.reach(), Blur::NONE);
+        let filter = Filter::new(ray, Blur::NONE);
         walk::single::<S, Q>(
             stack,
             tree,
@@ -143,14 +133,23 @@ impl Bvh {
                 Visit::Until(found.limit)
             },
         );
-        found
     }
+}
+
+/// [`Ray::is_valid`], by the ray's numbers as they lie in memory: they are loaded for the walk anyway.
+#[inline(always)]
+fn is_valid<S: Simd>(ray: &Ray) -> bool {
+    let zero = S::V8::splat(0.0);
+    // Of origin and direction: zero for finite numbers.
+    let finite = slab::row::<S>(ray).mul(zero).at_most(zero).bits() & 0b11_1111;
+    let largest = ray.direction.abs().max_element();
+    finite == 0b11_1111 && largest >= f32::MIN_POSITIVE && ray.tmin >= 0.0 && ray.tmin <= ray.tmax
 }
 
 struct Alone<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
-    stack: &'a mut Stack,
+    scratch: &'a mut Scratch,
 }
 
 impl Kernel for Alone<'_> {
@@ -158,20 +157,20 @@ impl Kernel for Alone<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let Self { bvh, ray, stack } = self;
-        let found = bvh.walk_alone::<S, Closest>(ray, stack);
+        let Self { bvh, ray, scratch } = self;
+        bvh.walk_alone::<S, Closest>(ray, scratch);
+        let [found, ..] = &scratch.found;
         if found.is_noted() {
-            let (_, [hit, ..]) = bvh.fixed.triangles.hits::<S>(&Rays::new::<S>([ray; 4]), [found.noted; 4]);
-            return Some(TriangleFound { hit, corners: bvh.corners(found.noted) });
+            return Some(bvh.sure_triangle(ray, found.noted));
         }
-        bvh.computed_triangle(&found)
+        bvh.computed_triangle(found)
     }
 }
 
 struct AnyAlone<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
-    stack: &'a mut Stack,
+    scratch: &'a mut Scratch,
 }
 
 impl Kernel for AnyAlone<'_> {
@@ -179,50 +178,8 @@ impl Kernel for AnyAlone<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        self.bvh.walk_alone::<S, Occluded>(self.ray, self.stack).is_hit()
-    }
-}
-
-struct Together<'a> {
-    bvh: &'a Bvh,
-    rays: &'a [Ray],
-    found: &'a mut [Option<TriangleFound>],
-    flight: &'a mut Flight,
-}
-
-impl Kernel for Together<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self) {
-        let Self { bvh, rays, found, flight } = self;
-        let mut noted = [(0, 0); TOGETHER];
-        let mut count = 0;
-        // Ids of placed objects' triangles are not those of fixed ones.
-        debug_assert!(bvh.placements.is_empty(), "a flight goes through placements as well");
-        flight::trace::<S, Closest>(
-            flight,
-            bvh,
-            rays,
-            #[inline(always)]
-            |i, state| {
-                if state.is_noted() {
-                    noted[count % TOGETHER] = (i, state.noted);
-                    count += 1;
-                } else {
-                    found[i] = bvh.computed_triangle(state);
-                }
-            },
-        );
-        for four in noted[..count].chunks(4) {
-            let at = |k: usize| four.get(k).copied().unwrap_or(four[0]);
-            let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
-            let each = [&rays[a.0], &rays[b.0], &rays[c.0], &rays[d.0]];
-            let triangles = bvh.noted_triangles::<S>(each, [a.1, b.1, c.1, d.1]);
-            for (&(ray, _), triangle) in four.iter().zip(triangles) {
-                found[ray] = Some(triangle);
-            }
-        }
+        self.bvh.walk_alone::<S, Occluded>(self.ray, self.scratch);
+        self.scratch.found[0].is_hit()
     }
 }
 

@@ -121,7 +121,7 @@ impl Kernel for VisitBoxes<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { boxes, ray, stack, visitor } = self;
-        let slab = SlabRay::new(ray, boxes.tree.reach(), Blur::NONE);
+        let slab = SlabRay::new::<S>(ray, boxes.tree.reach(), Blur::NONE);
         let mut limit = ray.tmax.next_up();
         walk::single::<S, Closest>(
             stack,

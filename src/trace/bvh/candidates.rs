@@ -67,7 +67,7 @@ pub(super) fn walk<S: Simd>(
     mut each: impl FnMut(&Block, usize, f32) -> Option<f32>,
 ) {
     let tree = triangles.tree();
-    let (slab, filter) = (SlabRay::new(ray, tree.reach(), blur), Filter::new(ray, blur));
+    let (slab, filter) = (SlabRay::new::<S>(ray, tree.reach(), blur), Filter::new(ray, blur));
     let mut limit = ray.tmax.next_up();
     walk::single::<S, Closest>(
         stack,

@@ -7,6 +7,7 @@
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
+use super::placements::FIXED;
 use super::query::Query;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
@@ -159,9 +160,22 @@ impl Found {
         }
     }
 
+    /// As it was when it was left: a ray's [`Self::range`], and what is noted of the fixed triangles.
+    #[inline(always)]
+    pub fn resume(&mut self, [sure, limit]: [f32; 2], noted: u32) {
+        (self.sure, self.limit, self.noted, self.place) = (sure, limit, noted, FIXED);
+    }
+
+    /// Up to where a hit is the nearest for sure, and up to where one is wanted.
+    #[inline(always)]
+    pub fn range(&self) -> [f32; 2] {
+        [self.sure, self.limit]
+    }
+
+    /// Decides whether the ray hits one triangle of a block.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, bvh: &Bvh, place: u32, index: u32, block: &Block, lane: usize, ray: &Ray) {
+    pub fn decide(&mut self, bvh: &Bvh, place: u32, index: u32, block: &Block, lane: usize, ray: &Ray) {
         let mut nearest = self.nearest(bvh, ray);
         if self.is_noted() {
             self.computed = self.noted;

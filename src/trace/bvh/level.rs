@@ -53,7 +53,7 @@ impl Level {
         }
         let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
         let through = place.map(Place::through);
-        let (slab, filter) = (SlabRay::new(&local, tree.reach(), blur), Filter::new(&local, blur));
+        let (slab, filter) = (SlabRay::new::<S>(&local, tree.reach(), blur), Filter::new(&local, blur));
         walk::single::<S, Q>(
             stack,
             tree,
@@ -95,7 +95,7 @@ impl Level {
     ) {
         let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
-            let slab = SlabRay::new(local, self.shapes.tree().reach(), Blur::NONE);
+            let slab = SlabRay::new::<S>(local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Q>(
                 stack,
                 self.shapes.tree(),

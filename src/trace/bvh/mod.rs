@@ -19,12 +19,14 @@
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `alone` | one ray at a time, with the corners of what it hits; or with a visitor that says what counts |
+//! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
+//! | `scratch` | what both need of a thread |
 //! | `boxes` | a tree over boxes of the caller's |
 //! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near` | the triangles that may be nearest to a point, eight boxes at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
-//! | `block`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
+//! | `block`, `woop`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
 //! | `steps` | what a ray cannot but look at, counted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
@@ -61,6 +63,7 @@ mod moving;
 mod near;
 mod node;
 mod noted;
+mod packet;
 mod place;
 mod placements;
 mod preset;
@@ -69,6 +72,7 @@ mod query;
 mod range;
 mod refit;
 mod room;
+mod scratch;
 mod shapes;
 mod simd;
 mod slab;
@@ -76,6 +80,7 @@ mod steps;
 mod tile;
 mod triangles;
 mod walk;
+mod woop;
 
 pub use alone::{Search, TriangleFound};
 pub use boxes::BoxTree;
@@ -87,6 +92,7 @@ pub(super) use query::Verdict;
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;
+pub use packet::{Packet, PacketHits};
 pub use preset::{Options, Preset};
 pub use steps::Steps;
 

@@ -49,7 +49,7 @@ pub(super) fn walk_over<S: Simd, Q: Query>(
     stack: &mut Stack,
     mut enter: impl FnMut(u32) -> Visit,
 ) {
-    let slab = SlabRay::new(ray, tree.reach(), Blur::NONE);
+    let slab = SlabRay::new::<S>(ray, tree.reach(), Blur::NONE);
     walk::single::<S, Q>(
         stack,
         tree,

@@ -24,11 +24,12 @@ use crate::ray::Ray;
 /// A ray made ready for slab tests in one tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlabRay {
-    reciprocal: [f32; 3],
+    /// Of each axis, and one number more, as a vector is stored.
+    reciprocal: [f32; 4],
     /// -origin / direction, less the pad.
-    near_offset: [f32; 3],
+    near_offset: [f32; 4],
     /// -origin / direction, plus the pad.
-    far_offset: [f32; 3],
+    far_offset: [f32; 4],
     /// On each axis 1 if a box's upper side is met first, else 0.
     side: [u32; 3],
     /// Rounded down, for t is rounded before it is held against it; not below 0.
@@ -48,33 +49,16 @@ const OPEN: f32 = f32::MIN_POSITIVE;
 impl SlabRay {
     /// `reach` is the tree's.
     #[inline(always)]
-    pub fn new(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
-        let largest = ray.direction.abs().max_element();
-        let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
-        let span = ray.origin.abs() + reach;
-        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * span.max_element() + 1.1 * blur.origin;
-        let mut slab = Self {
-            reciprocal: [0.0; 3],
-            near_offset: [0.0; 3],
-            far_offset: [0.0; 3],
-            side: [0; 3],
-            tmin: if ray.tmin > 0.0 { ray.tmin.next_down() } else { 0.0 },
-        };
-        for axis in 0..3 {
-            let component = ray.direction[axis];
-            let kept = if component.abs() < smallest { smallest.copysign(component) } else { component };
-            let reciprocal = 1.0 / kept;
-            let width = reciprocal.abs() * (6.0 * UNIT_ROUNDOFF * span[axis] + stray);
-            let offset = -ray.origin[axis] * reciprocal;
-            let is_small = reciprocal.abs() * span[axis] < HUGE && width < HUGE;
-            (slab.reciprocal[axis], slab.near_offset[axis], slab.far_offset[axis]) = if is_small {
-                (reciprocal, offset - width, offset + width)
-            } else {
-                (OPEN.copysign(reciprocal), -f32::MAX, f32::MAX)
-            };
-            slab.side[axis] = u32::from(reciprocal < 0.0);
+    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+        let Slabs { reciprocal, near, far, is_negative } = Slabs::new::<S>(ray, reach, blur);
+        let negative = is_negative.bits();
+        Self {
+            reciprocal: reciprocal.to_array(),
+            near_offset: near.to_array(),
+            far_offset: far.to_array(),
+            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+            tmin: least_t(ray),
         }
-        slab
     }
 
     /// The children the ray may hit something in, up to `limit`; and where it enters each, not below 0.
@@ -95,40 +79,17 @@ impl SlabRay {
     }
 }
 
-/// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
-#[derive(Clone, Copy)]
-pub(super) struct ReadyRay {
-    rows: [[f32; 8]; 4],
+/// The slabs of a ray, an axis a lane; the fourth means nothing.
+struct Slabs<V: Vector> {
+    reciprocal: V,
+    near: V,
+    far: V,
+    is_negative: V::Mask,
 }
 
-impl ReadyRay {
-    /// None.
-    pub const NONE: Self = Self { rows: [[0.0; 8]; 4] };
-
+impl<V: Vector> Slabs<V> {
     #[inline(always)]
-    pub fn slab(&self) -> SlabRay {
-        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, ..], _, [x, y, z, ..]] = self.rows;
-        SlabRay {
-            reciprocal: [rx, ry, rz],
-            near_offset: [nx, ny, nz],
-            far_offset: [fx, fy, fz],
-            side: [x.to_bits(), y.to_bits(), z.to_bits()],
-            tmin,
-        }
-    }
-
-    #[inline(always)]
-    pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
-            self.rows;
-        let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
-        let blur = Blur { origin: b, direction: r };
-        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
-    }
-
-    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
-    #[inline(always)]
-    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+    fn new<S: Simd<V4 = V>>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let splat = S::V4::splat;
         let (o, d, zero) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction), splat(0.0));
         let largest = ray.direction.abs().max_element();
@@ -147,17 +108,60 @@ impl ReadyRay {
         let reciprocal = S::V4::select(is_small, reciprocal, open);
         let near = S::V4::select(is_small, offset.sub(width), splat(-f32::MAX));
         let far = S::V4::select(is_small, offset.add(width), splat(f32::MAX));
-        let sides = S::V4::select(is_negative, splat(f32::from_bits(1)), zero);
+        Self { reciprocal, near, far, is_negative }
+    }
+}
+
+/// The least t, rounded down, for t is rounded before it is held against it; not below 0.
+#[inline(always)]
+fn least_t(ray: &Ray) -> f32 {
+    (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
+}
+
+/// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
+#[derive(Clone, Copy)]
+pub(super) struct ReadyRay {
+    rows: [[f32; 8]; 4],
+}
+
+impl ReadyRay {
+    /// None.
+    pub const NONE: Self = Self { rows: [[0.0; 8]; 4] };
+
+    #[inline(always)]
+    pub fn slab(&self) -> SlabRay {
+        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, ..], _, [x, y, z, ..]] = self.rows;
+        SlabRay {
+            reciprocal: [rx, ry, rz, 0.0],
+            near_offset: [nx, ny, nz, 0.0],
+            far_offset: [fx, fy, fz, 0.0],
+            side: [x.to_bits(), y.to_bits(), z.to_bits()],
+            tmin,
+        }
+    }
+
+    #[inline(always)]
+    pub fn filter(&self) -> Filter {
+        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
+            self.rows;
+        let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
+        let blur = Blur { origin: b, direction: r };
+        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
+    }
+
+    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
+    #[inline(always)]
+    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+        let Slabs { reciprocal, near, far, is_negative } = Slabs::new::<S>(ray, reach, blur);
+        let sides = S::V4::select(is_negative, S::V4::splat(f32::from_bits(1)), S::V4::splat(0.0));
         let filter = Filter::new(ray, blur);
         let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
         let [ax, ay, az] = [axis(ax), axis(ay), axis(az)];
         let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), near.to_array());
         let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
-        // Rounded down, for t is rounded before it is held against it.
-        let tmin = (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0);
         Self {
             rows: [
-                [rx, ry, rz, tmin, nx, ny, nz, begin],
+                [rx, ry, rz, least_t(ray), nx, ny, nz, begin],
                 [fx, fy, fz, width, x, y, z, shorten],
                 [p, q, along, ax, ay, az, 0.0, 0.0],
                 [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
@@ -260,7 +264,8 @@ pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8
     ])
 }
 
+/// Its origin, direction, tmin and tmax.
 #[inline(always)]
-fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax, .. }: &Ray) -> S::V8 {
+pub(super) fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax, .. }: &Ray) -> S::V8 {
     S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

@@ -34,11 +34,11 @@ impl Bvh {
         }
         let limit = self.closest(ray).map_or(ray.tmax, |hit| hit.t);
         count_level(&mut steps, &self.fixed, (ray, Blur::NONE), Some(ray), limit);
-        let world = SlabRay::new(ray, self.placements.tree().reach(), Blur::NONE);
+        let world = SlabRay::new::<Portable>(ray, self.placements.tree().reach(), Blur::NONE);
         for number in items(&mut steps, self.placements.tree(), &world, limit) {
             self.count_object(&mut steps, self.placements.at(number), ray, limit);
         }
-        let world = SlabRay::new(ray, self.moving.tree().reach(), Blur::NONE);
+        let world = SlabRay::new::<Portable>(ray, self.moving.tree().reach(), Blur::NONE);
         for number in items(&mut steps, self.moving.tree(), &world, limit) {
             let placement = self.moving.at(number).at(ray.moment()).into_owned();
             let reach = self.objects[placement.object as usize].triangles.tree().reach();
@@ -59,10 +59,11 @@ impl Bvh {
 /// Triangles and shapes of a level, for the ray in its coordinates as either of them takes it.
 fn count_level(steps: &mut Steps, level: &Level, (ray, blur): (&Ray, Blur), for_shapes: Option<&Ray>, limit: f32) {
     let tree = level.triangles.tree();
-    steps.blocks += items(steps, tree, &SlabRay::new(ray, tree.reach(), blur), limit).len() as u32;
+    steps.blocks += items(steps, tree, &SlabRay::new::<Portable>(ray, tree.reach(), blur), limit).len() as u32;
     if let Some(ray) = for_shapes {
         let tree = level.shapes.tree();
-        steps.shapes += items(steps, tree, &SlabRay::new(ray, tree.reach(), Blur::NONE), limit).len() as u32;
+        steps.shapes +=
+            items(steps, tree, &SlabRay::new::<Portable>(ray, tree.reach(), Blur::NONE), limit).len() as u32;
     }
 }
 

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use super::build::MAX_DEPTH;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::query::Query;
-use super::simd::{Array, Mask, Simd};
+use super::simd::{Array, Mask, Simd, Vector};
 use super::slab::SlabRay;
 use crate::trace::nearest::Nearest;
 
@@ -56,7 +56,7 @@ pub(super) struct Stack {
 }
 
 impl Stack {
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self { entries: [Entry::ROOT; STACK], len: 0 }
     }
 
@@ -100,12 +100,25 @@ pub(super) fn with_stack<R>(work: impl FnOnce(&mut Stack) -> R) -> R {
     result
 }
 
-/// Visits the leaves that the ray enters before `limit`; near ones first, if that matters to the query.
+/// What walks: a ray, or several that go the same way.
+pub(super) trait Enter {
+    /// The children in which something may be hit up to `limit`; and where each is entered, not below 0.
+    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8);
+}
+
+impl Enter for SlabRay {
+    #[inline(always)]
+    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        SlabRay::enter::<S>(self, node, limit)
+    }
+}
+
+/// Visits the leaves that `ray` enters before `limit`; near ones first, if that matters to the query.
 #[inline(always)]
 pub(super) fn single<S: Simd, Q: Query>(
     stack: &mut Stack,
     tree: &Tree,
-    ray: &SlabRay,
+    ray: &impl Enter,
     mut limit: f32,
     mut leaf: impl FnMut(Child) -> Visit,
 ) {

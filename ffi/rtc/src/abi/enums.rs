@@ -69,13 +69,9 @@ pub mod scene_flag {
     pub const FILTER_IN_ARGUMENTS: u32 = 1 << 3;
 }
 
-/// Flags of a query.
+/// Flags of a query; that of coherent rays is not asked, since rays are looked at.
+#[cfg(feature = "v4")]
 pub mod query_flag {
-    #[cfg(feature = "v3")]
-    pub const COHERENT: u32 = 1;
-    #[cfg(feature = "v4")]
-    pub const COHERENT: u32 = 1 << 16;
-    #[cfg(feature = "v4")]
     pub const INVOKE_ARGUMENT_FILTER: u32 = 1 << 1;
 }
 

@@ -1,9 +1,7 @@
 //! Queries of version 3: with a context, which holds the filter.
 
 use super::{present, with};
-use crate::abi::{
-    RTCContext, RTCFilterFunctionNArguments, RTCRay, RTCRayHit, RTCRayHitNp, RTCUserFunctionNArguments, query_flag,
-};
+use crate::abi::{RTCContext, RTCFilterFunctionNArguments, RTCRay, RTCRayHit, RTCRayHitNp, RTCUserFunctionNArguments};
 use crate::scene::{Committed, Scene};
 use crate::trace::{Packed, Pointers, Query, Target, UserCall, cast_one, intersect_lanes, occluded_lanes, run_filters};
 
@@ -17,9 +15,8 @@ unsafe fn ask<T>(scene: *const Scene, context: *mut RTCContext, rays: *mut T, wo
         present(context)?;
         present(rays)?;
         // SAFETY: not null; the caller's.
-        let RTCContext { filter, flags, .. } = unsafe { context.read() };
-        let is_coherent = flags & query_flag::COHERENT != 0;
-        let query = Query { context, filter, filters_all: true, is_coherent, user: None };
+        let RTCContext { filter, .. } = unsafe { context.read() };
+        let query = Query { context, filter, filters_all: true, user: None };
         // SAFETY: the interface's rules.
         if let Some(committed) = unsafe { scene.committed() } {
             work(committed, &query);

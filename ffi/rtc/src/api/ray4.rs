@@ -25,8 +25,7 @@ unsafe fn ask<T>(
             #[cfg(not(feature = "compact-ray-hit"))]
             instance_primitive: INVALID_ID,
         };
-        let mut query =
-            Query { context: &raw mut own, filter: None, filters_all: false, is_coherent: false, user: None };
+        let mut query = Query { context: &raw mut own, filter: None, filters_all: false, user: None };
         // SAFETY: null or the caller's.
         if let Some(arguments) = unsafe { arguments.as_ref() } {
             if !arguments.context.is_null() {
@@ -34,7 +33,6 @@ unsafe fn ask<T>(
             }
             query.filter = arguments.filter;
             query.filters_all = arguments.flags & query_flag::INVOKE_ARGUMENT_FILTER != 0;
-            query.is_coherent = arguments.flags & query_flag::COHERENT != 0;
             query.user = arguments.user;
         }
         // SAFETY: the interface's rules.

@@ -151,10 +151,9 @@ impl Surface {
         }
     }
 
-    /// A hit with a triangle at `u`, `v`, in terms of the geometry.
+    /// A hit with a triangle at `u`, `v`, whose normal is `ng`, in terms of the geometry.
     #[inline]
-    pub fn name(&self, triangle: u32, u: f32, v: f32, corners: [Vec3; 3]) -> Named {
-        let ng = normal(corners);
+    pub fn name(&self, triangle: u32, u: f32, v: f32, ng: Vec3) -> Named {
         if self.is_plain() {
             return Named { primitive: triangle, u, v, ng };
         }

@@ -81,22 +81,21 @@ fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query
             target.take(query, 0, 0.0, &named);
         }
     } else if let Some(found) = solid.closest_triangle(ray)
-        && let Some((geometry, named)) = name_solid(committed, &found)
+        && let TriangleFound { hit, .. } = &found
+        && let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], found.normal())
     {
-        target.take(query, geometry, found.hit.t, &named);
+        target.take(query, hit.geometry, hit.t, &named);
     }
 }
 
-/// A hit with a triangle in terms of its geometry, whose id comes first.
+/// A hit with a triangle, whose normal is `ng`, in terms of its geometry.
 #[inline(always)]
-pub fn name_solid(committed: &Committed, found: &TriangleFound) -> Option<(u32, Named)> {
-    let hit = &found.hit;
+pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: [f32; 2], ng: Vec3) -> Option<Named> {
     if committed.is_plain {
-        let ng = normal(found.corners);
-        return Some((hit.geometry, Named { primitive: hit.primitive, u: hit.u, v: hit.v, ng }));
+        return Some(Named { primitive, u, v, ng });
     }
-    let Some(Record { body: Body::Surface(surface), .. }) = committed.record(hit.geometry) else { return None };
-    Some((hit.geometry, surface.name(hit.primitive, hit.u, hit.v, found.corners)))
+    let Some(Record { body: Body::Surface(surface), .. }) = committed.record(geometry) else { return None };
+    Some(surface.name(primitive, u, v, ng))
 }
 
 /// Among the triangles, each of which has to pass.
@@ -108,7 +107,7 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: &Query, target: &Target
             && hit.t <= target.tfar()
             && let Body::Surface(surface) = &record.body
         {
-            let named = surface.name(hit.primitive, hit.u, hit.v, found.corners);
+            let named = surface.name(hit.primitive, hit.u, hit.v, found.normal());
             target.offer(query, record, hit.geometry, hit.t, &named);
         }
         onwards(target)
@@ -146,7 +145,7 @@ fn cast_item<const ANY: bool>(query: &Query, target: &Target, record: &Record, i
                 let corners = surface.corners_at(primitive as usize, ray.time);
                 let native = Ray { tmax: target.tfar(), ..native(ray) };
                 if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
-                    let named = surface.name(primitive, hit.u as f32, hit.v as f32, corners);
+                    let named = surface.name(primitive, hit.u as f32, hit.v as f32, normal(corners));
                     target.offer(query, record, geometry, hit.t as f32, &named);
                 }
             }

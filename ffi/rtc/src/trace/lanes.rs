@@ -4,7 +4,7 @@ use std::mem::{size_of, transmute};
 
 use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay};
 
-/// Rays of the caller's, by number.
+/// Rays of the caller's, by number; those words of all rays that are the same lie side by side.
 pub trait Lanes {
     /// Where word `word` of ray `lane` is: those of the ray, then those of its hit.
     fn word(&self, word: usize, lane: usize) -> *mut u32;
@@ -19,6 +19,20 @@ pub trait Lanes {
         }
         // SAFETY: both are that many words, of which each may be anything.
         unsafe { transmute::<[u32; RAY_WORDS], RTCRay>(words) }
+    }
+
+    /// One word of eight rays.
+    #[inline(always)]
+    fn eight(&self, word: usize, first: usize) -> [u32; 8] {
+        // SAFETY: who made the lanes promised that all words of all rays can be read; they lie side by side.
+        unsafe { self.word(word, first).cast::<[u32; 8]>().read() }
+    }
+
+    /// Writes one word of eight rays.
+    #[inline(always)]
+    fn set_eight(&self, word: usize, first: usize, values: [u32; 8]) {
+        // SAFETY: who made the lanes promised that hits, and where rays end, can be written; they lie side by side.
+        unsafe { self.word(word, first).cast::<[u32; 8]>().write(values) };
     }
 
     /// Writes where a ray ends.
@@ -52,7 +66,8 @@ pub trait Lanes {
     }
 }
 
-const TFAR: usize = 8;
+/// Where a ray ends.
+pub const TFAR: usize = 8;
 
 const _: () = {
     assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);

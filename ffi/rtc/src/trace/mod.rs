@@ -43,8 +43,6 @@ pub struct Query {
     pub filter: RTCFilterFunctionN,
     /// Whether it is run for all geometries: always in version 3.
     pub filters_all: bool,
-    /// Whether rays that are asked for together start and point alike.
-    pub is_coherent: bool,
     /// The callback of user geometry that comes with the query.
     pub user: RTCIntersectFunctionN,
 }

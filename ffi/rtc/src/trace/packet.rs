@@ -1,75 +1,20 @@
 //! Several rays at a time.
 //!
-//! Among triangles of which each counts, those that are asked for together travel together, and hide each other's waiting
-//! for memory. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
+//! Among triangles of which each counts, they are asked together, eight or sixteen at a time, in the caller's own layout: rows of words are copied
+//! into a [`Packet`] and back. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
 
 use twincast::math::Vec3;
-use twincast::trace::bvh::{Bvh, TriangleFound};
-use twincast::{Batch, Hit, Ray, Tracer};
+use twincast::trace::bvh::{Bvh, Packet, PacketHits};
 
 use super::Query;
-use super::cast::{Sight, cast_one, name_solid, native, sight};
-use super::lanes::Lanes;
+use super::cast::{Sight, cast_one, name_solid, sight};
+use super::lanes::{Lanes, TFAR};
 use super::offer::{Target, hit_of};
-use crate::abi::RTCRayHit;
-use crate::scene::{Body, Committed, Record};
+use crate::abi::{RAY_WORDS, RTCRayHit};
+use crate::scene::Committed;
 
-/// Rays that are taken together.
-const TOGETHER: usize = 16;
-
-/// A ray for lanes that are not asked for.
-const NO_RAY: Ray = Ray { origin: Vec3::ZERO, direction: Vec3::ZERO, tmin: 0.0, tmax: 0.0, time: 0.0 };
-
-/// Those of a chunk of lanes that can be answered together, without a gap; and where they were.
-struct Chunk {
-    rays: [Ray; TOGETHER],
-    lanes: [usize; TOGETHER],
-    count: usize,
-}
-
-impl Chunk {
-    fn rays(&self) -> &[Ray] {
-        &self.rays[..self.count]
-    }
-
-    /// Fills the chunk with rays from lane `next` on, and returns where it stopped; `alone` is told of lanes that must go by themselves.
-    #[inline(always)]
-    fn fill(
-        lanes: &impl Lanes,
-        range: std::ops::Range<usize>,
-        is_valid: &impl Fn(usize) -> bool,
-        see: impl Fn(u32) -> Sight,
-        mut alone: impl FnMut(usize),
-    ) -> (Self, usize) {
-        let mut chunk = Self { rays: [NO_RAY; TOGETHER], lanes: [0; TOGETHER], count: 0 };
-        let end = range.end;
-        for lane in range {
-            if !is_valid(lane) {
-                continue;
-            }
-            let ray = lanes.ray(lane);
-            match see(ray.mask) {
-                Sight::Nothing => {}
-                Sight::Some => alone(lane),
-                Sight::Everything => {
-                    (chunk.rays[chunk.count], chunk.lanes[chunk.count]) = (native(&ray), lane);
-                    chunk.count += 1;
-                    if chunk.count == TOGETHER {
-                        return (chunk, lane + 1);
-                    }
-                }
-            }
-        }
-        (chunk, end)
-    }
-}
-
-/// A hit with the corners of its triangle, fetched from the mesh.
-#[inline(always)]
-fn with_corners(committed: &Committed, hit: Hit) -> Option<TriangleFound> {
-    let Some(Record { body: Body::Surface(surface), .. }) = committed.record(hit.geometry) else { return None };
-    Some(TriangleFound { hit, corners: surface.corners_at(hit.primitive as usize, 0.0) })
-}
+/// Rays of a packet.
+const RAYS: usize = Packet::RAYS;
 
 /// The lanes of a query that are asked for.
 struct Asked<'a, L, V> {
@@ -79,29 +24,71 @@ struct Asked<'a, L, V> {
 }
 
 impl<L: Lanes, V: Fn(usize) -> bool> Asked<'_, L, V> {
-    /// Calls `together` with the triangles and those rays, a chunk at a time, that see all of them and nothing else, and `alone` with
-    /// every other lane.
+    /// Calls `two` and `one` with the triangles, packets of rays that see all of them and nothing else, and the first lane; or `alone` with every
+    /// lane.
     #[inline(always)]
     fn each(
         &self,
         committed: &Committed,
         query: &Query,
         any: bool,
-        alone: impl Fn(usize) + Copy,
-        mut together: impl FnMut(&Bvh, &Chunk),
+        alone: impl Fn(usize),
+        two: impl Fn(&Bvh, &[Packet; 2], usize),
+        one: impl Fn(&Bvh, &[Packet; 1], usize),
     ) {
-        let Self { lanes, count, is_valid } = self;
-        let Some(solid) = committed.solid.as_ref().filter(|_| committed.others.is_none()) else {
-            return (0..*count).filter(|&lane| is_valid(lane)).for_each(alone);
+        let Some((solid, mask)) = plain(committed, query, any) else {
+            return (0..self.count).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
         };
-        let mut next = 0;
-        while next < *count {
-            let see = |mask| sight(committed, query, mask, any);
-            let (chunk, end) = Chunk::fill(*lanes, next..*count, is_valid, see, alone);
-            next = end;
-            together(solid, &chunk);
+        let mut first = 0;
+        while first + 2 * RAYS <= self.count {
+            two(solid, &[self.packet(first, mask), self.packet(first + RAYS, mask)], first);
+            first += 2 * RAYS;
+        }
+        while first < self.count {
+            one(solid, &[self.packet(first, mask)], first);
+            first += RAYS;
         }
     }
+
+    /// The rays from lane `first` on, of which those are asked for that are valid and have a bit in common with `mask`.
+    #[inline(always)]
+    fn packet(&self, first: usize, mask: u32) -> Packet {
+        let Self { lanes, count, is_valid } = self;
+        let mut packet = Packet::NONE;
+        if first + RAYS > *count {
+            for lane in first..*count {
+                let ray = lanes.ray(lane);
+                if is_valid(lane) && ray.mask & mask != 0 {
+                    packet.set(lane - first, &super::cast::native(&ray));
+                }
+            }
+            return packet;
+        }
+        for axis in 0..3 {
+            packet.origin[axis] = lanes.eight(axis, first).map(f32::from_bits);
+            packet.direction[axis] = lanes.eight(DIRECTION + axis, first).map(f32::from_bits);
+        }
+        packet.tmin = lanes.eight(TNEAR, first).map(|tnear| f32::from_bits(tnear).max(0.0));
+        packet.tmax = lanes.eight(TFAR, first).map(f32::from_bits);
+        for (lane, own) in lanes.eight(MASK, first).into_iter().enumerate() {
+            packet.lanes |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
+        }
+        packet
+    }
+}
+
+/// Words of a ray.
+const TNEAR: usize = 3;
+const DIRECTION: usize = 4;
+const MASK: usize = 9;
+
+/// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in common to see all of them; the
+/// others see none.
+#[inline(always)]
+fn plain<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
+    let mask = committed.heeded.mask?;
+    let solid = committed.solid.as_ref().filter(|_| committed.others.is_none())?;
+    (sight(committed, query, mask, any) == Sight::Everything).then_some((solid, mask))
 }
 
 /// Nearest hits of `count` rays, of those that are valid.
@@ -124,27 +111,58 @@ pub fn intersect_lanes(
         // SAFETY: as above.
         lanes.set_hit(lane, unsafe { &(*own).hit });
     };
-    Asked { lanes, count, is_valid }.each(committed, query, false, alone, |solid, chunk| {
-        let mut found: [Option<TriangleFound>; TOGETHER] = [None; TOGETHER];
-        if query.is_coherent {
-            let mut hits = [None; TOGETHER];
-            let batch = Batch { coherent: true, ..Batch::default() };
-            solid.closest_batch(chunk.rays(), &mut hits[..chunk.count], batch);
-            for (found, hit) in found.iter_mut().zip(hits) {
-                *found = hit.and_then(|hit| with_corners(committed, hit));
-            }
-        } else {
-            solid.closest_triangles(chunk.rays(), &mut found[..chunk.count]);
+    let two = |solid: &Bvh, packets: &[Packet; 2], first: usize| {
+        let mut hits = [PacketHits::NONE; 2];
+        solid.closest_packets(packets, &mut hits);
+        tell(committed, query, lanes, first, &hits[0]);
+        tell(committed, query, lanes, first + RAYS, &hits[1]);
+    };
+    let one = |solid: &Bvh, packets: &[Packet; 1], first: usize| {
+        let mut hits = [PacketHits::NONE];
+        solid.closest_packets(packets, &mut hits);
+        tell(committed, query, lanes, first, &hits[0]);
+    };
+    Asked { lanes, count, is_valid }.each(committed, query, false, alone, two, one);
+}
+
+/// Writes the hits of the rays from lane `first` on.
+#[inline(always)]
+fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits) {
+    if hits.lanes == 0 {
+        return;
+    }
+    if !committed.is_plain || hits.lanes != 0xff {
+        return tell_some(committed, query, lanes, first, hits);
+    }
+    let PacketHits { t, u, v, normal, primitive, geometry, .. } = hits;
+    let [nx, ny, nz] = normal;
+    lanes.set_eight(TFAR, first, t.map(f32::to_bits));
+    for (word, row) in [nx, ny, nz, u, v].into_iter().enumerate() {
+        lanes.set_eight(RAY_WORDS + word, first, row.map(f32::to_bits));
+    }
+    lanes.set_eight(RAY_WORDS + 5, first, *primitive);
+    lanes.set_eight(RAY_WORDS + 6, first, *geometry);
+    // SAFETY: the context is the caller's, which lives as long as the query, or our own.
+    let context = unsafe { query.context.read() };
+    lanes.set_eight(RAY_WORDS + 7, first, [context.instance; RAYS]);
+    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+    lanes.set_eight(RAY_WORDS + 8, first, [context.instance_primitive; RAYS]);
+}
+
+/// The same, lane by lane: where rays miss, and where triangles are parts of other primitives.
+#[inline(always)]
+fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits) {
+    let PacketHits { t, u, v, normal: [nx, ny, nz], primitive, geometry, .. } = hits;
+    let mut open = hits.lanes;
+    while open != 0 {
+        let i = open.trailing_zeros() as usize % RAYS;
+        open &= open - 1;
+        let ng = Vec3::new(nx[i], ny[i], nz[i]);
+        if let Some(named) = name_solid(committed, geometry[i], primitive[i], [u[i], v[i]], ng) {
+            lanes.set_tfar(first + i, t[i]);
+            lanes.set_hit(first + i, &hit_of(query, geometry[i], &named));
         }
-        for (&lane, found) in chunk.lanes.iter().zip(&found[..chunk.count]) {
-            if let Some(found) = found
-                && let Some((geometry, named)) = name_solid(committed, found)
-            {
-                lanes.set_tfar(lane, found.hit.t);
-                lanes.set_hit(lane, &hit_of(query, geometry, &named));
-            }
-        }
-    });
+    }
 }
 
 /// Whether each of `count` rays hits anything, of those that are valid.
@@ -163,12 +181,19 @@ pub fn occluded_lanes(
         cast_one::<true>(committed, query, &target);
         lanes.set_tfar(lane, target.tfar());
     };
-    Asked { lanes, count, is_valid }.each(committed, query, true, alone, |solid, chunk| {
-        let mut occluded = [false; TOGETHER];
-        let batch = Batch { coherent: query.is_coherent, ..Batch::default() };
-        solid.occluded_batch(chunk.rays(), &mut occluded[..chunk.count], batch);
-        for (&lane, _) in chunk.lanes.iter().zip(&occluded[..chunk.count]).filter(|(_, occluded)| **occluded) {
-            lanes.set_tfar(lane, f32::NEG_INFINITY);
+    let end = |first: usize, mut occluded: u32| {
+        while occluded != 0 {
+            lanes.set_tfar(first + occluded.trailing_zeros() as usize, f32::NEG_INFINITY);
+            occluded &= occluded - 1;
         }
-    });
+    };
+    let two = |solid: &Bvh, packets: &[Packet; 2], first: usize| {
+        let [low, high] = solid.occluded_packets(packets);
+        end(first, low | high << RAYS);
+    };
+    let one = |solid: &Bvh, packets: &[Packet; 1], first: usize| {
+        let [occluded] = solid.occluded_packets(packets);
+        end(first, occluded);
+    };
+    Asked { lanes, count, is_valid }.each(committed, query, true, alone, two, one);
 }

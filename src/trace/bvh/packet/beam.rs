@@ -1,0 +1,174 @@
+//! The rays of a packet as one: what bounds their origins and directions, held against eight boxes at a time.
+//!
+//! By interval arithmetic (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*): with x the
+//! least that a slab's distance from an origin may be, no ray enters it before the lesser of x times the least and x times the largest 1 / d.
+//! Kept as distance times reciprocal, and not as bound / d less origin / d as a single ray does ([`super::super::slab`]), since origin and
+//! direction would then vary apart from each other, which rays that start in one point do not.
+//!
+//! With u = 2^-24, the subtraction, the reciprocal and the product round by 3 u |1/d| (|bound| + |origin|); the origin is moved by 10 u
+//! of this span, which leaves room for the rounding of the hit's own t. Small components of directions are replaced as for single rays.
+
+use super::Packet;
+use crate::math::{Aabb, UNIT_ROUNDOFF};
+use crate::trace::bvh::block::Block;
+use crate::trace::bvh::bundle::axes;
+use crate::trace::bvh::node::Node;
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::walk::Enter;
+
+/// Rays that go the same way.
+pub(super) struct Beam {
+    /// The axis along which directions are large, before it the two that follow it.
+    pub axes: [usize; 3],
+    /// The farthest t that any ray wants, rounded up.
+    pub limit: f32,
+    /// Whether rays are so far apart, for the size of the scene, that they have little in common.
+    pub is_wide: bool,
+    /// On each axis whether a box's upper side is met first.
+    is_backward: [bool; 3],
+    /// Of each axis, and one number more, as a vector is stored.
+    /// What is subtracted from the sides that are met first, and last: the origin farthest on, and back, and the pad.
+    near_origin: [f32; 4],
+    far_origin: [f32; 4],
+    /// 1 / direction.
+    least: [f32; 4],
+    most: [f32; 4],
+    /// Rounded down.
+    tmin: f32,
+}
+
+/// The smallest share of the largest direction component that a component keeps.
+const SMALLEST: f32 = 1e-18;
+
+/// Products of this size are not trusted to be finite after a sum.
+const HUGE: f32 = 1e37;
+
+/// Directions longer than this have reciprocals that may vanish.
+const LONGEST: f32 = 1e30;
+
+/// Share of the scene that the rays of a beam may be apart.
+const WIDE: f32 = 1.0 / 16.0;
+
+impl Beam {
+    /// Of rays of which each is valid; none where they go different ways.
+    #[inline(always)]
+    pub fn new<S: Simd, const N: usize>(packets: &[Packet; N], bounds: Aabb) -> Option<Self> {
+        let (mut least, mut most) = (S::V8::splat(f32::INFINITY), S::V8::splat(f32::NEG_INFINITY));
+        for packet in packets {
+            // Each row a ray: the least and the most of all its numbers at once.
+            for ray in S::transpose(packet.rows::<S>()) {
+                (least, most) = (ray.min(least), ray.max(most));
+            }
+        }
+        let magnitude = least.abs().max(most.abs());
+        // The least magnitude, where all rays run one way.
+        let [_, _, _, x, y, z, ..] = least.max(S::V8::splat(0.0).sub(most)).to_array();
+        let (along, depth) = if x > y && x > z {
+            (0, x)
+        } else if y > z {
+            (1, y)
+        } else {
+            (2, z)
+        };
+        // What `woop` allows.
+        let is_gentle = magnitude.at_most(S::V8::splat((2.0 * depth).min(LONGEST))).bits() >> 3 & 0b111 == 0b111;
+        if depth <= 0.0 || !is_gentle {
+            return None;
+        }
+        let [ox, oy, oz, mut dx, mut dy, mut dz, tmin, _] = least.to_array();
+        let [px, py, pz, mut ex, mut ey, mut ez, _, tmax] = most.to_array();
+        let smallest = (2.0 * SMALLEST * depth).max(f32::MIN_POSITIVE);
+        let is_clamped = x.min(y).min(z) < smallest;
+        if is_clamped {
+            ([dx, dy, dz], [ex, ey, ez]) = clamp([dx, dy, dz], [ex, ey, ez], smallest)?;
+        }
+        // An axis a lane; the fourth means nothing.
+        let splat = S::V4::splat;
+        let (first, last) = (S::V4::load(&[ox, oy, oz, 0.0]), S::V4::load(&[px, py, pz, 0.0]));
+        let (low, high) = (S::V4::load(&[dx, dy, dz, 1.0]), S::V4::load(&[ex, ey, ez, 1.0]));
+        let [rx, ry, rz] = bounds.min.abs().max(bounds.max.abs()).to_array();
+        let span = first.abs().max(last.abs()).add(S::V4::load(&[rx, ry, rz, 0.0]));
+        let stray = if is_clamped { 4.0 * (smallest / depth) * span.largest() } else { 0.0 };
+        let pad = span.mul_add(splat(10.0 * UNIT_ROUNDOFF), splat(stray));
+        let (shortest, longest) = (splat(1.0).div(high), splat(1.0).div(low));
+        let steepest = shortest.abs().max(longest.abs());
+        if steepest.mul(span.add(pad)).less(splat(HUGE)).bits() & 0b111 != 0b111 {
+            return None;
+        }
+        let is_backward = low.less(splat(0.0));
+        let (back, on) = (first.sub(pad), last.add(pad));
+        let extent = (bounds.max - bounds.min).max_element();
+        let apart = high.sub(low).mul_add(splat(extent / depth), last.sub(first));
+        let backward = is_backward.bits();
+        Some(Self {
+            axes: axes(along),
+            limit: tmax.next_up(),
+            is_wide: apart.less(splat(WIDE * extent)).bits() & 0b111 != 0b111,
+            is_backward: [backward & 1 != 0, backward & 2 != 0, backward & 4 != 0],
+            near_origin: S::V4::select(is_backward, back, on).to_array(),
+            far_origin: S::V4::select(is_backward, on, back).to_array(),
+            least: shortest.to_array(),
+            most: longest.to_array(),
+            tmin: (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0),
+        })
+    }
+
+    /// Between the sides that are met first and those that are met last.
+    #[inline(always)]
+    fn between<V: Vector>(&self, near_side: [V; 3], far_side: [V; 3], limit: f32) -> (V::Mask, V) {
+        let (mut near, mut far) = (V::splat(self.tmin), V::splat(limit));
+        for axis in 0..3 {
+            let (least, most) = (V::splat(self.least[axis]), V::splat(self.most[axis]));
+            let first = near_side[axis].sub(V::splat(self.near_origin[axis]));
+            let last = far_side[axis].sub(V::splat(self.far_origin[axis]));
+            near = first.mul(least).min(first.mul(most)).max(near);
+            far = last.mul(least).max(last.mul(most)).min(far);
+        }
+        (near.at_most(far), near)
+    }
+
+    /// A bit for each triangle of a block whose box some ray may meet up to `limit`.
+    #[inline(always)]
+    pub fn triangles<S: Simd>(&self, block: &Block, limit: f32) -> u32 {
+        let zero = S::V8::splat(0.0);
+        let (mut near, mut far) = ([zero; 3], [zero; 3]);
+        for axis in 0..3 {
+            let [a, b, c] = &block.corners[axis];
+            let (a, b, c) = (S::V8::load(a), S::V8::load(b), S::V8::load(c));
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            (near[axis], far[axis]) = if self.is_backward[axis] { (high, low) } else { (low, high) };
+        }
+        self.between(near, far, limit).0.bits() & block.lanes
+    }
+}
+
+/// Least and largest components of directions without small ones, which count as running the way of the others; none where these run both
+/// ways.
+#[cold]
+#[inline(never)]
+fn clamp(mut low: [f32; 3], mut high: [f32; 3], smallest: f32) -> Option<([f32; 3], [f32; 3])> {
+    for (low, high) in low.iter_mut().zip(&mut high) {
+        if *low > -smallest {
+            (*low, *high) = (low.max(smallest), high.max(smallest));
+        } else if *high < smallest {
+            (*low, *high) = (low.min(-smallest), high.min(-smallest));
+        } else {
+            return None;
+        }
+    }
+    Some((low, high))
+}
+
+impl Enter for Beam {
+    #[inline(always)]
+    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        let zero = S::V8::splat(0.0);
+        let (mut near, mut far) = ([zero; 3], [zero; 3]);
+        for axis in 0..3 {
+            let side = usize::from(self.is_backward[axis]);
+            near[axis] = S::V8::load(&node.bounds[2 * axis + side]);
+            far[axis] = S::V8::load(&node.bounds[2 * axis + 1 - side]);
+        }
+        self.between(near, far, limit)
+    }
+}

@@ -1,0 +1,283 @@
+//! Eight or sixteen rays of a caller's that go the same way: they walk as one, and meet triangles eight at a time.
+//!
+//! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a bundle of 64
+//! ([`super::tile`]), whose making takes longer than eight rays do. So as little as possible is made ready:
+//!
+//! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal directions, at
+//!   little more than what a single ray costs; no ray is asked by itself.
+//! - **Triangles**: the beam rejects most of a block by their boxes. Of the others each is tested against eight rays, a lane a ray
+//!   ([`Octet`]), by the test and with the bounds of single rays ([`super::woop`]).
+//! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
+//!   ([`Doubts`]). So the bits are those of single rays.
+//!
+//! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
+//! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
+
+mod beam;
+mod doubts;
+mod finish;
+mod octet;
+mod way;
+
+use super::Bvh;
+use super::alone::TriangleFound;
+use super::isa::{self, Kernel};
+use super::query::{Closest, Occluded};
+use super::scratch::{Scratch, with_scratch};
+use super::simd::{Array, Mask, Simd, Vector};
+use crate::math::Vec3;
+use crate::ray::Ray;
+use beam::Beam;
+use doubts::Doubts;
+
+/// Rays of a packet.
+pub(super) const RAYS: usize = Packet::RAYS;
+
+/// Packets that travel together at most.
+pub(super) const MOST: usize = 2;
+
+/// Eight rays, component by component.
+#[repr(C, align(32))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Packet {
+    /// Where they start: all x, all y, all z.
+    pub origin: [[f32; Packet::RAYS]; 3],
+    /// Directions, likewise; not of unit length necessarily.
+    pub direction: [[f32; Packet::RAYS]; 3],
+    /// Nearest valid t of each, at least 0.
+    pub tmin: [f32; Packet::RAYS],
+    /// Farthest valid t of each.
+    pub tmax: [f32; Packet::RAYS],
+    /// A bit for each ray that is asked for; the others may be anything.
+    pub lanes: u32,
+}
+
+/// What the rays of a packet hit.
+#[repr(C, align(32))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct PacketHits {
+    /// A bit for each ray that hits anything; the numbers of the others mean nothing.
+    pub lanes: u32,
+    /// Distance in units of the ray's direction.
+    pub t: [f32; Packet::RAYS],
+    /// Weight of the triangle's second corner.
+    pub u: [f32; Packet::RAYS],
+    /// Weight of the triangle's third corner.
+    pub v: [f32; Packet::RAYS],
+    /// [`TriangleFound::normal`] of the triangle: all x, all y, all z.
+    pub normal: [[f32; Packet::RAYS]; 3],
+    /// Ids as of [`Hit`](crate::Hit).
+    pub primitive: [u32; Packet::RAYS],
+    /// Likewise.
+    pub geometry: [u32; Packet::RAYS],
+    /// Likewise.
+    pub instance: [u32; Packet::RAYS],
+}
+
+impl Packet {
+    /// Rays of a packet.
+    pub const RAYS: usize = 8;
+
+    /// The ray of a lane, at time 0.
+    #[inline]
+    pub fn ray(&self, lane: usize) -> Ray {
+        let at = |v: &[[f32; RAYS]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        Ray {
+            origin: at(&self.origin),
+            direction: at(&self.direction),
+            tmin: self.tmin[lane],
+            tmax: self.tmax[lane],
+            time: 0.0,
+        }
+    }
+
+    /// Sets the ray of a lane, which is asked for from now on.
+    pub fn set(&mut self, lane: usize, ray: &Ray) {
+        for axis in 0..3 {
+            (self.origin[axis][lane], self.direction[axis][lane]) = (ray.origin[axis], ray.direction[axis]);
+        }
+        (self.tmin[lane], self.tmax[lane]) = (ray.tmin, ray.tmax);
+        self.lanes |= 1 << lane;
+    }
+
+    /// No rays.
+    pub const NONE: Self =
+        Self { origin: [[0.0; RAYS]; 3], direction: [[0.0; RAYS]; 3], tmin: [0.0; RAYS], tmax: [0.0; RAYS], lanes: 0 };
+
+    /// Origins, directions, tmin and tmax.
+    #[inline(always)]
+    fn rows<S: Simd>(&self) -> [S::V8; 8] {
+        let ([x, y, z], [dx, dy, dz]) = (&self.origin, &self.direction);
+        let (x, y, z) = (S::V8::load(x), S::V8::load(y), S::V8::load(z));
+        let (dx, dy, dz) = (S::V8::load(dx), S::V8::load(dy), S::V8::load(dz));
+        [x, y, z, dx, dy, dz, S::V8::load(&self.tmin), S::V8::load(&self.tmax)]
+    }
+
+    /// A bit for each ray that is asked for and [is valid](Ray::is_valid).
+    #[inline(always)]
+    fn valid<S: Simd>(&self) -> u32 {
+        let [x, y, z, dx, dy, dz, tmin, tmax] = self.rows::<S>();
+        let zero = S::V8::splat(0.0);
+        // Zero for finite numbers, else none.
+        let finite = x.mul_add(zero, y.mul_add(zero, z.mul(zero)));
+        let finite = dx.mul_add(zero, dy.mul_add(zero, dz.mul_add(zero, finite)));
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let directed = S::V8::splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
+        directed.and(zero.at_most(tmin)).and(tmin.at_most(tmax)).bits() & self.lanes
+    }
+
+    /// The lanes that are asked for.
+    fn asked(&self) -> impl Iterator<Item = usize> {
+        (0..RAYS).filter(|lane| self.lanes >> lane & 1 != 0)
+    }
+}
+
+impl PacketHits {
+    /// None.
+    pub const NONE: Self = Self {
+        lanes: 0,
+        t: [0.0; RAYS],
+        u: [0.0; RAYS],
+        v: [0.0; RAYS],
+        normal: [[0.0; RAYS]; 3],
+        primitive: [0; RAYS],
+        geometry: [0; RAYS],
+        instance: [0; RAYS],
+    };
+
+    /// The hit of one ray.
+    fn put(&mut self, lane: usize, found: &TriangleFound) {
+        let TriangleFound { hit, .. } = found;
+        (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
+        let normal = found.normal();
+        for axis in 0..3 {
+            self.normal[axis][lane] = normal[axis];
+        }
+        (self.primitive[lane], self.geometry[lane], self.instance[lane]) = (hit.primitive, hit.geometry, hit.instance);
+        self.lanes |= 1 << lane;
+    }
+}
+
+impl Bvh {
+    /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits.
+    pub fn closest_packets<const N: usize>(&self, packets: &[Packet; N], hits: &mut [PacketHits; N]) {
+        const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
+        if self.fixed.triangles.tree().is_empty() {
+            return hits.iter_mut().for_each(|hits| hits.lanes = 0);
+        }
+        let kernel = |scratch: &mut Scratch| {
+            isa::dispatch(self.isa, ClosestPackets { bvh: self, packets, scratch, hits: &mut *hits })
+        };
+        if !with_scratch(kernel) {
+            for (packet, hits) in packets.iter().zip(hits) {
+                hits.lanes = 0;
+                for lane in packet.asked() {
+                    if let Some(found) = self.closest_triangle(&packet.ray(lane)) {
+                        hits.put(lane, &found);
+                    }
+                }
+            }
+        }
+    }
+
+    /// [`Bvh::occludes`] of each ray of a packet, or of two that go together: a bit for each that is occluded.
+    pub fn occluded_packets<const N: usize>(&self, packets: &[Packet; N]) -> [u32; N] {
+        const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
+        let mut occluded = [0; N];
+        if self.fixed.triangles.tree().is_empty() {
+            return occluded;
+        }
+        let kernel = |scratch: &mut Scratch| {
+            isa::dispatch(self.isa, OccludedPackets { bvh: self, packets, scratch, occluded: &mut occluded })
+        };
+        if !with_scratch(kernel) {
+            for (packet, occluded) in packets.iter().zip(&mut occluded) {
+                for lane in packet.asked() {
+                    *occluded |= u32::from(self.occludes(&packet.ray(lane))) << lane;
+                }
+            }
+        }
+        occluded
+    }
+}
+
+struct ClosestPackets<'a, const N: usize> {
+    bvh: &'a Bvh,
+    packets: &'a [Packet; N],
+    scratch: &'a mut Scratch,
+    hits: &'a mut [PacketHits; N],
+}
+
+impl<const N: usize> Kernel for ClosestPackets<'_, N> {
+    /// Whether the rays made a beam; else nothing was done.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { bvh, packets, scratch: Scratch { stack, found }, hits } = self;
+        let mut own = None;
+        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
+        let mut doubts = Doubts::new(found);
+        let octets = way::trace::<S, Closest, N>(bvh, packets, &beam, stack, &mut doubts);
+        for (number, hits) in hits.iter_mut().enumerate() {
+            finish::finish::<S>(bvh, number, &packets[number % N], &octets[number % N], &doubts, hits);
+        }
+        true
+    }
+}
+
+struct OccludedPackets<'a, const N: usize> {
+    bvh: &'a Bvh,
+    packets: &'a [Packet; N],
+    scratch: &'a mut Scratch,
+    occluded: &'a mut [u32; N],
+}
+
+impl<const N: usize> Kernel for OccludedPackets<'_, N> {
+    /// Whether the rays made a beam; else nothing was done.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { bvh, packets, scratch: Scratch { stack, found }, occluded } = self;
+        let mut own = None;
+        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
+        let mut doubts = Doubts::new(found);
+        let octets = way::trace::<S, Occluded, N>(bvh, packets, &beam, stack, &mut doubts);
+        for (occluded, octet) in occluded.iter_mut().zip(&octets) {
+            *occluded = octet.hit;
+        }
+        true
+    }
+}
+
+/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or one too wide.
+#[inline(always)]
+fn together<'a, S: Simd, const N: usize>(
+    bvh: &Bvh,
+    packets: &'a [Packet; N],
+    own: &'a mut Option<[Packet; N]>,
+) -> Option<(&'a [Packet; N], Beam)> {
+    let (mut valid, mut all) = ([0; N], 0xff);
+    for (valid, packet) in valid.iter_mut().zip(packets) {
+        *valid = packet.valid::<S>();
+        all &= *valid;
+    }
+    let packets = if all == 0xff { packets } else { own.insert(only(packets, &valid)?) };
+    let beam = Beam::new::<S, N>(packets, bvh.fixed.triangles.tree().bounds())?;
+    (!beam.is_wide).then_some((packets, beam))
+}
+
+/// The packets with valid rays alone, and copies of one of these in the other lanes; none where there are none.
+#[cold]
+#[inline(never)]
+fn only<const N: usize>(packets: &[Packet; N], valid: &[u32; N]) -> Option<[Packet; N]> {
+    let first = valid.iter().position(|&lanes| lanes != 0)?;
+    let ray = packets[first].ray(valid[first].trailing_zeros() as usize % RAYS);
+    let mut packets = packets.clone();
+    for (packet, &valid) in packets.iter_mut().zip(valid) {
+        (0..RAYS).filter(|lane| valid >> lane & 1 == 0).for_each(|lane| packet.set(lane, &ray));
+        packet.lanes = valid;
+    }
+    Some(packets)
+}

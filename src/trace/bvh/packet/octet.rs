@@ -1,0 +1,143 @@
+//! Eight rays of a packet against one triangle after the other, and what they have hit.
+//!
+//! A lane a ray, so that a triangle is looked at once for all of them. What is in doubt is told, a bit a ray; the caller decides it as
+//! for a single ray ([`Found`](crate::trace::bvh::found::Found)).
+
+use super::{Packet, RAYS};
+use crate::trace::bvh::block::Block;
+use crate::trace::bvh::found::NONE;
+use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::woop::{self, Aim, Judged, SLACK, Sheared};
+
+/// Eight rays made ready for triangles, and what they have hit so far.
+#[derive(Clone, Copy)]
+pub(super) struct Octet<V> {
+    /// In the order of the beam's axes.
+    origin: [V; 3],
+    /// Direction along the first two axes over that along the third, negative.
+    shear: [V; 2],
+    aim: Aim<V>,
+    tmin: V,
+    /// No hit beyond this is wanted; rounded up. Minus infinity for a ray that wants none any more.
+    pub limit: [f32; RAYS],
+    /// A hit nearer than this is the nearest for sure; likewise.
+    pub sure: [f32; RAYS],
+    /// Bits of the number of a triangle that was found without doubt, but not computed yet: block and lane.
+    noted: [f32; RAYS],
+    /// A bit for each ray that is asked for.
+    asked: u32,
+    /// A bit for each ray that has a hit, where any will do.
+    pub hit: u32,
+}
+
+/// `limit` and `sure` of a ray that wants no more.
+const DONE: f32 = f32::NEG_INFINITY;
+
+/// What a triangle did.
+pub(super) struct Met {
+    /// Whether a limit has changed.
+    pub changed: bool,
+    /// A bit for each ray of which it is in doubt.
+    pub open: u32,
+}
+
+impl<V: Vector + Array<RAYS>> Octet<V> {
+    #[inline(always)]
+    pub fn new<S: Simd<V8 = V>>(packet: &Packet, axes: [usize; 3]) -> Self {
+        let [x, y, z] = axes;
+        let [ox, oy, oz] = [V::load(&packet.origin[x]), V::load(&packet.origin[y]), V::load(&packet.origin[z])];
+        let [dx, dy, along] =
+            [V::load(&packet.direction[x]), V::load(&packet.direction[y]), V::load(&packet.direction[z])];
+        let reciprocal = V::splat(1.0).div(along);
+        let negative = V::splat(0.0).sub(reciprocal);
+        let shear = [dx.mul(negative), dy.mul(negative)];
+        let (tmin, tmax) = (V::load(&packet.tmin), V::load(&packet.tmax));
+        // Rounded up, for t is rounded before it is held against it.
+        let limit = tmax.mul_add(V::splat(1.0 + SLACK), V::splat(f32::MIN_POSITIVE));
+        let mut octet = Self {
+            origin: [ox, oy, oz],
+            shear,
+            aim: Aim {
+                width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
+                along,
+                shorten: reciprocal.abs(),
+                begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
+            },
+            tmin,
+            limit: limit.to_array(),
+            sure: packet.tmax,
+            noted: [f32::from_bits(NONE); RAYS],
+            asked: packet.lanes,
+            hit: 0,
+        };
+        if packet.lanes != 0xff {
+            (0..RAYS).filter(|lane| packet.lanes >> lane & 1 == 0).for_each(|lane| octet.finish(lane));
+        }
+        octet
+    }
+
+    /// One triangle, lane `lane` of a block; `id` is its number.
+    #[inline(always)]
+    pub fn meet<Q: Query>(&mut self, [kx, ky, kz]: [usize; 3], block: &Block, lane: usize, id: u32) -> Met {
+        let splat = V::splat;
+        let [ox, oy, oz] = self.origin;
+        let [sx, sy] = self.shear;
+        let (mut x, mut y, mut z) = ([ox; 3], [oy; 3], [oz; 3]);
+        for k in 0..3 {
+            z[k] = oz.sub(splat(block.corners[kz][k][lane]));
+            x[k] = z[k].mul_add(sx, ox.sub(splat(block.corners[kx][k][lane])));
+            y[k] = z[k].mul_add(sy, oy.sub(splat(block.corners[ky][k][lane])));
+        }
+        let judged = woop::judge::<V, false, false>(
+            &Sheared { x, y, z },
+            &self.aim,
+            V::load(&self.limit),
+            splat(block.size),
+            self.asked,
+            Blur::NONE,
+            #[inline(always)]
+            || {
+                let corners = [along(block, lane, kx), along(block, lane, ky), along(block, lane, kz)];
+                woop::height(corners, [ox, oy, oz], 0.0)
+            },
+        );
+        let Some(Judged { lanes, sure, low, high }) = judged else { return Met { changed: false, open: 0 } };
+        let (limit, before) = (V::load(&self.limit), V::load(&self.sure));
+        let nearest = sure.and(self.tmin.at_most(low)).and(high.at_most(before));
+        let beyond = sure.and(limit.less(low));
+        let taken = nearest.bits();
+        if taken != 0 {
+            let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
+            self.limit = V::select(nearest, high, limit).to_array();
+            self.sure = V::select(nearest, low, before).to_array();
+            self.noted = V::select(nearest, splat(f32::from_bits(id)), V::load(&self.noted)).to_array();
+            self.hit |= taken;
+        }
+        Met { changed: taken != 0, open: lanes & !taken & !beyond.bits() }
+    }
+
+    /// What is noted for a ray.
+    #[inline(always)]
+    pub fn noted(&self, lane: usize) -> u32 {
+        self.noted[lane % RAYS].to_bits()
+    }
+
+    /// What was noted for a ray has been computed.
+    pub fn forget(&mut self, lane: usize) {
+        self.noted[lane % RAYS] = f32::from_bits(NONE);
+    }
+
+    /// A ray that wants no more.
+    pub fn finish(&mut self, lane: usize) {
+        (self.limit[lane % RAYS], self.sure[lane % RAYS]) = (DONE, DONE);
+    }
+}
+
+/// One component of a triangle's corners.
+#[inline(always)]
+fn along<V: Vector>(block: &Block, lane: usize, axis: usize) -> [V; 3] {
+    let [a, b, c] = &block.corners[axis];
+    [V::splat(a[lane]), V::splat(b[lane]), V::splat(c[lane])]
+}

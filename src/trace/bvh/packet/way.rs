@@ -1,0 +1,79 @@
+//! A packet on its way through the fixed triangles: boxes for all rays at once, triangles for eight of them.
+
+use super::beam::Beam;
+use super::octet::Octet;
+use super::{Doubts, Packet, RAYS};
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::block::LANES;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::{Array, Simd, Vector};
+use crate::trace::bvh::walk::{self, Stack, Visit};
+
+/// Walks, and notes what is hit; what is decided at once is in `doubts`.
+#[inline(always)]
+pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
+    bvh: &Bvh,
+    packets: &[Packet; N],
+    beam: &Beam,
+    stack: &mut Stack,
+    doubts: &mut Doubts<'_>,
+) -> [Octet<S::V8>; N] {
+    let triangles = &bvh.fixed.triangles;
+    let mut octets = [Octet::new::<S>(&packets[0], beam.axes); N];
+    for (octet, packet) in octets.iter_mut().zip(packets).skip(1) {
+        *octet = Octet::new::<S>(packet, beam.axes);
+    }
+    let mut most = beam.limit;
+    walk::single::<S, Q>(
+        stack,
+        triangles.tree(),
+        beam,
+        most,
+        #[inline(always)]
+        |leaf| {
+            for index in leaf.blocks() {
+                let mut scratch = None;
+                let block = triangles.block(index, &mut scratch);
+                let mut open = beam.triangles::<S>(block, most);
+                let mut changed = false;
+                while open != 0 {
+                    let lane = open.trailing_zeros() as usize % LANES;
+                    open &= open - 1;
+                    let id = LANES as u32 * index + lane as u32;
+                    for (number, octet) in octets.iter_mut().enumerate() {
+                        let met = octet.meet::<Q>(beam.axes, block, lane, id);
+                        changed |= met.changed;
+                        if met.open != 0 {
+                            let packet = &packets[number % N];
+                            doubts.decide::<Q, S::V8>(bvh, number, packet, octet, met.open, block, id);
+                            changed = true;
+                        }
+                    }
+                }
+                if changed {
+                    most = farthest::<S, N>(&octets);
+                    if Q::ANY && most < 0.0 {
+                        return Visit::Stop;
+                    }
+                }
+            }
+            Visit::Until(most)
+        },
+    );
+    octets
+}
+
+/// The farthest t that any ray wants.
+#[inline(always)]
+fn farthest<S: Simd, const N: usize>(octets: &[Octet<S::V8>; N]) -> f32 {
+    let mut most = limit::<S>(&octets[0].limit);
+    for octet in &octets[1..] {
+        most = most.max(limit::<S>(&octet.limit));
+    }
+    most.largest()
+}
+
+#[inline(always)]
+fn limit<S: Simd>(limit: &[f32; RAYS]) -> S::V8 {
+    S::V8::load(limit)
+}

@@ -1,0 +1,166 @@
+//! Rays against triangles in f32, a lane a pair, with bounds on the rounding: one ray and eight triangles ([`super::filter`]), or eight
+//! rays and one triangle ([`super::packet`]).
+//!
+//! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
+//! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it
+//! only rejects: a triangle falls out when two edge functions have opposite signs by more than their rounding error, or
+//! when t is out of range by more than its own. What remains is noted where there is no doubt, else goes to the exact test.
+//!
+//! With u = 2^-24, a triangle that is hit has its corners, after the shear, within S = (1 + k) s of the ray, s being the
+//! largest component of its edges and k <= 2 of the shear; so no component of a corner relative to the origin is larger
+//! than k Z + S, Z being the largest along the ray. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
+//! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
+//! function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by three such errors. A triangle that is not hit may be bounded wrongly, to no harm.
+//!
+//! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
+//! of the direction by r times the largest, r <= 2^-10, and k <= 1: the shear is off by (1 + k) r / (1 - r), so that a sheared component
+//! errs by 2 b + 2.1 r L besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
+//! but for their errors; and t |along| by r.
+//!
+//! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
+//! by 2 c. Only the distance from a plane ([`height`]) counts on edges that are exact, and is not asked for such corners.
+
+use super::place::Blur;
+use super::simd::{Mask, Vector};
+use crate::math::UNIT_ROUNDOFF;
+
+/// Slack of t for its own rounding and that of products with it.
+pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+
+/// Against underflow.
+const TINY: f32 = 1e-36;
+
+/// From the corners to the origins, each ray running along its third component.
+pub(super) struct Sheared<V> {
+    pub x: [V; 3],
+    pub y: [V; 3],
+    pub z: [V; 3],
+}
+
+/// A ray made ready for the test, but for its origin and its shear.
+#[derive(Clone, Copy)]
+pub(super) struct Aim<V> {
+    /// 1 more than the larger shear.
+    pub width: V,
+    /// Direction along the third axis.
+    pub along: V,
+    /// 1 over its magnitude.
+    pub shorten: V,
+    /// Least t, rounded down, times the magnitude of `along`.
+    pub begin: V,
+}
+
+/// Pairs of which the ray may hit the triangle.
+pub(super) struct Judged<V: Vector> {
+    /// A bit for each of them.
+    pub lanes: u32,
+    /// Those that it hits without doubt, at a t between `low` and `high`, and so that t, u and v can be computed in f64.
+    pub sure: V::Mask,
+    pub low: V,
+    pub high: V,
+}
+
+/// The pairs, of those of the bit mask `lanes`, of which the ray may hit the triangle up to `limit`; `size` is at least the largest
+/// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `height`
+/// is asked only if corners are not `ROUNDED`.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "both sides of a pair")]
+pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
+    &Sheared { x, y, z }: &Sheared<V>,
+    aim: &Aim<V>,
+    limit: V,
+    size: V,
+    lanes: u32,
+    blur: Blur,
+    height: impl FnOnce() -> (V, V),
+) -> Option<Judged<V>> {
+    let splat = V::splat;
+    let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
+    let reach = aim.width.mul(size);
+    let deep = z[0].abs().add(size);
+    // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
+    // less than e.
+    let Blur { origin: blur, direction } = if BLURRED { blur } else { Blur::NONE };
+    // (4 + 5 k) u, one u of which is for the bound's own rounding.
+    let relative = aim.width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * direction - UNIT_ROUNDOFF));
+    let slack = SLACK + 2.0 * direction;
+    let e = deep.mul_add(relative, reach.mul_add(relative, splat(2.2 * blur)));
+    let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    let zero = splat(0.0);
+    // Whatever overflowed is not rejected.
+    let passed = !bound.less(most.min(zero.sub(least))).bits() & lanes;
+    if passed == 0 {
+        return None;
+    }
+    // t |along| = depth / determinant, both multiplied by the determinant.
+    let determinant = u.add(v).add(w);
+    let area = determinant.abs();
+    let error = bound.mul_add(splat(4.0), area.mul(splat(SLACK))).mul(area);
+    let square = determinant.mul(determinant);
+    let (least_square, most_square) = (square.sub(error), square.add(error));
+    let begin = least_square.mul(if BLURRED { aim.begin.mul(splat(1.0 - slack)) } else { aim.begin });
+    let end = most_square.mul(limit.mul(aim.along.abs()).mul(splat(1.0 + slack)));
+    let turn = V::select(aim.along.less(zero), zero.sub(determinant), determinant);
+    let depth = zero.sub(u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2])))).mul(turn);
+    // The sum of all edges is at most the determinant and 6 bounds.
+    let depth_error = error.mul_add(deep, splat(f32::MIN_POSITIVE));
+    let depth_error = if BLURRED { most_square.mul_add(splat(1.6 * blur), depth_error) } else { depth_error };
+    let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
+    let mut lanes = passed & !far.less(begin).or(end.less(near)).bits();
+    let four = splat(4.0);
+    let is_precise = depth_error.mul(four).less(depth);
+    if !ROUNDED && lanes & !is_precise.bits() != 0 {
+        // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
+        let (height, height_error) = height();
+        let (depth, depth_error) = (height.mul(turn), height_error.mul_add(area, splat(f32::MIN_POSITIVE)));
+        let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
+        // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
+        lanes &= !far.less(begin).or(end.less(near)).and(zero.less(least_square)).bits();
+    }
+    if lanes == 0 {
+        return None;
+    }
+    // Precise to a quarter in f32 is more than enough in f64, unless the origin all but touches the triangle: both
+    // count the same products of components, but f64 is wanted 2^18 times as precise, and is 2^29 times.
+    let precise = error.mul(four).less(square).and(is_precise);
+    let apart = size.mul(splat(1.0 / 32.0)).less(deep);
+    let inside = bound.less(least.max(zero.sub(most)));
+    Some(Judged {
+        lanes,
+        sure: inside.and(precise).and(apart),
+        low: near.div(most_square).mul(aim.shorten.mul(splat(1.0 - slack))),
+        high: far.div(least_square).mul(aim.shorten.mul(splat(1.0 + slack))),
+    })
+}
+
+/// The edge function of the edge from corner `a` to corner `b`, each of which is at (x, y).
+#[inline(always)]
+fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
+    x[a].mul_sub(y[b], y[a].mul(x[b]))
+}
+
+/// Twice the area times the distance of the origin from the plane: the normal's product with p, which leads from the first
+/// corner to the origin; and its error. Let u = 2^-24 and N be the normal with all signs positive. Edges err by u,
+/// the normal by 4 u N, p by u (and `blur`), and the scalar product by another 3 u N p. `corners` are component by component.
+#[inline(always)]
+pub(super) fn height<V: Vector>(corners: [[V; 3]; 3], origin: [V; 3], blur: f32) -> (V, V) {
+    let (tiny, unit, blur) = (V::splat(TINY), V::splat(12.0 * UNIT_ROUNDOFF), V::splat(1.1 * blur));
+    let [(bx, cx), (by, cy), (bz, cz)] = [edges(corners[0]), edges(corners[1]), edges(corners[2])];
+    let p = [origin[0].sub(corners[0][0]), origin[1].sub(corners[1][0]), origin[2].sub(corners[2][0])];
+    let height = by.mul_sub(cz, bz.mul(cy)).mul(p[0]);
+    let height = bz.mul_sub(cx, bx.mul(cz)).mul_add(p[1], height);
+    let height = bx.mul_sub(cy, by.mul(cx)).mul_add(p[2], height);
+    let (bx, by, bz) = (bx.abs(), by.abs(), bz.abs());
+    let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
+    let off = [p[0].abs().mul_add(unit, blur), p[1].abs().mul_add(unit, blur), p[2].abs().mul_add(unit, blur)];
+    let error = by.mul_add(cz, bz.mul_add(cy, tiny)).mul_add(off[0], V::splat(f32::MIN_POSITIVE));
+    let error = bz.mul_add(cx, bx.mul_add(cz, tiny)).mul_add(off[1], error);
+    (height, bx.mul_add(cy, by.mul_add(cx, tiny)).mul_add(off[2], error))
+}
+
+/// From the first corner to the others, along one axis.
+#[inline(always)]
+fn edges<V: Vector>([a, b, c]: [V; 3]) -> (V, V) {
+    (b.sub(a), c.sub(a))
+}

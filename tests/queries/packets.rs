@@ -1,0 +1,154 @@
+//! Packets of eight rays, and two of them at once, against single rays to the last bit, and against brute force.
+
+use twincast::math::Vec3;
+use twincast::scene::{Geometry, Material, Mesh, Scene};
+use twincast::trace::brute::Brute;
+use twincast::trace::bvh::{Bvh, Isa, Options, Packet, PacketHits, Preset};
+use twincast::{Hit, Ray, Tracer, World};
+
+use super::grid_sphere;
+use crate::scenes::{Random, soup};
+
+/// Spheres whose corners are exact, and triangles without order.
+fn world() -> (World, Vec<Vec3>) {
+    let sphere = grid_sphere(9, 1);
+    let larger: Vec<Vec3> = sphere.positions.iter().map(|&p| p * 2.0).collect();
+    let larger = Mesh::new(larger, sphere.triangles.to_vec());
+    let mut corners = sphere.positions.to_vec();
+    corners.extend(&larger.positions[..]);
+    let geometries = vec![Geometry::Mesh(sphere), Geometry::Mesh(larger), Geometry::Mesh(soup(300, 0.2, 3))];
+    let scene = Scene::from_geometries(geometries, vec![Material::default()]);
+    (World::new(&scene).expect("a world"), corners)
+}
+
+/// Sixteen rays that have something in common, or nothing.
+fn families(corners: &[Vec3]) -> Vec<[Ray; 16]> {
+    let mut random = Random::new(11);
+    let mut all = Vec::new();
+    for round in 0..60 {
+        let (eye, towards) = (random.vec3() * 4.0, random.vec3());
+        let corner = corners[random.below(corners.len())];
+        let other = corners[random.below(corners.len())];
+        let mut add = |ray: &mut dyn FnMut(&mut Random, usize) -> Ray| {
+            all.push(std::array::from_fn(|i| ray(&mut random, i)));
+        };
+        // Of a camera: neighbours, and some farther apart.
+        for width in [0.002, 0.05, 0.5] {
+            add(&mut |random, _| Ray::new(eye, towards + random.vec3() * width - eye));
+        }
+        // Through a corner and near it, where bounds leave doubts.
+        add(&mut |random, i| Ray::new(eye, corner + random.vec3() * [0.0, 1e-7, 1e-5][i % 3] - eye));
+        // Along an edge, or through the sphere from corner to corner.
+        add(&mut |_, i| Ray::new(eye, corner.lerp(other, i as f32 / 16.0) - eye));
+        // From a surface to a light.
+        add(&mut |random, _| {
+            let start = corner + random.vec3() * 0.01;
+            Ray { tmax: 0.999, ..Ray::new(start, eye - start) }
+        });
+        // Side by side, along an axis as well; there a component is zero, and some are not quite.
+        let along = if round % 2 == 0 { towards } else { [Vec3::X, Vec3::NEG_Y, Vec3::Z][round % 3] };
+        add(&mut |random, i| {
+            let tilt = [0.0, -0.0, 1e-30, -1e-30][i % 4];
+            Ray::new(corner + random.vec3() * 0.05 - along * 5.0, along + Vec3::splat(tilt))
+        });
+        // From a corner, in the planes of its triangles.
+        add(&mut |random, i| Ray::new(corner, corners[i * 7 % corners.len()] - corner + random.vec3() * 1e-6));
+        // Nothing in common.
+        add(&mut |random, _| Ray::new(random.vec3() * 3.0, random.vec3()));
+        // Of one direction and many lengths, within a range.
+        add(&mut |random, i| {
+            let direction = (towards + random.vec3() * 0.01 - eye) * (1.0 + i as f32 * [0.01, 1.0][round % 2]);
+            Ray { tmin: 0.3, tmax: 0.9, ..Ray::new(eye, direction) }
+        });
+        // Some that are not valid among others.
+        add(&mut |random, i| {
+            let ray = Ray::new(eye, towards + random.vec3() * 0.01 - eye);
+            match i {
+                1 => Ray { origin: Vec3::NAN, ..ray },
+                3 => Ray { direction: Vec3::ZERO, ..ray },
+                4 => Ray { direction: Vec3::splat(f32::INFINITY), ..ray },
+                6 => Ray { tmin: 2.0, tmax: 1.0, ..ray },
+                9 => Ray { tmin: f32::NAN, ..ray },
+                10 => Ray { direction: Vec3::splat(1e-42), ..ray },
+                12 => Ray { direction: ray.direction * 1e35, ..ray },
+                _ => ray,
+            }
+        });
+    }
+    all
+}
+
+fn packets(rays: &[Ray; 16], asked: u32) -> [Packet; 2] {
+    let mut packets = [Packet::NONE; 2];
+    for (i, ray) in rays.iter().enumerate() {
+        packets[i / 8].set(i % 8, ray);
+    }
+    packets[0].lanes = asked & 0xff;
+    packets[1].lanes = asked >> 8;
+    packets
+}
+
+/// Hit and normal of a lane, as bits.
+fn lane(hits: &PacketHits, i: usize) -> Option<(Hit, [u32; 3])> {
+    let hit = Hit {
+        t: hits.t[i],
+        u: hits.u[i],
+        v: hits.v[i],
+        primitive: hits.primitive[i],
+        geometry: hits.geometry[i],
+        instance: hits.instance[i],
+    };
+    (hits.lanes >> i & 1 != 0).then(|| (hit, hits.normal.map(|n| n[i].to_bits())))
+}
+
+#[test]
+fn packets_meet_what_single_rays_and_brute_force_meet() {
+    let (world, corners) = world();
+    let brute = Brute::new(&world);
+    let families = families(&corners);
+    let mut hit_count = 0;
+    let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available());
+    for (isa, preset) in isas.flat_map(|isa| [Preset::Default, Preset::Compact].map(|preset| (isa, preset))) {
+        let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
+        for (number, rays) in families.iter().enumerate() {
+            let asked = [0xffff, 0xffff, 0x0ff0, 0x8421, 0xff00][number % 5];
+            let packets = packets(rays, asked);
+            let mut together = [PacketHits::NONE, PacketHits::NONE];
+            bvh.closest_packets(&packets, &mut together);
+            let occluded = bvh.occluded_packets(&packets);
+            for (half, packet) in packets.iter().enumerate() {
+                let mut by_itself = [PacketHits::NONE];
+                bvh.closest_packets(std::array::from_ref(packet), &mut by_itself);
+                let [occluded_by_itself] = bvh.occluded_packets(std::array::from_ref(packet));
+                for i in 0..8 {
+                    let ray = &rays[8 * half + i];
+                    let is_asked = packet.lanes >> i & 1 != 0;
+                    let single = bvh.closest_triangle(ray).filter(|_| is_asked);
+                    let expected = single.map(|found| (found.hit, found.normal().to_array().map(f32::to_bits)));
+                    let name = format!("{isa:?} {preset:?}, family {number}, ray {half} {i}");
+                    assert_eq!(lane(&together[half], i), expected, "{name}");
+                    assert_eq!(lane(&by_itself[0], i), expected, "{name}");
+                    assert_eq!(occluded[half] >> i & 1 != 0, expected.is_some(), "{name}");
+                    assert_eq!(occluded_by_itself >> i & 1 != 0, expected.is_some(), "{name}");
+                    if is_asked {
+                        assert_eq!(single.map(|found| found.hit), brute.closest(ray), "{name}");
+                        assert_eq!(bvh.occludes(ray), single.is_some(), "{name}");
+                        hit_count += u32::from(single.is_some());
+                    }
+                }
+            }
+        }
+    }
+    assert!(hit_count > 5000, "{hit_count} hits");
+}
+
+#[test]
+fn packets_in_an_empty_world_hit_nothing() {
+    let world = World::new(&Scene::from_geometries(Vec::new(), vec![Material::default()])).expect("a world");
+    let bvh = Bvh::build(&world);
+    let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16], 0xffff);
+    let mut hits = [PacketHits { lanes: 7, ..PacketHits::NONE }, PacketHits::NONE];
+    bvh.closest_packets(&packets, &mut hits);
+    assert_eq!(hits.map(|hits| hits.lanes), [0, 0]);
+    assert_eq!(bvh.occluded_packets(&packets), [0, 0]);
+}
