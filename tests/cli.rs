@@ -255,6 +255,34 @@ fn builds_never_change_a_picture_and_memory_is_kept() {
 }
 
 #[test]
+fn what_cannot_fit_is_refused_before_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // Corners that are not there: what the loader says, once it reads.
+    let vertices = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    let head = format!(
+        "ply\nformat ascii 1.0\n{vertices}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    );
+    std::fs::write(path("broken.ply"), head.clone() + "0 0 0 1 0 0 0 1 0\n3 0 1 9\n").unwrap();
+    // Less than it promises, so that the promise is not believed.
+    std::fs::write(path("short.ply"), head.replace("face 1", "face 99999999")).unwrap();
+    let mut stl = vec![0; 84 + 50];
+    stl[80] = 1;
+    std::fs::write(path("one.stl"), stl).unwrap();
+    let fails = |scene: &str, memory: &str| {
+        let (code, message) = fails(&["render", &path(scene), "-o", &path("x.png"), "--max-memory", memory]);
+        assert_eq!(code, 3, "{message}");
+        message
+    };
+    for scene in ["broken.ply", "one.stl"] {
+        let message = fails(scene, "1M");
+        assert!(message.contains("compact build needs"), "{message}");
+    }
+    assert!(fails("broken.ply", "1T").contains("line 11: index 9"));
+    assert!(fails("short.ply", "1M").contains("bytes are left"));
+}
+
+#[test]
 fn trees_are_kept_in_a_folder() {
     let folder = Folder::new();
     let kept = folder.path("kept/trees");

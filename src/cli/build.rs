@@ -1,10 +1,13 @@
 //! How well the tree is worth building, and whether there is the memory for it: flags, and what the plan makes of them.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 
 use super::common::parse_bytes;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
+use crate::io;
 use crate::memory::process;
 use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory, Rays};
 use crate::trace::bvh::Preset;
@@ -18,7 +21,7 @@ pub(super) struct BuildArgs {
     #[arg(long, value_enum, default_value_t)]
     build: Build,
 
-    /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built
+    /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built, PLY and binary STL before they are read
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     max_memory: Option<u64>,
 }
@@ -56,6 +59,15 @@ impl BuildArgs {
         self.max_memory.is_some() || self.build.wanted().is_some()
     }
 
+    /// Whether what a file promises may fit at all, before it is read.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] where it cannot.
+    pub(super) fn check_file(&self, backend: BackendArg, scene: &Path) -> Result<()> {
+        let Some(promised) = self.max_memory.and_then(|_| io::promised(scene)) else { return Ok(()) };
+        self.decide(backend, promised.triangles, 0, promised.bytes).map(drop)
+    }
+
     /// How to build the native tree over so many triangles, for so many rays; none where only Embree renders.
     ///
     /// # Errors
@@ -67,12 +79,16 @@ impl BuildArgs {
         rays: &Rays,
         pixels: u64,
     ) -> Result<Option<BuildChoice>> {
+        self.decide(backend, triangles, rays.total(), pixels.saturating_mul(BYTES_A_PIXEL))
+    }
+
+    /// The same, with so many bytes still to come beside the tree.
+    fn decide(&self, backend: BackendArg, triangles: u64, rays: u64, to_come: u64) -> Result<Option<BuildChoice>> {
         let embree = if backend == BackendArg::Native { 0 } else { triangles.saturating_mul(EMBREE_BYTES) };
-        let picture = pixels.saturating_mul(BYTES_A_PIXEL);
         let request = BuildRequest {
             triangles,
-            rays: rays.total(),
-            held: process::held().unwrap_or(0).saturating_add(picture).saturating_add(embree),
+            rays,
+            held: process::held().unwrap_or(0).saturating_add(to_come).saturating_add(embree),
             max_memory: self.max_memory,
             wanted: self.build.wanted(),
         };

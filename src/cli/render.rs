@@ -149,6 +149,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 fn render(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
     args.accel.check(args.backend, Some(&args.build), &args.cache)?;
+    args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;
     let may_be_without = args.print_camera || args.explain.is_wanted();
     if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {

@@ -14,6 +14,7 @@ mod obj;
 mod parts;
 mod ply;
 mod polygon;
+mod promised;
 mod records;
 mod save;
 mod statement;
@@ -27,6 +28,7 @@ mod weld;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
 use self::weld::weld;

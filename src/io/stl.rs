@@ -8,6 +8,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::Promised;
 use super::text::{Words, quoted};
 use super::weld::{Weld, weld};
 use crate::error::{Error, Result, Warning};
@@ -40,6 +41,13 @@ fn is_text(bytes: &[u8]) -> bool {
 fn promised(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER - 4..)?.first_chunk()?;
     Some(u32::from_le_bytes(*count).into())
+}
+
+/// What the header of a binary file says, if the file has as much; neighbours share corners, which are left out of account.
+pub(super) fn promised_mesh(bytes: &[u8]) -> Option<Promised> {
+    let triangles = promised(bytes).filter(|_| !is_text(bytes))?;
+    let is_there = HEADER as u64 + triangles * FACET as u64 <= bytes.len() as u64;
+    is_there.then(|| Promised { triangles, bytes: triangles * size_of::<[u32; 3]>() as u64 })
 }
 
 fn binary(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Mesh> {

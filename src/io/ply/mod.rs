@@ -21,7 +21,7 @@ use self::faces::Faces;
 use self::header::{Element, Encoding, Header, Scalar};
 use self::vertices::{Layout, Positions, Vertices};
 use crate::error::{Error, Result, Warning};
-use crate::io::Placeless;
+use crate::io::{Placeless, Promised};
 use crate::math::Vec3;
 use crate::memory::Mapped;
 use crate::scene::{Geometry, Material, Mesh, Scene};
@@ -64,6 +64,17 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     let base = if mesh.colors.is_empty() { Material::default().diffuse } else { Vec3::ONE };
     let material = Material { ambient: base, diffuse: base, ..Material::default() };
     Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]))
+}
+
+/// What the header says of vertices and faces, if the file may hold as many; a face is a triangle at least.
+pub(super) fn promised(path: &Path, file: &Mapped<'_>) -> Option<Promised> {
+    let header = header::parse(path, file).ok()?;
+    let count =
+        |name: &str| header.elements.iter().find(|element| element.name == name).map_or(0, |element| element.count);
+    let (vertices, triangles) = (count("vertex"), count("face"));
+    let items = vertices.checked_add(triangles)?;
+    // No item takes less than a byte, in either encoding.
+    (items <= file.len() as u64).then(|| Promised { triangles, bytes: items * size_of::<[u32; 3]>() as u64 })
 }
 
 fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<Warning>) -> Result<Mesh> {
