@@ -64,7 +64,6 @@ pub(super) struct Judged<V: Vector> {
 /// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `height`
 /// is asked only if corners are not `ROUNDED`.
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "both sides of a pair")]
 pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     &Sheared { x, y, z }: &Sheared<V>,
     aim: &Aim<V>,
