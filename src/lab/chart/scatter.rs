@@ -136,7 +136,8 @@ impl Scatter<'_> {
             drawing.dot(at(point), 5.0, color(point.group));
         }
         for label in placed {
-            drawing.text(label.at, Anchor::Start, NOTE, &panel.points[label.index].label);
+            let point = &panel.points[label.index];
+            drawing.text(label.at, Anchor::Start, Font { color: color(point.group), ..NOTE }, &point.label);
         }
     }
 }
