@@ -23,7 +23,7 @@ use crate::trace::Tracer;
 use super::Renderer;
 use super::aov::{Event, Parts, Route, Tally};
 use super::explain::Answer;
-use super::sampler::{Choice, Dimension, Pattern};
+use super::sampler::{Bounces, Choice, Dimension, Pattern};
 use super::wavefront::{Buffers, Path, Wave};
 
 /// How often a path is scattered before it may end by chance.
@@ -34,9 +34,10 @@ const HIGHEST_CHANCE: f32 = 0.95;
 /// The surface that a path has come to.
 struct Vertex<'a> {
     path: Path,
-    point: SurfacePoint,
+    point: &'a SurfacePoint,
     lobes: Lobes<'a>,
     pattern: &'a Pattern,
+    bounces: &'a Bounces,
     sample: u32,
     depth: u32,
 }
@@ -86,8 +87,9 @@ impl Renderer<'_> {
         buffers.shadow_rays.clear();
         buffers.shadow_light.clear();
         buffers.shadow_parts.clear();
-        let Buffers { patterns, radiance, hits, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } =
-            &mut *buffers;
+        let Buffers {
+            patterns, bounces, radiance, hits, shadow_rays, shadow_light, shadow_parts, tally, trail, ..
+        } = &mut *buffers;
         let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         for (i, ((ray, path), hit)) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()).enumerate() {
@@ -115,13 +117,14 @@ impl Renderer<'_> {
             if let Some(tally) = &mut tally {
                 tally.add(path.pixel, route, own);
             }
-            let ways = Ways::new(material, &point, ray.direction.as_dvec3().normalize());
+            let ways = Ways::new(material, &point, shading.direction());
             let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
-            let pattern = &patterns[path.pixel as usize];
-            let vertex = Vertex { path, point, lobes, pattern, sample, depth };
-            let DVec2 { x: light, y: lobe } = self.choice(&vertex, Choice::Which);
+            let (pattern, bounces) = (&patterns[path.pixel as usize], &bounces[path.pixel as usize]);
+            let vertex = Vertex { path, point: &point, lobes, pattern, bounces, sample, depth };
+            let is_choice = self.lights.is_choice() || vertex.lobes.is_choice();
+            let DVec2 { x: light, y: lobe } = if is_choice { self.choice(&vertex, Choice::Which) } else { DVec2::ZERO };
             if let Some(Asked { chosen, arriving, value, fog, share, worth }) = self.ask(&vertex, light) {
-                trail.light(&path, &vertex.point, || {
+                trail.light(&path, vertex.point, || {
                     let faces = shading.faces(arriving.to_light);
                     let [diffuse, highlight] = if faces { shading.lobes(arriving.to_light) } else { [Vec3::ZERO; 2] };
                     Answer {
@@ -135,7 +138,7 @@ impl Renderer<'_> {
                     }
                 });
                 if chosen.source.casts_shadows {
-                    shadow_rays.push(LightSource::shadow_ray(&vertex.point, &arriving));
+                    shadow_rays.push(LightSource::shadow_ray(vertex.point, &arriving));
                     shadow_light.push((path.pixel, worth));
                 } else {
                     *pixel += worth.extend(0.0);
@@ -162,7 +165,7 @@ impl Renderer<'_> {
     }
 
     fn choice(&self, vertex: &Vertex<'_>, choice: Choice) -> DVec2 {
-        self.sampler.pair(vertex.pattern, vertex.sample, Dimension::bounce(vertex.depth, choice))
+        self.sampler.bounce(vertex.pattern, vertex.bounces, vertex.sample, vertex.depth, choice)
     }
 
     /// What share of the light from around the scene counts that a ray finds which hits nothing.
@@ -212,7 +215,7 @@ impl Renderer<'_> {
             }
             _ => 1.0,
         };
-        let fog = self.fog_to_light(&vertex.path, &vertex.point, &arriving);
+        let fog = self.fog_to_light(&vertex.path, vertex.point, &arriving);
         let share = share / chosen.chance as f32;
         let mut worth = vertex.path.weight * value.share * arriving.color * share;
         if let Some(left) = fog {

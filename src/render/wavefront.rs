@@ -21,7 +21,7 @@ use super::aov::{Parts, Request, Route, Tally};
 use super::camera::View;
 use super::explain::Trail;
 use super::fog::is_solid;
-use super::sampler::{Dimension, Pattern};
+use super::sampler::{Bounces, Dimension, Pattern};
 use super::whitted::Lit;
 use super::{Renderer, tiles::Tile};
 
@@ -33,6 +33,8 @@ const LANES: usize = 16;
 pub(super) struct Buffers {
     /// In the order of [`Tile::pixels`], as `sums`, `weights` and `radiance`.
     pub(super) patterns: Vec<Pattern>,
+    /// As many where paths are traced; else empty.
+    pub(super) bounces: Vec<Bounces>,
     pub(super) sums: Vec<Vec4>,
     /// Of each pixel's samples so far, added up.
     pub(super) weights: Vec<f32>,
@@ -171,6 +173,10 @@ impl Renderer<'_> {
     pub(super) fn begin(&self, pixels: impl Iterator<Item = (u32, u32)>, buffers: &mut Buffers) {
         buffers.patterns.clear();
         buffers.patterns.extend(pixels.map(|(x, y)| self.sampler.pattern(x, y)));
+        buffers.bounces.clear();
+        if self.plan.integrator == Integrator::Path {
+            buffers.bounces.extend(buffers.patterns.iter().map(|pixel| self.sampler.bounces(pixel)));
+        }
     }
 
     /// One sample of each pixel: its camera ray, and what that hits.

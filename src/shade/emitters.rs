@@ -30,6 +30,8 @@ struct Patch {
     corner: Vec3,
     /// Two sides of a triangle, or two radii of a disk that are perpendicular.
     sides: [Vec3; 2],
+    /// Unit, to one of its sides.
+    normal: DVec3,
     is_disk: bool,
     emission: Vec3,
 }
@@ -224,7 +226,8 @@ impl Patches {
         if area > 0.0 && area.is_finite() {
             self.cumulative.push(self.total() + area * brightness(emission));
             let sides = sides.map(|side| side.as_vec3());
-            self.patches.push(Patch { corner: corner.as_vec3(), sides, is_disk, emission });
+            let normal = sides[0].as_dvec3().cross(sides[1].as_dvec3()).normalize_or_zero();
+            self.patches.push(Patch { corner: corner.as_vec3(), sides, normal, is_disk, emission });
         }
     }
 
@@ -239,7 +242,7 @@ impl Patches {
         let index = self.cumulative.partition_point(|&sum| sum <= wanted).min(self.patches.len().checked_sub(1)?);
         let before = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
         let within = ((wanted - before) / (self.cumulative[index] - before)).clamp(0.0, 1.0);
-        let Patch { corner, sides, is_disk, emission } = self.patches[index];
+        let Patch { corner, sides, normal, is_disk, emission } = self.patches[index];
         let [a, b] = sides.map(|side| side.as_dvec3());
         let (x, y) = if is_disk {
             let (radius, angle) = (within.sqrt(), even.y * TAU);
@@ -252,7 +255,7 @@ impl Patches {
         let at = corner.as_dvec3() + a * x + b * y;
         let offset = at - point;
         let to_light = offset.try_normalize()?;
-        let cosine = a.cross(b).normalize_or_zero().dot(to_light).abs();
+        let cosine = normal.dot(to_light).abs();
         let density = brightness(emission) / self.total() * offset.length_squared() / cosine;
         let color = emission * (1.0 / (PI * density)) as f32;
         let end = Some(short_of(at, to_light, point));

@@ -98,6 +98,11 @@ impl Lights {
         &self.sources
     }
 
+    /// Whether [`Lights::choose`] has any choice.
+    pub fn is_choice(&self) -> bool {
+        self.sources.len() > 1
+    }
+
     /// The light that `choice`, from 0 to below 1, chooses.
     pub fn choose(&self, choice: f64) -> Option<Chosen<'_>> {
         let index = self.cumulative.partition_point(|&sum| sum <= choice).min(self.sources.len().checked_sub(1)?);

@@ -218,7 +218,7 @@ impl SurfacePoint {
             false => (self.position, -self.normal),
         };
         let exact = from + away * self.error;
-        Vec3::from_array([0, 1, 2].map(|axis| round_towards(exact[axis], away[axis])))
+        Vec3::new(round_towards(exact.x, away.x), round_towards(exact.y, away.y), round_towards(exact.z, away.z))
     }
 }
 
@@ -245,7 +245,7 @@ fn on_triangle(ray: &Ray, placement: Option<&Placement>, [a, b, c]: [DVec3; 3]) 
     // An f32 test takes the distance from the plane as a triple product of edges and origin - corner. Its rounding
     // error is proportional to the longest edge cubed, over twice the area: for slivers, more than the edge. Where
     // that leaves no sensible offset, an eighth of the edge is the most that is spent.
-    let longest = e1.length().max(e2.length()).max((c - b).length());
+    let longest = e1.length_squared().max(e2.length_squared()).max((c - b).length_squared()).sqrt();
     let condition = longest * longest / cross.length();
     let relative = (f64::from(gamma(TEST_ROUNDINGS)) * condition).min(0.125);
     let error = relative * longest + rounding_error(position, outwards, placement);

@@ -11,7 +11,7 @@ mod hash;
 mod sobol;
 mod stratified;
 
-use std::fmt;
+use std::{array, fmt};
 
 use crate::math::DVec2;
 pub(crate) use hash::pcg4d;
@@ -77,6 +77,11 @@ pub(super) enum Choice {
     Alpha,
 }
 
+impl Choice {
+    /// By their numbers.
+    const ALL: [Self; 5] = [Self::Which, Self::Light, Self::Direction, Self::End, Self::Alpha];
+}
+
 impl Dimension {
     /// The point on the pixel.
     pub(super) const FILM: Self = Self(0);
@@ -123,6 +128,14 @@ pub struct Pattern {
     film: [u32; 4],
 }
 
+/// What the samples of a pixel have in common where paths are scattered first, which is where most of them are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounces([[[u32; 4]; KEPT_CHOICES]; KEPT_DEPTHS]);
+
+/// Depths and choices of which [`Bounces`] are kept.
+const KEPT_DEPTHS: usize = 2;
+const KEPT_CHOICES: usize = 3;
+
 impl Pattern {
     /// The pixel's top left corner, pixels from that of the film.
     #[inline]
@@ -159,7 +172,32 @@ impl Sampler {
         self.spread(pixel, self.key([pixel.x, pixel.y], dimension), sample, dimension)
     }
 
+    /// What [`Sampler::bounce`] wants to be computed once for all samples of a pixel.
+    pub(super) fn bounces(&self, pixel: &Pattern) -> Bounces {
+        let key = |depth: usize, choice: usize| {
+            self.key([pixel.x, pixel.y], Dimension::bounce(depth as u32, Choice::ALL[choice]))
+        };
+        Bounces(array::from_fn(|depth| array::from_fn(|choice| key(depth, choice))))
+    }
+
+    /// [`Sampler::pair`] of one of the choices where a path was scattered `depth` times.
+    pub(super) fn bounce(&self, pixel: &Pattern, kept: &Bounces, sample: u32, depth: u32, choice: Choice) -> DVec2 {
+        let dimension = Dimension::bounce(depth, choice);
+        match kept.0.get(depth as usize).and_then(|choices| choices.get(choice as usize)) {
+            Some(key) => self.spread(pixel, *key, sample, dimension),
+            None => self.pair(pixel, sample, dimension),
+        }
+    }
+
+    #[inline]
     fn spread(&self, pixel: &Pattern, key: [u32; 4], sample: u32, dimension: Dimension) -> DVec2 {
+        if self.sampling == Sampling::Sobol {
+            return sobol::point(sample, key);
+        }
+        self.spread_otherwise(pixel, key, sample, dimension)
+    }
+
+    fn spread_otherwise(&self, pixel: &Pattern, key: [u32; 4], sample: u32, dimension: Dimension) -> DVec2 {
         let place = [pixel.x, pixel.y];
         match self.sampling {
             Sampling::Sobol => sobol::point(sample, key),
@@ -235,6 +273,26 @@ mod tests {
             let pairs = dimensions.map(|dimension| sampler.pair(&pixel, 0, dimension));
             for (i, pair) in pairs.iter().enumerate() {
                 assert!(!pairs[..i].contains(pair), "{sampling}: {:?}", dimensions[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_kept_of_bounces_changes_nothing() {
+        for sampling in Sampling::ALL {
+            let sampler = Sampler::new(sampling, 16, 3);
+            let pixel = sampler.pattern(7, 5);
+            let kept = sampler.bounces(&pixel);
+            for depth in 0..4 {
+                for (choice, number) in Choice::ALL.into_iter().zip(0..) {
+                    assert_eq!(choice as usize, number);
+                    let expected = sampler.pair(&pixel, 9, Dimension::bounce(depth, choice));
+                    assert_eq!(
+                        sampler.bounce(&pixel, &kept, 9, depth, choice),
+                        expected,
+                        "{sampling}, {depth}, {choice:?}"
+                    );
+                }
             }
         }
     }

@@ -56,6 +56,11 @@ impl<'a> Lobes<'a> {
         self.chances[0] + self.chances[1] > 0.0 || self.gloss.is_some()
     }
 
+    /// Whether there are several, of which [`Lobes::sample`] follows one.
+    pub fn is_choice(&self) -> bool {
+        self.chances.iter().filter(|&&chance| chance > 0.0).count() > 1
+    }
+
     /// For light along `to_light`.
     pub fn evaluate(&self, to_light: DVec3) -> Value {
         let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;

@@ -68,6 +68,11 @@ impl Shading {
         shading
     }
 
+    /// The unit vector along which the surface is seen.
+    pub fn direction(&self) -> DVec3 {
+        -self.to_viewer
+    }
+
     fn scale(&mut self, factor: f32) {
         self.diffuse *= factor;
         self.highlight.color *= factor;
