@@ -78,6 +78,11 @@ impl Linear {
         self.steps.len()
     }
 
+    /// From when to when it moves.
+    pub fn range(&self) -> (f32, f32) {
+        self.range
+    }
+
     /// Whether it is there at a time at all.
     pub fn is_at(&self, time: f32) -> bool {
         self.steps.len() == 1 || (self.range.0..=self.range.1).contains(&time)

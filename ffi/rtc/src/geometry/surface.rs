@@ -111,6 +111,11 @@ impl Surface {
         matches!(self.pairs, Pairs::None)
     }
 
+    /// From when to when it moves.
+    pub fn range(&self) -> (f32, f32) {
+        self.range
+    }
+
     /// Whether it is there at a time at all.
     pub fn is_at(&self, time: f32) -> bool {
         self.is_still() || (self.range.0..=self.range.1).contains(&time)

@@ -1,78 +1,123 @@
 //! Boxes of all primitives, for point queries.
 //!
 //! A query shows the caller each primitive near a point, triangles too. The tree of triangles knows triangles, but not quads, nor what stands
-//! beside them; scenes that are asked for points are few, and get one more tree over all boxes then.
+//! beside them; scenes that are asked for points are few, and get one more tree over all boxes then. It holds what moves by where it ever is;
+//! whether it is near at the time of the query is looked at before the caller is shown it.
 
 use twincast::math::{Aabb, Vec3};
 use twincast::trace::bvh::{BoxTree, Options, Search};
 
 use super::committed::{Body, Committed, Item};
-use crate::geometry::Surface;
+use crate::geometry::{Surface, segment};
 
 /// Boxes of all primitives.
 pub struct Near {
     tree: BoxTree,
     items: Vec<Item>,
+    /// As many.
+    paths: Vec<Option<Path>>,
+}
+
+/// Where a primitive is that moves.
+struct Path {
+    /// At equally distant times of the range, at least two.
+    steps: Vec<Aabb>,
+    range: (f32, f32),
+}
+
+impl Path {
+    fn new(steps: Vec<Aabb>, range: (f32, f32)) -> Option<Self> {
+        (steps.len() > 1).then_some(Self { steps, range })
+    }
+
+    /// Whether it is as near as that at a time; maybe where rounding decides.
+    fn is_near(&self, point: Vec3, radius: f32, time: f32) -> bool {
+        if !(self.range.0..=self.range.1).contains(&time) {
+            return false;
+        }
+        let (step, fraction) = segment(self.steps.len(), self.range, time);
+        let (a, b) = (self.steps[step], self.steps[step + 1]);
+        let (min, max) = (a.min.lerp(b.min, fraction), a.max.lerp(b.max, fraction));
+        let slack = 8.0 * f32::EPSILON * (min.abs().max(max.abs()).max(point.abs()).max_element() + radius);
+        // Not by "farther than": what is not a number is shown.
+        let is_farther = (min - point).max(point - max).max(Vec3::ZERO).length() > radius + slack;
+        !is_farther
+    }
 }
 
 impl Near {
     pub fn new(committed: &Committed) -> Self {
-        let (mut items, mut boxes) = (Vec::new(), Vec::new());
+        let (mut items, mut boxes, mut paths) = (Vec::new(), Vec::new(), Vec::new());
         for (id, record) in committed.records.iter().enumerate() {
             let Some(record) = record else { continue };
-            let mut add = |primitive: usize, bounds: Aabb| {
+            let mut add = |primitive: usize, steps: Vec<Aabb>, range: (f32, f32)| {
                 items.push(Item { geometry: id as u32, primitive: primitive as u32 });
-                boxes.push(bounds);
+                boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
+                paths.push(Path::new(steps, range));
             };
             match &record.body {
                 Body::Surface(surface) => primitives(surface, &mut add),
                 Body::Linear(linear) => {
                     for i in 0..linear.count() {
                         let steps = (0..linear.step_count()).map(|step| linear.bounds_at(i, step));
-                        add(i, steps.fold(Aabb::EMPTY, Aabb::union));
+                        add(i, steps.collect(), linear.range());
                     }
                 }
                 Body::User(user) => {
                     for i in 0..user.boxes[0].len() {
-                        add(i, user.boxes.iter().map(|step| step[i]).fold(Aabb::EMPTY, Aabb::union));
+                        add(i, user.boxes.iter().map(|step| step[i]).collect(), user.range);
                     }
                 }
                 Body::Instances(instances) => {
                     for (i, instance) in instances.iter().enumerate() {
-                        add(i, super::boxes::instance_bounds(instance).0);
+                        // Where it is then is known when it is entered.
+                        add(i, vec![super::boxes::instance_bounds(instance).0], (0.0, 1.0));
                     }
                 }
             }
         }
-        Self { tree: BoxTree::build(&boxes, Options::default()), items }
+        Self { tree: BoxTree::build(&boxes, Options::default()), items, paths }
     }
 
-    /// Names primitives near a point, up to the radius that the visitor returns last.
-    pub fn visit(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(Item) -> Search) {
-        self.tree.visit_near(point, radius, &mut |i| visitor(self.items[i as usize]));
+    /// Names primitives that are near a point at a time, or whenever, up to the radius that the visitor returns last.
+    pub fn visit(&self, point: Vec3, mut radius: f32, time: Option<f32>, visitor: &mut dyn FnMut(Item) -> Search) {
+        self.tree.visit_near(point, radius, &mut |i| {
+            if let (Some(path), Some(time)) = (&self.paths[i as usize], time)
+                && !path.is_near(point, radius, time)
+            {
+                return Search::Continue(radius);
+            }
+            let search = visitor(self.items[i as usize]);
+            if let Search::Continue(reach) = search {
+                radius = reach;
+            }
+            search
+        });
     }
 }
 
-/// The box of each primitive, which may be several triangles in a row.
-fn primitives(surface: &Surface, add: &mut impl FnMut(usize, Aabb)) {
-    let of = |triangle: usize| {
-        let steps = (0..surface.steps.len()).map(|step| surface.bounds_at(triangle, step));
-        steps.fold(Aabb::EMPTY, Aabb::union)
+/// The boxes of each primitive, which may be several triangles in a row.
+fn primitives(surface: &Surface, add: &mut impl FnMut(usize, Vec<Aabb>, (f32, f32))) {
+    let of = |triangle: usize| -> Vec<Aabb> {
+        (0..surface.steps.len()).map(|step| surface.bounds_at(triangle, step)).collect()
     };
-    let mut open: Option<(u32, Aabb)> = None;
+    let mut open: Option<(u32, Vec<Aabb>)> = None;
     for triangle in 0..surface.triangles.len() {
         let (primitive, bounds) = (surface.primitive(triangle as u32), of(triangle));
         open = match open {
-            Some((last, all)) if last == primitive => Some((last, all.union(bounds))),
+            Some((last, mut all)) if last == primitive => {
+                all.iter_mut().zip(bounds).for_each(|(all, bounds)| *all = all.union(bounds));
+                Some((last, all))
+            }
             before => {
                 if let Some((last, all)) = before {
-                    add(last as usize, all);
+                    add(last as usize, all, surface.range());
                 }
                 Some((primitive, bounds))
             }
         };
     }
     if let Some((last, all)) = open {
-        add(last as usize, all);
+        add(last as usize, all, surface.range());
     }
 }

@@ -33,7 +33,7 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
             // A ball around the box finds all boxes that overlap it, and some more.
             let centre = bounds.min.midpoint(bounds.max);
             let radius = (bounds.max - centre).max(centre - bounds.min).length() * (1.0 + 1e-6);
-            near.visit(centre, radius, &mut |item| {
+            near.visit(centre, radius, None, &mut |item| {
                 let other = second.record(item.geometry).map(|record| &record.body);
                 if let Some(Body::User(other)) = other {
                     let box1 = &other.boxes[0][item.primitive as usize];

@@ -54,7 +54,9 @@ impl Search1 {
     fn run(&self, committed: &Committed, space: &Space) -> bool {
         let mut changed = false;
         let limit = || self.radius() * space.stretch;
-        committed.near().visit(space.point, limit(), &mut |item| {
+        // SAFETY: the query is the caller's.
+        let time = unsafe { (*self.query).time };
+        committed.near().visit(space.point, limit(), Some(time), &mut |item| {
             if let Some(record) = committed.record(item.geometry) {
                 changed |= match &record.body {
                     Body::Instances(instances) => {

@@ -201,6 +201,29 @@ static void points() {
   }
 }
 
+// What moves is shown where it is at the time of the query, not where it ever is.
+static void moving_points() {
+  World w;
+  static const float steps[2][9] = {{0, 0, -1, 1, 0, -1, 0, 1, -1}, {0, 0, 1, 1, 0, 1, 0, 1, 1}};
+  static const unsigned corners[3] = {0, 1, 2};
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetGeometryTimeStepCount(g, 2);
+  for (unsigned k = 0; k < 2; k++) rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, k, RTC_FORMAT_FLOAT3, steps[k], 0, 12, 3);
+  rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, corners, 0, 12, 1);
+  w.add(g);
+  rtcCommitScene(w.scene);
+  for (float time : {0.f, 0.25f, 0.5f, 1.f})
+    for (float z : {-1.f, -0.5f, 0.f, 1.f}) {
+      Nearest n;
+      RTCPointQuery q;
+      q.x = q.y = 0.25f, q.z = z, q.time = time, q.radius = 0.1f;
+      RTCPointQueryContext context;
+      rtcInitPointQueryContext(&context);
+      rtcPointQuery(w.scene, &q, &context, nearer, &n);
+      CHECK(n.asked.size() == (z == 2 * time - 1 ? 1u : 0u));
+    }
+}
+
 #ifdef EMBREE4
 // User geometry that sends rays on into another scene, 10 to the right.
 static RTCScene beyond;
@@ -251,4 +274,5 @@ void callbacks() {
   of_query();
   user_geometry();
   points();
+  moving_points();
 }
