@@ -40,6 +40,8 @@ pub(super) struct Scratch {
     one: One,
     /// t of the closest hits of the last bundle.
     pub t: [f64; RAYS],
+    /// How many placed objects the last bundles entered.
+    pub entered: u32,
     /// Rays of one octant.
     part: Part,
 }
@@ -66,7 +68,7 @@ impl Scratch {
         let stack = [Entry::root(0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
         let one = One { upper: stack, stack, single: Stack::new(), bundle, local, range, found };
-        Self { one, t: [0.0; RAYS], part: Part::new() }
+        Self { one, t: [0.0; RAYS], entered: 0, part: Part::new() }
     }
 }
 
@@ -80,7 +82,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
-    let Scratch { one, t, part } = scratch;
+    let Scratch { one, t, entered, part } = scratch;
+    *entered = 0;
     let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
     // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one loop, so
     // that what is called here, of which most of the kernel consists, is compiled once.
@@ -103,7 +106,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
             }
         };
         let fit = one.bundle.fill::<S, Q>(group, &mut one.range);
-        let is_traced = fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t);
+        let is_traced = fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered);
         if is_traced {
             done |= members;
         }
@@ -131,6 +134,7 @@ impl One {
         count: usize,
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
+        entered: &mut u32,
     ) -> bool {
         let Self { upper, stack, single, bundle, local, range, found } = self;
         let groups = count.div_ceil(S::Wide::LANES);
@@ -141,6 +145,7 @@ impl One {
             if tree.tree().is_empty() {
                 continue;
             }
+            *entered += u32::from(place != FIXED);
             let is_bundle = place == FIXED || local.place::<S>(bundle, bvh.placements.at(place), range);
             let bundle = if place == FIXED { &*bundle } else { &*local };
             let Some(slab) = bundle.slab(tree.tree().reach()).filter(|_| is_bundle) else {
