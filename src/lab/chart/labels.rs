@@ -54,23 +54,16 @@ pub(super) fn place(points: &[((f64, f64), &str)], within: Area) -> Vec<Placed> 
 fn beside(index: usize, (x, y): (f64, f64), label: &str, ring: f64, (across, up): (f64, f64)) -> Placed {
     let (width, height) = (NOTE.size * LETTER * label.chars().count() as f64, NOTE.size * LINE);
     let end = (x + across * ring, y - up * ring);
-    let left = if across > 0.0 {
-        end.0
-    } else if across < 0.0 {
-        end.0 - width
-    } else {
-        end.0 - width / 2.0
-    };
-    let top = if up > 0.0 {
-        end.1 - height
-    } else if up < 0.0 {
-        end.1
-    } else {
-        end.1 - height / 2.0
-    };
+    // What of it is at the end of the line: the side that is nearer to the point, and the middle where that line runs straight.
+    let (left, top) = (end.0 + (sign(across) - 1.0) / 2.0 * width, end.1 - (sign(up) + 1.0) / 2.0 * height);
     let area = [left, top, left + width, top + height];
     let lead = (ring > RINGS[0]).then_some([(x, y), end]);
     Placed { index, at: (left, top + 0.8 * height), lead, area }
+}
+
+/// -1, 0 or 1.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
 }
 
 fn is_inside(area: &Area, within: &Area) -> bool {
