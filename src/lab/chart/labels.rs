@@ -91,6 +91,22 @@ mod tests {
     }
 
     #[test]
+    fn a_label_touches_the_end_of_its_line_with_the_side_that_is_nearer() {
+        let point = (100.0, 100.0);
+        for (across, up) in DIRECTIONS {
+            let Placed { area: [left, top, right, bottom], lead, .. } = beside(0, point, "16", RINGS[1], (across, up));
+            let (x, y) = lead.expect("beyond the first ring")[1];
+            assert!((left..=right).contains(&x) && (top..=bottom).contains(&y));
+            // Where it goes neither way, its middle; else it lies beyond the line's end altogether.
+            for (towards, near, far) in [(across, left, right), (-up, top, bottom)] {
+                let (end, middle) = (if near == left { x } else { y }, near.midpoint(far));
+                assert!(if towards == 0.0 { middle == end } else { (middle - end) * towards > 0.0 });
+                assert!(towards == 0.0 || end == if towards > 0.0 { near } else { far });
+            }
+        }
+    }
+
+    #[test]
     fn crowded_labels_cover_neither_each_other_nor_a_point() {
         let points: Vec<((f64, f64), &str)> =
             (0..21).map(|i| ((150.0 + f64::from(i % 7) * 9.0, 100.0 + f64::from(i / 7) * 11.0), "16")).collect();
