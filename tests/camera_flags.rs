@@ -2,10 +2,12 @@
 
 use std::io::Read;
 use std::net::TcpListener;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use twincast::Image;
 use twincast::math::Vec4;
+
+use crate::program::{text, twincast};
 
 /// A red floor that glows with 0.25, 0.125, 0.0625 under a camera, and what is left of it black.
 const SCENE: &str = "[render]\nsize = [40, 30]\nspp = 1\nheadlight = false\n[[camera]]\neye = [0, 5, 0]\nlook_at = [0, 0, 0]\n\
@@ -26,17 +28,12 @@ impl Folder {
 
     fn render(&self, flags: &[&str]) -> Output {
         let scene = self.path("scene.toml");
-        let args = [&["render", &scene][..], flags].concat();
-        Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the binary runs")
+        twincast(&[&["render", &scene][..], flags].concat())
     }
 
     fn image(&self, name: &str) -> Image {
         twincast::image::read(self.path(name).as_ref()).expect("a picture")
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
 }
 
 #[test]

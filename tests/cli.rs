@@ -5,13 +5,7 @@ use std::process::{Command, Output};
 use clap::CommandFactory;
 use twincast::cli::Cli;
 
-fn twincast(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the binary runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
+use crate::program::{text, twincast};
 
 /// Exit code and stderr.
 fn fails(args: &[&str]) -> (i32, String) {
@@ -266,20 +260,24 @@ fn what_cannot_fit_is_refused_before_it_is_read() {
     std::fs::write(path("broken.ply"), head.clone() + "0 0 0 1 0 0 0 1 0\n3 0 1 9\n").unwrap();
     // Less than it promises, so that the promise is not believed.
     std::fs::write(path("short.ply"), head.replace("face 1", "face 99999999")).unwrap();
-    let mut stl = vec![0; 84 + 50];
+    // A byte too many, of which the loader warns.
+    let mut stl = vec![0; 84 + 50 + 1];
     stl[80] = 1;
     std::fs::write(path("one.stl"), stl).unwrap();
-    let fails = |scene: &str, memory: &str| {
-        let (code, message) = fails(&["render", &path(scene), "-o", &path("x.png"), "--max-memory", memory]);
-        assert_eq!(code, 3, "{message}");
-        message
-    };
-    for scene in ["broken.ply", "one.stl"] {
-        let message = fails(scene, "1M");
-        assert!(message.contains("compact build needs"), "{message}");
+    let picture = path("x.png");
+    for (command, output) in [("render", &["-o", &picture][..]), ("plan", &[])] {
+        let fails = |scene: &str, memory: &str| {
+            let (code, message) = fails(&[&[command, &path(scene), "--max-memory", memory], output].concat());
+            assert_eq!(code, 3, "{command}: {message}");
+            message
+        };
+        for scene in ["broken.ply", "one.stl"] {
+            let message = fails(scene, "1M");
+            assert!(message.contains("compact build needs") && message.lines().count() == 1, "{command}: {message}");
+        }
+        assert!(fails("broken.ply", "1T").contains("line 11: index 9"));
+        assert!(fails("short.ply", "1M").contains("bytes are left"));
     }
-    assert!(fails("broken.ply", "1T").contains("line 11: index 9"));
-    assert!(fails("short.ply", "1M").contains("bytes are left"));
 }
 
 #[test]

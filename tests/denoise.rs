@@ -3,18 +3,13 @@
 //! Tests of the second kind leave off with a word on stderr where Open Image Denoise is not installed; `TWINCAST_OIDN` may name it.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-fn twincast(library: Option<&str>, args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_twincast"));
-    if let Some(library) = library {
-        command.env("TWINCAST_OIDN", library);
-    }
-    command.args(args).output().expect("the binary runs")
-}
+use crate::program::{command, text, twincast};
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
+/// With this library, or the lack of it.
+fn with_library(library: &str, args: &[&str]) -> Output {
+    command().env("TWINCAST_OIDN", library).args(args).output().expect("the program runs")
 }
 
 /// The scene of the project that is noisy everywhere.
@@ -29,7 +24,7 @@ fn without_the_library_nothing_is_rendered_and_the_remedy_is_told() {
     let (room, nowhere) = (room(), folder.path().to_string_lossy().into_owned());
     let absent = folder.path().join("libOpenImageDenoise.so.2").to_string_lossy().into_owned();
     for library in [&nowhere, &absent] {
-        let output = twincast(Some(library), &["render", &room, "-o", &picture, "--denoise"]);
+        let output = with_library(library, &["render", &room, "-o", &picture, "--denoise"]);
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(5), "{message}");
         let words = if cfg!(feature = "oidn") {
@@ -42,7 +37,7 @@ fn without_the_library_nothing_is_rendered_and_the_remedy_is_told() {
         assert!(!Path::new(&picture).exists());
     }
     // Whoever asks for no denoising needs no library.
-    let output = twincast(Some(&nowhere), &["render", &room, "-o", &picture, "--spp", "1", "--size", "8x8"]);
+    let output = with_library(&nowhere, &["render", &room, "-o", &picture, "--spp", "1", "--size", "8x8"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
 
@@ -52,7 +47,7 @@ fn a_file_that_is_another_library_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a.png").to_string_lossy().into_owned();
     // The C library's own loader opens it, and finds none of the functions.
-    let output = twincast(Some("libm.so.6"), &["render", &room(), "-o", &picture, "--denoise"]);
+    let output = with_library("libm.so.6", &["render", &room(), "-o", &picture, "--denoise"]);
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(5), "{message}");
     assert!(message.contains("libm.so.6: has no function oidnNewDevice"), "{message}");
@@ -63,7 +58,7 @@ fn what_cannot_go_together_ends_with_2() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a.exr").to_string_lossy().into_owned();
     for args in [&["--denoise", "--pixel", "3,4"][..], &["--denoise", "--aov", "noisy=LDE", "-o", &picture]] {
-        let output = twincast(None, &[&["render", &room()], args].concat());
+        let output = twincast(&[&["render", &room()], args].concat());
         assert_eq!(output.status.code(), Some(2), "{args:?}: {}", text(&output.stderr));
     }
 }
@@ -174,7 +169,7 @@ mod with_the_library {
         let render = |output: &str, more: &[&str]| {
             let (room, output) = (room(), path(output));
             let args = ["render", &room, "-o", &output, "--size", "48x40", "--spp", "8"];
-            let run = twincast(None, &[&args, more].concat());
+            let run = twincast(&[&args, more].concat());
             assert!(run.status.success() && run.stderr.is_empty(), "{more:?}: {}", text(&run.stderr));
             text(&run.stdout)
         };

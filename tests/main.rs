@@ -17,6 +17,7 @@ mod minray;
 mod motion;
 mod mutation;
 mod parity;
+mod program;
 mod queries;
 mod references;
 mod render;

@@ -4,6 +4,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::program::command;
+
 /// A program that is ended when the test is, whatever becomes of it.
 struct Running(Option<Child>);
 
@@ -36,7 +38,7 @@ impl Drop for Running {
 
 fn render(output: &Path, flags: &[&str]) -> Running {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml");
-    let child = Command::new(env!("CARGO_BIN_EXE_twincast"))
+    let child = command()
         .arg("render")
         .arg(scene)
         .args(["--integrator", "path", "--size", "64x48", "--spp", "192"])
@@ -94,7 +96,7 @@ fn an_interrupted_render_leaves_a_checkpoint() {
     let begin = Instant::now();
     let mut ready = None;
     for (flags, is_kept) in [(&["--checkpoint", "0.01s"][..], true), (&[], false)] {
-        let child = Command::new(env!("CARGO_BIN_EXE_twincast"))
+        let child = command()
             .arg("render")
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml"))
             .args(["--integrator", "path", "--size", "1600x1200", "--spp", "256", "--tile-size", "8", "-q", "-o"])

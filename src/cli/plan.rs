@@ -106,10 +106,12 @@ struct Document<'a> {
 
 pub(super) fn run(args: &PlanCommand) -> Result<()> {
     args.backend.check_available()?;
+    let cache = CacheArgs::default();
+    args.accel.check(args.backend, Some(&args.build), &cache)?;
+    args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;
     let (scene, warnings) = args.scene.load(args.camera.has_shutter())?;
     warn(&warnings);
-    let cache = CacheArgs::default();
     let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &cache)?.0;
     let settings = args.picture.settings(&scene.request, args.backend.best_width());
     let world = plan::world(&scene, settings.complete)?;

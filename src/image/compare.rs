@@ -61,15 +61,33 @@ impl Image {
         Ok(Self { width: self.width, height: self.height, pixels })
     }
 
-    pub(super) fn check_size(&self, other: &Self) -> Result<()> {
-        if (self.width, self.height) == (other.width, other.height) && self.pixels.len() == other.pixels.len() {
-            return Ok(());
-        }
-        Err(Error::Check(format!(
-            "the images differ in size: {} x {} and {} x {} pixels",
-            self.width, self.height, other.width, other.height
-        )))
+    fn check_size(&self, other: &Self) -> Result<()> {
+        check_extents(self.extent(), other.extent())
     }
+
+    pub(super) fn extent(&self) -> Extent {
+        Extent { width: self.width, height: self.height, pixels: self.pixels.len() }
+    }
+}
+
+/// The size of an image, and how many pixels are there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Extent {
+    width: u32,
+    height: u32,
+    pixels: usize,
+}
+
+/// # Errors
+/// [`Error::Check`] where they differ.
+pub(super) fn check_extents(one: Extent, other: Extent) -> Result<()> {
+    if one == other {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "the images differ in size: {} x {} and {} x {} pixels",
+        one.width, one.height, other.width, other.height
+    )))
 }
 
 /// In f64, where differences of f32 neither overflow nor vanish.

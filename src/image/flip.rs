@@ -5,10 +5,14 @@
 //! edges and points that one picture has and the other lacks make the difference larger. 0 is the same, 1 the largest difference there
 //! is. Root mean square errors, the simpler alternative, count a speck that everyone sees like noise that no one does.
 //!
-//! Light is clamped to 0 .. 1, as a screen shows it; further [`Response`](super::Response) is the caller's. The weights of the filters are
-//! applied as they stand, in two dimensions: pictures of charts are small.
+//! Light is clamped to 0 .. 1, as a screen shows it; further [`Response`](super::Response) is the caller's. All filters are products of
+//! one across and one down, or sums of such products, and are applied so: some 300 products a pixel, where the squares of weights, as the
+//! paper has them, take 3000.
+
+use rayon::prelude::*;
 
 use super::Image;
+use super::compare::{Extent, check_extents};
 use crate::error::Result;
 use crate::math::Vec4;
 
@@ -28,9 +32,8 @@ const BEND_AT: f64 = 0.95;
 /// The width of an edge or a point, in degrees.
 const FEATURE_WIDTH: f64 = 0.082;
 
-/// Contrast sensitivity of achromatic, red-green and blue-yellow: two Gaussians each, by weight and width (Movshon and Kiorpes 1988; Mullen 1985).
-const SENSITIVITY: [[(f64, f64); 2]; 3] =
-    [[(1.0, 0.0047), (0.0, 1e-5)], [(1.0, 0.0053), (0.0, 1e-5)], [(34.1, 0.04), (13.5, 0.025)]];
+/// Contrast sensitivity of achromatic, red-green and blue-yellow: Gaussians by weight and width (Movshon and Kiorpes 1988; Mullen 1985).
+const SENSITIVITY: [&[(f64, f64)]; 3] = [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
 
 /// XYZ of linear Rec. 709 light, row by row.
 const XYZ: [[f64; 3]; 3] = [
@@ -38,6 +41,15 @@ const XYZ: [[f64; 3]; 3] = [
     [2_613_072.0 / 12_288_897.0, 8_788_810.0 / 12_288_897.0, 887_015.0 / 12_288_897.0],
     [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
+
+/// A picture as it is seen, for one reference and many tests.
+pub struct Seen {
+    extent: Extent,
+    pixels_per_degree: f64,
+    colors: Vec<Color>,
+    /// How much of an edge and of a point there is in each pixel.
+    features: Vec<[f64; 2]>,
+}
 
 impl Image {
     /// The mean of LDR-FLIP over all pixels, 0 to 1, of this picture as the reference; alpha is left out.
@@ -47,35 +59,44 @@ impl Image {
     /// # Errors
     /// [`Error::Check`](crate::Error::Check) where the sizes differ.
     pub fn mean_flip(&self, test: &Self, pixels_per_degree: f64) -> Result<f64> {
-        self.check_size(test)?;
-        let size = (self.width as usize, self.height as usize);
-        let [(colors, features), (others, other_features)] =
-            [self, test].map(|image| seen(image, size, pixels_per_degree));
+        self.seen(pixels_per_degree).mean_flip(test)
+    }
+
+    /// The picture as it is seen at this size.
+    pub fn seen(&self, pixels_per_degree: f64) -> Seen {
+        let opponent: Vec<Color> = self.pixels.iter().map(|pixel| opponent(xyz(displayed(*pixel)))).collect();
+        let size = [self.width as usize, self.height as usize];
+        let layer = |value: &dyn Fn(&Color) -> f64| Layer { size, values: opponent.iter().map(value).collect() };
+        let blurred: [Layer; 3] =
+            std::array::from_fn(|i| layer(&|pixel| pixel[i]).resolved(SENSITIVITY[i], pixels_per_degree));
+        let color = |i: usize| {
+            let light = linear(unopponent(std::array::from_fn(|k| blurred[k].values[i])));
+            hunt(light.map(|x| x.clamp(0.0, 1.0)))
+        };
+        let features = layer(&|pixel| (pixel[0] + 16.0) / 116.0).features(pixels_per_degree);
+        let colors = (0..opponent.len()).into_par_iter().map(color).collect();
+        Seen { extent: self.extent(), pixels_per_degree, colors, features }
+    }
+}
+
+impl Seen {
+    /// [`Image::mean_flip`] of the picture that is seen.
+    ///
+    /// # Errors
+    /// [`Error::Check`](crate::Error::Check) where the sizes differ.
+    pub fn mean_flip(&self, test: &Image) -> Result<f64> {
+        check_extents(self.extent, test.extent())?;
+        let test = test.seen(self.pixels_per_degree);
         let largest = distance(&hunt([0.0, 1.0, 0.0]), &hunt([0.0, 0.0, 1.0])).powf(COLOR_EXPONENT);
-        let colors = colors.iter().zip(&others).map(|(a, b)| bend(distance(a, b).powf(COLOR_EXPONENT), largest));
-        let features = features.iter().zip(&other_features).map(|(a, b)| {
+        let colors = self.colors.iter().zip(&test.colors);
+        let colors = colors.map(|(a, b)| bend(distance(a, b).powf(COLOR_EXPONENT), largest));
+        let features = self.features.iter().zip(&test.features).map(|(a, b)| {
             let most = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
             (most / std::f64::consts::SQRT_2).powf(FEATURE_EXPONENT)
         });
         let sum: f64 = colors.zip(features).map(|(color, feature)| color.powf(1.0 - feature)).sum();
-        Ok(sum / self.pixels.len().max(1) as f64)
+        Ok(sum / self.colors.len().max(1) as f64)
     }
-}
-
-/// Each pixel's colour as it is seen, and how much of an edge and of a point there is.
-fn seen(image: &Image, size: (usize, usize), pixels_per_degree: f64) -> (Vec<Color>, Vec<[f64; 2]>) {
-    let opponent: Vec<Color> = image.pixels.iter().map(|pixel| opponent(xyz(displayed(*pixel)))).collect();
-    let blurs = SENSITIVITY.map(|gaussians| Kernel::sensitivity(gaussians, pixels_per_degree));
-    let [edge, point] = Kernel::features(pixels_per_degree);
-    let achromatic = |pixel: &Color| (pixel[0] + 16.0) / 116.0;
-    let at = |index: usize| {
-        let place = (index % size.0, index / size.0);
-        let blurred: Color = std::array::from_fn(|i| blurs[i].apply(&opponent, size, place, |pixel| pixel[i])[0]);
-        let [edge, point] = [&edge, &point].map(|kernel| kernel.apply(&opponent, size, place, achromatic));
-        let light = linear(unopponent(blurred)).map(|x| x.clamp(0.0, 1.0));
-        (hunt(light), [edge[0].hypot(edge[1]), point[0].hypot(point[1])])
-    };
-    (0..opponent.len()).map(at).unzip()
 }
 
 /// The part of light that a screen shows.
@@ -94,7 +115,8 @@ fn linear(xyz: Color) -> Color {
         let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
         a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
     };
-    [det(xyz, y, z), det(x, xyz, z), det(x, y, xyz)].map(|d| d / det(x, y, z))
+    let whole = det(x, y, z);
+    [det(xyz, y, z), det(x, xyz, z), det(x, y, xyz)].map(|d| d / whole)
 }
 
 /// XYZ as shares of those of white.
@@ -140,80 +162,90 @@ fn bend(difference: f64, largest: f64) -> f64 {
     }
 }
 
-/// A square of weights, for what lies across and for what lies down.
-struct Kernel {
-    radius: isize,
-    /// Row by row.
-    weights: Vec<[f64; 2]>,
+/// A number of each pixel, row by row.
+struct Layer {
+    /// Pixels in a row, and rows.
+    size: [usize; 2],
+    values: Vec<f64>,
 }
 
-impl Kernel {
-    fn new(radius: f64, weight: impl Fn(f64, f64) -> f64) -> Self {
-        let radius = radius.ceil() as isize;
-        let places = (-radius..=radius).flat_map(|y| (-radius..=radius).map(move |x| (x as f64, y as f64)));
-        Self { radius, weights: places.map(|(x, y)| [weight(x, y), weight(y, x)]).collect() }
-    }
-
-    /// Divides by the sum of the weights, those above and those below 0 each by their own.
-    fn normalized(mut self) -> Self {
-        for side in 0..2 {
-            let sum = |sign: f64| self.weights.iter().map(|w| (w[side] * sign).max(0.0)).sum::<f64>();
-            let (above, below) = (sum(1.0), sum(-1.0));
-            for weight in &mut self.weights {
-                weight[side] /= if weight[side] > 0.0 {
-                    above
-                } else if weight[side] < 0.0 {
-                    below
-                } else {
-                    1.0
-                };
-            }
-        }
-        self
-    }
-
+impl Layer {
     /// What the eye resolves.
-    fn sensitivity(gaussians: [(f64, f64); 2], pixels_per_degree: f64) -> Self {
+    fn resolved(&self, gaussians: &[(f64, f64)], pixels_per_degree: f64) -> Self {
         use std::f64::consts::PI;
-        let widest = SENSITIVITY.iter().flatten().map(|gaussian| gaussian.1).fold(0.0, f64::max);
+        // One radius for all three.
+        let widest = SENSITIVITY.into_iter().flatten().map(|gaussian| gaussian.1).fold(0.0, f64::max);
         let radius = 3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree;
-        let weight = |x: f64, y: f64| {
-            let squared = (x * x + y * y) / pixels_per_degree.powi(2);
-            gaussians.iter().map(|(a, b)| a * (PI / b).sqrt() * (-PI * PI * squared / b).exp()).sum::<f64>()
-        };
-        Self::new(radius, weight).normalized()
-    }
-
-    /// First and second derivatives of a Gaussian: what finds edges, and what finds points.
-    fn features(pixels_per_degree: f64) -> [Self; 2] {
-        let deviation = 0.5 * FEATURE_WIDTH * pixels_per_degree;
-        let gaussian = |x: f64, y: f64| (-(x * x + y * y) / (2.0 * deviation * deviation)).exp();
-        let edge = Self::new(3.0 * deviation, |x, y| -x * gaussian(x, y));
-        let point = Self::new(3.0 * deviation, |x, y| (x * x / (deviation * deviation) - 1.0) * gaussian(x, y));
-        [edge.normalized(), point.normalized()]
-    }
-
-    /// The weighted sums around a place; beyond the borders, the pictures go on as they end.
-    fn apply(
-        &self,
-        pixels: &[Color],
-        (width, height): (usize, usize),
-        (x, y): (usize, usize),
-        value: impl Fn(&Color) -> f64,
-    ) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        let mut weights = self.weights.iter();
-        for down in -self.radius..=self.radius {
-            let row = y.saturating_add_signed(down).min(height - 1) * width;
-            for across in -self.radius..=self.radius {
-                let value = value(&pixels[row + x.saturating_add_signed(across).min(width - 1)]);
-                let Some(weight) = weights.next() else { return sums };
-                sums[0] += weight[0] * value;
-                sums[1] += weight[1] * value;
-            }
+        let (mut sum, mut shares) = (vec![0.0; self.values.len()], 0.0);
+        for &(weight, width) in gaussians {
+            let gaussian = weights(radius, |x| (-PI * PI * (x / pixels_per_degree).powi(2) / width).exp());
+            // Of the sum of all weights, across and down.
+            let share = weight * (PI / width).sqrt() * gaussian.iter().sum::<f64>().powi(2);
+            let gaussian = normalized(gaussian);
+            let filtered = self.filtered(&gaussian, &gaussian);
+            sum.iter_mut().zip(filtered.values).for_each(|(sum, value)| *sum += share * value);
+            shares += share;
         }
-        sums
+        sum.iter_mut().for_each(|sum| *sum /= shares);
+        Self { size: self.size, values: sum }
     }
+
+    /// How much of an edge and of a point there is: by the first and second derivatives of a Gaussian.
+    fn features(&self, pixels_per_degree: f64) -> Vec<[f64; 2]> {
+        let deviation = 0.5 * FEATURE_WIDTH * pixels_per_degree;
+        let gaussian = |x: f64| (-x * x / (2.0 * deviation * deviation)).exp();
+        let of = |weight: &dyn Fn(f64) -> f64| normalized(weights(3.0 * deviation, weight));
+        let along = of(&gaussian);
+        let [edge, point] = [of(&|x| -x * gaussian(x)), of(&|x| (x * x / (deviation * deviation) - 1.0) * gaussian(x))];
+        let [edges, points] = [edge, point].map(|filter| {
+            let (across, down) = (self.filtered(&filter, &along).values, self.filtered(&along, &filter).values);
+            across.into_iter().zip(down).map(|(across, down)| across.hypot(down))
+        });
+        edges.zip(points).map(|(edge, point)| [edge, point]).collect()
+    }
+
+    /// By the product of two filters.
+    fn filtered(&self, across: &[f64], down: &[f64]) -> Self {
+        let [width, height] = self.size;
+        let rows = self.summed(across, |i| Line { first: i - i % width, step: 1, length: width, at: i % width });
+        rows.summed(down, |i| Line { first: i % width, step: width, length: height, at: i / width })
+    }
+
+    /// The weighted sum around each place on its line; beyond the borders, pictures go on as they end.
+    fn summed(&self, weights: &[f64], line: impl Fn(usize) -> Line + Sync) -> Self {
+        let radius = weights.len() / 2;
+        let sum = |i: usize| {
+            let Line { first, step, length, at } = line(i);
+            let value = |k: usize| self.values[first + step * (at + k).saturating_sub(radius).min(length - 1)];
+            weights.iter().enumerate().map(|(k, weight)| weight * value(k)).sum()
+        };
+        // A sum a pixel: the same for any number of threads.
+        Self { size: self.size, values: (0..self.values.len()).into_par_iter().map(sum).collect() }
+    }
+}
+
+/// A row or a column, and a place in it.
+struct Line {
+    first: usize,
+    step: usize,
+    length: usize,
+    at: usize,
+}
+
+/// The weights of all places up to a radius.
+fn weights(radius: f64, weight: impl Fn(f64) -> f64) -> Vec<f64> {
+    let radius = radius.ceil() as i32;
+    (-radius..=radius).map(|x| weight(x.into())).collect()
+}
+
+/// Divided by their sum, those above and those below 0 each by their own.
+fn normalized(mut weights: Vec<f64>) -> Vec<f64> {
+    let sum = |sign: f64| weights.iter().map(|weight| (weight * sign).max(0.0)).sum::<f64>();
+    let (above, below) = (sum(1.0), sum(-1.0));
+    for weight in &mut weights {
+        *weight /= if *weight < 0.0 { below } else { above };
+    }
+    weights
 }
 
 #[cfg(test)]

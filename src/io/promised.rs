@@ -27,3 +27,63 @@ pub fn promised(path: &Path) -> Option<Promised> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+        property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    /// What is promised by a file of this name and content.
+    fn of(name: &str, content: &[u8]) -> Option<Promised> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).expect("a file in it");
+        promised(&path)
+    }
+
+    /// A binary file that promises so many triangles, and has room for so many.
+    fn stl(count: u32, room: usize) -> Vec<u8> {
+        let mut bytes = vec![0; 84 + 50 * room];
+        bytes[80..84].copy_from_slice(&count.to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn heads_promise_vertices_and_triangles() {
+        // Three floats or three indices each: of PLY vertices and faces, of STL faces alone.
+        let one = Promised { triangles: 1, bytes: 4 * 12 };
+        assert_eq!(of("a.ply", PLY.as_bytes()), Some(one));
+        assert_eq!(of("a.PLY", PLY.as_bytes()), Some(one));
+        let seven = Promised { triangles: 7, bytes: 7 * 12 };
+        assert_eq!(of("a.stl", &stl(7, 7)), Some(seven));
+        assert_eq!(of("a.stl", &stl(7, 9)), Some(seven), "what follows the last one is no triangle");
+        // The first word of a text, in a file that is as long as its header says.
+        let mut solid = stl(7, 7);
+        solid[..11].copy_from_slice(b"solid facet");
+        assert_eq!(of("a.stl", &solid), Some(seven));
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_promised() {
+        assert_eq!(of("a.ply", PLY.replace("face 1", "face 99999").as_bytes()), None);
+        assert_eq!(of("a.ply", PLY.replace("vertex 3", "vertex 18446744073709551615").as_bytes()), None);
+        assert_eq!(of("a.ply", b"nothing of the kind"), None);
+        assert_eq!(of("a.stl", &stl(7, 6)), None);
+        assert_eq!(of("a.stl", &[0; 83]), None);
+        assert_eq!(promised(Path::new("no/such/file.ply")), None);
+    }
+
+    #[test]
+    fn texts_and_other_formats_promise_nothing() {
+        let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+        let mut text = format!("solid a\n{}endsolid a\n", facet.repeat(3)).into_bytes();
+        assert_eq!(of("a.stl", &text), None);
+        // Where a binary file has its number, one that the file would keep.
+        text[80..84].fill(0);
+        assert_eq!(of("a.stl", &text), None);
+        assert_eq!(of("a.obj", PLY.as_bytes()), None);
+        assert_eq!(of("ply", PLY.as_bytes()), None);
+    }
+}

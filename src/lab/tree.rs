@@ -1,9 +1,9 @@
 //! The exact nearest hit among many primitives, at a pace of hundreds of thousands of rays a second.
 //!
 //! [`oracle::closest`] meets every primitive with integers. Here a plain binary tree of boxes, in f64, says which triangles
-//! a ray may meet at all; each of those is met in f64 with a running error bound; and only where the bounds leave doubt
-//! about a sign, about which is nearest or about an end of the range does [`oracle::meet`] decide. So the answers are the
-//! same, but for the last digits of t.
+//! a ray may meet at all; of those, plain f64 under one bound for all of it passes most by (`passes_by`); each of the others is met in
+//! f64 with a running error bound; and only where the bounds leave doubt about a sign, about which is nearest or about an end of the range
+//! does [`oracle::meet`] decide. So the answers are the same, but for the last digits of t.
 //!
 //! The tree is this file's own: median splits, boxes around exact corners, slabs that are widened by far more than f64
 //! rounds. Shapes are met one by one, as their boxes would be those of the code that is judged.

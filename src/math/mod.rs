@@ -50,6 +50,12 @@ pub fn tangents(n: DVec3) -> [DVec3; 2] {
     [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
+/// The normal of a triangle, (b - a) x (c - a): not of unit length, and on the side from which a, b, c run counterclockwise.
+#[inline(always)]
+pub fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
 /// Whether a vertex may take part in tracing: finite, and small enough not to overflow.
 pub fn is_traceable(p: Vec3) -> bool {
     // Written so that NaN gives false.

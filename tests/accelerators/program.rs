@@ -1,17 +1,9 @@
 //! What the program says and draws of accelerators: flags, refusals, tables, charts.
 
-use std::process::{Command, Output};
-
 use twincast::lab::{Entrant, bench};
 use twincast::trace::accel::Accel;
 
-fn twincast(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the program runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use crate::program::{text, twincast};
 
 fn pyramid(folder: &tempfile::TempDir) -> String {
     let path = folder.path().join("scene.obj");

@@ -101,6 +101,38 @@ fn lane(hits: &PacketHits, i: usize) -> Option<(Hit, [u32; 3])> {
     (hits.lanes >> i & 1 != 0).then(|| (hit, hits.normal.map(|n| n[i].to_bits())))
 }
 
+/// Both packets, together and each by itself, against single rays and brute force. How many rays hit.
+#[track_caller]
+fn assert_packets(bvh: &Bvh, brute: &Brute, rays: &[Ray; 16], asked: u32, name: &str) -> u32 {
+    let packets = packets(rays, asked);
+    let mut together = [PacketHits::NONE, PacketHits::NONE];
+    bvh.closest_packets(&packets, &mut together);
+    let occluded = bvh.occluded_packets(&packets);
+    let mut hit_count = 0;
+    for (half, packet) in packets.iter().enumerate() {
+        let mut by_itself = [PacketHits::NONE];
+        bvh.closest_packets(std::array::from_ref(packet), &mut by_itself);
+        let [occluded_by_itself] = bvh.occluded_packets(std::array::from_ref(packet));
+        for i in 0..8 {
+            let ray = &rays[8 * half + i];
+            let is_asked = packet.lanes >> i & 1 != 0;
+            let single = bvh.closest_triangle(ray).filter(|_| is_asked);
+            let expected = single.map(|found| (found.hit, found.normal().to_array().map(f32::to_bits)));
+            let name = format!("{name}, ray {half} {i}");
+            assert_eq!(lane(&together[half], i), expected, "{name}");
+            assert_eq!(lane(&by_itself[0], i), expected, "{name}");
+            assert_eq!(occluded[half] >> i & 1 != 0, expected.is_some(), "{name}");
+            assert_eq!(occluded_by_itself >> i & 1 != 0, expected.is_some(), "{name}");
+            if is_asked {
+                assert_eq!(single.map(|found| found.hit), brute.closest(ray), "{name}");
+                assert_eq!(bvh.occludes(ray), single.is_some(), "{name}");
+                hit_count += u32::from(single.is_some());
+            }
+        }
+    }
+    hit_count
+}
+
 #[test]
 fn packets_meet_what_single_rays_and_brute_force_meet() {
     let (world, corners) = world();
@@ -112,31 +144,35 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
         let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
         for (number, rays) in families.iter().enumerate() {
             let asked = [0xffff, 0xffff, 0x0ff0, 0x8421, 0xff00][number % 5];
-            let packets = packets(rays, asked);
-            let mut together = [PacketHits::NONE, PacketHits::NONE];
-            bvh.closest_packets(&packets, &mut together);
-            let occluded = bvh.occluded_packets(&packets);
-            for (half, packet) in packets.iter().enumerate() {
-                let mut by_itself = [PacketHits::NONE];
-                bvh.closest_packets(std::array::from_ref(packet), &mut by_itself);
-                let [occluded_by_itself] = bvh.occluded_packets(std::array::from_ref(packet));
-                for i in 0..8 {
-                    let ray = &rays[8 * half + i];
-                    let is_asked = packet.lanes >> i & 1 != 0;
-                    let single = bvh.closest_triangle(ray).filter(|_| is_asked);
-                    let expected = single.map(|found| (found.hit, found.normal().to_array().map(f32::to_bits)));
-                    let name = format!("{isa:?} {preset:?}, family {number}, ray {half} {i}");
-                    assert_eq!(lane(&together[half], i), expected, "{name}");
-                    assert_eq!(lane(&by_itself[0], i), expected, "{name}");
-                    assert_eq!(occluded[half] >> i & 1 != 0, expected.is_some(), "{name}");
-                    assert_eq!(occluded_by_itself >> i & 1 != 0, expected.is_some(), "{name}");
-                    if is_asked {
-                        assert_eq!(single.map(|found| found.hit), brute.closest(ray), "{name}");
-                        assert_eq!(bvh.occludes(ray), single.is_some(), "{name}");
-                        hit_count += u32::from(single.is_some());
-                    }
-                }
+            hit_count += assert_packets(&bvh, &brute, rays, asked, &format!("{isa:?} {preset:?}, family {number}"));
+        }
+    }
+    assert!(hit_count > 5000, "{hit_count} hits");
+}
+
+/// Both ends of a range belong to it: whoever rounds either of them inwards loses these hits. At 0, no slack that is relative helps.
+#[test]
+fn packets_meet_what_lies_at_the_ends_of_their_ranges() {
+    let (world, corners) = world();
+    let brute = Brute::new(&world);
+    let mut hit_count = 0;
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
+        for (number, rays) in families(&corners).iter().enumerate() {
+            let hits: Vec<Ray> =
+                rays.iter().filter_map(|ray| Some(Ray { tmax: brute.closest(ray)?.t, ..*ray })).collect();
+            if !hits.is_empty() {
+                let at_ends = std::array::from_fn(|i| {
+                    let ray = hits[i % hits.len()];
+                    Ray { tmin: if i % 2 == 0 { ray.tmax } else { ray.tmin }, ..ray }
+                });
+                // Several with ranges of their own, or one by itself that has nowhere else to go.
+                let asked = [0xffff, 0x0101][number % 2];
+                hit_count += assert_packets(&bvh, &brute, &at_ends, asked, &format!("{isa:?}, family {number}"));
             }
+            let corner = corners[number % corners.len()];
+            let at_origin = rays.map(|ray| Ray { origin: corner, tmin: 0.0, tmax: 0.0, ..ray });
+            hit_count += assert_packets(&bvh, &brute, &at_origin, 0xffff, &format!("{isa:?}, family {number} at 0"));
         }
     }
     assert!(hit_count > 5000, "{hit_count} hits");

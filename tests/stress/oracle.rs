@@ -4,6 +4,11 @@ use twincast::lab::oracle::{self, Id};
 use twincast::lab::rays::{Aim, Query};
 use twincast::lab::stress::catalogue;
 use twincast::lab::tree::Oracle;
+use twincast::math::Vec3;
+use twincast::scene::{Geometry, Material, Mesh, Scene};
+use twincast::{Ray, World};
+
+use crate::scenes::Random;
 
 /// The tree and its filter against every primitive met exactly, on the catalogue's own scenes and rays, and on aimed ones.
 #[test]
@@ -35,4 +40,26 @@ fn the_tree_loses_nothing() {
         }
     }
     assert!(hits > 500 && ties > 20 && touching > 20, "{hits} {ties} {touching}");
+}
+
+/// Rays from the origin to an edge, exactly, where f64 rounds and may tell either side of it: those are not passed by.
+#[test]
+fn an_edge_that_is_met_exactly_is_not_passed_by() {
+    let mut random = Random::new(5);
+    for _ in 0..2000 {
+        // Whole numbers of 21 bits: a sum of six is exact in f32, and the volume of three is not in f64.
+        let mut corner = || (random.vec3() * 2f32.powi(21)).round();
+        let corners = [corner(), corner(), corner()];
+        // With its mirror image behind the ray the triangle's middle is the origin, and nothing is moved there.
+        let positions = corners.into_iter().chain(corners.map(|corner| -corner)).collect();
+        let mesh = Mesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]);
+        let scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+        let world = World::new(&scene).expect("a world");
+        let along = [1.0, 2.0, 3.0];
+        let ray = Ray::new(Vec3::ZERO, corners[0] * along[random.below(3)] + corners[1] * along[random.below(3)]);
+        let found = Oracle::new(&world, 0.0).closest(&ray);
+        let expected: Vec<Id> = oracle::closest(&world, &ray).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(found.nearest, expected, "{corners:?} {ray:?}");
+        assert!(found.touches && expected.len() == 1, "{corners:?} {ray:?}");
+    }
 }

@@ -1,14 +1,6 @@
 //! `twincast stress` and `twincast trace`.
 
-use std::process::{Command, Output};
-
-fn twincast(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_twincast")).args(args).output().expect("the binary runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("UTF-8")
-}
+use crate::program::{text, twincast};
 
 /// A folder with the matrix; a ray of it, traced again, is wrong in the same way.
 #[test]

@@ -54,23 +54,16 @@ pub(super) fn place(points: &[((f64, f64), &str)], within: Area) -> Vec<Placed> 
 fn beside(index: usize, (x, y): (f64, f64), label: &str, ring: f64, (across, up): (f64, f64)) -> Placed {
     let (width, height) = (NOTE.size * LETTER * label.chars().count() as f64, NOTE.size * LINE);
     let end = (x + across * ring, y - up * ring);
-    let left = if across > 0.0 {
-        end.0
-    } else if across < 0.0 {
-        end.0 - width
-    } else {
-        end.0 - width / 2.0
-    };
-    let top = if up > 0.0 {
-        end.1 - height
-    } else if up < 0.0 {
-        end.1
-    } else {
-        end.1 - height / 2.0
-    };
+    // What of it is at the end of the line: the side that is nearer to the point, and the middle where that line runs straight.
+    let (left, top) = (end.0 + (sign(across) - 1.0) / 2.0 * width, end.1 - (sign(up) + 1.0) / 2.0 * height);
     let area = [left, top, left + width, top + height];
     let lead = (ring > RINGS[0]).then_some([(x, y), end]);
     Placed { index, at: (left, top + 0.8 * height), lead, area }
+}
+
+/// -1, 0 or 1.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
 }
 
 fn is_inside(area: &Area, within: &Area) -> bool {
@@ -95,6 +88,22 @@ mod tests {
         let [placed] = place(&[((398.0, 100.0), "16")], WITHIN)[..] else { panic!("one label") };
         assert!(placed.area[2] < 398.0);
         assert!(place(&[((100.0, 100.0), "")], WITHIN).is_empty());
+    }
+
+    #[test]
+    fn a_label_touches_the_end_of_its_line_with_the_side_that_is_nearer() {
+        let point = (100.0, 100.0);
+        for (across, up) in DIRECTIONS {
+            let Placed { area: [left, top, right, bottom], lead, .. } = beside(0, point, "16", RINGS[1], (across, up));
+            let (x, y) = lead.expect("beyond the first ring")[1];
+            assert!((left..=right).contains(&x) && (top..=bottom).contains(&y));
+            // Where it goes neither way, its middle; else it lies beyond the line's end altogether.
+            for (towards, near, far) in [(across, left, right), (-up, top, bottom)] {
+                let (end, middle) = (if near == left { x } else { y }, near.midpoint(far));
+                assert!(if towards == 0.0 { middle == end } else { (middle - end) * towards > 0.0 });
+                assert!(towards == 0.0 || end == if towards > 0.0 { near } else { far });
+            }
+        }
     }
 
     #[test]

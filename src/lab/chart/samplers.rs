@@ -9,7 +9,7 @@ use super::scatter::{Panel, Point, Scatter};
 use super::{Figure, Setup, csv};
 use crate::error::Result;
 use crate::image::Image;
-use crate::image::flip::PIXELS_PER_DEGREE;
+use crate::image::flip::{PIXELS_PER_DEGREE, Seen};
 use crate::lab::bench::Spread;
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::render::{Adaptive, Control, Filter, Renderer, Sampling, Settings};
@@ -35,6 +35,7 @@ struct Way {
 /// A picture of many samples, and about how far it is off: root mean square.
 struct Reference {
     image: Image,
+    seen: Seen,
     error: f64,
 }
 
@@ -65,9 +66,9 @@ impl Stage<'_> {
     fn reference(&self, settings: &Settings, spp: u32) -> Result<Reference> {
         let of_seed = |seed| self.render(&Settings { spp, seed, sampling: Sampling::Sobol, ..settings.clone() });
         let [mut image, other] = [of_seed(SEEDS[0])?, of_seed(SEEDS[1])?];
-        let error = errors(&image, &other)?.rmse / 2.0;
+        let error = rmse(&image, &other) / 2.0;
         image.pixels.iter_mut().zip(&other.pixels).for_each(|(a, b)| *a = a.midpoint(*b));
-        Ok(Reference { image, error })
+        Ok(Reference::new(image, error))
     }
 }
 
@@ -100,7 +101,7 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
             // The first turn warms up.
             if turn > 0 {
                 seconds[i].push(start.elapsed().as_secs_f64());
-                let Errors { rmse, relative, flip } = errors(&image, &references[way.filter].image)?;
+                let Errors { rmse, relative, flip } = references[way.filter].errors(&image)?;
                 rmses[i].push(rmse);
                 relatives[i].push(relative);
                 flips[i].push(flip);
@@ -225,18 +226,28 @@ fn scene() -> Scene {
     scene
 }
 
-/// Of the colours of a picture.
-fn errors(image: &Image, reference: &Image) -> Result<Errors> {
-    let (mut squares, mut relative) = (0.0, 0.0);
-    for (x, r) in image.pixels.iter().zip(&reference.pixels) {
-        for (x, r) in rgb(*x).into_iter().zip(rgb(*r)) {
-            squares += (x - r).powi(2);
-            relative += (x - r).powi(2) / (r + 0.01).powi(2);
-        }
+impl Reference {
+    fn new(image: Image, error: f64) -> Self {
+        Self { seen: image.seen(PIXELS_PER_DEGREE), image, error }
     }
-    let count = 3.0 * image.pixels.len().max(1) as f64;
-    let flip = reference.mean_flip(image, PIXELS_PER_DEGREE)?;
-    Ok(Errors { rmse: (squares / count).sqrt(), relative: relative / count, flip })
+
+    /// Of the colours of a picture.
+    fn errors(&self, image: &Image) -> Result<Errors> {
+        let flip = self.seen.mean_flip(image)?;
+        let relative = mean(image, &self.image, |x, r| (x - r).powi(2) / (r + 0.01).powi(2));
+        Ok(Errors { rmse: rmse(image, &self.image), relative, flip })
+    }
+}
+
+/// Of the colours, alpha left out.
+fn rmse(image: &Image, reference: &Image) -> f64 {
+    mean(image, reference, |x, r| (x - r).powi(2)).sqrt()
+}
+
+/// Over the colours of all pixels.
+fn mean(image: &Image, reference: &Image, error: impl Fn(f64, f64) -> f64) -> f64 {
+    let pairs = image.pixels.iter().zip(&reference.pixels).flat_map(|(x, r)| rgb(*x).into_iter().zip(rgb(*r)));
+    pairs.map(|(x, r)| error(x, r)).sum::<f64>() / (3 * image.pixels.len()).max(1) as f64
 }
 
 fn rgb(pixel: Vec4) -> [f64; 3] {
@@ -254,7 +265,8 @@ mod tests {
             image.pixels = vec![Vec4::new(value, 0.0, 0.0, 1.0), Vec4::ZERO];
             image
         };
-        let Errors { rmse, relative, flip } = errors(&image(0.5), &image(0.25)).expect("of one size");
+        let Errors { rmse, relative, flip } =
+            Reference::new(image(0.25), 0.0).errors(&image(0.5)).expect("of one size");
         assert!((rmse - (0.0625f64 / 6.0).sqrt()).abs() < 1e-12);
         assert!((relative - 0.0625 / 0.26f64.powi(2) / 6.0).abs() < 1e-12);
         assert_eq!(flip, image(0.25).mean_flip(&image(0.5), PIXELS_PER_DEGREE).expect("of one size"));
@@ -270,7 +282,7 @@ mod tests {
         let reference = stage.reference(&usual, 256).expect("rendered");
         let of = |spp| {
             let image = stage.render(&Settings { spp, ..usual.clone() }).expect("rendered");
-            errors(&image, &reference.image).expect("of one size")
+            reference.errors(&image).expect("of one size")
         };
         let (few, more) = (of(1), of(16));
         assert!(

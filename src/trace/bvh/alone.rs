@@ -24,7 +24,7 @@ use super::scratch::{Scratch, with_scratch};
 use super::simd::{Mask, Simd, Vector};
 use super::slab::{self, SlabRay};
 use super::walk::{self, Stack, Visit, with_stack};
-use crate::math::Vec3;
+use crate::math::{Vec3, triangle_normal};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
 
@@ -38,11 +38,10 @@ pub struct TriangleFound {
 }
 
 impl TriangleFound {
-    /// The triangle's normal, (b - a) x (c - a), not of unit length.
+    /// The triangle's normal, not of unit length.
     #[inline(always)]
     pub fn normal(&self) -> Vec3 {
-        let [a, b, c] = self.corners;
-        (b - a).cross(c - a)
+        triangle_normal(self.corners)
     }
 }
 

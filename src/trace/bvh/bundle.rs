@@ -20,7 +20,7 @@ use super::place::Place;
 use super::query::Query;
 use super::range::Range;
 use super::simd::{Array, Group, Mask, Simd, Vector};
-use super::slab::columns;
+use super::slab::{HUGE, columns};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -86,8 +86,6 @@ pub(super) enum Fit {
 pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
 /// Absolute slack, against underflow.
 pub(super) const TINY: f32 = 1e-37;
-/// Products of this size are not trusted to be finite after a sum.
-const HUGE: f32 = 1e37;
 /// Error of a direction's component, over the depth, that counts for nothing beside its rounding.
 const NOISE: f32 = UNIT_ROUNDOFF / 8.0;
 /// Slopes beyond this spoil the bounds for all rays.

@@ -37,10 +37,10 @@ pub(super) struct SlabRay {
 }
 
 /// The smallest share of the largest direction component that a component keeps.
-const SMALLEST: f32 = 1e-18;
+pub(super) const SMALLEST: f32 = 1e-18;
 
 /// Products of this size are not trusted to be finite after a sum.
-const HUGE: f32 = 1e37;
+pub(super) const HUGE: f32 = 1e37;
 
 /// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
 /// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
@@ -57,7 +57,7 @@ impl SlabRay {
             near_offset: near.to_array(),
             far_offset: far.to_array(),
             side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
-            tmin: least_t(ray),
+            tmin: least_t(ray.tmin),
         }
     }
 
@@ -112,10 +112,10 @@ impl<V: Vector> Slabs<V> {
     }
 }
 
-/// The least t, rounded down, for t is rounded before it is held against it; not below 0.
+/// A least t, rounded down, for t is rounded before it is held against it; not below 0.
 #[inline(always)]
-fn least_t(ray: &Ray) -> f32 {
-    (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
+pub(super) fn least_t(tmin: f32) -> f32 {
+    (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
 }
 
 /// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
@@ -161,7 +161,7 @@ impl ReadyRay {
         let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
         Self {
             rows: [
-                [rx, ry, rz, least_t(ray), nx, ny, nz, begin],
+                [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, begin],
                 [fx, fy, fz, width, x, y, z, shorten],
                 [p, q, along, ax, ay, az, 0.0, 0.0],
                 [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
@@ -223,7 +223,7 @@ pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3, blur: Blur) -> ([Read
         far[axis] = S::V8::select(is_small, offset.add(width), splat(f32::MAX));
         sides[axis] = S::V8::select(is_negative, splat(f32::from_bits(1)), zero);
     }
-    // Rounded down, for t is rounded before it is held against it.
+    // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
     let filter = Filters::new(origin, direction, tmin);
     let [rx, ry, rz] = reciprocals;

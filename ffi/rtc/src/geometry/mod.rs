@@ -21,7 +21,7 @@ use crate::scene::Scene;
 
 pub use interpolate::{Place, interpolate};
 pub use linear::{Ball, Linear, Segment, Shape};
-pub use surface::{Named, Surface, normal, segment};
+pub use surface::{Named, Surface, segment};
 pub use transform::{Motion, Transform, read as read_transform, words as transform_words, write as write_transform};
 
 /// What a geometry is made of.

@@ -59,12 +59,6 @@ pub fn segment(steps: usize, (begin, end): (f32, f32), time: f32) -> (usize, f32
     (step, if at.is_nan() { 0.0 } else { at - step as f32 })
 }
 
-/// The normal of a triangle, not of unit length.
-#[inline(always)]
-pub fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-    (b - a).cross(c - a)
-}
-
 impl Surface {
     /// Reads the buffers.
     pub fn new(kind: Kind, state: &State) -> Result<Self> {

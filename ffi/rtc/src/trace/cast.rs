@@ -1,13 +1,13 @@
 //! One ray: the triangles, then everything else.
 
-use twincast::math::{DVec3, Vec3};
+use twincast::math::{DVec3, Vec3, triangle_normal};
 use twincast::trace::bvh::{Bvh, Search, TriangleFound};
 use twincast::{Ray, TriangleMethod};
 
 use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
-use crate::geometry::{Named, normal};
+use crate::geometry::Named;
 use crate::scene::{Body, Committed, Instance, Item, Record};
 
 /// The ray as the native tracer knows it.
@@ -145,7 +145,7 @@ fn cast_item<const ANY: bool>(query: &Query, target: &Target, record: &Record, i
                 let corners = surface.corners_at(primitive as usize, ray.time);
                 let native = Ray { tmax: target.tfar(), ..native(ray) };
                 if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
-                    let named = surface.name(primitive, hit.u as f32, hit.v as f32, normal(corners));
+                    let named = surface.name(primitive, hit.u as f32, hit.v as f32, triangle_normal(corners));
                     target.offer(query, record, geometry, hit.t as f32, &named);
                 }
             }

@@ -14,6 +14,7 @@ use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::axes;
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::slab::{HUGE, SMALLEST, least_t};
 use crate::trace::bvh::walk::Enter;
 
 /// Rays that go the same way.
@@ -26,22 +27,18 @@ pub(super) struct Beam {
     pub is_wide: bool,
     /// On each axis whether a box's upper side is met first.
     is_backward: [bool; 3],
-    /// Of each axis, and one number more, as a vector is stored.
-    /// What is subtracted from the sides that are met first, and last: the origin farthest on, and back, and the pad.
+    /// What is subtracted from the sides that are met first: on each axis the origin farthest on, and the pad. One number more, here and
+    /// below, as a vector is stored.
     near_origin: [f32; 4],
+    /// What is subtracted from the sides that are met last: the origin farthest back, less the pad.
     far_origin: [f32; 4],
-    /// 1 / direction.
+    /// The least of 1 / direction.
     least: [f32; 4],
+    /// The largest of it.
     most: [f32; 4],
-    /// Rounded down.
+    /// The least of all, rounded down.
     tmin: f32,
 }
-
-/// The smallest share of the largest direction component that a component keeps.
-const SMALLEST: f32 = 1e-18;
-
-/// Products of this size are not trusted to be finite after a sum.
-const HUGE: f32 = 1e37;
 
 /// Directions longer than this have reciprocals that may vanish.
 const LONGEST: f32 = 1e30;
@@ -109,7 +106,7 @@ impl Beam {
             far_origin: S::V4::select(is_backward, on, back).to_array(),
             least: shortest.to_array(),
             most: longest.to_array(),
-            tmin: (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0),
+            tmin: least_t(tmin),
         })
     }
 
