@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use twincast::math::{Aabb, Vec3};
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search};
+use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search, SingleRay};
 use twincast::{Ray, Tracer, TriangleMethod, World};
 
-use super::{Triangle, grid_sphere, triangles};
+use super::{Triangle, closest_triangle, grid_sphere, triangles};
 use crate::scenes::Random;
 
 /// Two spheres of triangles, one in the other, and rays from everywhere, also through their corners.
@@ -34,21 +34,22 @@ fn world_and_rays() -> (World, Vec<Ray>) {
 }
 
 #[test]
-fn single_rays_meet_what_brute_force_meets_with_its_corners() {
+fn single_rays_meet_what_brute_force_meets_with_its_normal() {
     let (world, rays) = world_and_rays();
     let brute = Brute::new(&world);
     let all = triangles(&world);
     for preset in Preset::ALL {
         let bvh = Bvh::build_with(&world, preset.into());
         for (i, ray) in rays.iter().enumerate() {
-            let found = bvh.closest_triangle(ray);
+            let found = closest_triangle(&bvh, ray);
             assert_eq!(found.map(|found| found.hit), brute.closest(ray));
-            assert_eq!(bvh.occludes(ray), found.is_some());
+            assert_eq!(bvh.occludes(&SingleRay::from(ray)), found.is_some());
             if let Some(found) = found
                 && i % 50 == 0
             {
                 let triangle = all.iter().find(|triangle| triangle.id == found.hit.id());
-                assert_eq!(Some(found.corners), triangle.map(|triangle| triangle.corners));
+                let normal = triangle.map(|Triangle { corners: [a, b, c], .. }| (b - a).cross(c - a));
+                assert_eq!(Some(found.normal), normal);
             }
         }
     }

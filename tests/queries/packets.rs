@@ -3,10 +3,10 @@
 use twincast::math::Vec3;
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Isa, Options, Packet, PacketHits, Preset};
+use twincast::trace::bvh::{Bvh, Isa, Options, Packet, PacketHits, Preset, SingleRay};
 use twincast::{Hit, Ray, Tracer, World};
 
-use super::grid_sphere;
+use super::{closest_triangle, grid_sphere};
 use crate::scenes::{Random, soup};
 
 /// Spheres whose corners are exact, and triangles without order.
@@ -123,8 +123,8 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
                 for i in 0..8 {
                     let ray = &rays[8 * half + i];
                     let is_asked = packet.lanes >> i & 1 != 0;
-                    let single = bvh.closest_triangle(ray).filter(|_| is_asked);
-                    let expected = single.map(|found| (found.hit, found.normal().to_array().map(f32::to_bits)));
+                    let single = closest_triangle(&bvh, ray).filter(|_| is_asked);
+                    let expected = single.map(|found| (found.hit, found.normal.to_array().map(f32::to_bits)));
                     let name = format!("{isa:?} {preset:?}, family {number}, ray {half} {i}");
                     assert_eq!(lane(&together[half], i), expected, "{name}");
                     assert_eq!(lane(&by_itself[0], i), expected, "{name}");
@@ -132,7 +132,7 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
                     assert_eq!(occluded_by_itself >> i & 1 != 0, expected.is_some(), "{name}");
                     if is_asked {
                         assert_eq!(single.map(|found| found.hit), brute.closest(ray), "{name}");
-                        assert_eq!(bvh.occludes(ray), single.is_some(), "{name}");
+                        assert_eq!(bvh.occludes(&SingleRay::from(ray)), single.is_some(), "{name}");
                         hit_count += u32::from(single.is_some());
                     }
                 }

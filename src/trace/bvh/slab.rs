@@ -25,22 +25,22 @@ use crate::ray::Ray;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlabRay {
     /// Of each axis, and one number more, as a vector is stored.
-    reciprocal: [f32; 4],
+    pub reciprocal: [f32; 4],
     /// -origin / direction, less the pad.
-    near_offset: [f32; 4],
+    pub near_offset: [f32; 4],
     /// -origin / direction, plus the pad.
-    far_offset: [f32; 4],
+    pub far_offset: [f32; 4],
     /// On each axis 1 if a box's upper side is met first, else 0.
-    side: [u32; 3],
+    pub side: [u32; 3],
     /// Rounded down, for t is rounded before it is held against it; not below 0.
-    tmin: f32,
+    pub tmin: f32,
 }
 
 /// The smallest share of the largest direction component that a component keeps.
 const SMALLEST: f32 = 1e-18;
 
 /// Products of this size are not trusted to be finite after a sum.
-const HUGE: f32 = 1e37;
+pub(super) const HUGE: f32 = 1e37;
 
 /// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
 /// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
@@ -57,7 +57,7 @@ impl SlabRay {
             near_offset: near.to_array(),
             far_offset: far.to_array(),
             side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
-            tmin: least_t(ray),
+            tmin: least_t(ray.tmin),
         }
     }
 
@@ -114,8 +114,8 @@ impl<V: Vector> Slabs<V> {
 
 /// The least t, rounded down, for t is rounded before it is held against it; not below 0.
 #[inline(always)]
-fn least_t(ray: &Ray) -> f32 {
-    (ray.tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
+pub(super) fn least_t(tmin: f32) -> f32 {
+    (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
 }
 
 /// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
@@ -161,7 +161,7 @@ impl ReadyRay {
         let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
         Self {
             rows: [
-                [rx, ry, rz, least_t(ray), nx, ny, nz, begin],
+                [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, begin],
                 [fx, fy, fz, width, x, y, z, shorten],
                 [p, q, along, ax, ay, az, 0.0, 0.0],
                 [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],

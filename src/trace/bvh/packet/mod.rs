@@ -20,7 +20,7 @@ mod octet;
 mod way;
 
 use super::Bvh;
-use super::alone::TriangleFound;
+use super::alone::{SingleRay, TriangleFound};
 use super::isa::{self, Kernel};
 use super::query::{Closest, Occluded};
 use super::scratch::{Scratch, with_scratch};
@@ -113,6 +113,16 @@ impl Packet {
         [x, y, z, dx, dy, dz, S::V8::load(&self.tmin), S::V8::load(&self.tmax)]
     }
 
+    /// The rays for walks by themselves.
+    #[inline(always)]
+    fn singles<S: Simd>(&self) -> [SingleRay; RAYS] {
+        let [x, y, z, dx, dy, dz, tmin, tmax] = self.rows::<S>();
+        let rays = S::transpose([x, y, z, tmin, dx, dy, dz, tmax]);
+        let [a, b, c, d, e, f, g, h] = rays;
+        // Written out: a closure mapped over the array may miss the instruction set.
+        [single(a), single(b), single(c), single(d), single(e), single(f), single(g), single(h)]
+    }
+
     /// A bit for each ray that is asked for and [is valid](Ray::is_valid).
     #[inline(always)]
     fn valid<S: Simd>(&self) -> u32 {
@@ -147,9 +157,9 @@ impl PacketHits {
 
     /// The hit of one ray.
     fn put(&mut self, lane: usize, found: &TriangleFound) {
-        let TriangleFound { hit, .. } = found;
+        let hit = &found.hit;
         (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
-        let normal = found.normal();
+        let normal = found.normal;
         for axis in 0..3 {
             self.normal[axis][lane] = normal[axis];
         }
@@ -165,19 +175,7 @@ impl Bvh {
         if self.fixed.triangles.tree().is_empty() {
             return hits.iter_mut().for_each(|hits| hits.lanes = 0);
         }
-        let kernel = |scratch: &mut Scratch| {
-            isa::dispatch(self.isa, ClosestPackets { bvh: self, packets, scratch, hits: &mut *hits })
-        };
-        if !with_scratch(kernel) {
-            for (packet, hits) in packets.iter().zip(hits) {
-                hits.lanes = 0;
-                for lane in packet.asked() {
-                    if let Some(found) = self.closest_triangle(&packet.ray(lane)) {
-                        hits.put(lane, &found);
-                    }
-                }
-            }
-        }
+        with_scratch(|scratch| isa::dispatch(self.isa, ClosestPackets { bvh: self, packets, scratch, hits }));
     }
 
     /// [`Bvh::occludes`] of each ray of a packet, or of two that go together: a bit for each that is occluded.
@@ -187,18 +185,18 @@ impl Bvh {
         if self.fixed.triangles.tree().is_empty() {
             return occluded;
         }
-        let kernel = |scratch: &mut Scratch| {
-            isa::dispatch(self.isa, OccludedPackets { bvh: self, packets, scratch, occluded: &mut occluded })
-        };
-        if !with_scratch(kernel) {
-            for (packet, occluded) in packets.iter().zip(&mut occluded) {
-                for lane in packet.asked() {
-                    *occluded |= u32::from(self.occludes(&packet.ray(lane))) << lane;
-                }
-            }
-        }
+        with_scratch(|scratch| {
+            isa::dispatch(self.isa, OccludedPackets { bvh: self, packets, scratch, occluded: &mut occluded });
+        });
         occluded
     }
+}
+
+/// Of its origin, tmin, direction and tmax.
+#[inline(always)]
+fn single(row: impl Array<RAYS>) -> SingleRay {
+    let [x, y, z, tmin, dx, dy, dz, tmax] = row.to_array();
+    SingleRay { origin: Vec3::new(x, y, z), tmin, direction: Vec3::new(dx, dy, dz), time: tmax, tmax }
 }
 
 struct ClosestPackets<'a, const N: usize> {
@@ -209,20 +207,31 @@ struct ClosestPackets<'a, const N: usize> {
 }
 
 impl<const N: usize> Kernel for ClosestPackets<'_, N> {
-    /// Whether the rays made a beam; else nothing was done.
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { bvh, packets, scratch: Scratch { stack, found }, hits } = self;
+    fn run<S: Simd>(self) {
+        let Self { bvh, packets, scratch, hits } = self;
         let mut own = None;
-        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
-        let mut doubts = Doubts::new(found);
-        let octets = way::trace::<S, Closest, N>(bvh, packets, &beam, stack, &mut doubts);
-        for (number, hits) in hits.iter_mut().enumerate() {
-            finish::finish::<S>(bvh, number, &packets[number % N], &octets[number % N], &doubts, hits);
+        if let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) {
+            let Scratch { stack, found } = scratch;
+            let mut doubts = Doubts::new(found);
+            let octets = way::trace::<S, Closest, N>(bvh, packets, &beam, stack, &mut doubts);
+            for (number, hits) in hits.iter_mut().enumerate() {
+                finish::finish::<S>(bvh, number, &packets[number % N], &octets[number % N], &doubts, hits);
+            }
+            return;
         }
-        true
+        let mut found = TriangleFound::NONE;
+        for (packet, hits) in packets.iter().zip(hits) {
+            let rays = packet.singles::<S>();
+            hits.lanes = 0;
+            for lane in packet.asked() {
+                if bvh.closest_alone(&rays[lane], scratch, &mut found) {
+                    hits.put(lane, &found);
+                }
+            }
+        }
     }
 }
 
@@ -234,20 +243,27 @@ struct OccludedPackets<'a, const N: usize> {
 }
 
 impl<const N: usize> Kernel for OccludedPackets<'_, N> {
-    /// Whether the rays made a beam; else nothing was done.
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { bvh, packets, scratch: Scratch { stack, found }, occluded } = self;
+    fn run<S: Simd>(self) {
+        let Self { bvh, packets, scratch, occluded } = self;
         let mut own = None;
-        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
-        let mut doubts = Doubts::new(found);
-        let octets = way::trace::<S, Occluded, N>(bvh, packets, &beam, stack, &mut doubts);
-        for (occluded, octet) in occluded.iter_mut().zip(&octets) {
-            *occluded = octet.hit;
+        if let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) {
+            let Scratch { stack, found } = scratch;
+            let mut doubts = Doubts::new(found);
+            let octets = way::trace::<S, Occluded, N>(bvh, packets, &beam, stack, &mut doubts);
+            for (occluded, octet) in occluded.iter_mut().zip(&octets) {
+                *occluded = octet.hit;
+            }
+            return;
         }
-        true
+        for (packet, occluded) in packets.iter().zip(occluded) {
+            let rays = packet.singles::<S>();
+            for lane in packet.asked() {
+                *occluded |= u32::from(bvh.occluded_alone(&rays[lane], scratch)) << lane;
+            }
+        }
     }
 }
 
