@@ -6,12 +6,12 @@ mod closest_point;
 mod packets;
 mod precise;
 
-use twincast::{Ray, World};
 use twincast::lab::exact::{Ring, Vector, dot, vector};
 use twincast::math::{Affine3, Vec3};
 use twincast::scene::Mesh;
 use twincast::trace::Primitives;
 use twincast::trace::bvh::{Bvh, SingleRay, TriangleFound};
+use twincast::{Ray, World};
 
 use crate::scenes;
 

@@ -144,7 +144,11 @@ pub(super) fn single<S: Simd, Q: Query>(
                 if other.near < next.near {
                     std::mem::swap(&mut next, &mut other);
                 }
-                if Q::ANY { stack.0[len] = other } else { stack.insert(base, len, other) }
+                if Q::ANY {
+                    stack.0[len] = other
+                } else {
+                    stack.insert(base, len, other)
+                }
                 len += 1;
             }
         }

@@ -152,15 +152,7 @@ impl Noted {
     /// Decides whether the ray hits one triangle of a block. By value, so that it need not lie in memory before.
     #[cold]
     #[inline(never)]
-    fn decide(
-        self,
-        bvh: &Bvh,
-        found: &mut Found,
-        index: u32,
-        block: &Block,
-        lane: usize,
-        ray: &SingleRay,
-    ) -> Self {
+    fn decide(self, bvh: &Bvh, found: &mut Found, index: u32, block: &Block, lane: usize, ray: &SingleRay) -> Self {
         if !self.is_doubted {
             found.start([self.sure, self.limit]);
         }

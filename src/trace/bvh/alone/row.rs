@@ -1,8 +1,8 @@
 //! A ray by itself, made ready for nodes and triangles in as few instructions as will do.
 //!
 //! An axis a lane. Most rays have directions of which no component is small against the largest, and are where products do not overflow: for
-//! these the bounds of [`slab`](super::super::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The others are made
-//! ready as [`Slabs`](super::super::slab) are for everyone, out of the way.
+//! these the bounds of [`slab`](super::super::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The
+//! others are made ready as those of everyone else, out of the way.
 
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -65,8 +65,9 @@ impl SingleRay {
         let slope = direction.mul(shorten);
         let inverse = splat(1.0).div(direction);
         let farthest = inverse.abs().mul(origin.abs().add(S::V4::load(reach)));
-        // False for NaN, and infinities become one here or there.
+        // False for NaN, which infinities become here or there.
         let is_usual = splat(STEEPEST).at_most(slope.abs()).and(farthest.less(splat(HUGE)));
+        let is_usual = is_usual.and(splat(f32::MIN_POSITIVE).at_most(largest));
         let width = farthest.mul(splat(6.5 * UNIT_ROUNDOFF));
         let offset = splat(0.0).sub(origin.mul(inverse));
         let (mut reciprocal, mut near, mut far) = (inverse, offset.sub(width), offset.add(width));
