@@ -3,7 +3,7 @@
 use twincast::math::Vec3;
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Isa, Options, Packet, PacketHits, Preset, SingleRay};
+use twincast::trace::bvh::{Asked, Bvh, Isa, Options, Packet, PacketHits, Preset, SingleRay};
 use twincast::{Hit, Ray, Tracer, World};
 
 use super::{closest_triangle, grid_sphere};
@@ -78,13 +78,11 @@ fn families(corners: &[Vec3]) -> Vec<[Ray; 16]> {
     all
 }
 
-fn packets(rays: &[Ray; 16], asked: u32) -> [Packet; 2] {
+fn packets(rays: &[Ray; 16]) -> [Packet; 2] {
     let mut packets = [Packet::NONE; 2];
     for (i, ray) in rays.iter().enumerate() {
         packets[i / 8].set(i % 8, ray);
     }
-    packets[0].lanes = asked & 0xff;
-    packets[1].lanes = asked >> 8;
     packets
 }
 
@@ -111,18 +109,20 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
     for (isa, preset) in isas.flat_map(|isa| [Preset::Default, Preset::Compact].map(|preset| (isa, preset))) {
         let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
         for (number, rays) in families.iter().enumerate() {
-            let asked = [0xffff, 0xffff, 0x0ff0, 0x8421, 0xff00][number % 5];
-            let packets = packets(rays, asked);
+            let lanes = [[0xff, 0xff], [0xff, 0xff], [0xf0, 0x0f], [0x21, 0x84], [0x00, 0xff]][number % 5];
+            let packets = packets(rays);
+            let asked = Asked { packets: packets.each_ref(), lanes };
             let mut together = [PacketHits::NONE, PacketHits::NONE];
-            bvh.closest_packets(&packets, &mut together);
-            let occluded = bvh.occluded_packets(&packets);
+            bvh.closest_packets(&asked, &mut together);
+            let occluded = bvh.occluded_packets(&asked);
             for (half, packet) in packets.iter().enumerate() {
+                let asked = Asked { packets: [packet], lanes: [lanes[half]] };
                 let mut by_itself = [PacketHits::NONE];
-                bvh.closest_packets(std::array::from_ref(packet), &mut by_itself);
-                let [occluded_by_itself] = bvh.occluded_packets(std::array::from_ref(packet));
+                bvh.closest_packets(&asked, &mut by_itself);
+                let [occluded_by_itself] = bvh.occluded_packets(&asked);
                 for i in 0..8 {
                     let ray = &rays[8 * half + i];
-                    let is_asked = packet.lanes >> i & 1 != 0;
+                    let is_asked = lanes[half] >> i & 1 != 0;
                     let single = closest_triangle(&bvh, ray).filter(|_| is_asked);
                     let expected = single.map(|found| (found.hit, found.normal.to_array().map(f32::to_bits)));
                     let name = format!("{isa:?} {preset:?}, family {number}, ray {half} {i}");
@@ -146,9 +146,10 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
 fn packets_in_an_empty_world_hit_nothing() {
     let world = World::new(&Scene::from_geometries(Vec::new(), vec![Material::default()])).expect("a world");
     let bvh = Bvh::build(&world);
-    let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16], 0xffff);
+    let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16]);
+    let asked = Asked { packets: packets.each_ref(), lanes: [0xff; 2] };
     let mut hits = [PacketHits { lanes: 7, ..PacketHits::NONE }, PacketHits::NONE];
-    bvh.closest_packets(&packets, &mut hits);
+    bvh.closest_packets(&asked, &mut hits);
     assert_eq!(hits.map(|hits| hits.lanes), [0, 0]);
-    assert_eq!(bvh.occluded_packets(&packets), [0, 0]);
+    assert_eq!(bvh.occluded_packets(&asked), [0, 0]);
 }

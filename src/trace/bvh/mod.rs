@@ -92,7 +92,7 @@ pub(super) use query::Verdict;
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;
-pub use packet::{Packet, PacketHits};
+pub use packet::{Asked, Packet, PacketHits};
 pub use preset::{Options, Preset};
 pub use steps::Steps;
 

@@ -54,7 +54,7 @@ const WIDE: f32 = 1.0 / 16.0;
 impl Beam {
     /// Of rays of which each is valid; none where they go different ways.
     #[inline(always)]
-    pub fn new<S: Simd, const N: usize>(packets: &[Packet; N], bounds: Aabb) -> Option<Self> {
+    pub fn new<S: Simd, const N: usize>(packets: &[&Packet; N], bounds: Aabb) -> Option<Self> {
         let (mut least, mut most) = (S::V8::splat(f32::INFINITY), S::V8::splat(f32::NEG_INFINITY));
         for packet in packets {
             // Each row a ray: the least and the most of all its numbers at once.
