@@ -132,12 +132,6 @@ pub fn intersect<Co: Corners>(ray: &Ray, corners: &Co) -> Option<TriangleHit> {
     (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
 }
 
-/// The same for who knows that the triangle is hit, and that f64 is precise enough for its numbers.
-#[inline(always)]
-pub(crate) fn intersect_surely(ray: &Ray, corners: &[Vec3; 3]) -> TriangleHit {
-    Seen::new(ray.origin.as_dvec3(), ray.direction.as_dvec3(), corners.rounded()).hit()
-}
-
 /// The intersection with the line from `origin` along `d`, at any t. Whether there is one is exact for these f64, too.
 #[inline]
 pub fn intersect_line<Co: Corners>(origin: DVec3, d: DVec3, corners: &Co) -> Option<TriangleHit> {

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use twincast::math::{Aabb, Vec3};
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search};
+use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search, SingleRay, TriangleFound};
 use twincast::{Ray, Tracer, TriangleMethod, World};
 
-use super::{Triangle, grid_sphere, triangles};
+use super::{Triangle, closest_triangle, grid_sphere, triangles};
 use crate::scenes::Random;
 
 /// Two spheres of triangles, one in the other, and rays from everywhere, also through their corners.
@@ -27,29 +27,60 @@ fn world_and_rays() -> (World, Vec<Ray>) {
         };
         rays.push(Ray::new(origin, target - origin));
     }
-    rays.push(Ray::new(Vec3::NAN, Vec3::X));
+    // Along axes, all but along them, short, long, from far away, and none at all.
+    for i in 0..600 {
+        let target = sphere.positions[i % sphere.positions.len()];
+        let mut direction = target - random.vec3() * 3.0;
+        direction[i % 3] *= [0.0, -0.0, 1e-20, -1e-17, 1e-15][i % 5];
+        direction *= [1.0, 1e-30, 1e25, 1e-37][i % 4];
+        rays.push(Ray::new(target - direction * [1.0, 1e30, 1e-25, 1e37][i % 4] * [1.0, 1.0, 1e4][i % 3], direction));
+    }
+    let infinite = Vec3::splat(f32::INFINITY);
+    for direction in [Vec3::NAN, Vec3::ZERO, infinite, Vec3::new(0.0, f32::NAN, 1.0), Vec3::splat(1e-42)] {
+        rays.extend([Ray::new(Vec3::ZERO, direction), Ray::new(infinite, Vec3::X), Ray::new(Vec3::NAN, Vec3::ONE)]);
+    }
+    rays.push(Ray { tmin: 2.0, tmax: 1.0, ..Ray::new(Vec3::ZERO, Vec3::ONE) });
+    rays.push(Ray { tmax: f32::NAN, ..Ray::new(Vec3::ZERO, Vec3::ONE) });
     let geometries = vec![Geometry::Mesh(sphere), Geometry::Mesh(larger)];
     let scene = Scene::from_geometries(geometries, vec![Material::default()]);
     (World::new(&scene).expect("a world"), rays)
 }
 
 #[test]
-fn single_rays_meet_what_brute_force_meets_with_its_corners() {
+fn single_rays_meet_what_brute_force_meets_with_its_normal() {
     let (world, rays) = world_and_rays();
     let brute = Brute::new(&world);
     let all = triangles(&world);
-    for preset in Preset::ALL {
-        let bvh = Bvh::build_with(&world, preset.into());
+    let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available());
+    for (isa, preset) in isas.flat_map(|isa| Preset::ALL.map(|preset| (isa, preset))) {
+        let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
         for (i, ray) in rays.iter().enumerate() {
-            let found = bvh.closest_triangle(ray);
+            let found = closest_triangle(&bvh, ray);
             assert_eq!(found.map(|found| found.hit), brute.closest(ray));
-            assert_eq!(bvh.occludes(ray), found.is_some());
+            assert_eq!(bvh.occludes(&SingleRay::from(ray)), found.is_some());
             if let Some(found) = found
                 && i % 50 == 0
             {
                 let triangle = all.iter().find(|triangle| triangle.id == found.hit.id());
-                assert_eq!(Some(found.corners), triangle.map(|triangle| triangle.corners));
+                let normal = triangle.map(|Triangle { corners: [a, b, c], .. }| (b - a).cross(c - a));
+                assert_eq!(Some(found.normal), normal);
             }
+        }
+    }
+}
+
+#[test]
+fn a_ray_begins_at_its_origin_at_the_earliest() {
+    let (world, rays) = world_and_rays();
+    let bvh = Bvh::build(&world);
+    for ray in rays.iter().step_by(5) {
+        for tmin in [-1.0, f32::NEG_INFINITY, f32::NAN, -0.0] {
+            let early = SingleRay { tmin, ..SingleRay::from(ray) };
+            let mut found = TriangleFound::NONE;
+            let hit = bvh.closest_triangle(&early, &mut found).then_some(found);
+            assert_eq!(hit, closest_triangle(&bvh, ray));
+            assert_eq!(bvh.occludes(&early), hit.is_some());
+            assert_eq!(early.ray().tmin, 0.0);
         }
     }
 }

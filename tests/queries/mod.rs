@@ -6,11 +6,12 @@ mod closest_point;
 mod packets;
 mod precise;
 
-use twincast::World;
 use twincast::lab::exact::{Ring, Vector, dot, vector};
 use twincast::math::{Affine3, Vec3};
 use twincast::scene::Mesh;
 use twincast::trace::Primitives;
+use twincast::trace::bvh::{Bvh, SingleRay, TriangleFound};
+use twincast::{Ray, World};
 
 use crate::scenes;
 
@@ -22,6 +23,12 @@ struct Triangle {
     indices: [u32; 3],
     to_world: Option<Affine3>,
     id: Id,
+}
+
+/// The nearest triangle that a ray by itself hits.
+fn closest_triangle(bvh: &Bvh, ray: &Ray) -> Option<TriangleFound> {
+    let mut found = TriangleFound::NONE;
+    bvh.closest_triangle(&SingleRay::from(ray), &mut found).then_some(found)
 }
 
 /// Every triangle, placed ones as often as they are placed.

@@ -3,10 +3,10 @@
 use twincast::math::Vec3;
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Isa, Options, Packet, PacketHits, Preset};
+use twincast::trace::bvh::{Asked, Bvh, Isa, Options, Packet, PacketHits, Preset, SingleRay};
 use twincast::{Hit, Ray, Tracer, World};
 
-use super::grid_sphere;
+use super::{closest_triangle, grid_sphere};
 use crate::scenes::{Random, soup};
 
 /// Spheres whose corners are exact, and triangles without order.
@@ -78,13 +78,11 @@ fn families(corners: &[Vec3]) -> Vec<[Ray; 16]> {
     all
 }
 
-fn packets(rays: &[Ray; 16], asked: u32) -> [Packet; 2] {
+fn packets(rays: &[Ray; 16]) -> [Packet; 2] {
     let mut packets = [Packet::NONE; 2];
     for (i, ray) in rays.iter().enumerate() {
         packets[i / 8].set(i % 8, ray);
     }
-    packets[0].lanes = asked & 0xff;
-    packets[1].lanes = asked >> 8;
     packets
 }
 
@@ -104,20 +102,23 @@ fn lane(hits: &PacketHits, i: usize) -> Option<(Hit, [u32; 3])> {
 /// Both packets, together and each by itself, against single rays and brute force. How many rays hit.
 #[track_caller]
 fn assert_packets(bvh: &Bvh, brute: &Brute, rays: &[Ray; 16], asked: u32, name: &str) -> u32 {
-    let packets = packets(rays, asked);
+    let packets = packets(rays);
+    let lanes = [asked & 0xff, asked >> 8];
+    let asked = Asked { packets: packets.each_ref(), lanes };
     let mut together = [PacketHits::NONE, PacketHits::NONE];
-    bvh.closest_packets(&packets, &mut together);
-    let occluded = bvh.occluded_packets(&packets);
+    bvh.closest_packets(&asked, &mut together);
+    let occluded = bvh.occluded_packets(&asked);
     let mut hit_count = 0;
     for (half, packet) in packets.iter().enumerate() {
+        let asked = Asked { packets: [packet], lanes: [lanes[half]] };
         let mut by_itself = [PacketHits::NONE];
-        bvh.closest_packets(std::array::from_ref(packet), &mut by_itself);
-        let [occluded_by_itself] = bvh.occluded_packets(std::array::from_ref(packet));
+        bvh.closest_packets(&asked, &mut by_itself);
+        let [occluded_by_itself] = bvh.occluded_packets(&asked);
         for i in 0..8 {
             let ray = &rays[8 * half + i];
-            let is_asked = packet.lanes >> i & 1 != 0;
-            let single = bvh.closest_triangle(ray).filter(|_| is_asked);
-            let expected = single.map(|found| (found.hit, found.normal().to_array().map(f32::to_bits)));
+            let is_asked = lanes[half] >> i & 1 != 0;
+            let single = closest_triangle(bvh, ray).filter(|_| is_asked);
+            let expected = single.map(|found| (found.hit, found.normal.to_array().map(f32::to_bits)));
             let name = format!("{name}, ray {half} {i}");
             assert_eq!(lane(&together[half], i), expected, "{name}");
             assert_eq!(lane(&by_itself[0], i), expected, "{name}");
@@ -125,7 +126,7 @@ fn assert_packets(bvh: &Bvh, brute: &Brute, rays: &[Ray; 16], asked: u32, name: 
             assert_eq!(occluded_by_itself >> i & 1 != 0, expected.is_some(), "{name}");
             if is_asked {
                 assert_eq!(single.map(|found| found.hit), brute.closest(ray), "{name}");
-                assert_eq!(bvh.occludes(ray), single.is_some(), "{name}");
+                assert_eq!(bvh.occludes(&SingleRay::from(ray)), single.is_some(), "{name}");
                 hit_count += u32::from(single.is_some());
             }
         }
@@ -182,9 +183,10 @@ fn packets_meet_what_lies_at_the_ends_of_their_ranges() {
 fn packets_in_an_empty_world_hit_nothing() {
     let world = World::new(&Scene::from_geometries(Vec::new(), vec![Material::default()])).expect("a world");
     let bvh = Bvh::build(&world);
-    let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16], 0xffff);
+    let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16]);
+    let asked = Asked { packets: packets.each_ref(), lanes: [0xff; 2] };
     let mut hits = [PacketHits { lanes: 7, ..PacketHits::NONE }, PacketHits::NONE];
-    bvh.closest_packets(&packets, &mut hits);
+    bvh.closest_packets(&asked, &mut hits);
     assert_eq!(hits.map(|hits| hits.lanes), [0, 0]);
-    assert_eq!(bvh.occluded_packets(&packets), [0, 0]);
+    assert_eq!(bvh.occluded_packets(&asked), [0, 0]);
 }

@@ -4,6 +4,7 @@
 //! thread, and told to the device's error function at once. Where there is no device (a null handle), it is kept
 //! for the thread alone.
 
+use std::any::Any;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -65,19 +66,29 @@ pub fn take_homeless() -> u32 {
 
 /// Runs what a function of the interface does. `device` is asked only after an error. A panic, which is a bug of this
 /// library, is told as an unknown error; it must not unwind into code that knows nothing of it.
+#[inline(always)]
 pub fn guard<'a, T>(default: T, device: impl FnOnce() -> Option<&'a Device>, work: impl FnOnce() -> Result<T>) -> T {
-    let failure = match catch_unwind(AssertUnwindSafe(work)) {
+    match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(value)) => return value,
-        Ok(Err(failure)) => failure,
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-            Failure { code: Code::Unknown, message: format!("panic: {}", text.unwrap_or("no message")) }
-        }
-    };
-    match device() {
-        Some(device) => device.report(&failure),
+        Ok(Err(failure)) => report(device(), &failure),
+        Err(panic) => report(device(), &of_panic(&*panic)),
+    }
+    default
+}
+
+#[cold]
+fn of_panic(panic: &(dyn Any + Send)) -> Failure {
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    Failure { code: Code::Unknown, message: format!("panic: {}", text.unwrap_or("no message")) }
+}
+
+/// Tells of an error where it is looked for.
+#[cold]
+#[inline(never)]
+fn report(device: Option<&Device>, failure: &Failure) {
+    match device {
+        Some(device) => device.report(failure),
         None if HOMELESS.get() == NONE => HOMELESS.set(failure.code as u32),
         None => {}
     }
-    default
 }

@@ -76,8 +76,14 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx512 => unsafe { with_avx512(kernel) },
-        _ => kernel.run::<Portable>(),
+        _ => portable(kernel),
     }
+}
+
+/// Not inlined: whoever has something better need not make room for it.
+#[inline(never)]
+fn portable<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Portable>()
 }
 
 #[cfg(target_arch = "x86_64")]

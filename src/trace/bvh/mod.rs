@@ -18,7 +18,7 @@
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
-//! | `alone` | one ray at a time, with the corners of what it hits; or with a visitor that says what counts |
+//! | `alone` | one ray at a time, with the normal of what it hits; or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
 //! | `scratch` | what both need of a thread |
 //! | `boxes` | a tree over boxes of the caller's |
@@ -82,7 +82,7 @@ mod triangles;
 mod walk;
 mod woop;
 
-pub use alone::{Search, TriangleFound};
+pub use alone::{Search, SingleRay, TriangleFound};
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use near::Waiting;
@@ -92,7 +92,7 @@ pub(super) use query::Verdict;
 pub use cache::{Cache, CacheReport, CacheUse};
 pub use closest_point::ClosestPoint;
 pub use isa::Isa;
-pub use packet::{Packet, PacketHits};
+pub use packet::{Asked, Packet, PacketHits};
 pub use preset::{Options, Preset};
 pub use steps::Steps;
 

@@ -140,12 +140,20 @@ impl Node {
     }
 }
 
+/// The largest coordinate's magnitude on each axis.
+fn reach(bounds: Aabb) -> [f32; 4] {
+    let Vec3 { x, y, z } = bounds.min.abs().max(bounds.max.abs());
+    [x, y, z, 0.0]
+}
+
 /// A tree over items of any kind; leaves name ranges of them.
 #[derive(Debug)]
 pub(super) struct Tree {
     /// The root is the first; empty for no items.
     nodes: Array<Node>,
     bounds: Aabb,
+    /// [`Tree::reach`], as a vector is loaded.
+    reach: [f32; 4],
 }
 
 impl Tree {
@@ -153,7 +161,7 @@ impl Tree {
     pub fn new(nodes: impl Into<Array<Node>>) -> Self {
         let nodes = nodes.into();
         let bounds = nodes.first().map_or(Aabb::EMPTY, Node::bounds);
-        Self { nodes, bounds }
+        Self { nodes, bounds, reach: reach(bounds) }
     }
 
     /// All of them; the root is the first.
@@ -182,7 +190,14 @@ impl Tree {
     /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to.
     #[inline]
     pub fn reach(&self) -> Vec3 {
-        self.bounds.min.abs().max(self.bounds.max.abs())
+        let [x, y, z, _] = self.reach;
+        Vec3::new(x, y, z)
+    }
+
+    /// The same, and one number more, as a vector is loaded.
+    #[inline(always)]
+    pub fn reach_row(&self) -> &[f32; 4] {
+        &self.reach
     }
 
     /// Memory it holds, in bytes.
@@ -213,7 +228,7 @@ impl Tree {
             }
         }
         nodes.append(below);
-        Self { nodes: nodes.into(), bounds: self.bounds }
+        Self { nodes: nodes.into(), ..self }
     }
 
     /// Computes all boxes again, from those of the leaves' blocks.
@@ -239,6 +254,7 @@ impl Tree {
             }
         }
         self.bounds = self.nodes.first().map_or(Aabb::EMPTY, Node::bounds);
+        self.reach = reach(self.bounds);
     }
 
     /// All nodes, so that leaves can be renamed.

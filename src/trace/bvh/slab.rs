@@ -25,15 +25,15 @@ use crate::ray::Ray;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlabRay {
     /// Of each axis, and one number more, as a vector is stored.
-    reciprocal: [f32; 4],
+    pub reciprocal: [f32; 4],
     /// -origin / direction, less the pad.
-    near_offset: [f32; 4],
+    pub near_offset: [f32; 4],
     /// -origin / direction, plus the pad.
-    far_offset: [f32; 4],
+    pub far_offset: [f32; 4],
     /// On each axis 1 if a box's upper side is met first, else 0.
-    side: [u32; 3],
+    pub side: [u32; 3],
     /// Rounded down, for t is rounded before it is held against it; not below 0.
-    tmin: f32,
+    pub tmin: f32,
 }
 
 /// The smallest share of the largest direction component that a component keeps.

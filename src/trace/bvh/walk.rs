@@ -49,39 +49,27 @@ impl Entry {
 /// Every level of the tree leaves at most seven siblings waiting.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
 
-/// Children waiting to be visited, the nearest on top. Made once a batch, since filling it costs as much as a few nodes.
-pub(super) struct Stack {
-    entries: [Entry; STACK],
-    len: usize,
-}
+/// Where children are entered: within one cache line, for it is stored whole and loaded one by one.
+#[repr(align(32))]
+struct Near([f32; WIDTH]);
+
+/// Room for children waiting to be visited. Made once a batch, since filling it costs as much as a few nodes.
+pub(super) struct Stack([Entry; STACK]);
 
 impl Stack {
     pub const fn new() -> Self {
-        Self { entries: [Entry::ROOT; STACK], len: 0 }
+        Self([Entry::ROOT; STACK])
     }
 
+    /// Puts an entry on top of `len` others, but below those since `base` that are nearer.
     #[inline(always)]
-    fn pop(&mut self) -> Option<Entry> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.entries[self.len])
-    }
-
-    #[inline(always)]
-    fn push(&mut self, entry: Entry) {
-        self.entries[self.len] = entry;
-        self.len += 1;
-    }
-
-    /// Pushes so that of what came since `base` the nearest ends on top.
-    #[inline(always)]
-    fn insert(&mut self, base: usize, entry: Entry) {
-        let mut at = self.len;
-        while at > base && self.entries[at - 1].near < entry.near {
-            self.entries[at] = self.entries[at - 1];
+    fn insert(&mut self, base: usize, len: usize, entry: Entry) {
+        let mut at = len;
+        while at > base && self.0[at - 1].near < entry.near {
+            self.0[at] = self.0[at - 1];
             at -= 1;
         }
-        self.entries[at] = entry;
-        self.len += 1;
+        self.0[at] = entry;
     }
 }
 
@@ -122,7 +110,8 @@ pub(super) fn single<S: Simd, Q: Query>(
     mut limit: f32,
     mut leaf: impl FnMut(Child) -> Visit,
 ) {
-    stack.len = 0;
+    // Children on the stack, the nearest on top.
+    let mut len = 0;
     let mut next = Entry::ROOT;
     loop {
         // Down to a leaf. Mostly one or two children are entered: each number has its own branch, which is predicted
@@ -130,31 +119,37 @@ pub(super) fn single<S: Simd, Q: Query>(
         while !next.child.is_leaf() {
             let node = tree.node(next.child);
             let (mask, near) = ray.enter::<S>(node, limit);
-            let (mask, near) = (mask.bits(), near.to_array());
+            let (mask, Near(near)) = (mask.bits(), &Near(near.to_array()));
             if mask == 0 {
                 break;
             }
             let (first, rest) = lowest(mask);
-            next = Entry::child(node, &near, first);
+            next = Entry::child(node, near, first);
             if rest == 0 {
                 continue;
             }
             let (second, rest) = lowest(rest);
-            let mut other = Entry::child(node, &near, second);
+            let mut other = Entry::child(node, near, second);
             if other.near < next.near {
                 std::mem::swap(&mut next, &mut other);
             }
-            let base = stack.len;
-            stack.push(other);
+            let base = len;
+            stack.0[len] = other;
+            len += 1;
             let mut rest = rest;
             while rest != 0 {
                 let (slot, others) = lowest(rest);
                 rest = others;
-                let mut other = Entry::child(node, &near, slot);
+                let mut other = Entry::child(node, near, slot);
                 if other.near < next.near {
                     std::mem::swap(&mut next, &mut other);
                 }
-                if Q::ANY { stack.push(other) } else { stack.insert(base, other) }
+                if Q::ANY {
+                    stack.0[len] = other
+                } else {
+                    stack.insert(base, len, other)
+                }
+                len += 1;
             }
         }
         if next.child.is_leaf() {
@@ -164,10 +159,13 @@ pub(super) fn single<S: Simd, Q: Query>(
             }
         }
         next = loop {
-            match stack.pop() {
-                Some(entry) if entry.near <= limit => break entry,
-                Some(_) => {}
-                None => return,
+            if len == 0 {
+                return;
+            }
+            len -= 1;
+            let entry = stack.0[len];
+            if entry.near <= limit {
+                break entry;
             }
         };
     }

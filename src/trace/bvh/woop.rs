@@ -14,7 +14,7 @@
 //!
 //! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
 //! of the direction by r times the largest, r <= 2^-10, and k <= 1: the shear is off by (1 + k) r / (1 - r), so that a sheared component
-//! errs by 2 b + 2.1 r L besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
+//! errs by 2 b + 2.1 r (Z + S) besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
 //! but for their errors; and t |along| by r.
 //!
 //! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
@@ -80,10 +80,11 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
     // less than e.
     let Blur { origin: blur, direction } = if BLURRED { blur } else { Blur::NONE };
-    // (4 + 5 k) u, one u of which is for the bound's own rounding.
-    let relative = aim.width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * direction - UNIT_ROUNDOFF));
+    // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
+    let of_depth = aim.width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * direction - 4.0 * UNIT_ROUNDOFF));
+    let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
     let slack = SLACK + 2.0 * direction;
-    let e = deep.mul_add(relative, reach.mul_add(relative, splat(2.2 * blur)));
+    let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur)));
     let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
     let zero = splat(0.0);

@@ -47,17 +47,16 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
 /// The nearest hit, or any, of the target's ray; `ANY` as the target was made.
 #[inline(always)]
 pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
-    let ray = target.ray();
-    match sight(committed, query, ray.mask, ANY) {
+    match sight(committed, query, target.mask(), ANY) {
         Sight::Nothing => return,
         Sight::Everything => {
             if let Some(solid) = &committed.solid {
-                cast_solid::<ANY>(committed, solid, query, target, &native(&ray));
+                cast_solid::<ANY>(committed, solid, query, target);
             }
         }
         Sight::Some => {
             if let Some(solid) = &committed.solid {
-                show_solid(committed, solid, query, target, &ray);
+                show_solid(committed, solid, query, target, &target.ray());
             }
         }
     }
@@ -74,17 +73,22 @@ pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
 
 /// Among the triangles, of which each counts.
 #[inline(always)]
-fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query, target: &Target, ray: &Ray) {
+fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query, target: &Target) {
     if ANY {
-        if solid.occludes(ray) {
+        // SAFETY: nobody writes to the ray meanwhile.
+        if solid.occludes(unsafe { target.single() }) {
             let named = Named { primitive: 0, u: 0.0, v: 0.0, ng: Vec3::ZERO };
             target.take(query, 0, 0.0, &named);
         }
-    } else if let Some(found) = solid.closest_triangle(ray)
-        && let TriangleFound { hit, .. } = &found
-        && let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], found.normal())
-    {
-        target.take(query, hit.geometry, hit.t, &named);
+        return;
+    }
+    let mut found = TriangleFound::NONE;
+    // SAFETY: as above.
+    if solid.closest_triangle(unsafe { target.single() }, &mut found) {
+        let TriangleFound { hit, normal } = &found;
+        if let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], *normal) {
+            target.take(query, hit.geometry, hit.t, &named);
+        }
     }
 }
 
@@ -107,7 +111,7 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: &Query, target: &Target
             && hit.t <= target.tfar()
             && let Body::Surface(surface) = &record.body
         {
-            let named = surface.name(hit.primitive, hit.u, hit.v, found.normal());
+            let named = surface.name(hit.primitive, hit.u, hit.v, found.normal);
             target.offer(query, record, hit.geometry, hit.t, &named);
         }
         onwards(target)

@@ -2,6 +2,8 @@
 
 use std::mem::{size_of, transmute};
 
+use twincast::trace::bvh::Packet;
+
 use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay};
 
 /// Rays of the caller's, by number; those words of all rays that are the same lie side by side.
@@ -19,6 +21,15 @@ pub trait Lanes {
         }
         // SAFETY: both are that many words, of which each may be anything.
         unsafe { transmute::<[u32; RAY_WORDS], RTCRay>(words) }
+    }
+
+    /// Eight rays where they are; none where they do not lie as the native tracer reads them.
+    ///
+    /// # Safety
+    /// Nobody writes to them as long as the result is used.
+    #[inline(always)]
+    unsafe fn packet(&self, _first: usize) -> Option<&Packet> {
+        None
     }
 
     /// One word of eight rays.
@@ -70,6 +81,13 @@ pub trait Lanes {
 pub const TFAR: usize = 8;
 
 const _: () = {
+    use std::mem::offset_of;
+    // Eight of each word, in the order of the words of a ray.
+    assert!(offset_of!(Packet, origin) == 8 * offset_of!(RTCRay, org));
+    assert!(offset_of!(Packet, tmin) == 8 * offset_of!(RTCRay, tnear));
+    assert!(offset_of!(Packet, direction) == 8 * offset_of!(RTCRay, dir));
+    assert!(offset_of!(Packet, time) == 8 * offset_of!(RTCRay, time));
+    assert!(offset_of!(Packet, tmax) == 8 * offset_of!(RTCRay, tfar));
     assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);
     assert!(std::mem::offset_of!(RTCRay, tfar) == 4 * TFAR);
 };
@@ -93,6 +111,13 @@ impl Lanes for Packed {
     #[inline(always)]
     fn word(&self, word: usize, lane: usize) -> *mut u32 {
         self.base.wrapping_add(word * self.width + lane)
+    }
+
+    #[inline(always)]
+    unsafe fn packet(&self, _first: usize) -> Option<&Packet> {
+        let packet = self.base.cast::<Packet>().cast_const();
+        // SAFETY: who made the lanes promised that there are eight rays, which begin with one of these, and the caller that nobody writes to them.
+        (self.width == Packet::RAYS && packet.is_aligned()).then(|| unsafe { &*packet })
     }
 }
 

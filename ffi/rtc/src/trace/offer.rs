@@ -2,10 +2,22 @@
 
 use std::ffi::c_int;
 
+use twincast::trace::bvh::SingleRay;
+
 use super::Query;
 use crate::abi::{RTCContext, RTCFilterFunctionN, RTCFilterFunctionNArguments, RTCHit, RTCRay, RTCRayHit};
 use crate::geometry::Named;
 use crate::scene::Record;
+
+const _: () = {
+    use std::mem::offset_of;
+    assert!(size_of::<SingleRay>() <= size_of::<RTCRay>() && align_of::<SingleRay>() <= align_of::<RTCRay>());
+    assert!(offset_of!(SingleRay, origin) == offset_of!(RTCRay, org));
+    assert!(offset_of!(SingleRay, tmin) == offset_of!(RTCRay, tnear));
+    assert!(offset_of!(SingleRay, direction) == offset_of!(RTCRay, dir));
+    assert!(offset_of!(SingleRay, time) == offset_of!(RTCRay, time));
+    assert!(offset_of!(SingleRay, tmax) == offset_of!(RTCRay, tfar));
+};
 
 /// A ray of the caller's, and where its hit goes; nowhere for a ray that asks for any hit.
 ///
@@ -40,6 +52,23 @@ impl Target {
     pub fn ray(&self) -> RTCRay {
         // SAFETY: readable, as who made the target promised.
         unsafe { self.ray.read() }
+    }
+
+    /// The ray as the native tracer reads it, where it is.
+    ///
+    /// # Safety
+    /// Nobody writes to it as long as the result is used.
+    #[inline(always)]
+    pub unsafe fn single(&self) -> &SingleRay {
+        // SAFETY: readable, as who made the target promised, and not written to; a ray begins with one of these.
+        unsafe { &*self.ray.cast::<SingleRay>() }
+    }
+
+    /// Its mask.
+    #[inline(always)]
+    pub fn mask(&self) -> u32 {
+        // SAFETY: as in `ray`.
+        unsafe { (*self.ray).mask }
     }
 
     /// Where it is.

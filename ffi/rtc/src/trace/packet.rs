@@ -4,7 +4,7 @@
 //! into a [`Packet`] and back. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
 
 use twincast::math::Vec3;
-use twincast::trace::bvh::{Bvh, Packet, PacketHits};
+use twincast::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{Sight, cast_one, name_solid, sight};
@@ -16,14 +16,14 @@ use crate::scene::Committed;
 /// Rays of a packet.
 const RAYS: usize = Packet::RAYS;
 
-/// The lanes of a query that are asked for.
-struct Asked<'a, L, V> {
+/// The lanes of a query, and which of them are asked for.
+struct Called<'a, L, V> {
     lanes: &'a L,
     count: usize,
     is_valid: V,
 }
 
-impl<L: Lanes, V: Fn(usize) -> bool> Asked<'_, L, V> {
+impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     /// Calls `two` and `one` with the triangles, packets of rays that see all of them and nothing else, and the first lane; or `alone` with every
     /// lane.
     #[inline(always)]
@@ -33,47 +33,64 @@ impl<L: Lanes, V: Fn(usize) -> bool> Asked<'_, L, V> {
         query: &Query,
         any: bool,
         alone: impl Fn(usize),
-        two: impl Fn(&Bvh, &[Packet; 2], usize),
-        one: impl Fn(&Bvh, &[Packet; 1], usize),
+        two: impl Fn(&Bvh, &Asked<'_, 2>, usize),
+        one: impl Fn(&Bvh, &Asked<'_, 1>, usize),
     ) {
         let Some((solid, mask)) = plain(committed, query, any) else {
             return (0..self.count).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
         };
         let mut first = 0;
         while first + 2 * RAYS <= self.count {
-            two(solid, &[self.packet(first, mask), self.packet(first + RAYS, mask)], first);
+            let [low, high] = [self.packet(first), self.packet(first + RAYS)];
+            let lanes = [self.seeing(first, mask), self.seeing(first + RAYS, mask)];
+            two(solid, &Asked { packets: [&low, &high], lanes }, first);
             first += 2 * RAYS;
         }
         while first < self.count {
-            one(solid, &[self.packet(first, mask)], first);
+            let lanes = [self.seeing(first, mask)];
+            // SAFETY: nobody writes to them before it is answered.
+            match unsafe { self.lanes.packet(first) } {
+                Some(packet) => one(solid, &Asked { packets: [packet], lanes }, first),
+                None => one(solid, &Asked { packets: [&self.packet(first)], lanes }, first),
+            }
             first += RAYS;
         }
     }
 
-    /// The rays from lane `first` on, of which those are asked for that are valid and have a bit in common with `mask`.
+    /// The rays from lane `first` on.
     #[inline(always)]
-    fn packet(&self, first: usize, mask: u32) -> Packet {
-        let Self { lanes, count, is_valid } = self;
+    fn packet(&self, first: usize) -> Packet {
         let mut packet = Packet::NONE;
-        if first + RAYS > *count {
-            for lane in first..*count {
-                let ray = lanes.ray(lane);
-                if is_valid(lane) && ray.mask & mask != 0 {
-                    packet.set(lane - first, &super::cast::native(&ray));
-                }
+        if first + RAYS > self.count {
+            for lane in first..self.count {
+                packet.set(lane - first, &super::cast::native(&self.lanes.ray(lane)));
             }
             return packet;
         }
         for axis in 0..3 {
-            packet.origin[axis] = lanes.eight(axis, first).map(f32::from_bits);
-            packet.direction[axis] = lanes.eight(DIRECTION + axis, first).map(f32::from_bits);
+            packet.origin[axis] = self.lanes.eight(axis, first).map(f32::from_bits);
+            packet.direction[axis] = self.lanes.eight(DIRECTION + axis, first).map(f32::from_bits);
         }
-        packet.tmin = lanes.eight(TNEAR, first).map(|tnear| f32::from_bits(tnear).max(0.0));
-        packet.tmax = lanes.eight(TFAR, first).map(f32::from_bits);
-        for (lane, own) in lanes.eight(MASK, first).into_iter().enumerate() {
-            packet.lanes |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
-        }
+        packet.tmin = self.lanes.eight(TNEAR, first).map(f32::from_bits);
+        packet.tmax = self.lanes.eight(TFAR, first).map(f32::from_bits);
         packet
+    }
+
+    /// A bit for each of these rays that is valid and has a bit in common with `mask`.
+    #[inline(always)]
+    fn seeing(&self, first: usize, mask: u32) -> u32 {
+        let Self { lanes, count, is_valid } = self;
+        let mut seeing = 0;
+        if first + RAYS > *count {
+            for lane in first..*count {
+                seeing |= u32::from(is_valid(lane) && lanes.ray(lane).mask & mask != 0) << (lane - first);
+            }
+            return seeing;
+        }
+        for (lane, own) in lanes.eight(MASK, first).into_iter().enumerate() {
+            seeing |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
+        }
+        seeing
     }
 }
 
@@ -111,18 +128,18 @@ pub fn intersect_lanes(
         // SAFETY: as above.
         lanes.set_hit(lane, unsafe { &(*own).hit });
     };
-    let two = |solid: &Bvh, packets: &[Packet; 2], first: usize| {
+    let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
         let mut hits = [PacketHits::NONE; 2];
-        solid.closest_packets(packets, &mut hits);
+        solid.closest_packets(asked, &mut hits);
         tell(committed, query, lanes, first, &hits[0]);
         tell(committed, query, lanes, first + RAYS, &hits[1]);
     };
-    let one = |solid: &Bvh, packets: &[Packet; 1], first: usize| {
+    let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
         let mut hits = [PacketHits::NONE];
-        solid.closest_packets(packets, &mut hits);
+        solid.closest_packets(asked, &mut hits);
         tell(committed, query, lanes, first, &hits[0]);
     };
-    Asked { lanes, count, is_valid }.each(committed, query, false, alone, two, one);
+    Called { lanes, count, is_valid }.each(committed, query, false, alone, two, one);
 }
 
 /// Writes the hits of the rays from lane `first` on.
@@ -187,13 +204,13 @@ pub fn occluded_lanes(
             occluded &= occluded - 1;
         }
     };
-    let two = |solid: &Bvh, packets: &[Packet; 2], first: usize| {
-        let [low, high] = solid.occluded_packets(packets);
+    let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
+        let [low, high] = solid.occluded_packets(asked);
         end(first, low | high << RAYS);
     };
-    let one = |solid: &Bvh, packets: &[Packet; 1], first: usize| {
-        let [occluded] = solid.occluded_packets(packets);
+    let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
+        let [occluded] = solid.occluded_packets(asked);
         end(first, occluded);
     };
-    Asked { lanes, count, is_valid }.each(committed, query, true, alone, two, one);
+    Called { lanes, count, is_valid }.each(committed, query, true, alone, two, one);
 }

@@ -1,7 +1,9 @@
 //! The rays of a packet as one: what bounds their origins and directions, held against eight boxes at a time.
 //!
 //! By interval arithmetic (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*): with x the
-//! least that a slab's distance from an origin may be, no ray enters it before the lesser of x times the least and x times the largest 1 / d.
+//! least that a slab's distance from an origin may be, no ray enters it before x times the least magnitude of 1 / d, if it is ahead of the
+//! origins; with x the largest, none leaves it after x times the largest. What is behind gives something below 0 either way, which as an entry means
+//! the same as 0, and as an exit that nothing is met.
 //! Kept as distance times reciprocal, and not as bound / d less origin / d as a single ray does ([`super::super::slab`]), since origin and
 //! direction would then vary apart from each other, which rays that start in one point do not.
 //!
@@ -32,9 +34,9 @@ pub(super) struct Beam {
     near_origin: [f32; 4],
     /// What is subtracted from the sides that are met last: the origin farthest back, less the pad.
     far_origin: [f32; 4],
-    /// The least of 1 / direction.
+    /// 1 / direction, of the least magnitude.
     least: [f32; 4],
-    /// The largest of it.
+    /// The same of the largest.
     most: [f32; 4],
     /// The least of all, rounded down.
     tmin: f32,
@@ -49,7 +51,7 @@ const WIDE: f32 = 1.0 / 16.0;
 impl Beam {
     /// Of rays of which each is valid; none where they go different ways.
     #[inline(always)]
-    pub fn new<S: Simd, const N: usize>(packets: &[Packet; N], bounds: Aabb) -> Option<Self> {
+    pub fn new<S: Simd, const N: usize>(packets: &[&Packet; N], bounds: Aabb) -> Option<Self> {
         let (mut least, mut most) = (S::V8::splat(f32::INFINITY), S::V8::splat(f32::NEG_INFINITY));
         for packet in packets {
             // Each row a ray: the least and the most of all its numbers at once.
@@ -104,8 +106,8 @@ impl Beam {
             is_backward: [backward & 1 != 0, backward & 2 != 0, backward & 4 != 0],
             near_origin: S::V4::select(is_backward, back, on).to_array(),
             far_origin: S::V4::select(is_backward, on, back).to_array(),
-            least: shortest.to_array(),
-            most: longest.to_array(),
+            least: S::V4::select(is_backward, longest, shortest).to_array(),
+            most: S::V4::select(is_backward, shortest, longest).to_array(),
             tmin: least_t(tmin),
         })
     }
@@ -115,11 +117,10 @@ impl Beam {
     fn between<V: Vector>(&self, near_side: [V; 3], far_side: [V; 3], limit: f32) -> (V::Mask, V) {
         let (mut near, mut far) = (V::splat(self.tmin), V::splat(limit));
         for axis in 0..3 {
-            let (least, most) = (V::splat(self.least[axis]), V::splat(self.most[axis]));
             let first = near_side[axis].sub(V::splat(self.near_origin[axis]));
             let last = far_side[axis].sub(V::splat(self.far_origin[axis]));
-            near = first.mul(least).min(first.mul(most)).max(near);
-            far = last.mul(least).max(last.mul(most)).min(far);
+            near = first.mul(V::splat(self.least[axis])).max(near);
+            far = last.mul(V::splat(self.most[axis])).min(far);
         }
         (near.at_most(far), near)
     }

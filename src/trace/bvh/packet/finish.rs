@@ -15,6 +15,7 @@ pub(super) fn finish<S: Simd>(
     bvh: &Bvh,
     number: usize,
     packet: &Packet,
+    lanes: u32,
     octet: &Octet<S::V8>,
     doubts: &Doubts<'_>,
     hits: &mut PacketHits,
@@ -35,7 +36,7 @@ pub(super) fn finish<S: Simd>(
             u32::from(a != NONE) | u32::from(b != NONE) << 1 | u32::from(c != NONE) << 2 | u32::from(d != NONE) << 3;
         hits.lanes |= named << first;
     }
-    doubts.tell(bvh, number, packet.lanes & !hits.lanes, hits);
+    doubts.tell(bvh, number, lanes & !hits.lanes, hits);
 }
 
 /// Four rays, each with a triangle that it hits for sure.

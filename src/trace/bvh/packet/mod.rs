@@ -20,7 +20,7 @@ mod octet;
 mod way;
 
 use super::Bvh;
-use super::alone::TriangleFound;
+use super::alone::{SingleRay, TriangleFound};
 use super::isa::{self, Kernel};
 use super::query::{Closest, Occluded};
 use super::scratch::{Scratch, with_scratch};
@@ -36,20 +36,29 @@ pub(super) const RAYS: usize = Packet::RAYS;
 /// Packets that travel together at most.
 pub(super) const MOST: usize = 2;
 
-/// Eight rays, component by component.
+/// Eight rays, component by component, in the order in which Embree's `RTCRay8` begins: a caller's can be read where it is.
 #[repr(C, align(32))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packet {
     /// Where they start: all x, all y, all z.
     pub origin: [[f32; Packet::RAYS]; 3],
-    /// Directions, likewise; not of unit length necessarily.
-    pub direction: [[f32; Packet::RAYS]; 3],
-    /// Nearest valid t of each, at least 0.
+    /// Nearest valid t of each; what is below 0, or no number, counts as 0.
     pub tmin: [f32; Packet::RAYS],
+    /// Directions, as origins; not of unit length necessarily.
+    pub direction: [[f32; Packet::RAYS]; 3],
+    /// Nothing depends on it: triangles stand still.
+    pub time: [f32; Packet::RAYS],
     /// Farthest valid t of each.
     pub tmax: [f32; Packet::RAYS],
-    /// A bit for each ray that is asked for; the others may be anything.
-    pub lanes: u32,
+}
+
+/// Packets that go together, of each a bit for every ray that is asked for; the others may be anything.
+#[derive(Clone, Copy)]
+pub struct Asked<'a, const N: usize> {
+    /// The rays.
+    pub packets: [&'a Packet; N],
+    /// The bits.
+    pub lanes: [u32; N],
 }
 
 /// What the rays of a packet hit.
@@ -82,27 +91,27 @@ impl Packet {
     #[inline]
     pub fn ray(&self, lane: usize) -> Ray {
         let at = |v: &[[f32; RAYS]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
-        Ray {
-            origin: at(&self.origin),
-            direction: at(&self.direction),
-            tmin: self.tmin[lane],
-            tmax: self.tmax[lane],
-            time: 0.0,
-        }
+        // Not of NaN.
+        let tmin = if self.tmin[lane] > 0.0 { self.tmin[lane] } else { 0.0 };
+        Ray { origin: at(&self.origin), direction: at(&self.direction), tmin, tmax: self.tmax[lane], time: 0.0 }
     }
 
-    /// Sets the ray of a lane, which is asked for from now on.
+    /// Sets the ray of a lane.
     pub fn set(&mut self, lane: usize, ray: &Ray) {
         for axis in 0..3 {
             (self.origin[axis][lane], self.direction[axis][lane]) = (ray.origin[axis], ray.direction[axis]);
         }
         (self.tmin[lane], self.tmax[lane]) = (ray.tmin, ray.tmax);
-        self.lanes |= 1 << lane;
     }
 
-    /// No rays.
-    pub const NONE: Self =
-        Self { origin: [[0.0; RAYS]; 3], direction: [[0.0; RAYS]; 3], tmin: [0.0; RAYS], tmax: [0.0; RAYS], lanes: 0 };
+    /// Room for rays.
+    pub const NONE: Self = Self {
+        origin: [[0.0; RAYS]; 3],
+        tmin: [0.0; RAYS],
+        direction: [[0.0; RAYS]; 3],
+        time: [0.0; RAYS],
+        tmax: [0.0; RAYS],
+    };
 
     /// Origins, directions, tmin and tmax.
     #[inline(always)]
@@ -110,10 +119,20 @@ impl Packet {
         let ([x, y, z], [dx, dy, dz]) = (&self.origin, &self.direction);
         let (x, y, z) = (S::V8::load(x), S::V8::load(y), S::V8::load(z));
         let (dx, dy, dz) = (S::V8::load(dx), S::V8::load(dy), S::V8::load(dz));
-        [x, y, z, dx, dy, dz, S::V8::load(&self.tmin), S::V8::load(&self.tmax)]
+        [x, y, z, dx, dy, dz, S::V8::load(&self.tmin).max(S::V8::splat(0.0)), S::V8::load(&self.tmax)]
     }
 
-    /// A bit for each ray that is asked for and [is valid](Ray::is_valid).
+    /// The rays for walks by themselves.
+    #[inline(always)]
+    fn singles<S: Simd>(&self) -> [SingleRay; RAYS] {
+        let [x, y, z, dx, dy, dz, tmin, tmax] = self.rows::<S>();
+        let rays = S::transpose([x, y, z, tmin, dx, dy, dz, tmax]);
+        let [a, b, c, d, e, f, g, h] = rays;
+        // Written out: a closure mapped over the array may miss the instruction set.
+        [single(a), single(b), single(c), single(d), single(e), single(f), single(g), single(h)]
+    }
+
+    /// A bit for each ray that [is valid](Ray::is_valid).
     #[inline(always)]
     fn valid<S: Simd>(&self) -> u32 {
         let [x, y, z, dx, dy, dz, tmin, tmax] = self.rows::<S>();
@@ -123,13 +142,13 @@ impl Packet {
         let finite = dx.mul_add(zero, dy.mul_add(zero, dz.mul_add(zero, finite)));
         let largest = dx.abs().max(dy.abs()).max(dz.abs());
         let directed = S::V8::splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
-        directed.and(zero.at_most(tmin)).and(tmin.at_most(tmax)).bits() & self.lanes
+        directed.and(tmin.at_most(tmax)).bits()
     }
+}
 
-    /// The lanes that are asked for.
-    fn asked(&self) -> impl Iterator<Item = usize> {
-        (0..RAYS).filter(|lane| self.lanes >> lane & 1 != 0)
-    }
+/// The lanes of a bit mask.
+fn each(lanes: u32) -> impl Iterator<Item = usize> {
+    (0..RAYS).filter(move |lane| lanes >> lane & 1 != 0)
 }
 
 impl PacketHits {
@@ -147,9 +166,9 @@ impl PacketHits {
 
     /// The hit of one ray.
     fn put(&mut self, lane: usize, found: &TriangleFound) {
-        let TriangleFound { hit, .. } = found;
+        let hit = &found.hit;
         (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
-        let normal = found.normal();
+        let normal = found.normal;
         for axis in 0..3 {
             self.normal[axis][lane] = normal[axis];
         }
@@ -160,94 +179,101 @@ impl PacketHits {
 
 impl Bvh {
     /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits.
-    pub fn closest_packets<const N: usize>(&self, packets: &[Packet; N], hits: &mut [PacketHits; N]) {
+    pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, hits: &mut [PacketHits; N]) {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
         if self.fixed.triangles.tree().is_empty() {
             return hits.iter_mut().for_each(|hits| hits.lanes = 0);
         }
-        let kernel = |scratch: &mut Scratch| {
-            isa::dispatch(self.isa, ClosestPackets { bvh: self, packets, scratch, hits: &mut *hits })
-        };
-        if !with_scratch(kernel) {
-            for (packet, hits) in packets.iter().zip(hits) {
-                hits.lanes = 0;
-                for lane in packet.asked() {
-                    if let Some(found) = self.closest_triangle(&packet.ray(lane)) {
-                        hits.put(lane, &found);
-                    }
-                }
-            }
-        }
+        with_scratch(|scratch| isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch, hits }));
     }
 
     /// [`Bvh::occludes`] of each ray of a packet, or of two that go together: a bit for each that is occluded.
-    pub fn occluded_packets<const N: usize>(&self, packets: &[Packet; N]) -> [u32; N] {
+    pub fn occluded_packets<const N: usize>(&self, asked: &Asked<'_, N>) -> [u32; N] {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
         let mut occluded = [0; N];
         if self.fixed.triangles.tree().is_empty() {
             return occluded;
         }
-        let kernel = |scratch: &mut Scratch| {
-            isa::dispatch(self.isa, OccludedPackets { bvh: self, packets, scratch, occluded: &mut occluded })
-        };
-        if !with_scratch(kernel) {
-            for (packet, occluded) in packets.iter().zip(&mut occluded) {
-                for lane in packet.asked() {
-                    *occluded |= u32::from(self.occludes(&packet.ray(lane))) << lane;
-                }
-            }
-        }
+        with_scratch(|scratch| {
+            isa::dispatch(self.isa, OccludedPackets { bvh: self, asked, scratch, occluded: &mut occluded });
+        });
         occluded
     }
 }
 
+/// Of its origin, tmin, direction and tmax.
+#[inline(always)]
+fn single(row: impl Array<RAYS>) -> SingleRay {
+    let [x, y, z, tmin, dx, dy, dz, tmax] = row.to_array();
+    SingleRay { origin: Vec3::new(x, y, z), tmin, direction: Vec3::new(dx, dy, dz), time: tmax, tmax }
+}
+
 struct ClosestPackets<'a, const N: usize> {
     bvh: &'a Bvh,
-    packets: &'a [Packet; N],
+    asked: &'a Asked<'a, N>,
     scratch: &'a mut Scratch,
     hits: &'a mut [PacketHits; N],
 }
 
 impl<const N: usize> Kernel for ClosestPackets<'_, N> {
-    /// Whether the rays made a beam; else nothing was done.
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { bvh, packets, scratch: Scratch { stack, found }, hits } = self;
+    fn run<S: Simd>(self) {
+        let Self { bvh, asked, scratch, hits } = self;
         let mut own = None;
-        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
-        let mut doubts = Doubts::new(found);
-        let octets = way::trace::<S, Closest, N>(bvh, packets, &beam, stack, &mut doubts);
-        for (number, hits) in hits.iter_mut().enumerate() {
-            finish::finish::<S>(bvh, number, &packets[number % N], &octets[number % N], &doubts, hits);
+        if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
+            let Scratch { stack, found } = scratch;
+            let mut doubts = Doubts::new(found);
+            let octets = way::trace::<S, Closest, N>(bvh, &asked, &beam, stack, &mut doubts);
+            for (number, hits) in hits.iter_mut().enumerate() {
+                let (packet, lanes) = (asked.packets[number % N], asked.lanes[number % N]);
+                finish::finish::<S>(bvh, number, packet, lanes, &octets[number % N], &doubts, hits);
+            }
+            return;
         }
-        true
+        let mut found = TriangleFound::NONE;
+        for (number, hits) in hits.iter_mut().enumerate() {
+            let rays = asked.packets[number % N].singles::<S>();
+            hits.lanes = 0;
+            for lane in each(asked.lanes[number % N]) {
+                if bvh.closest_alone(&rays[lane], scratch, &mut found) {
+                    hits.put(lane, &found);
+                }
+            }
+        }
     }
 }
 
 struct OccludedPackets<'a, const N: usize> {
     bvh: &'a Bvh,
-    packets: &'a [Packet; N],
+    asked: &'a Asked<'a, N>,
     scratch: &'a mut Scratch,
     occluded: &'a mut [u32; N],
 }
 
 impl<const N: usize> Kernel for OccludedPackets<'_, N> {
-    /// Whether the rays made a beam; else nothing was done.
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { bvh, packets, scratch: Scratch { stack, found }, occluded } = self;
+    fn run<S: Simd>(self) {
+        let Self { bvh, asked, scratch, occluded } = self;
         let mut own = None;
-        let Some((packets, beam)) = together::<S, N>(bvh, packets, &mut own) else { return false };
-        let mut doubts = Doubts::new(found);
-        let octets = way::trace::<S, Occluded, N>(bvh, packets, &beam, stack, &mut doubts);
-        for (occluded, octet) in occluded.iter_mut().zip(&octets) {
-            *occluded = octet.hit;
+        if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
+            let Scratch { stack, found } = scratch;
+            let mut doubts = Doubts::new(found);
+            let octets = way::trace::<S, Occluded, N>(bvh, &asked, &beam, stack, &mut doubts);
+            for (occluded, octet) in occluded.iter_mut().zip(&octets) {
+                *occluded = octet.hit;
+            }
+            return;
         }
-        true
+        for (number, occluded) in occluded.iter_mut().enumerate() {
+            let rays = asked.packets[number % N].singles::<S>();
+            for lane in each(asked.lanes[number % N]) {
+                *occluded |= u32::from(bvh.occluded_alone(&rays[lane], scratch)) << lane;
+            }
+        }
     }
 }
 
@@ -255,29 +281,28 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
 #[inline(always)]
 fn together<'a, S: Simd, const N: usize>(
     bvh: &Bvh,
-    packets: &'a [Packet; N],
+    asked: &Asked<'a, N>,
     own: &'a mut Option<[Packet; N]>,
-) -> Option<(&'a [Packet; N], Beam)> {
+) -> Option<(Asked<'a, N>, Beam)> {
     let (mut valid, mut all) = ([0; N], 0xff);
-    for (valid, packet) in valid.iter_mut().zip(packets) {
-        *valid = packet.valid::<S>();
+    for (number, valid) in valid.iter_mut().enumerate() {
+        *valid = asked.packets[number].valid::<S>() & asked.lanes[number];
         all &= *valid;
     }
-    let packets = if all == 0xff { packets } else { own.insert(only(packets, &valid)?) };
-    let beam = Beam::new::<S, N>(packets, bvh.fixed.triangles.tree().bounds())?;
-    (!beam.is_wide).then_some((packets, beam))
+    let packets = if all == 0xff { asked.packets } else { own.insert(only(asked, &valid)?).each_ref() };
+    let beam = Beam::new::<S, N>(&packets, bvh.fixed.triangles.tree().bounds())?;
+    (!beam.is_wide).then_some((Asked { packets, lanes: valid }, beam))
 }
 
 /// The packets with valid rays alone, and copies of one of these in the other lanes; none where there are none.
 #[cold]
 #[inline(never)]
-fn only<const N: usize>(packets: &[Packet; N], valid: &[u32; N]) -> Option<[Packet; N]> {
+fn only<const N: usize>(asked: &Asked<'_, N>, valid: &[u32; N]) -> Option<[Packet; N]> {
     let first = valid.iter().position(|&lanes| lanes != 0)?;
-    let ray = packets[first].ray(valid[first].trailing_zeros() as usize % RAYS);
-    let mut packets = packets.clone();
+    let ray = asked.packets[first].ray(valid[first].trailing_zeros() as usize % RAYS);
+    let mut packets = asked.packets.map(Packet::clone);
     for (packet, &valid) in packets.iter_mut().zip(valid) {
-        (0..RAYS).filter(|lane| valid >> lane & 1 == 0).for_each(|lane| packet.set(lane, &ray));
-        packet.lanes = valid;
+        each(!valid).for_each(|lane| packet.set(lane, &ray));
     }
     Some(packets)
 }

@@ -45,7 +45,7 @@ pub(super) struct Met {
 
 impl<V: Vector + Array<RAYS>> Octet<V> {
     #[inline(always)]
-    pub fn new<S: Simd<V8 = V>>(packet: &Packet, axes: [usize; 3]) -> Self {
+    pub fn new<S: Simd<V8 = V>>(packet: &Packet, lanes: u32, axes: [usize; 3]) -> Self {
         let [x, y, z] = axes;
         let [ox, oy, oz] = [V::load(&packet.origin[x]), V::load(&packet.origin[y]), V::load(&packet.origin[z])];
         let [dx, dy, along] =
@@ -53,7 +53,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         let reciprocal = V::splat(1.0).div(along);
         let negative = V::splat(0.0).sub(reciprocal);
         let shear = [dx.mul(negative), dy.mul(negative)];
-        let (tmin, tmax) = (V::load(&packet.tmin), V::load(&packet.tmax));
+        let (tmin, tmax) = (V::load(&packet.tmin).max(V::splat(0.0)), V::load(&packet.tmax));
         // Rounded up, for t is rounded before it is held against it.
         let limit = tmax.mul_add(V::splat(1.0 + SLACK), V::splat(f32::MIN_POSITIVE));
         let mut octet = Self {
@@ -69,11 +69,11 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
             limit: limit.to_array(),
             sure: packet.tmax,
             noted: [f32::from_bits(NONE); RAYS],
-            asked: packet.lanes,
+            asked: lanes,
             hit: 0,
         };
-        if packet.lanes != 0xff {
-            (0..RAYS).filter(|lane| packet.lanes >> lane & 1 == 0).for_each(|lane| octet.finish(lane));
+        if lanes != 0xff {
+            super::each(!lanes).for_each(|lane| octet.finish(lane));
         }
         octet
     }

@@ -2,7 +2,7 @@
 
 use super::beam::Beam;
 use super::octet::Octet;
-use super::{Doubts, Packet, RAYS};
+use super::{Asked, Doubts, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::query::Query;
@@ -13,15 +13,15 @@ use crate::trace::bvh::walk::{self, Stack, Visit};
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
     bvh: &Bvh,
-    packets: &[Packet; N],
+    asked: &Asked<'_, N>,
     beam: &Beam,
     stack: &mut Stack,
     doubts: &mut Doubts<'_>,
 ) -> [Octet<S::V8>; N] {
     let triangles = &bvh.fixed.triangles;
-    let mut octets = [Octet::new::<S>(&packets[0], beam.axes); N];
-    for (octet, packet) in octets.iter_mut().zip(packets).skip(1) {
-        *octet = Octet::new::<S>(packet, beam.axes);
+    let mut octets = [Octet::new::<S>(asked.packets[0], asked.lanes[0], beam.axes); N];
+    for (number, octet) in octets.iter_mut().enumerate().skip(1) {
+        *octet = Octet::new::<S>(asked.packets[number], asked.lanes[number], beam.axes);
     }
     let mut most = beam.limit;
     walk::single::<S, Q>(
@@ -44,7 +44,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
                         let met = octet.meet::<Q>(beam.axes, block, lane, id);
                         changed |= met.changed;
                         if met.open != 0 {
-                            let packet = &packets[number % N];
+                            let packet = asked.packets[number % N];
                             doubts.decide::<Q, S::V8>(bvh, number, packet, octet, met.open, block, id);
                             changed = true;
                         }

@@ -24,7 +24,7 @@ use super::node::Child;
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {
     /// Four f32.
-    type V4: Vector + Array<4>;
+    type V4: Vector + Array<4> + Three;
     /// Eight f32.
     type V8: Vector + Array<8> + Boxes;
     /// As many f32 as one instruction takes.
@@ -94,6 +94,12 @@ pub(super) trait Array<const N: usize>: Sized {
     fn to_array(self) -> [f32; N];
 }
 
+/// The components of a vector in the first three lanes of four.
+pub(super) trait Three {
+    /// The second lane, the third, the first; then one that means nothing.
+    fn yzx(self) -> Self;
+}
+
 /// The rays of a bundle, group by group.
 pub(super) trait Group: Vector {
     /// Rays in a group.
@@ -105,7 +111,7 @@ pub(super) trait Group: Vector {
 }
 
 /// Four values of f64.
-pub(super) trait Doubles: Copy {
+pub(super) trait Doubles: Three + Copy {
     /// As many f32.
     type F: Array<4>;
     fn splat(value: f64) -> Self;
@@ -126,4 +132,6 @@ pub(super) trait Doubles: Copy {
     fn abs(self) -> Self;
     /// Bit i is set where self is less than other in lane i; not for NaN.
     fn less(self, other: Self) -> u32;
+    /// Of each of them the sum of its first three lanes, in their order.
+    fn sums(of: [Self; 4]) -> Self;
 }

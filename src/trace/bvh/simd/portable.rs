@@ -1,6 +1,6 @@
 //! Plain arrays, for any processor.
 
-use super::{Array, Doubles, Group, Mask, Simd, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::node::Child;
 
@@ -167,6 +167,14 @@ impl<const N: usize> Array<N> for [f32; N] {
     }
 }
 
+impl<T> Three for [T; 4] {
+    #[inline(always)]
+    fn yzx(self) -> Self {
+        let [x, y, z, w] = self;
+        [y, z, x, w]
+    }
+}
+
 impl Group for [f32; 8] {
     const LANES: usize = 8;
     #[inline(always)]
@@ -227,5 +235,9 @@ impl Doubles for [f64; 4] {
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {
         self
+    }
+    #[inline(always)]
+    fn sums(of: [Self; 4]) -> Self {
+        of.map(|[x, y, z, _]| x + y + z)
     }
 }

@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Array, Doubles, Group, Mask, Simd, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::node::Child;
 
@@ -246,6 +246,13 @@ impl Array<4> for V4 {
     }
 }
 
+impl Three for V4 {
+    #[inline(always)]
+    fn yzx(self) -> Self {
+        Self(unsafe { _mm_permute_ps::<0b11_00_10_01>(self.0) })
+    }
+}
+
 impl Vector for V8 {
     type Mask = M8;
     lanewise! {
@@ -338,6 +345,13 @@ impl Group for V8 {
     }
 }
 
+impl Three for D4 {
+    #[inline(always)]
+    fn yzx(self) -> Self {
+        Self(unsafe { _mm256_permute4x64_pd::<0b11_00_10_01>(self.0) })
+    }
+}
+
 impl Doubles for D4 {
     type F = V4;
     lanewise! {
@@ -371,6 +385,15 @@ impl Doubles for D4 {
     #[inline(always)]
     fn narrow(self) -> V4 {
         V4(unsafe { _mm256_cvtpd_ps(self.0) })
+    }
+    #[inline(always)]
+    fn sums([Self(a), Self(b), Self(c), Self(d)]: [Self; 4]) -> Self {
+        unsafe {
+            let (ab, cd) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+            let y = _mm256_permute2f128_pd::<0x20>(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+            let (x, z) = (_mm256_permute2f128_pd::<0x20>(ab, cd), _mm256_permute2f128_pd::<0x31>(ab, cd));
+            Self(_mm256_add_pd(_mm256_add_pd(x, y), z))
+        }
     }
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {

@@ -1,0 +1,250 @@
+//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one.
+//!
+//! An interface that hands over single rays (Embree's C functions) can have neither flights nor bundles, and wants the
+//! triangle's normal with the hit. So the ray walks by itself ([`super::walk`]), what it hits is noted and computed at the end
+//! ([`found`]), and the normal comes from the block that is in the cache anyway; to fetch corners from the mesh afterwards, the
+//! simpler way, costs two more steps through memory. A call takes as long as some hundred instructions more or less, so the ray is read where
+//! the caller has it ([`row`]), and what is found is written where it is wanted.
+//!
+//! Callers with rules of their own about what counts (masks, filters) are shown each triangle that is hit.
+//!
+//! Only the fixed triangles are asked: shapes and placements are those of [`Tracer`](crate::Tracer).
+
+mod found;
+mod row;
+
+use std::ops::ControlFlow;
+
+use super::Bvh;
+use super::block::{Block, LANES};
+use super::candidates;
+use super::filter::Candidates;
+use super::found::{Found, NONE};
+use super::isa::{self, Kernel};
+use super::place::Blur;
+use super::placements::FIXED;
+use super::query::{Closest, Occluded, Query};
+use super::scratch::{Scratch, with_scratch};
+use super::simd::Simd;
+use super::walk::{self, Stack, Visit, with_stack};
+use super::woop::SLACK;
+use crate::ray::{Hit, Ray};
+use crate::shape::triangle;
+pub use found::TriangleFound;
+pub use row::SingleRay;
+
+/// Whether a search goes on, up to some t.
+pub type Search = ControlFlow<(), f32>;
+
+impl Bvh {
+    /// The nearest fixed triangle that `ray` hits, into `found`. Whether there is one.
+    pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
+        with_scratch(|scratch| self.closest_alone(ray, scratch, found))
+    }
+
+    /// Whether `ray` hits any fixed triangle.
+    pub fn occludes(&self, ray: &SingleRay) -> bool {
+        with_scratch(|scratch| self.occluded_alone(ray, scratch))
+    }
+
+    /// [`Self::closest_triangle`], for who has room for the walk.
+    #[inline(always)]
+    pub(super) fn closest_alone(&self, ray: &SingleRay, scratch: &mut Scratch, found: &mut TriangleFound) -> bool {
+        !self.fixed.triangles.tree().is_empty() && isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found })
+    }
+
+    /// [`Self::occludes`], likewise.
+    #[inline(always)]
+    pub(super) fn occluded_alone(&self, ray: &SingleRay, scratch: &mut Scratch) -> bool {
+        !self.fixed.triangles.tree().is_empty() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch })
+    }
+
+    /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
+    /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
+    pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> Search) {
+        if !self.fixed.triangles.tree().is_empty() && ray.is_valid() {
+            with_stack(|stack| isa::dispatch(self.isa, VisitAll { bvh: self, ray, stack, visitor }));
+        }
+    }
+
+    /// Walks, and notes what is hit; none for a ray that is not valid.
+    #[inline(always)]
+    fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, scratch: &mut Scratch) -> Option<Noted> {
+        let Scratch { stack, found: [found, ..] } = scratch;
+        let triangles = &self.fixed.triangles;
+        let tree = triangles.tree();
+        let (slab, filter) = ray.ready::<S>(tree.reach_row())?;
+        // Rounded up, for t is rounded before it is held against it.
+        let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
+        let mut noted = Noted { sure: ray.tmax, limit, id: NONE, is_doubted: false };
+        walk::single::<S, Q>(
+            stack,
+            tree,
+            &slab,
+            noted.limit,
+            #[inline(always)]
+            |leaf| {
+                for index in leaf.blocks() {
+                    let mut scratch = None;
+                    let block = triangles.block(index, &mut scratch);
+                    let candidates = filter.candidates::<S, false>(block, noted.limit);
+                    if candidates.lanes != 0 && noted.offer::<Q>(self, found, index, block, &candidates, ray) {
+                        return Visit::Stop;
+                    }
+                }
+                Visit::Until(noted.limit)
+            },
+        );
+        Some(noted)
+    }
+}
+
+/// What a ray has hit so far, as [`Found`] is, which is asked only where there is doubt: kept in registers.
+#[derive(Clone, Copy)]
+struct Noted {
+    /// A hit nearer than this is the nearest for sure.
+    sure: f32,
+    /// No hit beyond this is wanted; rounded up.
+    limit: f32,
+    /// Found without doubt, but not computed yet: block and lane.
+    id: u32,
+    /// Whether anything was decided at once.
+    is_doubted: bool,
+}
+
+impl Noted {
+    /// Takes the candidates of block `index`. Whether that is enough.
+    #[inline(always)]
+    fn offer<Q: Query>(
+        &mut self,
+        bvh: &Bvh,
+        found: &mut Found,
+        index: u32,
+        block: &Block,
+        candidates: &Candidates,
+        ray: &SingleRay,
+    ) -> bool {
+        let mut open = candidates.lanes;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % LANES;
+            open &= open - 1;
+            let (low, high) = (candidates.low[lane], candidates.high[lane]);
+            if candidates.sure >> lane & 1 != 0 {
+                if ray.begin() <= low && high <= self.sure {
+                    (self.sure, self.limit, self.id) = (low, high, LANES as u32 * index + lane as u32);
+                    if Q::ANY {
+                        return true;
+                    }
+                    continue;
+                }
+                if low > self.limit {
+                    continue;
+                }
+            }
+            *self = self.decide(bvh, found, index, block, lane, ray);
+            if Q::ANY && found.is_hit() {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Decides whether the ray hits one triangle of a block. By value, so that it need not lie in memory before.
+    #[cold]
+    #[inline(never)]
+    fn decide(self, bvh: &Bvh, found: &mut Found, index: u32, block: &Block, lane: usize, ray: &SingleRay) -> Self {
+        if !self.is_doubted {
+            found.start([self.sure, self.limit]);
+        }
+        found.resume([self.sure, self.limit], self.id);
+        found.decide(bvh, FIXED, index, block, lane, &ray.ray());
+        let [sure, limit] = found.range();
+        Self { sure, limit, id: NONE, is_doubted: true }
+    }
+}
+
+struct Alone<'a> {
+    bvh: &'a Bvh,
+    ray: &'a SingleRay,
+    scratch: &'a mut Scratch,
+    found: &'a mut TriangleFound,
+}
+
+impl Kernel for Alone<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { bvh, ray, scratch, found } = self;
+        let Some(noted) = bvh.walk_alone::<S, Closest>(ray, scratch) else { return false };
+        if noted.id != NONE {
+            *found = bvh.sure_triangle::<S>(ray, noted.id);
+            return true;
+        }
+        let computed = if noted.is_doubted { bvh.computed_triangle(&scratch.found[0]) } else { None };
+        computed.is_some_and(|computed| {
+            *found = computed;
+            true
+        })
+    }
+}
+
+struct AnyAlone<'a> {
+    bvh: &'a Bvh,
+    ray: &'a SingleRay,
+    scratch: &'a mut Scratch,
+}
+
+impl Kernel for AnyAlone<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { bvh, ray, scratch } = self;
+        let noted = bvh.walk_alone::<S, Occluded>(ray, scratch);
+        noted.is_some_and(|noted| noted.id != NONE || noted.is_doubted && scratch.found[0].is_hit())
+    }
+}
+
+struct VisitAll<'a, 'v> {
+    bvh: &'a Bvh,
+    ray: &'a Ray,
+    stack: &'a mut Stack,
+    visitor: &'a mut (dyn FnMut(&TriangleFound) -> Search + 'v),
+}
+
+impl Kernel for VisitAll<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, ray, stack, visitor } = self;
+        let triangles = &bvh.fixed.triangles;
+        candidates::walk::<S>(
+            triangles,
+            ray,
+            Blur::NONE,
+            stack,
+            #[inline(always)]
+            |filter, block, limit| filter.candidates::<S, false>(block, limit),
+            #[inline(always)]
+            |block, lane, limit| {
+                let corners = block.triangle(lane);
+                let Some(found) = triangle::intersect(ray, &corners) else { return Some(limit) };
+                let part = triangles.part(block.part[lane]);
+                let hit = Hit {
+                    t: found.t as f32,
+                    u: found.u as f32,
+                    v: found.v as f32,
+                    primitive: block.primitive[lane],
+                    geometry: part.geometry,
+                    instance: part.instance,
+                };
+                match visitor(&TriangleFound::new(hit, corners)) {
+                    Search::Continue(t) => Some(t),
+                    Search::Break(()) => None,
+                }
+            },
+        );
+    }
+}

@@ -1,0 +1,121 @@
+//! A ray by itself, made ready for nodes and triangles in as few instructions as will do.
+//!
+//! An axis a lane. Most rays have directions of which no component is small against the largest, and are where products do not overflow: for
+//! these the bounds of [`slab`](super::super::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The
+//! others are made ready as those of everyone else, out of the way.
+
+use crate::math::{UNIT_ROUNDOFF, Vec3};
+use crate::ray::Ray;
+use crate::trace::bvh::bundle::axes;
+use crate::trace::bvh::filter::Filter;
+use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Vector};
+use crate::trace::bvh::slab::{HUGE, SlabRay, least_t};
+use crate::trace::bvh::woop::SLACK;
+
+/// A ray by itself, in the order in which Embree's `RTCRay` begins: a caller's can be read where it is.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SingleRay {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Nearest valid t; what is below 0, or no number, counts as 0.
+    pub tmin: f32,
+    /// Where it goes; not of unit length necessarily.
+    pub direction: Vec3,
+    /// Nothing depends on it: triangles stand still.
+    pub time: f32,
+    /// Farthest valid t.
+    pub tmax: f32,
+}
+
+impl From<&Ray> for SingleRay {
+    fn from(&Ray { origin, direction, tmin, tmax, time }: &Ray) -> Self {
+        Self { origin, tmin, direction, time, tmax }
+    }
+}
+
+/// The share of the largest component that all must have, for the short way.
+const STEEPEST: f32 = 1e-16;
+
+impl SingleRay {
+    /// The same ray.
+    #[inline]
+    pub fn ray(&self) -> Ray {
+        let &Self { origin, direction, time, tmax, .. } = self;
+        Ray { origin, direction, tmin: self.begin(), tmax, time }
+    }
+
+    #[inline(always)]
+    pub(super) fn begin(&self) -> f32 {
+        // Not of NaN.
+        if self.tmin > 0.0 { self.tmin } else { 0.0 }
+    }
+
+    /// None where it [is not valid](Ray::is_valid). `reach` is the tree's.
+    #[inline(always)]
+    pub(super) fn ready<S: Simd>(&self, reach: &[f32; 4]) -> Option<(SlabRay, Filter)> {
+        let splat = S::V4::splat;
+        let Self { origin: o, direction: d, time, .. } = self;
+        let tmin = self.begin();
+        let (origin, direction) = (S::V4::load(&[o.x, o.y, o.z, self.tmin]), S::V4::load(&[d.x, d.y, d.z, *time]));
+        let magnitude = direction.abs();
+        let largest = magnitude.max(magnitude.yzx()).max(magnitude.yzx().yzx());
+        let shorten = splat(1.0).div(largest);
+        let slope = direction.mul(shorten);
+        let inverse = splat(1.0).div(direction);
+        let farthest = inverse.abs().mul(origin.abs().add(S::V4::load(reach)));
+        // False for NaN, which infinities become here or there.
+        let is_usual = splat(STEEPEST).at_most(slope.abs()).and(farthest.less(splat(HUGE)));
+        let is_usual = is_usual.and(splat(f32::MIN_POSITIVE).at_most(largest));
+        let width = farthest.mul(splat(6.5 * UNIT_ROUNDOFF));
+        let offset = splat(0.0).sub(origin.mul(inverse));
+        let (mut reciprocal, mut near, mut far) = (inverse, offset.sub(width), offset.add(width));
+        if is_usual.bits() & 0b111 != 0b111 {
+            let [r, n, f] = unusual(self, reach)?;
+            (reciprocal, near, far) = (S::V4::load(&r), S::V4::load(&n), S::V4::load(&f));
+        }
+        let in_range = tmin <= self.tmax;
+        if !in_range {
+            return None;
+        }
+        let negative = reciprocal.less(splat(0.0)).bits();
+        let slab = SlabRay {
+            reciprocal: reciprocal.to_array(),
+            near_offset: near.to_array(),
+            far_offset: far.to_array(),
+            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+            tmin: least_t(tmin),
+        };
+        // The last of those that are largest.
+        let largest_lanes = largest.at_most(magnitude).bits();
+        let axis = if largest_lanes & 0b100 != 0 { 2 } else { (largest_lanes >> 1 & 1) as usize };
+        let [x, y, z] = axes(axis);
+        // Which spares the question later on.
+        let (x, y) = (x.min(2), y.min(2));
+        let (origin, slope, direction) = (origin.to_array(), slope.to_array(), direction.to_array());
+        let along = direction[z];
+        let turned = if along < 0.0 { 1.0 } else { -1.0 };
+        let shear = [slope[x] * turned, slope[y] * turned];
+        let [shorten, ..] = shorten.to_array();
+        // No number is NaN: a maximum of any kind will do.
+        let (p, q) = (shear[0].abs(), shear[1].abs());
+        let width = 1.0 + if p > q { p } else { q };
+        let begin = tmin * along.abs() * (1.0 - SLACK);
+        let origin = [origin[x], origin[y], origin[z]];
+        Some((slab, Filter::of_eight([x, y, z], origin, shear, [width, along, shorten, begin], Blur::NONE)))
+    }
+}
+
+/// The long way, for rays along an axis, far away, or not valid: reciprocals, near and far offsets.
+#[cold]
+#[inline(never)]
+fn unusual(ray: &SingleRay, &[x, y, z, _]: &[f32; 4]) -> Option<[[f32; 4]; 3]> {
+    let ray = ray.ray();
+    if !ray.is_valid() {
+        return None;
+    }
+    let SlabRay { reciprocal, near_offset, far_offset, .. } =
+        SlabRay::new::<Portable>(&ray, Vec3::new(x, y, z), Blur::NONE);
+    Some([reciprocal, near_offset, far_offset])
+}
