@@ -74,6 +74,7 @@ fn a_ray_begins_at_its_origin_at_the_earliest() {
     let (world, rays) = world_and_rays();
     let bvh = Bvh::build(&world);
     for ray in rays.iter().step_by(5) {
+        let ray = &Ray { tmin: 0.0, ..*ray };
         for tmin in [-1.0, f32::NEG_INFINITY, f32::NAN, -0.0] {
             let early = SingleRay { tmin, ..SingleRay::from(ray) };
             let mut found = TriangleFound::NONE;

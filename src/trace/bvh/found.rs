@@ -84,10 +84,11 @@ impl Found {
         sure_hits: SureHits::NONE,
     };
 
-    /// Nothing yet, up to the ray's tmax, and that rounded up.
+    /// Nothing yet, up to the ray's tmax, and that rounded up. What lies so far that t overflows is in doubt, whose decision is that it is not
+    /// hit.
     #[inline(always)]
     pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
-        (self.sure, self.limit, self.noted, self.is_computed) = (tmax, limit, NONE, false);
+        (self.sure, self.limit, self.noted, self.is_computed) = (tmax.min(f32::MAX), limit, NONE, false);
         (self.sure_hits.count, self.sure_hits.is_in_doubt) = (0, false);
     }
 

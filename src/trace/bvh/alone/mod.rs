@@ -76,7 +76,8 @@ impl Bvh {
         let (slab, filter) = ray.ready::<S>(tree.reach_row())?;
         // Rounded up, for t is rounded before it is held against it.
         let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
-        let mut noted = Noted { sure: ray.tmax, limit, id: NONE, is_doubted: false };
+        // What lies so far that t overflows is in doubt, whose decision is that it is not hit.
+        let mut noted = Noted { sure: ray.tmax.min(f32::MAX), limit, id: NONE, is_doubted: false };
         walk::single::<S, Q>(
             stack,
             tree,

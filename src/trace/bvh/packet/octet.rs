@@ -67,7 +67,8 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
             },
             tmin,
             limit: limit.to_array(),
-            sure: packet.tmax,
+            // As of single rays.
+            sure: tmax.min(V::splat(f32::MAX)).to_array(),
             noted: [f32::from_bits(NONE); RAYS],
             asked: lanes,
             hit: 0,
