@@ -201,15 +201,18 @@ static void points() {
   }
 }
 
-// What moves is shown where it is at the time of the query, not where it ever is.
+// What moves is shown where it is at the time of the query, not where it ever is. Of many triangles, for Embree does not ask where one is that has
+// no node above it.
 static void moving_points() {
   World w;
   static const float steps[2][9] = {{0, 0, -1, 1, 0, -1, 0, 1, -1}, {0, 0, 1, 1, 0, 1, 0, 1, 1}};
-  static const unsigned corners[3] = {0, 1, 2};
+  constexpr unsigned count = 64;
+  static unsigned corners[3 * count];
+  for (unsigned i = 0; i < 3 * count; i++) corners[i] = i % 3;
   RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryTimeStepCount(g, 2);
   for (unsigned k = 0; k < 2; k++) rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, k, RTC_FORMAT_FLOAT3, steps[k], 0, 12, 3);
-  rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, corners, 0, 12, 1);
+  rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, corners, 0, 12, count);
   w.add(g);
   rtcCommitScene(w.scene);
   for (float time : {0.f, 0.25f, 0.5f, 1.f})
@@ -220,7 +223,7 @@ static void moving_points() {
       RTCPointQueryContext context;
       rtcInitPointQueryContext(&context);
       rtcPointQuery(w.scene, &q, &context, nearer, &n);
-      CHECK(n.asked.size() == (z == 2 * time - 1 ? 1u : 0u));
+      CHECK(n.asked.size() == (z == 2 * time - 1 ? count : 0));
     }
 }
 
