@@ -1,6 +1,7 @@
 //! `twincast render`: from a scene file to finished pictures.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::Args;
@@ -22,6 +23,7 @@ use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
 use super::response::ResponseArgs;
 use super::summary::Rendered;
+use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image, Metadata, WriteOptions};
@@ -155,7 +157,13 @@ fn render(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
     }
-    outputs::check(&args.output, &args.stats, args.inputs())?;
+    outputs::check_places(&args.output, &args.stats, args.inputs())?;
+    let trial = Trial::start(args.output.clone(), cancel)?;
+    trial.join(produce(args, cancel))
+}
+
+/// What is left once it is known that there will be a picture.
+fn produce(args: &RenderArgs, cancel: &AtomicBool) -> Result<()> {
     let denoising = args.denoise.open(&args.aov.aovs())?;
     let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(image::read).transpose()?;
