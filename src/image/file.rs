@@ -127,6 +127,14 @@ pub fn holds_channels(path: &Path) -> bool {
     EXR.contains(&suffix(path).as_str())
 }
 
+/// Loads what image files take, as the first of them would.
+///
+/// # Errors
+/// [`Error::Unavailable`] where it cannot be loaded.
+pub(crate) fn prepare() -> Result<()> {
+    backend::prepare()
+}
+
 /// Whether every build writes files of this suffix; of the others, OpenImageIO has to be asked.
 pub(crate) fn has_common_suffix(path: &Path) -> bool {
     COMMON.contains(&suffix(path).as_str())
@@ -154,7 +162,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// claims more than 2^28 pixels, or more than its size makes plausible.
 pub fn read(path: &Path) -> Result<Image> {
     let bytes = file_size(path)?;
-    backend::prepare()?;
+    prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))
 }
@@ -165,7 +173,7 @@ pub fn read(path: &Path) -> Result<Image> {
 /// As of [`read`]; and for a file in another format.
 pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = file_size(path)?;
-    backend::prepare()?;
+    prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read_channels(path, &check).map_err(|message| Error::input(path, "", message))
 }
@@ -176,7 +184,7 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
 /// [`Error::Input`] for a file that is missing, broken or in another format.
 pub fn read_metadata(path: &Path) -> Result<Metadata> {
     file_size(path)?;
-    backend::prepare()?;
+    prepare()?;
     backend::read_metadata(path).map_err(|message| Error::input(path, "", message))
 }
 
@@ -215,7 +223,7 @@ fn suffix(path: &Path) -> String {
 /// The suffix in lower case, if this build writes it.
 fn writable_suffix(path: &Path) -> Result<String> {
     let suffix = suffix(path);
-    backend::prepare()?;
+    prepare()?;
     let known = backend::writable_suffixes().map_err(|message| Error::output(path, message))?;
     if known.contains(&suffix) {
         return Ok(suffix);

@@ -27,10 +27,10 @@ pub mod srgb;
 
 pub use channels::{Channel, Channels, Plane};
 pub use compare::Difference;
-pub(crate) use file::has_common_suffix;
 pub use file::{
     Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
 };
+pub(crate) use file::{has_common_suffix, prepare};
 pub use metadata::{Metadata, Window};
 pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 

@@ -11,6 +11,7 @@ mod bridge;
 mod shim;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use exr::prelude::f16;
 
@@ -32,11 +33,15 @@ pub(super) fn prepare() -> std::result::Result<(), Error> {
 
 /// Suffixes that the installed OpenImageIO writes, in lower case, sorted.
 pub(super) fn writable_suffixes() -> Result<Vec<String>> {
-    let suffixes = functions()?.suffixes()?;
-    let mut suffixes: Vec<_> = suffixes.split(',').map(str::to_owned).collect();
-    suffixes.sort();
-    suffixes.dedup();
-    Ok(suffixes)
+    // To ask takes milliseconds, for each format makes a writer.
+    static SUFFIXES: OnceLock<Result<Vec<String>>> = OnceLock::new();
+    let ask = || {
+        let mut suffixes: Vec<_> = functions()?.suffixes()?.split(',').map(str::to_owned).collect();
+        suffixes.sort();
+        suffixes.dedup();
+        Ok(suffixes)
+    };
+    SUFFIXES.get_or_init(ask).clone()
 }
 
 /// Writes a file.
