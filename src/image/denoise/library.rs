@@ -10,7 +10,7 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
-use libloading::os::unix::Library as File;
+use libloading::os::unix::{Library as File, RTLD_NOW};
 
 use super::VARIABLE;
 use super::device::Device;
@@ -70,9 +70,9 @@ impl Library {
         for place in &places {
             // SAFETY: what a library does when it is loaded is up to whoever installed it under this name, or named it in
             // the environment, as with every library that a program is linked with.
-            match unsafe { loading::open(place) } {
+            match unsafe { loading::open(place, RTLD_NOW) } {
                 Ok(file) => return Self::new(file, place),
-                Err(reason) => refusals.push(reason),
+                Err(words) => refusals.push(reason(words, place)),
             }
         }
         let refusals = refusals.join("; ");
@@ -128,6 +128,12 @@ impl Functions {
             })
         }
     }
+}
+
+/// The loader's words, with the name of the library.
+fn reason(words: String, place: &Path) -> String {
+    let place = place.display().to_string();
+    if words.contains(&place) { words } else { format!("{place}: {words}") }
 }
 
 fn dotted(version: c_int) -> String {

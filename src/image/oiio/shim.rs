@@ -14,6 +14,8 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use libloading::os::unix::RTLD_LAZY;
+
 use super::bridge::Functions;
 use crate::image::loading;
 
@@ -94,7 +96,7 @@ fn private_folder(parent: &Path) -> io::Result<PathBuf> {
 fn load(path: &Path) -> Result<&'static Functions, String> {
     // SAFETY: the file has just been written here, from what the program carries, where nobody else writes. What OpenImageIO does when it is loaded is up to
     // whoever installed it, as with every library that a program is linked with.
-    let library = ManuallyDrop::new(unsafe { loading::open(path) }?);
+    let library = ManuallyDrop::new(unsafe { loading::open(path, RTLD_LAZY) }?);
     // SAFETY: the shim defines the function so in `ffi/oiio/shim.h`, and is never closed.
     let table: extern "C" fn() -> &'static Functions = unsafe { loading::function(&library, &["twincast_oiio"]) }?;
     Ok(table())
