@@ -42,7 +42,7 @@ fn it_is_loaded_for_pictures_and_for_nothing_else() {
 fn where_it_cannot_be_loaded_the_reason_and_the_remedy_are_told_and_the_rest_goes_on() {
     let name = openimageio();
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join(&name), "not a library, whatever its name").expect("written");
+    std::fs::write(folder.path().join(&name), "not a library, whatever its name; ".repeat(9)).expect("written");
     let before = std::env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
     let path = [folder.path().as_os_str(), &before].join(&OsString::from(":"));
     let run = |args: &[&str]| {

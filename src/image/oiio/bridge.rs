@@ -130,6 +130,7 @@ struct File {
 
 /// The shim's functions. Each reads what it is given during the call alone, keeps none of it, and lets no exception out.
 #[repr(C)]
+#[derive(Debug)]
 pub(super) struct Functions {
     suffixes: unsafe extern "C" fn(*mut Bytes<'_>) -> Failure,
     write: unsafe extern "C" fn(Bytes<'_>, *const Layout<'_>, *const Attributes<'_>, Bytes<'_>) -> Failure,

@@ -35,13 +35,24 @@ pub(super) fn functions() -> Result<&'static Functions, String> {
 }
 
 fn open() -> Result<&'static Functions, String> {
-    let opened = from_memory().or_else(|_| from_file(&std::env::temp_dir()));
-    opened.map_err(|reason| {
-        format!(
-            "OpenImageIO cannot be loaded ({reason}): image files need version {VERSION}, which this program was built with. Install it (Debian: apt-get \
-             install libopenimageio{VERSION}), have LD_LIBRARY_PATH name its folder, or build the program anew with the version that is installed"
-        )
-    })
+    let ways: &[fn() -> Result<&'static Functions, String>] = &[
+        #[cfg(target_os = "linux")]
+        from_memory,
+        || from_file(&std::env::temp_dir()),
+    ];
+    let mut reasons = Vec::new();
+    for way in ways {
+        match way() {
+            Ok(functions) => return Ok(functions),
+            Err(reason) if reasons.contains(&reason) => {}
+            Err(reason) => reasons.push(reason),
+        }
+    }
+    Err(format!(
+        "OpenImageIO cannot be loaded ({}): image files need version {VERSION}, which this program was built with. Install it (Debian: apt-get \
+         install libopenimageio{VERSION}), have LD_LIBRARY_PATH name its folder, or build the program anew with the version that is installed",
+        reasons.join("; ")
+    ))
 }
 
 /// By a file that has no name, and is nowhere but in memory.
@@ -60,11 +71,6 @@ fn from_memory() -> Result<&'static Functions, String> {
     // It stays open. The loader takes files of one name for one file, and another library must not get this number.
     let file = ManuallyDrop::new(file);
     load(&PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd())))
-}
-
-#[cfg(not(target_os = "linux"))]
-fn from_memory() -> Result<&'static Functions, String> {
-    Err("only Linux has files in memory".to_owned())
 }
 
 /// By a file in a new folder that nobody else may enter. Both are removed once it is open.
