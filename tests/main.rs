@@ -16,6 +16,7 @@ mod layering;
 mod minray;
 mod motion;
 mod mutation;
+mod openimageio;
 mod parity;
 mod program;
 mod queries;

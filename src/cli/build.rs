@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::common::parse_bytes;
 use super::engine::BackendArg;
 use crate::error::{Error, Result};
+use crate::image;
 use crate::io;
 use crate::memory::process;
 use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory, Rays};
@@ -84,6 +85,11 @@ impl BuildArgs {
 
     /// The same, with so many bytes still to come beside the tree.
     fn decide(&self, backend: BackendArg, triangles: u64, rays: u64, to_come: u64) -> Result<Option<BuildChoice>> {
+        if self.max_memory.is_some() {
+            // A render holds OpenImageIO's libraries sooner or later, and may be loading them just now. Where that fails, whoever wants a
+            // picture says so.
+            let _ = image::prepare();
+        }
         let embree = if backend == BackendArg::Native { 0 } else { triangles.saturating_mul(EMBREE_BYTES) };
         let request = BuildRequest {
             triangles,

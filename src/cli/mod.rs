@@ -35,6 +35,7 @@ mod scaling;
 mod stress;
 mod summary;
 mod trace;
+mod trial;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};

@@ -15,6 +15,16 @@ pub(super) fn check<'a>(
     others: impl IntoIterator<Item = &'a PathBuf>,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<()> {
+    check_places(pictures, others, inputs)?;
+    try_out(pictures)
+}
+
+/// As far as [`check`] can say without OpenImageIO, which takes time to load. [`try_out`] says the rest.
+pub(super) fn check_places<'a>(
+    pictures: &'a [PathBuf],
+    others: impl IntoIterator<Item = &'a PathBuf>,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<()> {
     let others: Vec<&PathBuf> = others.into_iter().collect();
     // By where they really are; a file that does not exist yet has the place of its folder.
     let place = |path: &Path| {
@@ -33,8 +43,18 @@ pub(super) fn check<'a>(
         }
         taken.push(place);
     }
-    pictures.iter().try_for_each(|path| image::check_writable(path))?;
+    // Of an uncommon suffix it has to be known at once whether it is one.
+    let check = |path: &PathBuf| {
+        if image::has_common_suffix(path) { output::check_writable(path) } else { image::check_writable(path) }
+    };
+    pictures.iter().try_for_each(check)?;
     others.into_iter().try_for_each(|path| output::check_writable(path))
+}
+
+/// Whether pictures of these names can be made: that OpenImageIO is there, and a small picture finds room.
+pub(super) fn try_out(pictures: &[PathBuf]) -> Result<()> {
+    let mut common = pictures.iter().filter(|path| image::has_common_suffix(path));
+    common.try_for_each(|path| image::check_writable(path))
 }
 
 /// Writes one picture to each path, in the format its suffix says, with the channels where that holds any.

@@ -1,9 +1,11 @@
 //! `twincast render`: from a scene file to finished pictures.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::Args;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::accel::AccelArgs;
 use super::aov::AovArgs;
@@ -22,6 +24,7 @@ use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
 use super::response::ResponseArgs;
 use super::summary::Rendered;
+use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image, Metadata, WriteOptions};
@@ -155,15 +158,24 @@ fn render(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
     }
-    outputs::check(&args.output, &args.stats, args.inputs())?;
+    outputs::check_places(&args.output, &args.stats, args.inputs())?;
+    let pool = ThreadPoolBuilder::new().num_threads(args.threads).build();
+    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    // A thread that starts registers what is to be done at its end, under the lock that the system's loader holds as long as it loads libraries. So all are there
+    // before the trial has it load any.
+    pool.broadcast(|_| ());
+    let trial = Trial::start(args.output.clone(), cancel)?;
+    trial.join(produce(args, &pool, cancel))
+}
+
+/// What is left once it is known that there will be a picture.
+fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<()> {
     let denoising = args.denoise.open(&args.aov.aovs())?;
     let cache = args.cache.open(args.backend)?;
     let reference = args.reference.as_deref().map(image::read).transpose()?;
     let title = || args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let display = args.display_server.as_deref().map(|address| Display::connect(address, title())).transpose()?;
 
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     pool.install(|| {
         let start = Instant::now();
         let (mut scene, warnings) = args.scene.load_with_bar(args.camera.has_shutter(), args.quiet)?;

@@ -1,4 +1,6 @@
 //! Writing and reading image files, whichever backend does it.
+//!
+//! OpenImageIO is loaded by the first of these functions that needs it. Where it cannot be, [`Error::Unavailable`] says so.
 
 use std::path::Path;
 
@@ -47,6 +49,9 @@ pub(super) struct Encoding {
     /// Edge of a tile; 0 for rows, as most formats have them.
     pub tile: u32,
 }
+
+/// What is written with and without OpenImageIO.
+pub(super) const COMMON: [&str; 4] = ["exr", "jpeg", "jpg", "png"];
 
 /// Formats that hold linear floating values. In all others samples are 8-bit sRGB.
 const EXR: [&str; 3] = ["exr", "sxr", "mxr"];
@@ -119,8 +124,20 @@ pub fn write_channels(
 
 /// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.
 pub fn holds_channels(path: &Path) -> bool {
-    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    EXR.contains(&suffix.as_str())
+    EXR.contains(&suffix(path).as_str())
+}
+
+/// Loads what image files take, as the first of them would.
+///
+/// # Errors
+/// [`Error::Unavailable`] where it cannot be loaded.
+pub(crate) fn prepare() -> Result<()> {
+    backend::prepare()
+}
+
+/// Whether every build writes files of this suffix; of the others, OpenImageIO has to be asked.
+pub(crate) fn has_common_suffix(path: &Path) -> bool {
+    COMMON.contains(&suffix(path).as_str())
 }
 
 /// Checks, before a long render, that an image can be written to `path`: by writing a small one beside it.
@@ -145,6 +162,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// claims more than 2^28 pixels, or more than its size makes plausible.
 pub fn read(path: &Path) -> Result<Image> {
     let bytes = file_size(path)?;
+    prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))
 }
@@ -155,6 +173,7 @@ pub fn read(path: &Path) -> Result<Image> {
 /// As of [`read`]; and for a file in another format.
 pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = file_size(path)?;
+    prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read_channels(path, &check).map_err(|message| Error::input(path, "", message))
 }
@@ -165,6 +184,7 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
 /// [`Error::Input`] for a file that is missing, broken or in another format.
 pub fn read_metadata(path: &Path) -> Result<Metadata> {
     file_size(path)?;
+    prepare()?;
     backend::read_metadata(path).map_err(|message| Error::input(path, "", message))
 }
 
@@ -195,9 +215,15 @@ fn encoding(suffix: &str, options: &WriteOptions) -> Encoding {
     }
 }
 
+/// In lower case; empty where there is none.
+fn suffix(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
 /// The suffix in lower case, if this build writes it.
 fn writable_suffix(path: &Path) -> Result<String> {
-    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let suffix = suffix(path);
+    prepare()?;
     let known = backend::writable_suffixes().map_err(|message| Error::output(path, message))?;
     if known.contains(&suffix) {
         return Ok(suffix);

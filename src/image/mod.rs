@@ -2,7 +2,7 @@
 //!
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
 //! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light (`response`). `samples.rs` turns pixels into a file's samples, and a
-//! backend moves them: `oiio.rs` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
+//! backend moves them: `oiio` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
 //! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
 
 mod channels;
@@ -10,6 +10,8 @@ mod compare;
 pub mod denoise;
 mod file;
 pub mod flip;
+#[cfg(any(feature = "oiio", feature = "oidn"))]
+mod loading;
 mod metadata;
 #[cfg(feature = "oiio")]
 mod oiio;
@@ -28,6 +30,7 @@ pub use compare::Difference;
 pub use file::{
     Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
 };
+pub(crate) use file::{has_common_suffix, prepare};
 pub use metadata::{Metadata, Window};
 pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 

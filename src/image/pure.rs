@@ -9,7 +9,7 @@ use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
 use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 use openexr::{AttributeValue, FlatSamples, Text};
 
-use super::file::Encoding;
+use super::file::{COMMON, Encoding};
 use super::metadata::{Metadata, Window, is_text, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 use super::{Channel, pure_channels};
@@ -26,9 +26,15 @@ const RENDER_TIME_SECONDS: &str = "renderTimeSeconds";
 /// As OpenImageIO is told, too.
 const JPEG_QUALITY: u8 = 95;
 
+/// There is nothing to be loaded.
+#[cfg(not(feature = "oiio"))]
+pub(super) fn prepare() -> crate::error::Result<()> {
+    Ok(())
+}
+
 /// What is written; the same is read.
 pub(super) fn writable_suffixes() -> Result<Vec<String>> {
-    Ok(["exr", "jpeg", "jpg", "png"].map(str::to_owned).to_vec())
+    Ok(COMMON.map(str::to_owned).to_vec())
 }
 
 /// Writes a file.

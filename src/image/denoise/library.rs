@@ -10,11 +10,12 @@ use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
-use libloading::os::unix::{Library as File, RTLD_LOCAL, RTLD_NOW};
+use libloading::os::unix::{Library as File, RTLD_NOW};
 
 use super::VARIABLE;
 use super::device::Device;
 use crate::error::{Error, Result};
+use crate::image::loading::{self, function};
 
 /// Names of the library, the newest first.
 const NAMES: [&str; 2] = ["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1"];
@@ -69,9 +70,9 @@ impl Library {
         for place in &places {
             // SAFETY: what a library does when it is loaded is up to whoever installed it under this name, or named it in
             // the environment, as with every library that a program is linked with.
-            match unsafe { File::open(Some(place), RTLD_NOW | RTLD_LOCAL) } {
+            match unsafe { loading::open(place, RTLD_NOW) } {
                 Ok(file) => return Self::new(file, place),
-                Err(error) => refusals.push(reason(&error, place)),
+                Err(words) => refusals.push(reason(words, place)),
             }
         }
         let refusals = refusals.join("; ");
@@ -129,23 +130,10 @@ impl Functions {
     }
 }
 
-/// The first of these functions that a library has.
-///
-/// # Safety
-/// `T` must be the type of a pointer to each of them, and the library must not be closed while it is used.
-unsafe fn function<T: Copy>(file: &File, names: &[&'static str]) -> std::result::Result<T, &'static str> {
-    let found = names.iter().find_map(|name| {
-        // SAFETY: the caller says that a function of this name has this type.
-        unsafe { file.get::<T>(name.as_bytes()) }.ok()
-    });
-    found.map(|symbol| *symbol).ok_or(names[0])
-}
-
-/// Why a file cannot be loaded, in the loader's words, which mostly begin with the name.
-fn reason(error: &libloading::Error, place: &Path) -> String {
+/// The loader's words, with the name of the library.
+fn reason(words: String, place: &Path) -> String {
     let place = place.display().to_string();
-    let cause = std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
-    if cause.contains(&place) { cause } else { format!("{place}: {cause}") }
+    if words.contains(&place) { words } else { format!("{place}: {words}") }
 }
 
 fn dotted(version: c_int) -> String {

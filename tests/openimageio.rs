@@ -1,0 +1,75 @@
+//! OpenImageIO is loaded by whoever writes or reads a picture, by nobody else; and what is said where it cannot be.
+//!
+//! What is loaded is told by the loader of the GNU C library (ld.so(8), `LD_DEBUG`).
+#![cfg(all(feature = "oiio", target_os = "linux", target_env = "gnu"))]
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use crate::program::{command, text};
+
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/box/box.toml");
+
+/// The libraries that a run of the program asks for.
+fn libraries(args: &[&str]) -> Vec<String> {
+    let output = command().env("LD_DEBUG", "files").args(args).output().expect("the program runs");
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{args:?}: {words}");
+    let names = words.lines().filter(|line| line.contains("needed by")).filter_map(|line| line.split("file=").nth(1));
+    let names: Vec<_> = names.filter_map(|rest| rest.split_whitespace().next()).map(str::to_owned).collect();
+    assert!(names.iter().any(|name| name.starts_with("libc.so")), "the loader says what it loads: {words}");
+    names
+}
+
+/// The name under which the program asks for OpenImageIO, found in a run that writes a picture.
+fn openimageio() -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = folder.path().join("a.png").to_string_lossy().into_owned();
+    let libraries = libraries(&["render", SCENE, "-o", &picture, "--size", "8x8", "--spp", "1"]);
+    libraries.into_iter().find(|name| name.starts_with("libOpenImageIO.so")).expect("a picture takes OpenImageIO")
+}
+
+#[test]
+fn it_is_loaded_for_pictures_and_for_nothing_else() {
+    let asked_for = openimageio();
+    for args in [&["--version"][..], &["render", "--help"], &["info", SCENE], &["render", SCENE, "--print-camera"]] {
+        let libraries = libraries(args);
+        assert!(!libraries.iter().any(|name| name.contains("OpenImageIO")), "{args:?} loads {asked_for}");
+    }
+}
+
+#[test]
+fn where_it_cannot_be_loaded_the_reason_and_the_remedy_are_told_and_the_rest_goes_on() {
+    let name = openimageio();
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join(&name), "not a library, whatever its name; ".repeat(9)).expect("written");
+    let before = std::env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
+    let path = [folder.path().as_os_str(), &before].join(&OsString::from(":"));
+    let run = |args: &[&str]| {
+        let output = command().env("LD_LIBRARY_PATH", &path).args(args).output().expect("the program runs");
+        (output.status.code(), text(&output.stderr))
+    };
+    for args in [&["--version"][..], &["info", SCENE], &["render", SCENE, "--print-camera"]] {
+        assert_eq!(run(args), (Some(0), String::new()), "{args:?}");
+    }
+
+    let [picture, uncommon, reference] =
+        ["a.png", "a.tif", "b.exr"].map(|name| folder.path().join(name).to_string_lossy().into_owned());
+    std::fs::write(&reference, "never looked at").expect("written");
+    for args in [
+        &["render", SCENE, "-o", &picture][..],
+        &["render", SCENE, "-o", &uncommon],
+        // What was always found first is told first, whichever is found first now.
+        &["render", "missing.glb", "-o", &picture],
+        &["render", SCENE, "-o", &picture, "--max-memory", "1T"],
+        &["render", SCENE, "-o", &picture, "--reference", &reference],
+    ] {
+        let (code, message) = run(args);
+        assert_eq!(code, Some(5), "{args:?}: {message}");
+        for words in ["error: OpenImageIO cannot be loaded (", &name, "invalid ELF header", "LD_LIBRARY_PATH"] {
+            assert!(message.contains(words), "{args:?}: {words} in {message}");
+        }
+        assert_eq!(message.lines().count(), 1, "{args:?}: {message}");
+        assert!(!Path::new(&picture).exists() && !Path::new(&uncommon).exists(), "{args:?}");
+    }
+}
