@@ -26,8 +26,9 @@ const BITS: u32 = 18;
 const POINT_BITS: u32 = BITS / 3;
 const RAY_BITS: u32 = BITS / 3 - 1;
 
-/// Of the bits of a ray's key all but those that name one of eight octants, and one of eight times eight times eight parts of the scene.
-const FINE: u32 = BITS - 12;
+/// Of the bits of a ray's key those that name one of eight times eight times eight parts of the scene. Octants have no say in whether neighbours are near each other: rays that
+/// leave one surface in all directions are best left together.
+const PART: u32 = 0b111_111_111 << (3 * RAY_BITS - 9);
 
 /// Each counting takes a mebibyte.
 const MOST_COUNTINGS: usize = 8;
@@ -96,7 +97,7 @@ impl Order {
             let octant = (0..3).fold(0, |octant, axis| octant << 1 | u32::from(ray.direction[axis] < 0.0));
             octant << (3 * RAY_BITS) | cells.key(entry(&ray, &bounds))
         });
-        let far = keys.par_windows(2).filter(|pair| pair[0] >> FINE != pair[1] >> FINE).count();
+        let far = keys.par_windows(2).filter(|pair| (pair[0] ^ pair[1]) & PART != 0).count();
         (2 * far >= keys.len()).then(|| Self::by(&keys))
     }
 }
