@@ -145,9 +145,8 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Those from `first` on, at most `count`, into `rays`, which is cleared first.
-    pub fn chunk(&self, first: usize, count: usize, rays: &mut Vec<PreciseRay>) {
-        rays.clear();
-        rays.extend((first..self.len().min(first + count)).map(|i| self.at(i)));
+    /// Those with these numbers.
+    pub fn some(&self, which: impl Iterator<Item = usize>) -> Vec<PreciseRay> {
+        which.map(|i| self.at(i)).collect()
     }
 }

@@ -7,7 +7,7 @@ use twincast::trace::precise::{PreciseHit, PreciseRay};
 
 use crate::arrays::{Ends, Points, Rays};
 use crate::pool;
-use crate::scene::{CHUNK, Scene, for_each_ray, table};
+use crate::scene::{CHUNK, Scene, table};
 
 /// All hits, by ray, then by t: ray, primitive, geometry, t, (u, v), location.
 type Crossings<'py> = (
@@ -41,12 +41,16 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        for_each_ray(py, threads, rays.len(), 0i32, |from, counts| {
-            let (mut list, mut found) = (Vec::new(), [0; CHUNK]);
-            rays.chunk(from, counts.len(), &mut list);
-            self.precise.count_batch(&list, &mut found[..counts.len()]);
-            counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
-        })
+        let counts = pool::run(py, threads, || {
+            let mut counts = vec![0; rays.len()];
+            counts.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, counts)| {
+                let (first, mut found) = (chunk * CHUNK, [0; CHUNK]);
+                self.precise.count_batch(&rays.some(first..first + counts.len()), &mut found[..counts.len()]);
+                counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
+            });
+            counts
+        })?;
+        Ok(counts.into_pyarray(py))
     }
 
     /// All hits; of each ray the first `most`. Locations only where they are asked for, else without rows.
@@ -113,8 +117,8 @@ impl Scene {
 impl Scene {
     /// The hits of the rays of one task.
     fn found(&self, rays: &Rays<'_>, first: usize, most: usize) -> Found {
-        let mut found = Found::default();
-        rays.chunk(first, CHUNK, &mut found.rays);
+        let rays = rays.some(first..rays.len().min(first + CHUNK));
+        let mut found = Found { rays, ..Found::default() };
         self.precise.all_hits_batch(&found.rays, &mut found.ends, &mut found.hits);
         if most < usize::MAX {
             let (mut kept, mut from) = (Vec::with_capacity(found.hits.len()), 0);

@@ -16,7 +16,8 @@
 
 mod arrays;
 mod crossings;
-mod curve;
+mod inside;
+mod order;
 mod points;
 mod pool;
 mod render;

@@ -3,11 +3,12 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twincast::math::DVec3;
-use twincast::trace::precise::{NearestPoint, PreciseRay};
+use twincast::trace::precise::NearestPoint;
 
-use crate::arrays::Points;
+use crate::arrays::{Points, Rows};
+use crate::order::{self, Order};
+use crate::pool;
 use crate::scene::{INVALID, Scene, table};
-use crate::{curve, pool};
 
 /// The nearest points: where they are, primitive, geometry, (u, v), unit normal, distance.
 type Nearest<'py> = (
@@ -19,15 +20,16 @@ type Nearest<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Directions without a simple relation to axes or to each other: of a spiral on the sphere. The first is trimesh's.
-fn direction(sample: usize) -> DVec3 {
-    if sample == 0 {
-        return DVec3::new(0.439_506_445_5, 0.617_598_629_942, 0.652_231_566_745);
-    }
-    let (share, turn) = (sample as f64 * 0.754_877_666_246_692_8, sample as f64 * 3.883_222_077_450_933);
-    let z = 1.0 - 2.0 * share.fract();
-    let r = (1.0 - z * z).sqrt();
-    DVec3::new(r * turn.cos(), r * turn.sin(), z)
+/// Points that a thread takes at a time.
+const CHUNK: usize = 256;
+
+/// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`.
+fn along<T: Copy + Send + Sync>(rows: &Rows<'_>, none: T, ask: impl Fn(&[DVec3], &mut [T]) + Sync) -> Vec<T> {
+    let order = Order::of_points(rows);
+    order::along(rows.len(), order.as_ref(), CHUNK, none, |which, answers| {
+        let points: Vec<DVec3> = which.iter().map(|&i| rows.at(i)).collect();
+        ask(&points, answers);
+    })
 }
 
 #[pymethods]
@@ -38,7 +40,7 @@ impl Scene {
         let rows = points.rows("points")?;
         let count = rows.len();
         let found: Vec<Option<NearestPoint>> = pool::run(py, threads, || {
-            curve::along(&rows, None, |points, found| self.precise.nearest_point_batch(points, found))
+            along(&rows, None, |points, found| self.precise.nearest_point_batch(points, found))
         })?;
         let id = |id: fn(&NearestPoint) -> u32| -> Vec<u32> {
             found.iter().map(|found| found.as_ref().map_or(INVALID, id)).collect()
@@ -70,10 +72,13 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rows = points.rows("points")?;
         let distances = pool::run(py, threads, || {
-            curve::along(&rows, f64::NAN, |points, distances| {
+            let is_closed = samples > 0 && self.precise.is_closed();
+            along(&rows, f64::NAN, |points, distances| {
                 let (mut found, mut inside) = (vec![None; points.len()], vec![false; points.len()]);
                 self.precise.nearest_point_batch(points, &mut found);
-                if samples > 0 {
+                if is_closed {
+                    self.are_inside_closed(points, &found, &mut inside);
+                } else if samples > 0 {
                     self.are_inside(points, samples, false, &mut inside);
                 }
                 for (distance, (found, inside)) in distances.iter_mut().zip(found.iter().zip(inside)) {
@@ -100,35 +105,8 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rows = points.rows("points")?;
         let inside = pool::run(py, threads, || {
-            curve::along(&rows, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
+            along(&rows, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
         })?;
         Ok(inside.into_pyarray(py))
-    }
-}
-
-impl Scene {
-    fn are_inside(&self, points: &[DVec3], samples: usize, both_ways: bool, inside: &mut [bool]) {
-        let mut votes = vec![0; points.len()];
-        for sample in 0..samples {
-            let mut odd = self.are_odd(points, direction(sample));
-            if both_ways {
-                // Only of those that may still be inside.
-                let open: Vec<usize> = (0..points.len()).filter(|&i| odd[i]).collect();
-                let some: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
-                for (i, is_odd) in open.into_iter().zip(self.are_odd(&some, -direction(sample))) {
-                    odd[i] = is_odd;
-                }
-            }
-            votes.iter_mut().zip(odd).for_each(|(votes, odd)| *votes += usize::from(odd));
-        }
-        inside.iter_mut().zip(votes).for_each(|(inside, votes)| *inside = 2 * votes > samples);
-    }
-
-    /// Whether a ray from each point crosses the meshes an odd number of times.
-    fn are_odd(&self, points: &[DVec3], direction: DVec3) -> Vec<bool> {
-        let rays: Vec<PreciseRay> = points.iter().map(|&point| PreciseRay::new(point, direction)).collect();
-        let mut counts = vec![0; rays.len()];
-        self.precise.count_batch(&rays, &mut counts);
-        counts.iter().map(|count| count % 2 == 1).collect()
     }
 }

@@ -8,6 +8,7 @@ use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
 use twincast::{Batch, Hit, Ray, Tracer};
 
 use crate::arrays::{Ends, Points, Rays};
+use crate::order::{self, Order};
 use crate::{pool, value_error};
 
 /// Rays that a thread takes at a time.
@@ -48,23 +49,6 @@ pub fn table<'py, T: numpy::Element>(
     flat.into_pyarray(py).reshape([rows, columns])
 }
 
-/// An array with a value for each of `count` rays, at first `nothing`; `answer` is given the number of the first ray of a task, and the
-/// values of its rays.
-pub fn for_each_ray<T: numpy::Element + Copy>(
-    py: Python<'_>,
-    threads: usize,
-    count: usize,
-    nothing: T,
-    answer: impl Fn(usize, &mut [T]) + Sync,
-) -> PyResult<Bound<'_, PyArray1<T>>> {
-    let values = pool::run(py, threads, || {
-        let mut values = vec![nothing; count];
-        values.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, values)| answer(chunk * CHUNK, values));
-        values
-    })?;
-    Ok(values.into_pyarray(py))
-}
-
 #[pymethods]
 impl Scene {
     #[new]
@@ -99,9 +83,13 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        for_each_ray(py, threads, rays.len(), -1, |from, first| {
-            self.each_hit(&rays, from, first.len(), |i, hit| first[i] = hit.primitive.into());
-        })
+        let first = pool::run(py, threads, || {
+            self.along(&rays, -1, |which, first| {
+                let hits = self.hits(&rays, which);
+                first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
+            })
+        })?;
+        Ok(first.into_pyarray(py))
     }
 
     /// Whether each ray hits anything.
@@ -117,16 +105,17 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
-        for_each_ray(py, threads, rays.len(), false, |from, occluded| {
-            if let Some(bvh) = exact {
-                let rays: Vec<Ray> = (from..from + occluded.len()).map(|i| rays.rounded(i)).collect();
-                bvh.occluded_batch(&rays, occluded, Batch::default());
-            } else {
-                let mut list = Vec::new();
-                rays.chunk(from, occluded.len(), &mut list);
-                self.precise.occluded_batch(&list, occluded);
-            }
-        })
+        let occluded = pool::run(py, threads, || {
+            self.along(&rays, false, |which, occluded| {
+                if let Some(bvh) = exact {
+                    let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
+                    bvh.occluded_batch(&rays, occluded, Batch::default());
+                } else {
+                    self.precise.occluded_batch(&rays.some(which.iter().copied()), occluded);
+                }
+            })
+        })?;
+        Ok(occluded.into_pyarray(py))
     }
 
     /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
@@ -146,6 +135,7 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
+            let hits = self.along(&rays, None, |which, hits| hits.copy_from_slice(&self.hits(&rays, which)));
             let (mut t, mut uv) = (vec![f32::INFINITY; count], vec![0f32; 2 * count]);
             let (mut primitive, mut geometry) = (vec![INVALID; count], vec![INVALID; count]);
             let mut normal = vec![0f32; 3 * count];
@@ -153,11 +143,13 @@ impl Scene {
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = tasks.into_par_iter().zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv, normal), (primitive, geometry)))| {
-                self.each_hit(&rays, chunk * CHUNK, t.len(), |i, hit| {
-                    t[i] = hit.t;
-                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
-                    (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
-                });
+                for (i, hit) in hits[chunk * CHUNK..][..t.len()].iter().enumerate() {
+                    if let Some(hit) = hit {
+                        t[i] = hit.t;
+                        uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                        (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
+                    }
+                }
                 self.normals_of(primitive, geometry, normalize, normal);
             });
             (t, uv, primitive, geometry, normal)
@@ -180,16 +172,19 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry) = pool::run(py, threads, || {
+            let hits = self.along(&rays, None, |which, hits| hits.copy_from_slice(&self.precise_hits(&rays, which)));
             let (mut t, mut uv) = (vec![f64::INFINITY; count], vec![0f64; 2 * count]);
             let (mut primitive, mut geometry) = (vec![-1; count], vec![-1; count]);
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
-                self.each_precise_hit(&rays, chunk * CHUNK, t.len(), |i, hit| {
-                    t[i] = hit.t;
-                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
-                    (primitive[i], geometry[i]) = (hit.primitive.into(), hit.geometry.into());
-                });
+                for (i, hit) in hits[chunk * CHUNK..][..t.len()].iter().enumerate() {
+                    if let Some(hit) = hit {
+                        t[i] = hit.t;
+                        uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                        (primitive[i], geometry[i]) = (hit.primitive.into(), hit.geometry.into());
+                    }
+                }
             });
             (t, uv, primitive, geometry)
         })?;
@@ -247,33 +242,39 @@ impl Scene {
         }
     }
 
-    /// Calls `take` with the hits of the rays from `first` on, numbered from 0. Rays and meshes in f32 need no more.
-    fn each_hit(&self, rays: &Rays<'_>, first: usize, count: usize, mut take: impl FnMut(usize, Hit)) {
-        let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) else {
-            return self.each_precise_hit(rays, first, count, |i, hit| {
-                let PreciseHit { t, u, v, primitive, geometry, instance } = hit;
-                take(i, Hit { t: t as f32, u: u as f32, v: v as f32, primitive, geometry, instance });
-            });
-        };
-        let rays: Vec<Ray> = (first..first + count).map(|i| rays.rounded(i)).collect();
-        let mut hits = [None; CHUNK];
-        bvh.closest_batch(&rays, &mut hits[..count], Batch::default());
-        hits[..count].iter().enumerate().for_each(|(i, hit)| {
-            if let Some(hit) = hit {
-                take(i, *hit);
-            }
-        });
+    /// Answers to rays, in their order; `ask` is given the numbers of some at a time, and answers that say `none`.
+    fn along<T: Copy + Send + Sync>(
+        &self,
+        rays: &Rays<'_>,
+        none: T,
+        ask: impl Fn(&[usize], &mut [T]) + Sync,
+    ) -> Vec<T> {
+        let order = Order::of_rays(rays, &self.precise);
+        order::along(rays.len(), order.as_ref(), CHUNK, none, ask)
     }
 
-    fn each_precise_hit(&self, rays: &Rays<'_>, first: usize, count: usize, mut take: impl FnMut(usize, PreciseHit)) {
-        let mut list = Vec::with_capacity(count);
-        rays.chunk(first, count, &mut list);
-        let mut hits = [None; CHUNK];
-        self.precise.closest_batch(&list, &mut hits[..count]);
-        hits[..count].iter().enumerate().for_each(|(i, hit)| {
-            if let Some(hit) = hit {
-                take(i, *hit);
-            }
-        });
+    /// The hits of the rays with these numbers. Rays and meshes in f32 need no more.
+    fn hits(&self, rays: &Rays<'_>, which: &[usize]) -> Vec<Option<Hit>> {
+        let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) else {
+            let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
+                t: t as f32,
+                u: u as f32,
+                v: v as f32,
+                primitive,
+                geometry,
+                instance,
+            };
+            return self.precise_hits(rays, which).into_iter().map(|hit| hit.map(rounded)).collect();
+        };
+        let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
+        let mut hits = vec![None; rays.len()];
+        bvh.closest_batch(&rays, &mut hits, Batch::default());
+        hits
+    }
+
+    fn precise_hits(&self, rays: &Rays<'_>, which: &[usize]) -> Vec<Option<PreciseHit>> {
+        let mut hits = vec![None; which.len()];
+        self.precise.closest_batch(&rays.some(which.iter().copied()), &mut hits);
+        hits
     }
 }

@@ -6,6 +6,7 @@
 //! multidimensional sampling*). Sequences of many dimensions at once, the alternative, have bad pairs among them.
 
 mod blue_noise;
+mod dimension;
 mod halton;
 mod hash;
 mod sobol;
@@ -14,6 +15,7 @@ mod stratified;
 use std::{array, fmt};
 
 use crate::math::DVec2;
+pub(super) use dimension::{Choice, Dimension};
 pub(crate) use hash::pcg4d;
 
 /// How samples are spread.
@@ -55,60 +57,6 @@ impl Sampling {
 impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-/// What a pair of numbers is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Dimension(u32);
-
-/// What a path chooses where it meets a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Choice {
-    /// Which light is asked, and which lobe is followed.
-    Which,
-    /// The point on the light.
-    Light,
-    /// The direction to go on in.
-    Direction,
-    /// Whether it ends.
-    End,
-    /// What its ray passes through.
-    Alpha,
-}
-
-impl Choice {
-    /// By their numbers.
-    const ALL: [Self; 5] = [Self::Which, Self::Light, Self::Direction, Self::End, Self::Alpha];
-}
-
-impl Dimension {
-    /// The point on the pixel.
-    pub(super) const FILM: Self = Self(0);
-    /// The point on the lens.
-    pub(super) const LENS: Self = Self(1);
-    /// The time while the shutter is open.
-    pub(super) const TIME: Self = Self(u32::MAX >> 1);
-
-    /// The point on a light, as asked by the ray of a pixel's tree of rays that has the number `branch`.
-    pub(super) const fn light(light: u32, branch: u32) -> Self {
-        Self(branch.wrapping_mul(0x9e37_79b9).wrapping_add(2).wrapping_add(light))
-    }
-
-    /// How a glossy surface spreads the ray that has the number `branch`.
-    pub(super) const fn gloss(branch: u32) -> Self {
-        Self(branch.wrapping_mul(0x85eb_ca6b).wrapping_add(0x4000_0000))
-    }
-
-    /// What the ray that has the number `branch` passes through.
-    pub(super) const fn alpha(branch: u32) -> Self {
-        Self(branch.wrapping_mul(0xc2b2_ae35).wrapping_add(0x2000_0000))
-    }
-
-    /// One of the choices where a path was scattered `depth` times.
-    pub(super) const fn bounce(depth: u32, choice: Choice) -> Self {
-        // Below 2^31, for streams are twice the number.
-        Self(0x6000_0000 + depth * 8 + choice as u32)
     }
 }
 
@@ -215,13 +163,13 @@ impl Sampler {
     /// Numbers for all samples of a pixel.
     #[inline]
     fn key(&self, pixel: [u32; 2], dimension: Dimension) -> [u32; 4] {
-        self.mix(pixel, 0, dimension.0.wrapping_mul(2))
+        self.mix(pixel, 0, dimension.stream())
     }
 
     /// Numbers for one sample of a pixel.
     #[inline]
     fn hash(&self, pixel: [u32; 2], sample: u32, dimension: Dimension) -> [u32; 4] {
-        self.mix(pixel, sample, dimension.0.wrapping_mul(2).wrapping_add(1))
+        self.mix(pixel, sample, dimension.stream().wrapping_add(1))
     }
 
     #[inline]

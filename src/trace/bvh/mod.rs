@@ -24,7 +24,7 @@
 //! | `boxes` | a tree over boxes of the caller's |
 //! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
-//! | `near` | the triangles that may be nearest to a point, eight boxes at a time |
+//! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `woop`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
@@ -50,6 +50,7 @@ mod candidates;
 mod certain;
 mod closest_point;
 mod clusters;
+mod discs;
 mod edges;
 mod filter;
 mod flight;
@@ -69,6 +70,8 @@ mod placements;
 mod preset;
 mod quad;
 mod query;
+#[cfg(test)]
+mod random;
 mod range;
 mod refit;
 mod room;
@@ -85,6 +88,7 @@ mod woop;
 pub use alone::{Search, SingleRay, TriangleFound};
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
+pub(super) use discs::Discs;
 pub(super) use near::Waiting;
 pub(super) use place::Blur;
 pub(super) use query::Verdict;

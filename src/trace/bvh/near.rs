@@ -13,6 +13,7 @@
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::build::MAX_DEPTH;
+use super::discs::Discs;
 use super::isa::{self, Kernel};
 use super::node::{Child, Node, WIDTH};
 use super::simd::{Array, Mask, Simd, Vector};
@@ -39,10 +40,16 @@ impl Waiting {
 }
 
 impl Bvh {
+    /// What [`near_triangles`](Self::near_triangles) looks at besides boxes.
+    pub(in crate::trace) fn discs(&self) -> Discs {
+        Discs::new(&self.fixed.triangles)
+    }
+
     /// Offers every fixed triangle that may be the nearest to `point`, or as near, and no farther than `wanted`. The point and the
-    /// corners may be off by `error` in each component, both together.
+    /// corners may be off by `error` in each component, both together. `discs` are this tree's.
     pub(in crate::trace) fn near_triangles(
         &self,
+        discs: &Discs,
         point: Vec3,
         error: f32,
         wanted: f64,
@@ -50,13 +57,14 @@ impl Bvh {
         measure: Measure<'_>,
     ) {
         if point.is_finite() && !self.fixed.triangles.tree().is_empty() {
-            isa::dispatch(self.isa, Near { bvh: self, point, error, wanted, waiting, measure });
+            isa::dispatch(self.isa, Near { bvh: self, discs, point, error, wanted, waiting, measure });
         }
     }
 }
 
 struct Near<'a> {
     bvh: &'a Bvh,
+    discs: &'a Discs,
     point: Vec3,
     error: f32,
     wanted: f64,
@@ -69,11 +77,11 @@ impl Kernel for Near<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, point, error, wanted, waiting, measure } = self;
+        let Self { bvh, discs, point, error, wanted, waiting, measure } = self;
         let triangles = &bvh.fixed.triangles;
         let tree = triangles.tree();
         let span = (point.abs() + tree.reach()).max_element();
-        let boxes = Boxes { point, pad: error + 4.0 * UNIT_ROUNDOFF * span };
+        let bounds = Bounds { discs, point, pad: error + 4.0 * UNIT_ROUNDOFF * span };
         // For the rounding of what was measured.
         let rounded_up = |wanted: f64| (wanted as f32) * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * error + f32::MIN_POSITIVE;
         let mut limit = rounded_up(wanted);
@@ -87,7 +95,7 @@ impl Kernel for Near<'_> {
             }
             if !child.is_leaf() {
                 let node = tree.node(child);
-                let (mask, near) = boxes.enter::<S>(node, limit * limit);
+                let (mask, near) = bounds.enter::<S>(node, child, limit * limit);
                 let at = len % STACK;
                 let (nears, stack) = (waiting.near[at..].first_chunk_mut(), waiting.children[at..].first_chunk_mut());
                 if let (Some(nears), Some(stack)) = (nears, stack) {
@@ -116,17 +124,18 @@ impl Kernel for Near<'_> {
     }
 }
 
-/// A point made ready for boxes.
-struct Boxes {
+/// A point made ready for what is around children.
+struct Bounds<'a> {
+    discs: &'a Discs,
     point: Vec3,
     /// By how much a box is nearer than it seems, along each axis.
     pad: f32,
 }
 
-impl Boxes {
-    /// The children that are no farther than the square root of `limit`, and at least the squared distance of each.
+impl Bounds<'_> {
+    /// The children that are no farther than the square root of `limit`, and no more than the squared distance of each. `child` is the node.
     #[inline(always)]
-    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+    fn enter<S: Simd>(&self, node: &Node, child: Child, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
         let (zero, pad) = (S::V8::splat(0.0), S::V8::splat(self.pad));
         let mut square = zero;
         for axis in 0..3 {
@@ -137,7 +146,8 @@ impl Boxes {
             square = outside.mul_add(outside, square);
         }
         // Empty slots are infinitely far away.
-        let near = square.mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF));
+        let near =
+            square.mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF)).max(self.discs.near::<S>(child, self.point, self.pad));
         (near.at_most(S::V8::splat(limit.min(f32::MAX))), near)
     }
 }

@@ -171,20 +171,8 @@ mod tests {
     use super::*;
     use crate::math::expansion::{Expansion, cross, dot};
     use crate::math::{Affine3, Mat3};
+    use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
-
-    struct Random(u64);
-
-    impl Random {
-        /// In [-1, 1).
-        fn unit(&mut self) -> f32 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-        }
-        fn vec3(&mut self) -> Vec3 {
-            Vec3::new(self.unit(), self.unit(), self.unit())
-        }
-    }
 
     /// The solution of A x = v, by Cramer's rule in exact arithmetic.
     fn solve(matrix: &Mat3, v: &[Expansion; 3]) -> DVec3 {
@@ -199,7 +187,7 @@ mod tests {
     /// for an object that is merely turned the blur is not much more than the rounding to f32.
     #[test]
     fn rays_are_no_farther_off_than_their_blur() {
-        let mut random = Random(1);
+        let mut random = Random::new(1);
         let (mut known, mut worst) = (0, 0.0f64);
         for case in 0..4000 {
             let shear = [0.0, 1e2, 1e5, 1e7][case % 4];

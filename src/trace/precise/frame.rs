@@ -8,8 +8,8 @@
 //! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
 //! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
 
-use super::{PreciseMesh, PreciseRay};
-use crate::math::{DAabb, DVec3, LARGEST_COORDINATE, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
+use super::{PreciseMesh, PreciseRay, is_traceable};
+use crate::math::{DAabb, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
 use crate::ray::Ray;
 use crate::scene::choose_origin;
 use crate::trace::bvh::Blur;
@@ -54,10 +54,9 @@ const SMALLEST: f64 = 1e-140;
 const RANGE: f64 = 1e-6;
 
 impl Frame {
-    pub fn around(meshes: &[PreciseMesh]) -> Self {
+    /// Of meshes with this box around all that can be traced of them.
+    pub fn around(meshes: &[PreciseMesh], bounds: DAabb) -> Self {
         let positions = || meshes.iter().flat_map(|mesh| &mesh.positions);
-        let is_traceable = |p: &&DVec3| p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan();
-        let bounds = positions().filter(is_traceable).fold(DAabb::EMPTY, |all, &p| all.include(p));
         let is_f32 = |p: &DVec3| p.as_vec3().as_dvec3() == *p || p.is_nan();
         let (centre, radius) = if bounds.is_empty() { (DVec3::ZERO, 0.0) } else { (bounds.centre(), bounds.radius()) };
         let is_handy = bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&radius);
@@ -78,7 +77,7 @@ impl Frame {
 
     /// A corner; NaN for one that is too large to trace.
     pub fn point(&self, p: DVec3) -> Vec3 {
-        if p.abs().max_element() <= f64::from(LARGEST_COORDINATE) { self.local(p).as_vec3() } else { Vec3::NAN }
+        if is_traceable(p) { self.local(p).as_vec3() } else { Vec3::NAN }
     }
 
     fn local(&self, p: DVec3) -> DVec3 {
@@ -97,6 +96,11 @@ impl Frame {
     /// Lengths there are so many times those of the meshes.
     pub fn scale(&self) -> f64 {
         self.scale
+    }
+
+    /// At least the largest coordinate of the meshes, as they were given.
+    pub fn farthest(&self) -> f64 {
+        self.centre.abs().max_element() + self.reach / self.scale
     }
 
     /// Of many rays, to be used as [`slab::ready`](super::super::bvh) does: in the second part relative to their own size.

@@ -11,16 +11,19 @@
 //! Where all coordinates are f32 to begin with, and lie well ([`Precise::exact`]), the rounding is none, and rays in f32 may ask
 //! the [`Bvh`] itself.
 
+mod closed;
 mod frame;
 mod nearest_point;
 mod query;
 
+use std::sync::OnceLock;
+
 use crate::error::{Error, Result};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DAabb, DVec3, LARGEST_COORDINATE, Vec3};
 use crate::ray::Hit;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 use crate::trace::World;
-use crate::trace::bvh::Bvh;
+use crate::trace::bvh::{Bvh, Discs};
 use frame::Frame;
 pub use nearest_point::NearestPoint;
 
@@ -102,6 +105,11 @@ pub struct PreciseMesh {
 pub struct Precise {
     meshes: Vec<PreciseMesh>,
     bvh: Bvh,
+    bounds: DAabb,
+    /// Made for the first point that is asked for.
+    discs: OnceLock<Discs>,
+    /// Found out when it is first asked.
+    closed: OnceLock<bool>,
     frame: Frame,
 }
 
@@ -114,7 +122,8 @@ impl Precise {
         for (number, mesh) in meshes.iter().enumerate() {
             check_indices(number, mesh)?;
         }
-        let frame = Frame::around(&meshes);
+        let bounds = traceable_bounds(&meshes);
+        let frame = Frame::around(&meshes, bounds);
         let rounded = |mesh: &PreciseMesh| {
             let positions: Vec<Vec3> = mesh.positions.iter().map(|&p| frame.point(p)).collect();
             Geometry::Mesh(Mesh::new(positions, mesh.triangles.clone()))
@@ -122,12 +131,17 @@ impl Precise {
         let scene = Scene::from_geometries(meshes.iter().map(rounded).collect(), vec![Material::default()]);
         let world = World::new(&scene)?;
         debug_assert_eq!(world.centre, DVec3::ZERO, "the frame lies around zero");
-        Ok(Self { bvh: Bvh::build(&world), meshes, frame })
+        Ok(Self { bvh: Bvh::build(&world), bounds, discs: OnceLock::new(), closed: OnceLock::new(), meshes, frame })
     }
 
     /// The meshes as they were given.
     pub fn meshes(&self) -> &[PreciseMesh] {
         &self.meshes
+    }
+
+    /// The box around all corners that are not NaN, infinite or too large; empty where there is none.
+    pub fn bounds(&self) -> DAabb {
+        self.bounds
     }
 
     /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers.
@@ -141,6 +155,16 @@ impl Precise {
         let mesh = &self.meshes[geometry as usize];
         mesh.triangles[primitive as usize].map(|i| mesh.positions[i as usize])
     }
+}
+
+/// Whether a corner is one that triangles with it can be hit.
+fn is_traceable(p: DVec3) -> bool {
+    p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan()
+}
+
+fn traceable_bounds(meshes: &[PreciseMesh]) -> DAabb {
+    let positions = meshes.iter().flat_map(|mesh| &mesh.positions).filter(|&&p| is_traceable(p));
+    positions.fold(DAabb::EMPTY, |all, &p| all.include(p))
 }
 
 fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {

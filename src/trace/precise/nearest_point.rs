@@ -71,18 +71,26 @@ impl Precise {
             NearestPoint::on(point, self.corners(geometry, primitive), geometry, primitive)
         });
         let wanted = best.as_ref().map_or(f64::INFINITY, distance);
-        self.bvh.near_triangles(local, error as f32 * 1.01, wanted, waiting, &mut |geometry, primitive, rounded| {
-            let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
-            let answer = NearestPoint::on(point, corners, geometry, primitive);
-            let is_better = |best: &NearestPoint| {
-                answer.distance_squared < best.distance_squared
-                    || answer.distance_squared == best.distance_squared && answer.id() < best.id()
-            };
-            if best.as_ref().is_none_or(is_better) {
-                best = Some(answer);
-            }
-            best.as_ref().map_or(f64::INFINITY, distance)
-        });
+        let discs = self.discs.get_or_init(|| self.bvh.discs());
+        self.bvh.near_triangles(
+            discs,
+            local,
+            error as f32 * 1.01,
+            wanted,
+            waiting,
+            &mut |geometry, primitive, rounded| {
+                let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
+                let answer = NearestPoint::on(point, corners, geometry, primitive);
+                let is_better = |best: &NearestPoint| {
+                    answer.distance_squared < best.distance_squared
+                        || answer.distance_squared == best.distance_squared && answer.id() < best.id()
+                };
+                if best.as_ref().is_none_or(is_better) {
+                    best = Some(answer);
+                }
+                best.as_ref().map_or(f64::INFINITY, distance)
+            },
+        );
         best
     }
 }

@@ -95,6 +95,10 @@ impl Vector for V16 {
         Self(unsafe { _mm512_andnot_ps(_mm512_set1_ps(-0.0), self.0) })
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
     fn at_most(self, other: Self) -> M16 {
         M16(unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) })
     }

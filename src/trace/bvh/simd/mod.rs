@@ -76,6 +76,7 @@ pub(super) trait Vector: Copy {
     fn max(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    fn sqrt(self) -> Self;
     /// Where self is at most other; not for NaN.
     fn at_most(self, other: Self) -> Self::Mask;
     /// Where self is less than other; not for NaN.

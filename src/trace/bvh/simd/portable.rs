@@ -122,6 +122,10 @@ impl<const N: usize> Vector for [f32; N] {
         self.map(f32::abs)
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(f32::sqrt)
+    }
+    #[inline(always)]
     fn at_most(self, other: Self) -> Bits {
         compare(
             self,

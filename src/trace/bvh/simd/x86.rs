@@ -206,6 +206,10 @@ impl Vector for V4 {
         Self(unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self.0) })
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(unsafe { _mm_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
     fn at_most(self, other: Self) -> M4 {
         M4(unsafe { _mm_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
     }
@@ -278,6 +282,10 @@ impl Vector for V8 {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
     }
     #[inline(always)]
     fn at_most(self, other: Self) -> M8 {

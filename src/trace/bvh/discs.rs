@@ -1,0 +1,251 @@
+//! Discs around pieces of a surface, by which a tree knows better than by its boxes how far a point is from them.
+//!
+//! The box around a piece of a surface that is tilted is as thick as the piece is wide. A point at the distance d from the surface is in reach of the
+//! boxes of all pieces within sqrt(2 d w) of where it is nearest, w being their width: a hundred blocks on a mesh of 100,000 triangles. A disc, a cylinder whose axis
+//! is the normal, is as thin as the piece is flat. Both together leave a handful.
+//!
+//! Only points ask for discs, so they are made when the first does, from the tree, eight a node and 256 bytes, and not kept in files. Oriented boxes (Gottschalk, Lin,
+//! Manocha 1996, *OBBTree*), the alternative, take twice the memory and arithmetic.
+//!
+//! Discs are made in f64 around what f32 keeps of their centres and normals, and rounded up. With u = 2^-24 and q the vector from a centre to a point, height and
+//! distance from the axis are off by less than 12 u |q|, the square of the latter by less than 40 u |q|^2.
+
+use super::node::{Child, Node, Tree, WIDTH};
+use super::simd::{Array, Simd, Vector};
+use super::triangles::TriangleTree;
+use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec3};
+
+/// Of each node of a tree, in their order, the discs around its children.
+pub(in crate::trace) struct Discs(Vec<Eight>);
+
+/// Component by component.
+#[derive(Clone, Copy)]
+struct Eight {
+    centre: [[f32; WIDTH]; 3],
+    /// Of about unit length.
+    normal: [[f32; WIDTH]; 3],
+    /// Along the normal, to either side.
+    height: [f32; WIDTH],
+    radius: [f32; WIDTH],
+}
+
+/// A disc around some triangles, or around several of these.
+#[derive(Clone, Copy)]
+struct Disc {
+    centre: DVec3,
+    normal: DVec3,
+    height: f64,
+    radius: f64,
+    /// The sum of the triangles' normals, each twice as long as the triangle is large.
+    facing: DVec3,
+}
+
+impl Discs {
+    pub(super) fn new(triangles: &TriangleTree) -> Self {
+        let tree = triangles.tree();
+        let none =
+            Eight { centre: [[0.0; WIDTH]; 3], normal: [[0.0; WIDTH]; 3], height: [0.0; WIDTH], radius: [0.0; WIDTH] };
+        let mut discs = Self(vec![none; tree.nodes().len()]);
+        if !tree.is_empty() {
+            discs.fill(triangles, tree, Child::ROOT);
+        }
+        discs
+    }
+
+    /// Makes the discs of a node's children, and one around these.
+    fn fill(&mut self, triangles: &TriangleTree, tree: &Tree, parent: Child) -> Disc {
+        let node: &Node = tree.node(parent);
+        let mut all = Vec::with_capacity(WIDTH);
+        for (slot, child) in node.children() {
+            let disc =
+                if child.is_leaf() { Disc::around_leaf(triangles, child) } else { self.fill(triangles, tree, child) };
+            self.0[parent.node() as usize].put(slot, &disc);
+            all.push(disc);
+        }
+        Disc::around(node.bounds(), &all)
+    }
+
+    /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off by at most `pad` in each component.
+    #[inline(always)]
+    pub(super) fn near<S: Simd>(&self, node: Child, point: Vec3, pad: f32) -> S::V8 {
+        let discs = &self.0[node.node() as usize];
+        let zero = S::V8::splat(0.0);
+        let (mut along, mut square, mut length) = (zero, zero, zero);
+        for axis in 0..3 {
+            let q = S::V8::splat(point[axis]).sub(S::V8::load(&discs.centre[axis]));
+            along = q.mul_add(S::V8::load(&discs.normal[axis]), along);
+            square = q.mul_add(q, square);
+            length = length.add(q.abs());
+        }
+        // `length` is more than |q|, and 1.75 more than the length of three components of 1.
+        let across = square.mul(S::V8::splat(1.0 - 40.0 * UNIT_ROUNDOFF)).sub(along.mul(along)).max(zero).sqrt();
+        let off = length.mul_add(S::V8::splat(12.0 * UNIT_ROUNDOFF), S::V8::splat(1.75 * pad));
+        let above = along.abs().sub(S::V8::load(&discs.height)).sub(off).max(zero);
+        let beside = across.sub(S::V8::load(&discs.radius)).sub(off).max(zero);
+        let near = above.mul_add(above, beside.mul(beside)).mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF));
+        near.min(S::V8::splat(f32::MAX))
+    }
+}
+
+impl Eight {
+    fn put(&mut self, slot: usize, disc: &Disc) {
+        for axis in 0..3 {
+            // f32 already.
+            self.centre[axis][slot] = disc.centre[axis] as f32;
+            self.normal[axis][slot] = disc.normal[axis] as f32;
+        }
+        (self.height[slot], self.radius[slot]) = (rounded_up(disc.height), rounded_up(disc.radius));
+    }
+}
+
+/// No less, for what f64 has rounded, too.
+fn rounded_up(x: f64) -> f32 {
+    ((x * (1.0 + 1e-9)) as f32).next_up()
+}
+
+fn of_f32(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
+}
+
+/// How far a vector leads along and across a normal.
+fn parts(v: DVec3, normal: DVec3) -> (f64, f64) {
+    // f32 keeps the direction of a normal, not its length.
+    let unit = normal.normalize();
+    let along = v.dot(unit);
+    (along, (v - unit * along).length())
+}
+
+impl Disc {
+    fn around_leaf(triangles: &TriangleTree, leaf: Child) -> Self {
+        let mut scratch = None;
+        let mut corners = Vec::with_capacity(3 * super::block::LANES);
+        let mut bounds = Aabb::EMPTY;
+        let mut facing = DVec3::ZERO;
+        for index in leaf.blocks() {
+            let block = triangles.block(index, &mut scratch);
+            for lane in block.used() {
+                let triangle = block.triangle(lane);
+                bounds = triangle.iter().fold(bounds, |bounds, &corner| bounds.include(corner));
+                let [a, b, c] = triangle.map(|corner| corner.as_dvec3());
+                facing += (b - a).cross(c - a);
+                corners.extend([a, b, c]);
+            }
+        }
+        let mut disc = Self::empty(bounds, facing);
+        // As much on one side as on the other.
+        let along = corners.iter().map(|&corner| parts(corner - disc.centre, disc.normal).0);
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (x.min(low), x.max(high)));
+        disc.centre = of_f32(disc.centre + disc.normal * (0.5 * (low + high)));
+        for corner in corners {
+            let (along, across) = parts(corner - disc.centre, disc.normal);
+            disc.height = disc.height.max(along.abs());
+            disc.radius = disc.radius.max(across);
+        }
+        disc
+    }
+
+    /// Around discs that are in a box together.
+    fn around(bounds: Aabb, discs: &[Self]) -> Self {
+        let mut all = Self::empty(bounds, discs.iter().map(|disc| disc.facing).sum());
+        for disc in discs {
+            let (along, across) = parts(disc.centre - all.centre, all.normal);
+            let cosine = disc.normal.normalize().dot(all.normal.normalize()).abs().min(1.0);
+            let sine = (1.0 - cosine * cosine).sqrt() + 1e-7;
+            all.height = all.height.max(along.abs() + disc.height * cosine + disc.radius * sine);
+            all.radius = all.radius.max(across + disc.height * sine + disc.radius);
+        }
+        // No farther than the corners of the box.
+        let farthest = (bounds.max.as_dvec3() - all.centre).max(all.centre - bounds.min.as_dvec3()).length();
+        Self { height: all.height.min(farthest), radius: all.radius.min(farthest), ..all }
+    }
+
+    fn empty(bounds: Aabb, facing: DVec3) -> Self {
+        let normal = of_f32(facing.normalize_or(DVec3::Z));
+        let centre = of_f32(0.5 * (bounds.min.as_dvec3() + bounds.max.as_dvec3()));
+        Self { centre, normal, height: 0.0, radius: 0.0, facing }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::scene::{Geometry, Material, Mesh, Scene};
+    use crate::shape::closest::closest_point;
+    use crate::trace::World;
+    use crate::trace::bvh::Bvh;
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
+
+    fn built(triangles: &[[Vec3; 3]]) -> Bvh {
+        let count = triangles.len() as u32;
+        let mesh = Mesh::new(triangles.concat(), (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
+        let scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+        Bvh::build(&World::new(&scene).expect("a mesh"))
+    }
+
+    fn below(triangles: &TriangleTree, child: Child, all: &mut Vec<[DVec3; 3]>) {
+        if !child.is_leaf() {
+            let node = triangles.tree().node(child);
+            return node.children().for_each(|(_, child)| below(triangles, child, all));
+        }
+        for index in child.blocks() {
+            let mut scratch = None;
+            let block = triangles.block(index, &mut scratch);
+            all.extend(block.used().map(|lane| block.triangle(lane).map(|corner| corner.as_dvec3())));
+        }
+    }
+
+    /// Of every child of every node what the disc says and the distance, squared.
+    fn compare(bvh: &Bvh, points: &[Vec3], mut with: impl FnMut(f64, f64)) {
+        let triangles = &bvh.fixed.triangles;
+        let discs = bvh.discs();
+        for (i, node) in triangles.tree().nodes().iter().enumerate() {
+            for (slot, child) in node.children() {
+                let mut all = Vec::new();
+                below(triangles, child, &mut all);
+                for &point in points {
+                    let near = discs.near::<Portable>(Child::inner(i as u32), point, 0.0).to_array()[slot];
+                    let squares = all.iter().map(|&corners| closest_point(point.as_dvec3(), corners).distance_squared);
+                    with(f64::from(near), squares.fold(f64::INFINITY, f64::min));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_disc_is_farther_than_what_it_holds() {
+        let mut random = Random::new(3);
+        for (size, thin, away) in [(0.2, 1.0, 0.0), (0.05, 1e-6, 0.0), (1.0, 0.0, 0.0), (1e-3, 1e-3, 40.0)] {
+            let mut triangle = || {
+                let a = random.vec3() + Vec3::splat(away);
+                let edge = random.vec3() * size;
+                [a, a + edge, a + edge * 0.5 + random.vec3() * (size * thin)]
+            };
+            let triangles: Vec<_> = (0..300).map(|_| triangle()).collect();
+            let mut points: Vec<Vec3> = (0..50).map(|_| random.vec3() * 3.0 + Vec3::splat(away)).collect();
+            points.extend(triangles.iter().take(50).flatten());
+            compare(&built(&triangles), &points, |near, square| assert!(near <= square, "{near} > {square}"));
+        }
+    }
+
+    #[test]
+    fn a_disc_is_as_thin_as_a_plane_is() {
+        // A plane that no axis is along or across.
+        let (across, along) = (Vec3::new(1.0, 0.5, 0.3), Vec3::new(-0.4, 1.0, 0.7));
+        let at = |i: usize, k: usize| across * i as f32 * 0.1 + along * k as f32 * 0.1;
+        let triangles: Vec<_> = (0..20)
+            .flat_map(|i| {
+                (0..20).flat_map(move |k| {
+                    [[at(i, k), at(i + 1, k), at(i, k + 1)], [at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]]
+                })
+            })
+            .collect();
+        let normal = across.cross(along).normalize();
+        let points: Vec<Vec3> = [0.1, 1.0, 10.0].iter().map(|&h| at(10, 10) + normal * h).collect();
+        compare(&built(&triangles), &points, |near, square| {
+            // The disc is round, and the piece is not: it may be nearer to the side.
+            assert!(near <= square && near >= 0.25 * square, "{near}, {square}");
+        });
+    }
+}
