@@ -106,13 +106,15 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
         let occluded = pool::run(py, threads, || {
-            self.along(&rays, false, |which, occluded| {
-                if let Some(bvh) = exact {
-                    let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
-                    bvh.occluded_batch(&rays, occluded, Batch::default());
-                } else {
+            let Some(bvh) = exact else {
+                return self.along(&rays, false, |which, occluded| {
                     self.precise.occluded_batch(&rays.some(which.iter().copied()), occluded);
-                }
+                });
+            };
+            // The first hit of any is found so soon that sorting does not pay.
+            order::along(rays.len(), None, CHUNK, false, |which, occluded| {
+                let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
+                bvh.occluded_batch(&rays, occluded, Batch::default());
             })
         })?;
         Ok(occluded.into_pyarray(py))
