@@ -116,3 +116,17 @@ fn indices_that_are_not_there_are_an_error() {
     let error = Precise::new(vec![mesh]).err().expect("no fourth vertex");
     assert!(error.to_string().contains("triangle 1 of mesh 0"), "{error}");
 }
+
+#[test]
+fn points_beyond_the_squares_of_f32_have_a_nearest_point() {
+    let Case { corners, precise, .. } = case(&mut Random::new(6), 0, 1.0);
+    for away in [1e10, 1e18, 1e19, 1e25, 1e38, 1e100] {
+        let point = DVec3::new(away, -0.5 * away, 0.25 * away);
+        let found = precise.nearest_point(point).expect("there are triangles");
+        let distance = |corner: &Whole| (DVec3::from(corner.map(|x| x as f64)) - point).length();
+        let least = corners.iter().flatten().map(distance).fold(f64::INFINITY, f64::min);
+        let error = (found.distance_squared.sqrt() - least).abs();
+        // From so far away nothing is nearer than a corner, but for rounding and the size of a triangle against 1e10.
+        assert!(error <= 1e-6 * least, "{away}: {found:?}, {least}");
+    }
+}

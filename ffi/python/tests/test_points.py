@@ -104,6 +104,20 @@ def test_points_that_are_not_finite():
     assert scene.compute_occupancy(points).tolist() == [0, 0, 1]
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_points_that_are_very_far_away(rng, dtype):
+    """Squares of their distances are beyond f32."""
+    vertices, faces = brute.soup(rng, 100)
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(vertices.astype(dtype), faces)
+    for away in (1e10, 1e18, 1e19, 1e20, 1e37) + ((1e40, 1e150) if dtype == np.float64 else ()):
+        points = (rng.normal(size=(20, 3)) * away).astype(dtype)
+        expected = np.linalg.norm(points.astype(np.float64), axis=1)
+        assert np.allclose(scene.compute_distance(points), expected, rtol=1e-6 + 1e3 / away, atol=0)
+        assert np.allclose(scene.compute_signed_distance(points), expected, rtol=1e-6 + 1e3 / away, atol=0)
+        assert (scene.compute_closest_points(points)["primitive_ids"] < len(faces)).all()
+
+
 def test_a_scene_without_triangles():
     scene = twincast.RaycastingScene()
     assert np.isnan(scene.compute_signed_distance(np.zeros((2, 3), np.float32))).all()

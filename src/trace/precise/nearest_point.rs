@@ -2,7 +2,7 @@
 //!
 //! The tree offers what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
-use super::Precise;
+use super::{Precise, is_traceable};
 use crate::math::DVec3;
 use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::trace::bvh::Waiting;
@@ -37,9 +37,12 @@ impl NearestPoint {
     }
 }
 
+/// Farther away, in the coordinates of the tree, squares of distances leave f32.
+const FARTHEST: f32 = 1e18;
+
 impl Precise {
     /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry, primitive). Triangles
-    /// without an area count too. None for a point that is not finite, and where there are no triangles.
+    /// without an area count too. None for a point that is not finite, and where there are no triangles. Squares of distances above 1e154 are infinite.
     pub fn nearest_point(&self, point: DVec3) -> Option<NearestPoint> {
         self.nearest(point, None, &mut Waiting::new())
     }
@@ -59,11 +62,33 @@ impl Precise {
         }
     }
 
+    /// By a look at every triangle, which are all about as far away.
+    fn nearest_of_all(&self, point: DVec3) -> Option<NearestPoint> {
+        let mut best: Option<NearestPoint> = None;
+        for (mesh, geometry) in self.meshes.iter().zip(0..) {
+            for primitive in 0..mesh.triangles.len() as u32 {
+                let corners = self.corners(geometry, primitive);
+                if corners.iter().all(|&corner| is_traceable(corner)) {
+                    let answer = NearestPoint::on(point, corners, geometry, primitive);
+                    // Of equal ones the first has the lowest id.
+                    if best.as_ref().is_none_or(|best| answer.distance_squared < best.distance_squared) {
+                        best = Some(answer);
+                    }
+                }
+            }
+        }
+        best
+    }
+
     fn nearest(&self, point: DVec3, last: Option<NearestPoint>, waiting: &mut Waiting) -> Option<NearestPoint> {
         if !point.is_finite() {
             return None;
         }
         let (local, error) = self.frame.blurred_point(point);
+        let is_near = local.abs().max_element() <= FARTHEST;
+        if !is_near {
+            return self.nearest_of_all(point);
+        }
         let is_exact = self.frame.is_identity();
         let distance = |best: &NearestPoint| best.distance_squared.sqrt() * self.frame.scale();
         let mut best = last.map(|last| {
