@@ -3,7 +3,7 @@
 //! What is asked of a point or a ray leads to a few kilobytes of the tree. Asked in the order in which they came, which is often none, most of
 //! these are fetched from far; along Morton's curve (1966, *A computer oriented geodetic data base*) the next one finds them where they
 //! are. On a mesh of 100,000 triangles distances then take half of the time, and nearest hits in f64 0.7 of it. Cells are so large that a few points
-//! share one, which is as good as the finest order, and they are counted, which takes a third of the time of comparing.
+//! share one, which is as good as the finest order, and keys are counted, which costs less than to compare them.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -85,7 +85,8 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let first = pool::run(py, threads, || {
             self.along(&rays, -1, |which, first| {
-                let hits = self.hits(&rays, which);
+                let mut hits = vec![None; which.len()];
+                self.hits(&rays, which, &mut hits);
                 first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
             })
         })?;
@@ -137,7 +138,7 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
-            let hits = self.along(&rays, None, |which, hits| hits.copy_from_slice(&self.hits(&rays, which)));
+            let hits = self.along(&rays, None, |which, hits| self.hits(&rays, which, hits));
             let (mut t, mut uv) = (vec![f32::INFINITY; count], vec![0f32; 2 * count]);
             let (mut primitive, mut geometry) = (vec![INVALID; count], vec![INVALID; count]);
             let mut normal = vec![0f32; 3 * count];
@@ -174,7 +175,7 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry) = pool::run(py, threads, || {
-            let hits = self.along(&rays, None, |which, hits| hits.copy_from_slice(&self.precise_hits(&rays, which)));
+            let hits = self.along(&rays, None, |which, hits| self.precise_hits(&rays, which, hits));
             let (mut t, mut uv) = (vec![f64::INFINITY; count], vec![0f64; 2 * count]);
             let (mut primitive, mut geometry) = (vec![-1; count], vec![-1; count]);
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
@@ -256,27 +257,25 @@ impl Scene {
     }
 
     /// The hits of the rays with these numbers. Rays and meshes in f32 need no more.
-    fn hits(&self, rays: &Rays<'_>, which: &[usize]) -> Vec<Option<Hit>> {
-        let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) else {
-            let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
-                t: t as f32,
-                u: u as f32,
-                v: v as f32,
-                primitive,
-                geometry,
-                instance,
-            };
-            return self.precise_hits(rays, which).into_iter().map(|hit| hit.map(rounded)).collect();
+    fn hits(&self, rays: &Rays<'_>, which: &[usize], hits: &mut [Option<Hit>]) {
+        if let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) {
+            let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
+            return bvh.closest_batch(&rays, hits, Batch::default());
+        }
+        let mut precise = vec![None; which.len()];
+        self.precise_hits(rays, which, &mut precise);
+        let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
+            t: t as f32,
+            u: u as f32,
+            v: v as f32,
+            primitive,
+            geometry,
+            instance,
         };
-        let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
-        let mut hits = vec![None; rays.len()];
-        bvh.closest_batch(&rays, &mut hits, Batch::default());
-        hits
+        hits.iter_mut().zip(precise).for_each(|(hit, precise)| *hit = precise.map(rounded));
     }
 
-    fn precise_hits(&self, rays: &Rays<'_>, which: &[usize]) -> Vec<Option<PreciseHit>> {
-        let mut hits = vec![None; which.len()];
-        self.precise.closest_batch(&rays.some(which.iter().copied()), &mut hits);
-        hits
+    fn precise_hits(&self, rays: &Rays<'_>, which: &[usize], hits: &mut [Option<PreciseHit>]) {
+        self.precise.closest_batch(&rays.some(which.iter().copied()), hits);
     }
 }

@@ -3,7 +3,7 @@
 //! The tree offers what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
 use super::{Precise, is_traceable};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::trace::bvh::Waiting;
 
@@ -27,6 +27,13 @@ pub struct NearestPoint {
 impl NearestPoint {
     const fn id(&self) -> (u32, u32) {
         (self.geometry, self.primitive)
+    }
+
+    /// Nearer; of points as near that of the lowest triangle.
+    #[inline]
+    fn is_before(&self, other: &Self) -> bool {
+        self.distance_squared < other.distance_squared
+            || self.distance_squared == other.distance_squared && self.id() < other.id()
     }
 
     /// The point of one triangle.
@@ -70,8 +77,7 @@ impl Precise {
                 let corners = self.corners(geometry, primitive);
                 if corners.iter().all(|&corner| is_traceable(corner)) {
                     let answer = NearestPoint::on(point, corners, geometry, primitive);
-                    // Of equal ones the first has the lowest id.
-                    if best.as_ref().is_none_or(|best| answer.distance_squared < best.distance_squared) {
+                    if best.as_ref().is_none_or(|best| answer.is_before(best)) {
                         best = Some(answer);
                     }
                 }
@@ -96,26 +102,16 @@ impl Precise {
             NearestPoint::on(point, self.corners(geometry, primitive), geometry, primitive)
         });
         let wanted = best.as_ref().map_or(f64::INFINITY, distance);
+        let mut measure = |geometry: u32, primitive: u32, rounded: &[Vec3; 3]| {
+            let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
+            let answer = NearestPoint::on(point, corners, geometry, primitive);
+            if best.as_ref().is_none_or(|best| answer.is_before(best)) {
+                best = Some(answer);
+            }
+            best.as_ref().map_or(f64::INFINITY, distance)
+        };
         let discs = self.discs.get_or_init(|| self.bvh.discs());
-        self.bvh.near_triangles(
-            discs,
-            local,
-            error as f32 * 1.01,
-            wanted,
-            waiting,
-            &mut |geometry, primitive, rounded| {
-                let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
-                let answer = NearestPoint::on(point, corners, geometry, primitive);
-                let is_better = |best: &NearestPoint| {
-                    answer.distance_squared < best.distance_squared
-                        || answer.distance_squared == best.distance_squared && answer.id() < best.id()
-                };
-                if best.as_ref().is_none_or(is_better) {
-                    best = Some(answer);
-                }
-                best.as_ref().map_or(f64::INFINITY, distance)
-            },
-        );
+        self.bvh.near_triangles(discs, local, error as f32 * 1.01, wanted, waiting, &mut measure);
         best
     }
 }
