@@ -130,3 +130,58 @@ fn points_beyond_the_squares_of_f32_have_a_nearest_point() {
         assert!(error <= 1e-6 * least, "{away}: {found:?}, {least}");
     }
 }
+
+/// A tetrahedron, each triangle with corners of its own.
+fn tetrahedron() -> PreciseMesh {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let sides = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    PreciseMesh {
+        positions: sides.as_flattened().iter().map(|&i: &usize| corners[i]).collect(),
+        triangles: (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+    }
+}
+
+#[test]
+fn meshes_are_closed_where_an_even_number_of_triangles_meet_at_every_edge() {
+    let is_closed = |meshes: &[PreciseMesh]| Precise::new(meshes.to_vec()).expect("meshes").is_closed();
+    let whole = tetrahedron();
+    assert!(is_closed(std::slice::from_ref(&whole)), "corners at one place are one");
+    let mut signed = whole.clone();
+    signed.positions[..3].iter_mut().for_each(|p| *p = p.map(|x| if x == 0.0 { -0.0 } else { x }));
+    assert!(is_closed(&[signed]), "and so are zeros of both signs");
+
+    let mut open = whole.clone();
+    let lid = PreciseMesh { positions: whole.positions.clone(), triangles: open.triangles.split_off(3) };
+    assert!(!is_closed(&[open.clone()]));
+    assert!(is_closed(&[open, lid]), "another mesh may be what closes it");
+
+    let mut doubled = whole.clone();
+    doubled.triangles.push([0, 1, 2]);
+    assert!(!is_closed(&[doubled.clone()]), "three triangles at an edge");
+    doubled.triangles.push([2, 1, 0]);
+    assert!(is_closed(&[doubled]), "four of them");
+
+    let mut degenerate = whole.clone();
+    degenerate.triangles.push([0, 0, 1]);
+    assert!(is_closed(&[degenerate]), "an edge there and back, and a point");
+
+    let mut lost = whole;
+    lost.positions.push(DVec3::NAN);
+    lost.triangles[0][0] = 12;
+    assert!(!is_closed(&[lost]), "a triangle that cannot be hit leaves a hole");
+}
+
+#[test]
+fn nothing_is_within_a_clearance() {
+    let precise = Precise::new(vec![tetrahedron()]).expect("a mesh");
+    let mut random = Random::new(7);
+    for _ in 0..1000 {
+        let [x, y, z] = [0; 3].map(|_| f64::from(random.unit()) * 3.0 - 1.0);
+        let point = DVec3::new(x, y, z);
+        let nearest = precise.nearest_point(point).expect("there are triangles");
+        let clearance = precise.clearance(point, &nearest);
+        // Of the tetrahedron's own points none is nearer, and the ball is no smaller than rounding asks for.
+        let distance = (nearest.point - point).length();
+        assert!(clearance <= distance && clearance >= distance * (1.0 - 1e-9) - 1e-11, "{clearance}, {distance}");
+    }
+}
