@@ -73,3 +73,19 @@ fn where_it_cannot_be_loaded_the_reason_and_the_remedy_are_told_and_the_rest_goe
         assert!(!Path::new(&picture).exists() && !Path::new(&uncommon).exists(), "{args:?}");
     }
 }
+
+/// The reference is read while the output is tried out, and either may be OpenImageIO's first call.
+#[test]
+fn reading_and_writing_may_begin_together() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [picture, reference] = ["a.exr", "b.exr"].map(|name| folder.path().join(name).to_string_lossy().into_owned());
+    let small = ["render", SCENE, "--size", "8x8", "--spp", "1", "-q"];
+    let run = |rest: &[&str]| {
+        let output = command().args(small).args(rest).output().expect("the program runs");
+        (output.status.code(), text(&output.stderr))
+    };
+    assert_eq!(run(&["-o", &reference]), (Some(0), String::new()));
+    for _ in 0..8 {
+        assert_eq!(run(&["-o", &picture, "--reference", &reference, "--threshold", "0.001"]), (Some(0), String::new()));
+    }
+}

@@ -32,6 +32,8 @@ template<typename Work> Failure guarded(Work work) noexcept
 extern "C" const twincast::oiio::Functions* twincast_oiio()
 {
     using namespace twincast::oiio;
+    // OpenImageIO lists its formats as it is first asked for one, and tells another thread of those alone that it has by then.
+    guarded([] { OIIO::get_string_attribute("extension_list"); });
     static const Functions functions {
         [](Bytes* names) {
             return guarded([=] {
