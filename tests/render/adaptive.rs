@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use twincast::image::Plane;
 use twincast::math::{DVec3, Vec3, Vec4};
-use twincast::render::{Adaptive, Aov, Control, Picture, Sampling};
+use twincast::render::{Adaptive, Aov, Control, Counted, Picture, Sampling};
 use twincast::scene::{AreaShape, Integrator, Light, Material};
 use twincast::{Image, Renderer, Scene, Settings, World};
 
@@ -127,6 +127,33 @@ fn the_most_samples_are_those_of_a_plain_render() {
         assert!(counts.iter().all(|&n| n <= 40));
         for ((a, b), n) in plain.image.pixels.iter().zip(&found.image.pixels).zip(counts) {
             assert!(n < 40 || bits(&[*a]) == bits(&[*b]));
+        }
+    }
+}
+
+/// Rays that nothing sends on are camera rays: as many are traced as the picture says.
+#[test]
+fn samples_that_are_counted_are_taken() {
+    let scene = busier_scene();
+    let world = World::new(&scene).unwrap();
+    let base = Settings { integrator: Some(Integrator::RayCast), ..settings(48, 32, 4) };
+    for settings in [
+        Settings { adaptive: to(0.05, 64), ..base.clone() },
+        Settings { adaptive: to(0.05, 64), aovs: vec![Aov::Samples, Aov::Depth], ..base.clone() },
+        Settings { aovs: vec![Aov::Samples], ..base.clone() },
+        base,
+    ] {
+        let renderer = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings.clone()).unwrap();
+        let engines = engines(&world);
+        let native = engines.iter().find(|engine| engine.name == "native").unwrap();
+        let counted = Counted::new(&*native.tracer);
+        let picture = renderer.picture(&counted, Control::default(), None).unwrap();
+        assert_eq!(counted.closest_rays(), picture.camera_rays, "{settings:?}");
+        // Depth is that of a ray through the middle of each pixel.
+        let beside = if settings.aovs.contains(&Aov::Depth) { 48 * 32 } else { 0 };
+        assert_eq!(picture.samples + beside, picture.camera_rays);
+        if !settings.aovs.is_empty() {
+            assert_eq!(picture.samples, counts(&picture).into_iter().map(u64::from).sum::<u64>());
         }
     }
 }
