@@ -36,7 +36,7 @@ if [ -z "${TWINCAST_IN_NAMESPACE:-}" ]; then
         as_root=(sudo)
     fi
     exec "${as_root[@]}" env TWINCAST_IN_NAMESPACE=1 TWINCAST_CACHE="$cache" CARGO_HOME="$cargo_home" \
-        CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" \
+        ${CARGO_INCREMENTAL:+"CARGO_INCREMENTAL=$CARGO_INCREMENTAL"} \
         TWINCAST_DEBIAN_MIRROR="${TWINCAST_DEBIAN_MIRROR:-}" SYSROOT="$sysroot" OWNER="$(id -u):$(id -g)" \
         unshare --mount --propagation private "$script" "$@"
 fi
@@ -121,5 +121,5 @@ say "testing with $(chroot "$root" dpkg-query --show --showformat '${Package} ${
 # As the owner of the tree, so that nothing in cargo's home or in the cache ends up as root's.
 exec chroot --userspec="$OWNER" "$root" env -i \
     HOME=/tmp PATH="$SYSROOT/bin:/usr/local/bin:/usr/bin:/bin" CARGO_HOME="$cargo_home" CARGO_TARGET_DIR=/src/target \
-    CARGO_NET_OFFLINE=true CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" RUST_BACKTRACE=1 \
+    CARGO_NET_OFFLINE=true ${CARGO_INCREMENTAL:+"CARGO_INCREMENTAL=$CARGO_INCREMENTAL"} RUST_BACKTRACE=1 \
     sh -c 'cd /src/twincast && exec cargo test --locked "$@"' sh "$@"

@@ -173,15 +173,24 @@ fn meshes_are_closed_where_an_even_number_of_triangles_meet_at_every_edge() {
 
 #[test]
 fn nothing_is_within_a_clearance() {
-    let precise = Precise::new(vec![tetrahedron()]).expect("a mesh");
+    let mesh = tetrahedron();
+    let precise = Precise::new(vec![mesh.clone()]).expect("a mesh");
     let mut random = Random::new(7);
+    let sides = mesh.triangles.iter().map(|triangle| triangle.map(|i| mesh.positions[i as usize]));
+    let sides: Vec<[DVec3; 3]> = sides.collect();
     for _ in 0..1000 {
         let [x, y, z] = [0; 3].map(|_| f64::from(random.unit()) * 3.0 - 1.0);
         let point = DVec3::new(x, y, z);
         let nearest = precise.nearest_point(point).expect("there are triangles");
         let clearance = precise.clearance(point, &nearest);
-        // Of the tetrahedron's own points none is nearer, and the ball is no smaller than rounding asks for.
+        // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's own points is in it.
         let distance = (nearest.point - point).length();
         assert!(clearance <= distance && clearance >= distance * (1.0 - 1e-9) - 1e-11, "{clearance}, {distance}");
+        for [a, b, c] in &sides {
+            let [u, v] = [0; 2].map(|_| f64::from(random.unit()));
+            let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            let on = a + (b - a) * u + (c - a) * v;
+            assert!((on - point).length() >= clearance, "{point}: {on}, {clearance}");
+        }
     }
 }

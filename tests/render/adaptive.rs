@@ -152,8 +152,9 @@ fn samples_that_are_counted_are_taken() {
         // Depth is that of a ray through the middle of each pixel.
         let beside = if settings.aovs.contains(&Aov::Depth) { 48 * 32 } else { 0 };
         assert_eq!(picture.samples + beside, picture.camera_rays);
-        if !settings.aovs.is_empty() {
-            assert_eq!(picture.samples, counts(&picture).into_iter().map(u64::from).sum::<u64>());
+        if settings.adaptive.is_some() && !settings.aovs.is_empty() {
+            let counts = counts(&picture);
+            assert!(counts.iter().any(|n| n != &counts[0]), "some pixels take more than others");
         }
     }
 }
