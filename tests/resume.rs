@@ -51,6 +51,16 @@ fn render(output: &Path, flags: &[&str]) -> Running {
     Running(Some(child.expect("the binary runs")))
 }
 
+/// Until a checkpoint is there that was not there before.
+fn wait_for_a_checkpoint(kept: &Path) {
+    let written = || std::fs::read(kept).ok();
+    let (before, begin) = (written(), Instant::now());
+    while written() == before {
+        assert!(begin.elapsed().as_secs() < 120, "there is a checkpoint");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 #[test]
 fn a_render_that_is_killed_goes_on_to_the_same_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -63,18 +73,14 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
         let flags: &[&str] =
             if kills == 0 { &["--checkpoint", "0.02s"] } else { &["--checkpoint", "0.02s", "--resume"] };
         let mut child = render(&killed, flags);
-        if kills < 2 {
-            let written = || std::fs::read(&kept).ok();
-            let (before, begin) = (written(), Instant::now());
-            while written() == before {
-                assert!(begin.elapsed().as_secs() < 120, "there is a checkpoint");
-                std::thread::sleep(Duration::from_millis(1));
-            }
+        let is_killed = kills < 2;
+        if is_killed {
+            wait_for_a_checkpoint(&kept);
             child.kill();
         }
         let (code, said) = child.end();
-        assert_eq!(code, if kills < 2 { None } else { Some(0) }, "after {kills} kills: {said}");
-        assert_eq!(kept.exists(), kills < 2, "after {kills} kills");
+        assert_eq!(code, if is_killed { None } else { Some(0) }, "after {kills} kills: {said}");
+        assert_eq!(kept.exists(), is_killed, "after {kills} kills");
     }
     assert_eq!(std::fs::read(&whole).unwrap(), std::fs::read(&killed).unwrap());
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -107,10 +113,7 @@ fn an_interrupted_render_leaves_a_checkpoint() {
         // While it renders: what the first took until there was a checkpoint is enough for the second.
         match ready {
             None => {
-                while !kept.exists() {
-                    assert!(begin.elapsed().as_secs() < 120, "there is a checkpoint");
-                    std::thread::sleep(Duration::from_millis(20));
-                }
+                wait_for_a_checkpoint(&kept);
                 ready = Some(begin.elapsed());
             }
             Some(time) => std::thread::sleep(2 * time + Duration::from_secs(1)),

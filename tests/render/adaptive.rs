@@ -12,11 +12,18 @@ use super::determinism::{bits, busier_scene};
 use super::{engines, floor, from_above, matte, render, settings};
 
 fn picture(scene: &Scene, settings: &Settings) -> Picture {
+    counted(scene, settings).0
+}
+
+/// A picture, and how many rays were sent for a nearest hit.
+fn counted(scene: &Scene, settings: &Settings) -> (Picture, u64) {
     let world = World::new(scene).unwrap();
     let renderer = Renderer::new(scene, &world, scene.cameras[0].clone(), settings.clone()).unwrap();
     let engines = engines(&world);
     let native = engines.iter().find(|engine| engine.name == "native").unwrap();
-    renderer.picture(&*native.tracer, Control::default(), None).unwrap()
+    let counted = Counted::new(&*native.tracer);
+    let picture = renderer.picture(&counted, Control::default(), None).unwrap();
+    (picture, counted.closest_rays())
 }
 
 fn to(noise: f32, max_spp: u32) -> Option<Adaptive> {
@@ -135,7 +142,6 @@ fn the_most_samples_are_those_of_a_plain_render() {
 #[test]
 fn samples_that_are_counted_are_taken() {
     let scene = busier_scene();
-    let world = World::new(&scene).unwrap();
     let base = Settings { integrator: Some(Integrator::RayCast), ..settings(48, 32, 4) };
     for settings in [
         Settings { adaptive: to(0.05, 64), ..base.clone() },
@@ -143,12 +149,8 @@ fn samples_that_are_counted_are_taken() {
         Settings { aovs: vec![Aov::Samples], ..base.clone() },
         base,
     ] {
-        let renderer = Renderer::new(&scene, &world, scene.cameras[0].clone(), settings.clone()).unwrap();
-        let engines = engines(&world);
-        let native = engines.iter().find(|engine| engine.name == "native").unwrap();
-        let counted = Counted::new(&*native.tracer);
-        let picture = renderer.picture(&counted, Control::default(), None).unwrap();
-        assert_eq!(counted.closest_rays(), picture.camera_rays, "{settings:?}");
+        let (picture, rays) = counted(&scene, &settings);
+        assert_eq!(rays, picture.camera_rays, "{settings:?}");
         // Depth is that of a ray through the middle of each pixel.
         let beside = if settings.aovs.contains(&Aov::Depth) { 48 * 32 } else { 0 };
         assert_eq!(picture.samples + beside, picture.camera_rays);
