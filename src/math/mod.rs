@@ -110,6 +110,12 @@ impl Aabb {
         self.max - self.min
     }
 
+    /// The largest scalar product of `way` with any of its points.
+    #[inline]
+    pub fn farthest(&self, way: DVec3) -> f64 {
+        way.dot(DVec3::select(way.cmplt(DVec3::ZERO), self.min.as_dvec3(), self.max.as_dvec3()))
+    }
+
     /// Half the surface area, the measure of the surface area heuristic; 0 where empty.
     #[inline]
     pub fn half_area(&self) -> f32 {

@@ -145,32 +145,39 @@ impl Placement {
 
     /// A box around the object whose own box is `object`, in world coordinates, at all times; rounded outwards.
     pub fn bounds(&self, object: Aabb) -> Aabb {
+        self.bounds_of(object, |way| object.farthest(way))
+    }
+
+    /// The same, and tighter, of an object of which more is known: `farthest` is at least the scalar product of any of its points with
+    /// the given direction, in the object's coordinates.
+    pub fn bounds_of(&self, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
         if object.is_empty() {
             return Aabb::EMPTY;
         }
         let start = self.to_world.as_daffine3();
-        let bounds = bounds_under(&start, object, DVec3::ZERO);
-        let Some(motion) = &self.motion else { return bounds };
+        let reach = object.min.abs().max(object.max.abs()).as_dvec3();
+        let Some(motion) = &self.motion else { return bounds_under(&start, reach, DVec3::ZERO, &farthest) };
         // Points run along straight lines but for the rounding of the transform to f32.
         let end = motion.end.as_daffine3();
         let most = start.matrix3.abs().max_entries(&end.matrix3.abs());
-        let reach = object.min.abs().max(object.max.abs()).as_dvec3();
         let rounding = most * reach + start.translation.abs().max(end.translation.abs());
         let slack = rounding * (1.01 * f64::from(UNIT_ROUNDOFF));
-        bounds_under(&start, object, slack).union(bounds_under(&end, object, slack))
+        bounds_under(&start, reach, slack, &farthest).union(bounds_under(&end, reach, slack, &farthest))
     }
 }
 
-fn bounds_under(to_world: &DAffine3, object: Aabb, slack: DVec3) -> Aabb {
-    let (centre, half) = (object.min.as_dvec3() * 0.5 + object.max.as_dvec3() * 0.5, object.size().as_dvec3() * 0.5);
-    let middle = to_world.transform_point3(centre);
-    let reach = to_world.matrix3.abs() * half;
+/// `reach` is the largest magnitude of each coordinate of the object.
+fn bounds_under(to_world: &DAffine3, reach: DVec3, slack: DVec3, farthest: &impl Fn(DVec3) -> f64) -> Aabb {
+    let DAffine3 { matrix3, translation } = to_world;
     // f64 rounding of the sums, far below one step of f32.
-    let rounding = (to_world.matrix3.abs() * (centre.abs() + half) + to_world.translation.abs()) * gamma64(16);
-    let down = |x: f64| (x as f32).next_down();
-    let up = |x: f64| (x as f32).next_up();
-    let (low, high) = (middle - reach - rounding - slack, middle + reach + rounding + slack);
-    Aabb { min: Vec3::new(down(low.x), down(low.y), down(low.z)), max: Vec3::new(up(high.x), up(high.y), up(high.z)) }
+    let slack = slack + (matrix3.abs() * reach + translation.abs()) * gamma64(16);
+    let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
+    for axis in 0..3 {
+        let way = matrix3.row(axis);
+        min[axis] = ((translation[axis] - farthest(-way) - slack[axis]) as f32).next_down();
+        max[axis] = ((translation[axis] + farthest(way) + slack[axis]) as f32).next_up();
+    }
+    Aabb { min, max }
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use super::triangles::TriangleTree;
 use super::walk::{self, Stack, Visit};
 use crate::math::{Aabb, Affine3};
 use crate::ray::Ray;
-use crate::trace::Part;
 use crate::trace::nearest::Nearest;
+use crate::trace::{Part, Placement};
 
 /// Everything in one coordinate system.
 pub(super) struct Level {
@@ -35,6 +35,19 @@ impl Level {
 
     pub fn bounds(&self) -> Aabb {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
+    }
+
+    /// The box around everything where it is placed: the triangles are what is turned. The object's own box, turned, would be half as
+    /// wide again for a ball.
+    /// Takes at most so many `visits` of nodes, six times over; of none, it is the box that is turned.
+    pub fn placed_bounds(&self, placement: &Placement, visits: usize) -> Aabb {
+        let bounds = self.bounds();
+        placement.bounds_of(bounds, |way| {
+            // Its entries are f32.
+            let narrow = way.as_vec3();
+            let farthest = self.triangles.farthest(narrow, visits).max(self.shapes.farthest(narrow, visits));
+            farthest.min(bounds.farthest(way))
+        })
     }
 
     /// Offers the triangles that `ray`, in the world, hits in this level, which may be placed; all by itself.

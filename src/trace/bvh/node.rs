@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
-use crate::math::{Aabb, Vec3};
+use crate::math::{Aabb, UNIT_ROUNDOFF, Vec3};
 use crate::memory::Array;
 use crate::trace::limits;
 
@@ -185,6 +185,58 @@ impl Tree {
     #[inline]
     pub fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
+    /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches a
+    /// hundredth farther than what has been found, or `visits` are over.
+    pub fn farthest(&self, way: Vec3, visits: usize, of_leaf: impl Fn(Child) -> f32) -> f64 {
+        if self.is_empty() {
+            return f64::NEG_INFINITY;
+        }
+        let size = way.abs().dot(self.reach());
+        if visits == 0 || size.is_nan() || size > f32::MAX / 4.0 {
+            return f64::INFINITY;
+        }
+        let [x, y, z] = way.to_array();
+        let upper = |component: f32| usize::from(component >= 0.0);
+        let sides = [upper(x), 2 + upper(y), 4 + upper(z)];
+        let spare = way.abs().dot(self.bounds.size()) / 256.0;
+        let mut most = f32::NEG_INFINITY;
+        let mut open = Vec::with_capacity(8 * WIDTH);
+        open.push((f32::INFINITY, Child::ROOT));
+        for _ in 0..visits {
+            let Some((farthest, child)) = open.pop() else { break };
+            if farthest <= most {
+                continue;
+            }
+            if child.is_leaf() {
+                most = most.max((of_leaf(child) + spare).min(farthest));
+                continue;
+            }
+            let node = self.node(child);
+            let [bx, by, bz] = sides.map(|side| &node.bounds[side]);
+            let mut reach = [0.0; WIDTH];
+            for slot in 0..WIDTH {
+                reach[slot] = x * bx[slot] + y * by[slot] + z * bz[slot];
+            }
+            let (mut farthest, mut first) = (most, None);
+            for (slot, &reach) in reach.iter().enumerate() {
+                // Not so of an empty slot: there it is infinitely little, or not a number.
+                if reach > most {
+                    if reach > farthest {
+                        (farthest, first) = (reach, Some(open.len()));
+                    }
+                    open.push((reach, node.child[slot]));
+                }
+            }
+            if let (Some(first), Some(last)) = (first, open.len().checked_sub(1)) {
+                open.swap(first, last);
+            }
+        }
+        let most = open.iter().fold(most, |most, &(reach, _)| most.max(reach));
+        // Three products and two sums in f32, with as much again to spare.
+        f64::from(most) + f64::from(8.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
     }
 
     /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to.

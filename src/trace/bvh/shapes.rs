@@ -6,6 +6,7 @@ use super::level::Through;
 use super::node::{Child, Tree};
 use super::preset::Options;
 use super::query::{Query, SOMETHING};
+use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
 use crate::shape::distance::Distance;
@@ -51,6 +52,11 @@ impl ShapeTree {
 
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// As [`Tree::farthest`], of the boxes around shapes.
+    pub fn farthest(&self, way: Vec3, visits: usize) -> f64 {
+        self.tree.farthest(way, visits, |_| f32::INFINITY)
     }
 
     /// Memory it holds, in bytes.

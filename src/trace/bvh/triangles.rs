@@ -14,7 +14,7 @@ use super::preset::{Options, Preset};
 use super::simd::Simd;
 use super::{PartId, refit};
 use crate::error::Result;
-use crate::math::Aabb;
+use crate::math::{Aabb, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::Placed;
 use crate::trace::leaf::{Id, offer_triangle};
@@ -102,6 +102,14 @@ impl TriangleTree {
 
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// As [`Tree::farthest`], of the triangles themselves.
+    pub fn farthest(&self, way: Vec3, visits: usize) -> f64 {
+        self.tree.farthest(way, visits, |leaf| {
+            let of_block = |index| self.leaves.block(index, &mut None).farthest(way);
+            leaf.blocks().map(of_block).fold(f32::NEG_INFINITY, f32::max)
+        })
     }
 
     /// Triangles that can be hit.

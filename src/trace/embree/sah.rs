@@ -147,9 +147,10 @@ mod tests {
     #[test]
     fn native_trees_cost_no_more_than_a_twentieth_more() {
         let worlds = [of_mesh(terrain(80)), of_mesh(architecture(3)), World::new(&rocks(60)).unwrap()];
-        for (world, name) in worlds.iter().zip(["terrain", "architecture", "rocks"]) {
+        // What is placed has a tighter box in a native tree, since not the object's box is turned but what is in it.
+        for (world, (name, most)) in worlds.iter().zip([("terrain", 1.5), ("architecture", 1.5), ("rocks", 2.0)]) {
             let (native, embree) = (Bvh::build(world).sah_cost(), cost(world, Quality::Medium, Bvh::NODE_COST));
-            assert!(native < 1.05 * embree && embree < 1.5 * native, "{name}: {native}, embree {embree}");
+            assert!(native < 1.05 * embree && embree < most * native, "{name}: {native}, embree {embree}");
         }
         let building = &worlds[1];
         let [low, medium, high] = [Quality::Low, Quality::Medium, Quality::High].map(|q| cost(building, q, 2.0));
