@@ -60,6 +60,47 @@ pub(super) struct Judged<V: Vector> {
     pub high: V,
 }
 
+/// The edge functions of pairs, and the bound on their error.
+pub(super) struct Sides<V> {
+    u: V,
+    v: V,
+    w: V,
+    least: V,
+    most: V,
+    bound: V,
+}
+
+impl<V: Vector> Sides<V> {
+    /// `width` is as of [`Aim`]; `size` is at least the largest component of an edge.
+    #[inline(always)]
+    pub fn new(&Sheared { x, y, z }: &Sheared<V>, width: V, size: V, blur: Blur) -> Self {
+        let splat = V::splat;
+        let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
+        let reach = width.mul(size);
+        let deep = z[0].abs().add(size);
+        // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
+        // less than e.
+        // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
+        let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * blur.direction - 4.0 * UNIT_ROUNDOFF));
+        let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
+        let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur.origin)));
+        let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
+        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound }
+    }
+
+    /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected.
+    #[inline(always)]
+    pub fn passed(&self) -> u32 {
+        !self.bound.less(self.most.min(V::splat(0.0).sub(self.least))).bits()
+    }
+
+    /// The pairs whose edge functions have one sign for sure.
+    #[inline(always)]
+    pub fn inside(&self) -> V::Mask {
+        self.bound.less(self.least.max(V::splat(0.0).sub(self.most)))
+    }
+}
+
 /// The pairs, of those of the bit mask `lanes`, of which the ray may hit the triangle up to `limit`; `size` is at least the largest
 /// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `height`
 /// is asked only if corners are not `ROUNDED`.
@@ -73,26 +114,17 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     blur: Blur,
     height: impl FnOnce() -> (V, V),
 ) -> Option<Judged<V>> {
-    let splat = V::splat;
-    let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
-    let reach = aim.width.mul(size);
-    let deep = z[0].abs().add(size);
-    // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
-    // less than e.
-    let Blur { origin: blur, direction } = if BLURRED { blur } else { Blur::NONE };
-    // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
-    let of_depth = aim.width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * direction - 4.0 * UNIT_ROUNDOFF));
-    let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
-    let slack = SLACK + 2.0 * direction;
-    let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur)));
-    let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
-    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-    let zero = splat(0.0);
-    // Whatever overflowed is not rejected.
-    let passed = !bound.less(most.min(zero.sub(least))).bits() & lanes;
+    let (splat, zero) = (V::splat, V::splat(0.0));
+    let blur = if BLURRED { blur } else { Blur::NONE };
+    let sides = Sides::new(&Sheared { x, y, z }, aim.width, size, blur);
+    let Sides { u, v, w, bound, .. } = sides;
+    let passed = sides.passed() & lanes;
     if passed == 0 {
         return None;
     }
+    let deep = z[0].abs().add(size);
+    let Blur { origin: blur, direction } = blur;
+    let slack = SLACK + 2.0 * direction;
     // t |along| = depth / determinant, both multiplied by the determinant.
     let determinant = u.add(v).add(w);
     let area = determinant.abs();
@@ -125,10 +157,9 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     // count the same products of components, but f64 is wanted 2^18 times as precise, and is 2^29 times.
     let precise = error.mul(four).less(square).and(is_precise);
     let apart = size.mul(splat(1.0 / 32.0)).less(deep);
-    let inside = bound.less(least.max(zero.sub(most)));
     Some(Judged {
         lanes,
-        sure: inside.and(precise).and(apart),
+        sure: sides.inside().and(precise).and(apart),
         low: near.div(most_square).mul(aim.shorten.mul(splat(1.0 - slack))),
         high: far.div(least_square).mul(aim.shorten.mul(splat(1.0 + slack))),
     })
