@@ -301,6 +301,69 @@ fn bundles() {
     }
 }
 
+/// Bundles whose rays are farther apart than triangles are large, so that each leaf concerns a few of them; some aimed at corners and
+/// edges, some with ranges that begin or end at their hit, and shadow rays that start at corners. In the world and placed.
+#[test]
+fn triangles_smaller_than_pixels() {
+    use twincast::math::{DAffine3, DVec3};
+    let mesh = scenes::bumpy_sphere(24, 0.2, 11);
+    let mut placed = scenes::of_mesh(mesh.clone());
+    let first = placed.instances.pop().expect("one instance");
+    let turned = |i: f64| {
+        let turn = glam::DQuat::from_scaled_axis(DVec3::new(i, 0.7, -0.2 * i));
+        DAffine3::from_scale_rotation_translation(
+            DVec3::new(1.0, 0.8, 1.3),
+            turn,
+            DVec3::new(0.4 * i - 0.6, 0.1, 0.3 * i),
+        )
+    };
+    let transforms = [0.0, 1.0, 2.0].map(turned);
+    let instance = |transform| twincast::scene::Instance { transform, ..first.clone() };
+    placed.instances.extend(transforms.map(instance));
+    let mut hits = 0;
+    for (scene, transforms) in [(scenes::of_mesh(mesh.clone()), &[DAffine3::IDENTITY][..]), (placed, &transforms[..])] {
+        let world = World::new(&scene).expect("sound");
+        let brute = Brute::new(&world);
+        let mut random = Random::new(21);
+        let end_at_hits = |rays: &mut [Ray], random: &mut Random| {
+            for ray in rays.iter_mut().step_by(5) {
+                let Some(hit) = brute.closest(ray) else { continue };
+                match random.below(4) {
+                    0 => ray.tmin = hit.t,
+                    1 => ray.tmin = hit.t.next_up(),
+                    2 => ray.tmax = hit.t,
+                    _ => ray.tmax = hit.t.next_down(),
+                }
+            }
+        };
+        for view in 0..6 {
+            let eye = (Vec3::ONE + random.vec3() * 0.5) * [3.0, 30.0, 1000.0][view % 3];
+            let corner = |random: &mut Random| {
+                let transform = transforms[random.below(transforms.len())];
+                let at = |i: u32| transform.transform_point3(mesh.positions[i as usize].as_dvec3()).as_vec3();
+                let [a, b, _] = mesh.triangles[random.below(mesh.triangles.len())];
+                if random.unit() < 0.5 { at(a) } else { at(a).lerp(at(b), random.unit()) }
+            };
+            let mut rays: Vec<Ray> = (0..256)
+                .map(|k| Ray::new(eye, if k % 3 == 0 { corner(&mut random) } else { random.vec3() } - eye))
+                .collect();
+            let shadow = |k: usize| {
+                let start = match k % 3 {
+                    0 => corner(&mut random),
+                    1 => random.vec3() * 1.5,
+                    _ => rays[k].origin + rays[k].direction * brute.closest(&rays[k]).map_or(0.999, |hit| hit.t),
+                };
+                Ray { tmax: [1.0, 0.999][k % 2], ..Ray::new(start, eye - start) }
+            };
+            let mut shadows: Vec<Ray> = (0..256).map(shadow).collect();
+            end_at_hits(&mut rays, &mut random);
+            end_at_hits(&mut shadows, &mut random);
+            hits += assert_parity_of(&world, &brute, &rays) + assert_parity_of(&world, &brute, &shadows);
+        }
+    }
+    assert!(hits > 1000, "{hits} hits");
+}
+
 /// A tree fitted to moved vertices gives the hits of brute force; one for other triangles is refused.
 #[test]
 fn refitted_trees() {

@@ -14,11 +14,11 @@
 //! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
 
 use super::filter::largest_axis;
-use super::footprint::Rows;
 use super::node::{Node, WIDTH};
 use super::place::Place;
 use super::query::Query;
 use super::range::Range;
+use super::rows::Rows;
 use super::simd::{Array, Group, Mask, Simd, Vector};
 use super::slab::{HUGE, columns};
 use crate::math::{UNIT_ROUNDOFF, Vec3};

@@ -9,43 +9,10 @@
 //! own slope by 4.25 u D, D >= 1 being the largest of a direction ([`Edges`](super::edges::Edges)).
 
 use super::block::LANES;
-use super::bundle::{Bundle, PerRay, RAYS, axes};
+use super::bundle::{Bundle, axes};
+use super::rows::{ROWS, Rows};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::UNIT_ROUNDOFF;
-
-/// Rows of a bundle: eight rays each.
-const ROWS: usize = RAYS / 8;
-
-/// For each row of a bundle, the least and the largest slope on two axes.
-pub(super) struct Rows {
-    low: [[f32; ROWS]; 2],
-    high: [[f32; ROWS]; 2],
-}
-
-impl Rows {
-    pub const NONE: Self = Self { low: [[0.0; ROWS]; 2], high: [[0.0; ROWS]; 2] };
-
-    #[inline(always)]
-    pub fn new<S: Simd>(slope: &[PerRay; 2]) -> Self {
-        let mut rows = Self::NONE;
-        for (i, slope) in slope.iter().enumerate() {
-            let [a, b, c, d, e, f, g, h] = slope.0.as_chunks().0 else { return rows };
-            let [a, b, c, d, e, f, g, h] = S::transpose([
-                S::V8::load(a),
-                S::V8::load(b),
-                S::V8::load(c),
-                S::V8::load(d),
-                S::V8::load(e),
-                S::V8::load(f),
-                S::V8::load(g),
-                S::V8::load(h),
-            ]);
-            rows.low[i] = a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h))).to_array();
-            rows.high[i] = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h))).to_array();
-        }
-        rows
-    }
-}
 
 /// Rectangles of slopes around eight triangles.
 pub(super) struct Footprints {

@@ -75,6 +75,7 @@ mod random;
 mod range;
 mod refit;
 mod room;
+mod rows;
 mod scratch;
 mod shapes;
 mod simd;

@@ -3,11 +3,11 @@
 //!
 //! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
-//!   remains is tested group by group, up to the first group of rays that hits: the groups before it take no part in
-//!   that subtree.
+//!   remains is tested against eight rows of eight rays at once, and the rows that may enter ray by ray, up to the first that does: those before it
+//!   take no part in that subtree. For a leaf every ray is asked.
 //! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
-//!   that belongs to the edge. Four triangles are rejected at once by the rectangle of slopes; of the others each group
-//!   of rays takes three scalar products.
+//!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes; of the others each group
+//!   of rays takes three scalar products. Leaves that few rays enter are tested ray by ray instead, against eight triangles at once ([`single`]).
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
 //!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
@@ -17,6 +17,7 @@
 mod found;
 mod octants;
 mod placed;
+mod single;
 mod walk;
 
 use std::marker::PhantomData;
@@ -27,7 +28,7 @@ use super::bundle::{Bundle, Fit, RAYS};
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::range::Range;
-use super::simd::{Group, Simd};
+use super::simd::Simd;
 use super::walk::Stack;
 use crate::ray::Ray;
 use found::Found;
@@ -65,7 +66,7 @@ struct One {
 impl Scratch {
     pub fn new() -> Self {
         let found = Found::new();
-        let stack = [Entry::root(0); STACK];
+        let stack = [Entry::root(!0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
         let one = One { upper: stack, stack, single: Stack::new(), bundle, local, range, found };
         Self { one, t: [0.0; RAYS], entered: 0, part: Part::new() }
@@ -137,10 +138,9 @@ impl One {
         entered: &mut u32,
     ) -> bool {
         let Self { upper, stack, single, bundle, local, range, found } = self;
-        let groups = count.div_ceil(S::Wide::LANES);
-        let Some(mut tour) = Tour::new(bvh, bundle, groups, upper) else { return false };
+        let Some(mut tour) = Tour::new(bvh, bundle, count, upper) else { return false };
         found.start();
-        while let Some((place, first)) = tour.next::<S>(range) {
+        while let Some((place, seeing)) = tour.next::<S>(range) {
             let (tree, _) = bvh.triangles_at(place);
             if tree.tree().is_empty() {
                 continue;
@@ -152,9 +152,9 @@ impl One {
                 one_by_one::<S, Q>(bvh, place, rays, count, single, range, found);
                 continue;
             };
-            let way = Way { bundle, slab, groups, most: 0.0 };
-            let walk = Walk { bvh, place, tree, rays, bundle, found, groups, query: PhantomData::<Q> };
-            walk.run::<S>(stack, way, first);
+            let way = Way::new(bundle, slab, count);
+            let walk = Walk { bvh, place, tree, rays, bundle, found, query: PhantomData::<Q> };
+            walk.run::<S>(stack, way, seeing);
             range.shorten::<S>(bundle, &found.sure, &found.limit);
         }
         if Q::ANY {

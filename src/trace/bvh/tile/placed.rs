@@ -48,32 +48,32 @@ pub(super) struct Tour<'a> {
 impl<'a> Tour<'a> {
     /// None where the bundle is too steep for one of the trees.
     #[inline(always)]
-    pub fn new(bvh: &'a Bvh, bundle: &'a Bundle, groups: usize, stack: &'a mut [Entry]) -> Option<Self> {
+    pub fn new(bvh: &'a Bvh, bundle: &'a Bundle, count: usize, stack: &'a mut [Entry]) -> Option<Self> {
         let (fixed, placements) = (bvh.fixed.triangles.tree(), &bvh.placements);
         let visits_fixed = !fixed.is_empty();
         if visits_fixed && bundle.slab(fixed.reach()).is_none() {
             return None;
         }
         let way = if placements.has_triangles() {
-            Some(Way { bundle, slab: bundle.slab(placements.reach())?, groups, most: 0.0 })
+            Some(Way::new(bundle, bundle.slab(placements.reach())?, count))
         } else {
             None
         };
-        stack[0] = Entry::root(0);
+        stack[0] = Entry::root(way.as_ref().map_or(0, |way| way.wanted));
         Some(Self { places: Places { placements, limit: PerRay::ZERO }, way, stack, len: 1, visits_fixed })
     }
 
-    /// The next place, and the first group with a ray that goes there.
+    /// The next place, and a bit for every ray that may go there.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u8)> {
+    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u64)> {
         if std::mem::take(&mut self.visits_fixed) {
-            return Some((FIXED, 0));
+            return Some((FIXED, !0));
         }
         let way = self.way.as_mut()?;
         way.bundle.limit_of::<S>(range, &mut self.places.limit);
         way.measure::<S>(&self.places.limit);
         let leaf = way.next_leaf::<S>(&self.places, self.stack, &mut self.len)?;
-        Some((leaf.child.first(), leaf.first))
+        Some((leaf.child.first(), leaf.rays))
     }
 }
 

@@ -11,23 +11,27 @@ use crate::trace::bvh::edges::Edges;
 use crate::trace::bvh::footprint::Footprints;
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::rows::{self, ROWS};
+use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
 use crate::trace::bvh::triangles::TriangleTree;
+
+/// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
+const FEW: u32 = 8;
 
 /// A child to be visited.
 #[derive(Clone, Copy)]
 pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
-    near: f32,
+    pub near: f32,
     pub child: Child,
-    /// The first group with a ray that enters it.
-    pub first: u8,
+    /// A bit for every ray that may enter it: in a node, for all from the first row with such a ray on.
+    pub rays: u64,
 }
 
 impl Entry {
-    /// The root of a tree, of interest to groups from `first` on.
-    pub const fn root(first: u8) -> Self {
-        Self { near: 0.0, child: Child::ROOT, first }
+    /// The root of a tree, of interest to those rays.
+    pub const fn root(rays: u64) -> Self {
+        Self { near: 0.0, child: Child::ROOT, rays }
     }
 }
 
@@ -44,19 +48,25 @@ pub(super) trait Goal {
 pub(super) struct Way<'a> {
     pub bundle: &'a Bundle,
     pub slab: BundleSlab,
-    pub groups: usize,
-    /// The largest limit of all rays.
-    pub most: f32,
+    /// A bit for every ray that matters.
+    pub wanted: u64,
+    /// The largest limit of all rays, and of each row.
+    most: f32,
+    most_of: [f32; ROWS],
 }
 
-impl Way<'_> {
+impl<'a> Way<'a> {
+    /// Of the first `count` rays of the bundle.
+    #[inline(always)]
+    pub fn new(bundle: &'a Bundle, slab: BundleSlab, count: usize) -> Self {
+        let wanted = !0 >> (RAYS - count.clamp(1, RAYS));
+        Self { bundle, slab, wanted, most: 0.0, most_of: [0.0; ROWS] }
+    }
+
     #[inline(always)]
     pub fn measure<S: Simd>(&mut self, limit: &PerRay) {
-        let mut most = S::Wide::at(limit, 0);
-        for group in 1..self.groups {
-            most = most.max(S::Wide::at(limit, group));
-        }
-        self.most = most.largest();
+        let most = rows::most::<S>(limit);
+        (self.most, self.most_of) = (most.largest(), most.to_array());
     }
 
     /// The next leaf of what waits on the stack.
@@ -78,8 +88,13 @@ impl Way<'_> {
             while mask != 0 {
                 let slot = mask.trailing_zeros() as usize % WIDTH;
                 mask &= mask - 1;
-                let Some(first) = self.first_group::<S>(goal.limit(), &boxes, slot, next.first) else { continue };
-                let entry = Entry { near: near[slot], child: node.child[slot], first };
+                let child = node.child[slot];
+                let rays = rows::rays(self.bundle.rows.enter::<S>(&boxes, slot, &self.most_of)) & next.rays;
+                let rays = self.entering::<S>(goal.limit(), &boxes, slot, rays, child.is_leaf());
+                if rays == 0 {
+                    continue;
+                }
+                let entry = Entry { near: near[slot], child, rays };
                 let mut at = *len;
                 while at > base && stack[at - 1].near < entry.near {
                     stack[at] = stack[at - 1];
@@ -96,23 +111,27 @@ impl Way<'_> {
         }
     }
 
-    /// The first group, from `from` on, with a ray that enters the box.
+    /// Those of the rays that enter the box: each of them, or just all from the first row with such a ray on.
     #[inline(always)]
-    fn first_group<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, from: u8) -> Option<u8> {
-        let splat = S::Wide::splat;
+    fn entering<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, rays: u64, each: bool) -> u64 {
+        let splat = S::V8::splat;
         let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
         let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
-        for group in usize::from(from)..self.groups {
-            let p = S::Wide::at(&self.bundle.reciprocal[0], group);
-            let q = S::Wide::at(&self.bundle.reciprocal[1], group);
+        let (mut entering, mut open) = (0, rays);
+        while open != 0 {
+            let row = open.trailing_zeros() / 8;
+            open &= !(0xff << (8 * row));
+            let [p, q] = &self.bundle.reciprocal;
+            let (p, q, limit) = (rows::row::<S>(p, row), rows::row::<S>(q, row), rows::row::<S>(limit, row));
             let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
-            let limit = S::Wide::at(limit, group).min(far[2]);
-            let last = far[0].mul(p).min(far[1].mul(q)).min(limit);
-            if first.at_most(last).bits() != 0 {
-                return Some(group as u8);
+            let last = far[0].mul(p).min(far[1].mul(q)).min(far[2].min(limit));
+            let enter = u64::from(first.at_most(last).bits()) << (8 * row) & rays;
+            if enter != 0 && !each {
+                return rays & !0 << (8 * row);
             }
+            entering |= enter;
         }
-        None
+        entering
     }
 }
 
@@ -127,7 +146,6 @@ pub(super) struct Walk<'a, Q> {
     /// In the tree's coordinates.
     pub bundle: &'a Bundle,
     pub found: &'a mut Found,
-    pub groups: usize,
     pub query: PhantomData<Q>,
 }
 
@@ -148,10 +166,10 @@ impl<Q> Goal for Walk<'_, Q> {
 
 impl<Q: Query> Walk<'_, Q> {
     #[inline(always)]
-    pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, first: u8) {
+    pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, rays: u64) {
         self.found.enter(self.bundle);
         way.measure::<S>(&self.found.limit);
-        stack[0] = Entry::root(first);
+        stack[0] = Entry::root(rays & way.wanted);
         let mut len = 1;
         while let Some(leaf) = way.next_leaf::<S>(&self, stack, &mut len) {
             if self.visit::<S>(leaf, way.most) {
@@ -163,10 +181,11 @@ impl<Q: Query> Walk<'_, Q> {
     /// Tests the blocks of a leaf; true where a limit has changed.
     #[inline(always)]
     fn visit<S: Simd>(&mut self, leaf: Entry, most: f32) -> bool {
+        if leaf.rays.count_ones() <= FEW {
+            return self.visit_one_by_one::<S>(leaf);
+        }
         let mut changed = false;
-        // Those of the groups that enter the leaf.
-        let per_group = S::Wide::LANES / 8;
-        let rows = (1 << (self.groups * per_group)) - (1 << (usize::from(leaf.first) * per_group));
+        let rows = rows::rows(leaf.rays);
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
@@ -255,7 +274,7 @@ impl<Q: Query> Walk<'_, Q> {
     /// What the bounds leave open.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, ray: usize, id: u32) -> bool {
+    pub(super) fn decide(&mut self, ray: usize, id: u32) -> bool {
         let Self { bvh, rays, bundle, found, .. } = self;
         if Q::ANY && found.limit.0[ray] < 0.0 {
             return false;

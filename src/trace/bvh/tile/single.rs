@@ -1,0 +1,306 @@
+//! Rays of a bundle one by one, each against eight triangles at once: for leaves that few of them enter.
+//!
+//! Where triangles are smaller than pixels, eight of them concern a ray or two each, and to make their edges ready for 64 rays
+//! ([`Edges`](super::super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`]) shears the
+//! corners by the ray's slopes, which are at hand, from the origin that all share. Of turned rays, which share their end, it takes
+//! the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody could tell on which side.
+//!
+//! **Edge functions.** Slopes are off by as much as a single ray's shear in the world, and in an object's coordinates by 2 u of
+//! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
+//! off by b counts as (1 + k) b, not 2 b.
+//!
+//! **t'.** Height over slope, as for all rays at once: edge functions of small triangles far away leave t' open by a hundredth of
+//! itself and more. With N the normal computed with all signs positive, and |d| <= D on the bundle's axes, d being (p, q, 1): N is
+//! off by 4 u of itself, d by 4.25 u D at most, and the slope, with its products and sums, by 12 u N D; a corner relative to the
+//! origin by u and b, and the height by 10 u N times that, and b N.
+
+use super::found::DONE;
+use super::walk::{Entry, Walk};
+use crate::math::UNIT_ROUNDOFF;
+use crate::trace::bvh::block::{Block, LANES};
+use crate::trace::bvh::bundle::{Bundle, RAYS, SLACK, TINY, axes};
+use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::woop::{Sheared, Sides};
+
+/// Against underflow of products.
+const LEAST: f32 = 1e-36;
+
+/// A block as an origin sees it, on a bundle's axes.
+struct Seen<V> {
+    /// From each corner to the origin: component by component.
+    x: [V; 3],
+    y: [V; 3],
+    z: [V; 3],
+}
+
+/// The planes of a block's triangles.
+struct Planes<V> {
+    normal: [V; 3],
+    /// With all signs positive.
+    size: [V; 3],
+}
+
+/// How high an origin lies over each plane, as normals measure it, and how far that may be off.
+struct Heights<V> {
+    height: V,
+    error: V,
+}
+
+/// From where, and up to where, a ray looks along the bundle's axis.
+struct Span {
+    /// Rounded down.
+    first: f32,
+    /// Rounded up.
+    begin: f32,
+    /// Hits before it are within the range for sure, and the nearest.
+    sure: f32,
+    /// Rounded up.
+    limit: f32,
+}
+
+/// The triangles of a block that a ray may hit.
+struct Met<V: Vector> {
+    /// A bit for each of them.
+    lanes: u32,
+    /// Those that it hits without doubt, at a t' between `low` and `high`.
+    sure: V::Mask,
+    low: V,
+    high: V,
+}
+
+// Functions, not closures: these are inlined into the kernel of the instruction set without fail.
+
+/// From the corners to the origin, along one axis.
+#[inline(always)]
+fn towards<V: Vector + Array<LANES>>(origin: f32, [a, b, c]: &[[f32; LANES]; 3]) -> [V; 3] {
+    let origin = V::splat(origin);
+    [origin.sub(V::load(a)), origin.sub(V::load(b)), origin.sub(V::load(c))]
+}
+
+/// From the first corner to the others, along one axis.
+#[inline(always)]
+fn edges<V: Vector + Array<LANES>>([a, b, c]: &[[f32; LANES]; 3]) -> (V, V) {
+    let a = V::load(a);
+    (V::load(b).sub(a), V::load(c).sub(a))
+}
+
+impl<V: Vector + Array<LANES>> Seen<V> {
+    #[inline(always)]
+    fn new(block: &Block, axes: [usize; 3], origin: [f32; 3]) -> Self {
+        let [x, y, z] = axes;
+        Self {
+            x: towards(origin[x], &block.corners[x]),
+            y: towards(origin[y], &block.corners[y]),
+            z: towards(origin[z], &block.corners[z]),
+        }
+    }
+}
+
+impl<V: Vector + Array<LANES>> Planes<V> {
+    #[inline(always)]
+    fn new(block: &Block, [x, y, z]: [usize; 3]) -> Self {
+        let corners = &block.corners;
+        let [(bx, cx), (by, cy), (bz, cz)]: [(V, V); 3] = [edges(&corners[x]), edges(&corners[y]), edges(&corners[z])];
+        let normal = [by.mul_sub(cz, bz.mul(cy)), bz.mul_sub(cx, bx.mul(cz)), bx.mul_sub(cy, by.mul(cx))];
+        let (bx, by, bz, least) = (bx.abs(), by.abs(), bz.abs(), V::splat(LEAST));
+        let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
+        let size = [
+            by.mul_add(cz, bz.mul_add(cy, least)),
+            bz.mul_add(cx, bx.mul_add(cz, least)),
+            bx.mul_add(cy, by.mul_add(cx, least)),
+        ];
+        Self { normal, size }
+    }
+
+    /// `blur` is how far the origin may be off.
+    #[inline(always)]
+    fn heights(&self, seen: &Seen<V>, blur: f32) -> Heights<V> {
+        let Self { normal: n, size } = self;
+        let (unit, blur) = (V::splat(12.0 * UNIT_ROUNDOFF), V::splat(1.1 * blur));
+        let p = [seen.x[0], seen.y[0], seen.z[0]];
+        let height = p[2].mul_add(n[2], p[1].mul_add(n[1], p[0].mul(n[0])));
+        let off = [p[0].abs().mul_add(unit, blur), p[1].abs().mul_add(unit, blur), p[2].abs().mul_add(unit, blur)];
+        let error = off[0].mul_add(size[0], V::splat(f32::MIN_POSITIVE));
+        Heights { height, error: off[2].mul_add(size[2], off[1].mul_add(size[1], error)) }
+    }
+}
+
+impl<Q: Query> Walk<'_, Q> {
+    /// Tests the blocks of a leaf ray by ray; true where a limit has changed.
+    #[inline(always)]
+    pub(super) fn visit_one_by_one<S: Simd>(&mut self, leaf: Entry) -> bool {
+        let mut changed = false;
+        let bundle = self.bundle;
+        let (axes, blur) = (axes(bundle.axis), self.blur());
+        for index in leaf.child.blocks() {
+            let mut scratch = None;
+            let block = self.tree.block(index, &mut scratch);
+            let shared = Seen::new(block, axes, bundle.origin);
+            // Of each origin, and of the one that is shared; made when a ray first asks.
+            let mut planes = None;
+            let mut rays = leaf.rays;
+            while rays != 0 {
+                let ray = rays.trailing_zeros() as usize % RAYS;
+                rays &= rays - 1;
+                if self.found.limit.0[ray] < leaf.near {
+                    continue;
+                }
+                let own =
+                    if Q::ANY && bundle.is_turned { Some(Seen::new(block, axes, self.own_origin(ray))) } else { None };
+                let (sides, lanes) = sides::<S>(own.as_ref().unwrap_or(&shared), block, bundle, ray, blur);
+                if lanes == 0 {
+                    continue;
+                }
+                let (planes, heights) = planes.get_or_insert_with(
+                    #[inline(always)]
+                    || {
+                        let planes = Planes::new(block, axes);
+                        let heights = planes.heights(&shared, blur.origin);
+                        (planes, heights)
+                    },
+                );
+                let (met, span) = match &own {
+                    Some(own) => {
+                        let span = self.own_span(ray);
+                        (meet::<S>(&sides, lanes, planes, &planes.heights(own, blur.origin), bundle, ray, &span), span)
+                    }
+                    None => {
+                        let span = self.span(ray);
+                        (meet::<S>(&sides, lanes, planes, heights, bundle, ray, &span), span)
+                    }
+                };
+                if met.lanes != 0 {
+                    changed |= self.take::<S>(ray, LANES as u32 * index, &met, &span);
+                }
+            }
+        }
+        changed
+    }
+
+    /// Takes what a ray may hit in the block whose first triangle is `first`; true where its limit has changed.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Met<S::V8>, span: &Span) -> bool {
+        let &Met { lanes: mut open, sure, low, high } = met;
+        let sure = sure.and(S::V8::splat(span.begin).at_most(low));
+        if Q::ANY && sure.and(high.at_most(S::V8::splat(span.sure))).bits() & open != 0 {
+            (self.found.sure.0[ray], self.found.limit.0[ray]) = (DONE, DONE);
+            return true;
+        }
+        let sure = if Q::ANY { 0 } else { sure.bits() };
+        let (low, high) = (low.to_array(), high.to_array());
+        let mut changed = false;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % LANES;
+            open &= open - 1;
+            if sure >> lane & 1 != 0 {
+                if high[lane] <= self.found.sure.0[ray] {
+                    (self.found.sure.0[ray], self.found.limit.0[ray]) = (low[lane], high[lane]);
+                    (self.found.noted[ray], self.found.place[ray]) = (first + lane as u32, self.place);
+                    changed = true;
+                    continue;
+                }
+                if low[lane] > self.found.limit.0[ray] {
+                    continue;
+                }
+            }
+            changed |= self.decide(ray, first + lane as u32);
+        }
+        changed
+    }
+
+    /// Of a ray that starts where the bundle does.
+    #[inline(always)]
+    fn span(&self, ray: usize) -> Span {
+        let Self { bundle, found, .. } = self;
+        Span { first: bundle.first, begin: bundle.begin.0[ray], sure: found.sure.0[ray], limit: found.limit.0[ray] }
+    }
+
+    /// Of a turned ray, from its own origin.
+    #[inline(always)]
+    fn own_span(&self, ray: usize) -> Span {
+        let depth = self.bundle.depth.0[ray];
+        let (tmin, tmax) = (self.rays[ray].tmin * depth, self.rays[ray].tmax * depth);
+        Span {
+            first: tmin * (1.0 - SLACK) - TINY,
+            begin: tmin * (1.0 + SLACK) + TINY,
+            sure: tmax * (1.0 - SLACK) - TINY,
+            limit: tmax * (1.0 + SLACK) + TINY,
+        }
+    }
+
+    /// Where a turned ray starts.
+    #[inline(always)]
+    fn own_origin(&self, ray: usize) -> [f32; 3] {
+        if self.place == FIXED {
+            return self.rays[ray].origin.to_array();
+        }
+        let ([x, y, z], [dx, dy, dz]) = (self.bundle.origin, &self.bundle.direction);
+        [x - dx.0[ray], y - dy.0[ray], z - dz.0[ray]]
+    }
+
+    /// How far rays may be off, as [`Sides`] counts it. In the world they are as they were given, turned ones from their own
+    /// origins, too. In an object's coordinates these are told from the common end, and the difference rounds by less than the
+    /// blur, which has room for the rounding of both already.
+    #[inline(always)]
+    fn blur(&self) -> Blur {
+        if self.place == FIXED {
+            return Blur::NONE;
+        }
+        let Bundle { blur, largest, is_turned, .. } = *self.bundle;
+        let off = if is_turned { 2.0 * blur } else { blur };
+        Blur { origin: 0.5 * (1.0 + largest) * off, direction: 1.1 * UNIT_ROUNDOFF * largest }
+    }
+}
+
+/// A ray's edge functions, and a bit for every triangle that these leave.
+#[inline(always)]
+fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
+    let splat = S::V8::splat;
+    let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
+    let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
+    let Seen { x, y, z } = seen;
+    let sheared = Sheared {
+        x: [z[0].mul_add(sx, x[0]), z[1].mul_add(sx, x[1]), z[2].mul_add(sx, x[2])],
+        y: [z[0].mul_add(sy, y[0]), z[1].mul_add(sy, y[1]), z[2].mul_add(sy, y[2])],
+        z: *z,
+    };
+    let width = sx.abs().max(sy.abs()).add(splat(1.0));
+    let sides = Sides::new(&sheared, width, splat(block.size), blur);
+    let lanes = sides.passed() & block.lanes;
+    (sides, lanes)
+}
+
+/// Where a ray meets the planes of those triangles that its edge functions leave.
+#[inline(always)]
+fn meet<S: Simd>(
+    sides: &Sides<S::V8>,
+    lanes: u32,
+    planes: &Planes<S::V8>,
+    &Heights { height, error }: &Heights<S::V8>,
+    bundle: &Bundle,
+    ray: usize,
+    span: &Span,
+) -> Met<S::V8> {
+    let (splat, zero) = (S::V8::splat, S::V8::splat(0.0));
+    let Planes { normal: [nx, ny, nz], size: [sx, sy, sz] } = planes;
+    // A turned bundle runs against its rays.
+    let way = if bundle.is_turned { -1.0 } else { 1.0 };
+    let (p, q) = (splat(way * bundle.slope[0].0[ray]), splat(way * bundle.slope[1].0[ray]));
+    let slope = p.mul_add(*nx, q.mul_add(*ny, nz.mul(splat(way * bundle.forward))));
+    let slope_error = sx.add(*sy).add(*sz).mul(splat(16.0 * UNIT_ROUNDOFF * bundle.largest));
+    // t' = -height / slope. Turned so that it is positive where the slope is.
+    let turned = S::V8::select(height.less(zero), slope, zero.sub(slope));
+    let (height, steep, four) = (height.abs(), turned.abs(), splat(4.0));
+    let known = slope_error.mul(four).less(steep);
+    let low = height.sub(error).div(steep.add(slope_error)).mul(splat(1.0 - SLACK));
+    let high = height.add(error).div(steep.sub(slope_error)).mul(splat(1.0 + SLACK));
+    let behind = turned.less(zero).and(error.less(height));
+    let outside = behind.or(splat(span.limit).less(low)).or(high.less(splat(span.first)));
+    let lanes = lanes & !known.and(outside).bits();
+    // Known to a quarter in f32, both are precise enough in f64.
+    let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
+    Met { lanes, sure: sides.inside().and(tame), low, high }
+}
