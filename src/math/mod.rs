@@ -147,6 +147,11 @@ impl DAabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// Whether all points of `other` are in it.
+    pub fn contains(&self, other: &Self) -> bool {
+        self.min.cmple(other.min).all() && other.max.cmple(self.max).all()
+    }
+
     /// Whether it contains no point.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()

@@ -49,9 +49,15 @@ impl Mesh {
         self.positions = Arc::new(positions.par_iter().with_min_len(TASK).map(offset).collect());
     }
 
+    /// Where a position is: the origin and the offset.
+    #[inline]
+    pub fn point(&self, offset: Vec3) -> DVec3 {
+        self.origin + offset.as_dvec3()
+    }
+
     /// The bounds of the traceable vertices under `transform`.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
-        let place = |p: Vec3| transform.transform_point3(self.origin + p.as_dvec3());
+        let place = |p: Vec3| transform.transform_point3(self.point(p));
         let tasks = self.positions.par_chunks(TASK);
         let m = &transform.matrix3;
         let keeps_axes = (0..3).all(|row| (0..3).filter(|&column| m.col(column)[row] != 0.0).count() == 1);

@@ -3,6 +3,7 @@
 //! Coordinates are right-handed, +y up, metres. Positions keep f64 precision: a [`Mesh`] holds f32 offsets from an f64
 //! origin, transforms are f64. What the tracers see is made of it by [`World`](crate::World).
 
+mod bounds;
 mod camera;
 mod environment;
 mod fog;
@@ -151,17 +152,6 @@ impl Scene {
             .flat_map(|instance| self.group_geometries(instance.group))
             .map(|(_, geometry)| geometry.primitive_count() as u64)
             .sum()
-    }
-
-    /// Bounds of everything that can be hit, in scene coordinates, at all times.
-    pub fn bounds(&self) -> DAabb {
-        self.instances.iter().fold(DAabb::EMPTY, |all, instance| {
-            let geometries = self.group_geometries(instance.group);
-            geometries.fold(all, |all, (_, geometry)| {
-                let end = instance.transform_end.as_ref().map_or(DAabb::EMPTY, |end| geometry.bounds(end));
-                all.union(geometry.bounds(&instance.transform)).union(end)
-            })
-        })
     }
 
     /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities.

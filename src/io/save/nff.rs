@@ -136,8 +136,7 @@ fn fill(material: &Material, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn write_mesh(mesh: &Mesh, transform: &DAffine3, out: &mut dyn Write) -> io::Result<()> {
-    let place =
-        |i: u32| spaced(transform.transform_point3(mesh.origin + mesh.positions[i as usize].as_dvec3()).as_vec3());
+    let place = |i: u32| spaced(transform.transform_point3(mesh.point(mesh.positions[i as usize])).as_vec3());
     let for_normals = transform.matrix3.inverse().transpose();
     for corners in mesh.triangles.iter() {
         writeln!(out, "{} 3", if mesh.normals.is_empty() { "p" } else { "pp" })?;

@@ -57,7 +57,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         };
         match geometry {
             Geometry::Mesh(mesh) => {
-                mesh.positions.iter().try_for_each(|p| vertex(mesh.origin + p.as_dvec3()))?;
+                mesh.positions.iter().try_for_each(|&p| vertex(mesh.point(p)))?;
             }
             Geometry::Shapes { shapes, .. } => {
                 polygons(shapes).flat_map(Polygon::corners).try_for_each(|p| vertex(p.as_dvec3()))?;

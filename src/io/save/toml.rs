@@ -272,7 +272,7 @@ fn write_mesh(mesh: &Mesh, prefix: &str, out: &mut dyn Write) -> io::Result<()> 
         items.iter().try_for_each(|item| writeln!(out, "    {},", line(item)))?;
         writeln!(out, "]")
     }
-    column(out, "positions", &mesh.positions, |p| list_f64(mesh.origin + p.as_dvec3()))?;
+    column(out, "positions", &mesh.positions, |&p| list_f64(mesh.point(p)))?;
     column(out, "triangles", &mesh.triangles, |[a, b, c]| format!("[{a}, {b}, {c}]"))?;
     if !mesh.normals.is_empty() {
         column(out, "normals", &mesh.normals, |n| list(*n))?;
