@@ -15,6 +15,7 @@ mod limits;
 mod motion;
 mod nearest;
 pub mod precise;
+mod spread;
 mod unbounded;
 mod world;
 

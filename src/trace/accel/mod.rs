@@ -33,12 +33,13 @@ mod ray;
 use std::time::Duration;
 
 use super::nearest::Nearest;
+use super::spread::Spread;
 use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
 use items::{Boxes, Input, Items, Through, reach};
-use placed::{Placed, Spread, stray_of_shapes};
+use placed::{Placed, stray_of_shapes};
 use ray::{IndexRay, limit};
 
 pub use super::leaf::Methods;
@@ -127,7 +128,7 @@ impl<I: Index> Accelerated<I> {
             if !bounds.is_empty() {
                 let new = Placed::new(placement);
                 if object.items.has_shapes() {
-                    spread = spread.include(&new, &object.bounds);
+                    spread = spread.include(placement, &object.bounds);
                 }
                 placed.push(new);
                 boxes.push(bounds);

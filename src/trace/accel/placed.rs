@@ -1,30 +1,23 @@
-//! How far a ray strays from where it should be, in an object's coordinates and in the world.
+//! How far a ray strays from where it should be in an object's coordinates.
 //!
 //! **In an object.** The object's index is asked with the ray M^-1 (o, d), computed in f64. With B the inverse that a
 //! [`Placement`] holds and R = B M - 1, what should be is (1 + R)^-1 B (o, d); so a vector B v is off by at most 2 |R| |B v|, and its
-//! own computation by gamma(8) |B| |v| more, translation and all. R is computed when the scene is built.
+//! own computation by gamma(8) |B| |v| more, translation and all. R is computed when the scene is built ([`residual`]).
 //!
 //! **Shapes** are met by the ray rounded to f32 ([`Placement::object_ray`]), and a hit at a rim may lie 2^-26 of its t beside the shape:
 //! 2^-24 of the coordinates for the rounding, as much again for the rims.
 //!
 //! At t the ray is off by the sum of origin's error and t times the direction's; and where it is in the object's box, |t| is at most (reach +
 //! |origin|) / |direction| on the axis where the direction is largest.
-//!
-//! **In the world**, boxes of placed triangles are exact. Those of placed shapes are not, since the rounded ray meets them: it strays by
-//! |M| times what it strays in the object, with |o'| at most |B| (|o| + |T|). The largest of that over all placements is
-//! linear in |o|: a matrix and a vector, found when the scene is built.
 
 use std::borrow::Cow;
 
 use super::items::reach;
 use super::ray::IndexRay;
-use crate::math::{Aabb, DMat3, DVec3, UNIT_ROUNDOFF, gamma64};
+use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, gamma64};
 use crate::ray::Ray;
 use crate::trace::Placement;
-use crate::trace::motion::Extremes;
-
-/// How much of the coordinates a hit of a shape may lie beside where the ray is: see above.
-const SHAPE_ERROR: f64 = 4.0 * UNIT_ROUNDOFF as f64;
+use crate::trace::spread::{SHAPE_ERROR, residual};
 
 /// How far hits of shapes lie beside a ray that is not rounded, in coordinates of at most `reach`.
 pub(super) fn stray_of_shapes(ray: &Ray, reach: DVec3) -> DVec3 {
@@ -35,19 +28,13 @@ pub(super) fn stray_of_shapes(ray: &Ray, reach: DVec3) -> DVec3 {
 #[derive(Clone)]
 pub(super) struct Placed {
     pub placement: Placement,
-    /// The largest row sum of |B M - 1|, doubled, rounding and all; huge where the inverse is worth nothing.
+    /// As [`residual`] says.
     residual: f64,
 }
 
 impl Placed {
     pub fn new(placement: &Placement) -> Self {
-        let (forward, inverse) = (placement.to_world.as_daffine3().matrix3, placement.to_object.matrix3);
-        let residual = (inverse * forward + DMat3::IDENTITY * -1.0).abs();
-        let rounding = inverse.abs() * forward.abs() * gamma64(8);
-        let rows = (residual + rounding) * DVec3::ONE;
-        let residual = 2.0 * rows.max_element();
-        // The bound holds for |R| up to a half. Beyond, everything is let pass.
-        Self { placement: placement.clone(), residual: if residual <= 1.0 { residual } else { 1e30 } }
+        Self { placement: placement.clone(), residual: residual(placement) }
     }
 
     /// Where it stands at a time.
@@ -80,34 +67,5 @@ impl Placed {
         let longest = 2.0 * span.max_element() / direction.abs().max_element();
         stray += 2.0 * (origin_error + direction_error * longest);
         IndexRay::new(origin, direction, ray.tmin, reach, stray)
-    }
-}
-
-/// How far rays that are rounded in objects may be from where they are in the world.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Spread {
-    of_origin: DMat3,
-    constant: DVec3,
-}
-
-impl Spread {
-    pub const NONE: Self = Self { of_origin: DMat3::ZERO, constant: DVec3::ZERO };
-
-    /// With another object, which holds shapes within `bounds`.
-    pub fn include(self, placed: &Placed, bounds: &Aabb) -> Self {
-        let Extremes { forward, inverse, translation, residual } = placed.placement.extremes();
-        let residual = if residual <= 1.0 { residual.max(placed.residual) } else { 1e30 };
-        let ones = DMat3::from_cols(DVec3::ONE, DVec3::ONE, DVec3::ONE);
-        // From the size of coordinates in the object to the error in the world.
-        let error = forward * (DMat3::IDENTITY * (4.0 * SHAPE_ERROR) + ones * (2.0 * residual));
-        let matrix = error * inverse;
-        let constant = matrix * translation + error * reach(bounds);
-        let column = |i: usize| self.of_origin.col(i).max(matrix.col(i));
-        Self { of_origin: DMat3::from_cols(column(0), column(1), column(2)), constant: self.constant.max(constant) }
-    }
-
-    /// For one ray.
-    pub fn of(&self, ray: &Ray) -> DVec3 {
-        self.of_origin * ray.origin.abs().as_dvec3() + self.constant
     }
 }

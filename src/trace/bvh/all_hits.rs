@@ -94,7 +94,7 @@ impl Kernel for Gather<'_> {
         if bvh.placements.is_empty() {
             return;
         }
-        walk_over::<S, Closest>(bvh.placements.tree(), ray, limit, upper, |number| {
+        walk_over::<S, Closest>(bvh.placements.tree(), ray, bvh.placements.spread(), limit, upper, |number| {
             let place = bvh.placements.at(number);
             let object = &bvh.objects[place.placement.object as usize];
             object.gather::<S>(ray, Some(place), level, gathered);

@@ -14,6 +14,7 @@ use super::{Bvh, bundle, isa, tile};
 use crate::ray::{Hit, Ray};
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
+use crate::trace::spread::Spread;
 
 /// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some dozens of
 /// rays.
@@ -75,6 +76,7 @@ impl Bvh {
         walk_over::<S, Q>(
             self.placements.tree(),
             ray,
+            self.placements.spread(),
             nearest.limit(),
             upper,
             #[inline(always)]
@@ -233,7 +235,7 @@ impl Bvh {
         let Stacks { upper, level: lower } = stacks;
         self.fixed.trace_triangles::<S, Closest>(ray, None, lower, &mut nearest);
         if self.placements.has_triangles() {
-            walk_over::<S, Closest>(self.placements.tree(), ray, nearest.limit(), upper, |number| {
+            walk_over::<S, Closest>(self.placements.tree(), ray, &Spread::NONE, nearest.limit(), upper, |number| {
                 let place = self.placements.at(number);
                 let level = &self.objects[place.placement.object as usize];
                 level.trace_triangles::<S, Closest>(ray, Some(place), lower, &mut nearest);

@@ -8,26 +8,29 @@
 use super::level::Level;
 use super::node::Tree;
 use super::place::Place;
-use super::placements::{tree_over, walk_over};
+use super::placements::{spread_over, tree_over, walk_over};
 use super::preset::Options;
 use super::query::Query;
 use super::simd::Simd;
 use super::walk::{Stack, Visit};
 use crate::ray::Ray;
 use crate::trace::Placement;
+use crate::trace::spread::Spread;
 
 /// Everything that moves.
 pub(super) struct MovingTree {
     tree: Tree,
     /// In the order of the tree's leaves.
     placements: Vec<Placement>,
+    spread: Spread,
 }
 
 impl MovingTree {
     /// Takes those that move. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
         let (tree, order) = tree_over(placements, |placement| placement.motion.is_some(), objects, options);
-        Self { tree, placements: order.into_iter().map(|i| placements[i].clone()).collect() }
+        let placements: Vec<Placement> = order.into_iter().map(|i| placements[i].clone()).collect();
+        Self { tree, spread: spread_over(&placements, objects), placements }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -56,6 +59,7 @@ impl MovingTree {
         walk_over::<S, Q>(
             &self.tree,
             ray,
+            &self.spread,
             limit,
             stack,
             #[inline(always)]

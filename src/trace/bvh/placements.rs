@@ -14,6 +14,7 @@ use super::walk::{self, Stack, Visit};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::Placement;
+use crate::trace::spread::Spread;
 
 /// All that stand still, in the order of the tree's leaves.
 pub(super) struct PlacementTree {
@@ -21,6 +22,7 @@ pub(super) struct PlacementTree {
     places: Vec<Place>,
     has_triangles: bool,
     has_shapes: bool,
+    spread: Spread,
 }
 
 /// Visits of nodes for the boxes of all placements together, so that many of them do not take long: some 50 for each of 2,500 in each of six
@@ -46,16 +48,28 @@ pub(super) fn tree_over(
     (tree, items.iter().map(|item| item.primitive() as usize).collect())
 }
 
-/// Calls `enter` with the number of every placement whose box the ray enters; it says how far the ray still looks.
+/// How far rays of placed shapes stray from where they are in the world.
+pub(super) fn spread_over<'a>(placements: impl IntoIterator<Item = &'a Placement>, objects: &[Level]) -> Spread {
+    placements.into_iter().fold(Spread::NONE, |spread, placement| {
+        let shapes = objects[placement.object as usize].shapes.tree();
+        if shapes.is_empty() { spread } else { spread.include(placement, &shapes.bounds()) }
+    })
+}
+
+/// Calls `enter` with the number of every placement whose box the ray enters, or may enter where it strays by `spread`; it says how far
+/// the ray still looks.
 #[inline(always)]
 pub(super) fn walk_over<S: Simd, Q: Query>(
     tree: &Tree,
     ray: &Ray,
+    spread: &Spread,
     limit: f32,
     stack: &mut Stack,
     mut enter: impl FnMut(u32) -> Visit,
 ) {
-    let slab = SlabRay::new::<S>(ray, tree.reach(), Blur::NONE);
+    // Rounded up.
+    let origin = (spread.of(ray).max_element() * 1.01) as f32;
+    let slab = SlabRay::new::<S>(ray, tree.reach(), Blur { origin, ..Blur::NONE });
     walk::single::<S, Q>(
         stack,
         tree,
@@ -88,7 +102,8 @@ impl PlacementTree {
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());
-        Self { tree, places, has_triangles, has_shapes }
+        let spread = spread_over(places.iter().map(|place| &place.placement), objects);
+        Self { tree, places, has_triangles, has_shapes, spread }
     }
 
     /// Whether nothing is placed.
@@ -113,6 +128,11 @@ impl PlacementTree {
 
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// As [`spread_over`] says.
+    pub fn spread(&self) -> &Spread {
+        &self.spread
     }
 
     /// As [`Tree::reach`].
