@@ -301,6 +301,57 @@ fn bundles() {
     }
 }
 
+/// What overflows in f32 on the way is neither lost for it nor believed.
+#[test]
+fn products_that_overflow() {
+    let mesh = |triangles: &[[[f32; 3]; 3]]| {
+        let corners = triangles.as_flattened().iter().map(|&p| Vec3::from(p)).collect();
+        Mesh::new(corners, (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+    };
+    let ahead = |z: f32, w: f32| [[-w, -w, z], [3.0 * w, -w, z], [-w, 3.0 * w, z]];
+    // Edges of 1e12 far up along a ray as steep as a bundle takes it, beside a triangle that makes the ray enter their leaf.
+    let beyond = [[-1.7e18, -1.7e18, 1.7e18], [-1.7e18 + 1e12, -1.7e18, 1.7e18], [-1.7e18, -1.7e18 + 1e12, 1.7e18]];
+    let steep = [[1.8e18, -1.8e18, 0.0], [1.8e18, 1.8e18, -1.8e18], [-1.8e18, -1.7e18, 1.8e18]];
+    let few = |first: Vec3, second: Vec3| [first, second].map(|direction| Ray::new(Vec3::ZERO, direction)).to_vec();
+    let level = few(Vec3::new(0.3, 0.2, 1.0), Vec3::new(0.31, 0.2, 1.0));
+    let oblique = few(Vec3::new(0.9, 0.9, 1.0), Vec3::new(16.0, 16.0, 1.0));
+    let cases = [
+        (mesh(&[ahead(1e13, 2e13), ahead(2e13, 4e13)]), level.clone()),
+        (mesh(&[ahead(2e13, 4e13), ahead(1e13, 2e13)]), level.clone()),
+        (mesh(&[ahead(3e8, 3e7)]), few(Vec3::new(0.1, 0.05, 1.0), Vec3::new(0.1, 0.06, 1.0))),
+        (mesh(&[ahead(1e10, 2e10)]), few(Vec3::new(0.3, 0.2, 1.0) * 1e-30, Vec3::new(0.3, 0.21, 1.0) * 1e-30)),
+        (mesh(&[ahead(0.01, 5e9)]), level),
+        (mesh(&[steep]), oblique.clone()),
+        (mesh(&[steep, beyond]), oblique),
+    ];
+    for (mesh, rays) in cases {
+        let scene = scenes::of_mesh(mesh);
+        for tmax in [f32::INFINITY, 1e9, 1e10, 1e14, 3e13] {
+            for tmin in [0.0, 1e-3] {
+                let within: Vec<Ray> = rays.iter().map(|ray| Ray { tmin, tmax, ..*ray }).collect();
+                assert_parity(&scene, &within);
+            }
+        }
+    }
+}
+
+/// A ray that is rounded in an object's coordinates may meet a shape which it passes in the world.
+#[test]
+fn shapes_that_only_the_rounded_ray_meets() {
+    use twincast::math::{DAffine3, DVec3};
+    use twincast::scene::Geometry;
+    use twincast::{Cuboid, Shape};
+    let cuboid = |min: [f32; 3], max: [f32; 3]| Shape::Cuboid(Cuboid::new(min.into(), max.into()).expect("a box"));
+    let shapes = vec![cuboid([9.0; 3], [10.0, 10.00002, 10.0]), cuboid([-10.0; 3], [-9.0; 3])];
+    let mut scene = Scene::from_geometries(vec![Geometry::Shapes { shapes, material: 0 }], vec![Default::default()]);
+    scene.instances[0].transform = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_4);
+    assert!(scene.instances[0].transform.transform_point3(DVec3::ZERO) == DVec3::ZERO);
+    let ray = |y: f32| Ray::new(Vec3::new(9.5, y, 1000.00037), Vec3::NEG_Z);
+    let rays: Vec<Ray> = (-40..=40).map(|i| ray(0.70714092 + i as f32 * 1e-6)).collect();
+    let hits = assert_parity(&scene, &rays);
+    assert!(hits > 0 && hits < rays.len(), "{hits} hits");
+}
+
 /// Bundles whose rays are farther apart than triangles are large, so that each leaf concerns a few of them; some aimed at corners and
 /// edges, some with ranges that begin or end at their hit, and shadow rays that start at corners. In the world and placed.
 #[test]

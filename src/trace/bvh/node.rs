@@ -188,8 +188,8 @@ impl Tree {
     }
 
     /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
-    /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches a
-    /// hundredth farther than what has been found, or `visits` are over.
+    /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
+    /// farther than what has been found and the 256th part of the width, or `visits` are over.
     pub fn farthest(&self, way: Vec3, visits: usize, of_leaf: impl Fn(Child) -> f32) -> f64 {
         if self.is_empty() {
             return f64::NEG_INFINITY;

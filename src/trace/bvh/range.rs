@@ -30,7 +30,8 @@ impl Range {
                 let (a, b) = (splat(1.0 + 1e-6), splat(1.0 - 1e-6));
                 (a.sub(end), b.sub(end), b.sub(begin), a.sub(begin))
             } else {
-                (begin, begin, end, end)
+                // A t that overflows is no hit.
+                (begin, begin, end.min(splat(f32::MAX)), end)
             };
             begin.put(&mut self.begin, group);
             start.put(&mut self.start, group);

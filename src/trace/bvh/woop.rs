@@ -1,5 +1,5 @@
 //! Rays against triangles in f32, a lane a pair, with bounds on the rounding: one ray and eight triangles ([`super::filter`]), or eight
-//! rays and one triangle ([`super::packet`]).
+//! rays and one triangle ([`super::packet`]); of a ray in a bundle, the edge functions alone ([`super::tile`]).
 //!
 //! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
 //! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it
@@ -94,6 +94,12 @@ impl<V: Vector> Sides<V> {
         !self.bound.less(self.most.min(V::splat(0.0).sub(self.least))).bits()
     }
 
+    /// The pairs of which no edge function has overflowed. That of a ray with shears up to 2 does so only for triangles that it misses.
+    #[inline(always)]
+    pub fn are_finite(&self) -> V::Mask {
+        self.u.add(self.v).add(self.w).abs().less(V::splat(f32::INFINITY))
+    }
+
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
     pub fn inside(&self) -> V::Mask {
@@ -139,23 +145,27 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     let depth_error = error.mul_add(deep, splat(f32::MIN_POSITIVE));
     let depth_error = if BLURRED { most_square.mul_add(splat(1.6 * blur), depth_error) } else { depth_error };
     let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
-    let mut lanes = passed & !far.less(begin).or(end.less(near)).bits();
+    // What is too large for f32 is neither rejected for it nor sure.
+    let infinite = splat(f32::INFINITY);
+    let outside = far.less(begin).and(begin.less(infinite)).or(end.less(near).and(near.less(infinite)));
+    let mut lanes = passed & !outside.bits();
     let four = splat(4.0);
-    let is_precise = depth_error.mul(four).less(depth);
+    let is_precise = depth_error.mul(four).less(depth).and(depth.less(infinite));
     if !ROUNDED && lanes & !is_precise.bits() != 0 {
         // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
         let (height, height_error) = height();
         let (depth, depth_error) = (height.mul(turn), height_error.mul_add(area, splat(f32::MIN_POSITIVE)));
         let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
         // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
-        lanes &= !far.less(begin).or(end.less(near)).and(zero.less(least_square)).bits();
+        let outside = far.less(begin).and(begin.less(infinite)).or(end.less(near).and(near.less(infinite)));
+        lanes &= !outside.and(zero.less(least_square)).bits();
     }
     if lanes == 0 {
         return None;
     }
     // Precise to a quarter in f32 is more than enough in f64, unless the origin all but touches the triangle: both
     // count the same products of components, but f64 is wanted 2^18 times as precise, and is 2^29 times.
-    let precise = error.mul(four).less(square).and(is_precise);
+    let precise = error.mul(four).less(square).and(square.less(infinite)).and(is_precise);
     let apart = size.mul(splat(1.0 / 32.0)).less(deep);
     Some(Judged {
         lanes,

@@ -48,10 +48,16 @@ impl Found {
         (self.noted, self.place, self.computed) = ([NONE; RAYS], [FIXED; RAYS], 0);
     }
 
-    /// In another tree, for which `bundle` was made ready.
+    /// In another tree, for which `bundle` was made ready. Rays that are not `wanted` look no farther, so that they keep none waiting.
     #[inline(always)]
-    pub fn enter(&mut self, bundle: &Bundle) {
+    pub fn enter(&mut self, bundle: &Bundle, wanted: u64) {
         (self.limit, self.sure) = (bundle.limit, bundle.end);
+        let mut others = !wanted;
+        while others != 0 {
+            let ray = others.trailing_zeros() as usize % RAYS;
+            others &= others - 1;
+            (self.limit.0[ray], self.sure.0[ray]) = (DONE, DONE);
+        }
     }
 
     /// Makes `nearest` valid for a ray, from what is noted.

@@ -7,7 +7,7 @@
 //!
 //! **Edge functions.** Slopes are off by as much as a single ray's shear in the world, and in an object's coordinates by 2 u of
 //! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
-//! off by b counts as (1 + k) b, not 2 b.
+//! off by b counts as (1 + k) b, not 2 b. With k up to 16 the functions may overflow for triangles that are hit; then they say nothing.
 //!
 //! **t'.** Height over slope, as for all rays at once: edge functions of small triangles far away leave t' open by a hundredth of
 //! itself and more. With N the normal computed with all signs positive, and |d| <= D on the bundle's axes, d being (p, q, 1): N is
@@ -139,7 +139,7 @@ impl<Q: Query> Walk<'_, Q> {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
             let shared = Seen::new(block, axes, bundle.origin);
-            // Of each origin, and of the one that is shared; made when a ray first asks.
+            // Planes serve every origin, the heights are those of the shared one; made when a ray first asks.
             let mut planes = None;
             let mut rays = leaf.rays;
             while rays != 0 {
@@ -185,7 +185,7 @@ impl<Q: Query> Walk<'_, Q> {
     fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Met<S::V8>, span: &Span) -> bool {
         let &Met { lanes: mut open, sure, low, high } = met;
         let sure = sure.and(S::V8::splat(span.begin).at_most(low));
-        if Q::ANY && sure.and(high.at_most(S::V8::splat(span.sure))).bits() & open != 0 {
+        if Q::ANY && sure.and(high.less(S::V8::splat(span.sure))).bits() & open != 0 {
             (self.found.sure.0[ray], self.found.limit.0[ray]) = (DONE, DONE);
             return true;
         }
@@ -196,7 +196,7 @@ impl<Q: Query> Walk<'_, Q> {
             let lane = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             if sure >> lane & 1 != 0 {
-                if high[lane] <= self.found.sure.0[ray] {
+                if high[lane] < self.found.sure.0[ray] {
                     (self.found.sure.0[ray], self.found.limit.0[ray]) = (low[lane], high[lane]);
                     (self.found.noted[ray], self.found.place[ray]) = (first + lane as u32, self.place);
                     changed = true;
@@ -269,7 +269,7 @@ fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize
     };
     let width = sx.abs().max(sy.abs()).add(splat(1.0));
     let sides = Sides::new(&sheared, width, splat(block.size), blur);
-    let lanes = sides.passed() & block.lanes;
+    let lanes = (sides.passed() | !sides.are_finite().bits()) & block.lanes;
     (sides, lanes)
 }
 
@@ -294,7 +294,8 @@ fn meet<S: Simd>(
     // t' = -height / slope. Turned so that it is positive where the slope is.
     let turned = S::V8::select(height.less(zero), slope, zero.sub(slope));
     let (height, steep, four) = (height.abs(), turned.abs(), splat(4.0));
-    let known = slope_error.mul(four).less(steep);
+    let infinite = splat(f32::INFINITY);
+    let known = slope_error.mul(four).less(steep).and(steep.less(infinite)).and(height.less(infinite));
     let low = height.sub(error).div(steep.add(slope_error)).mul(splat(1.0 - SLACK));
     let high = height.add(error).div(steep.sub(slope_error)).mul(splat(1.0 + SLACK));
     let behind = turned.less(zero).and(error.less(height));
@@ -302,5 +303,5 @@ fn meet<S: Simd>(
     let lanes = lanes & !known.and(outside).bits();
     // Known to a quarter in f32, both are precise enough in f64.
     let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
-    Met { lanes, sure: sides.inside().and(tame), low, high }
+    Met { lanes, sure: sides.inside().and(sides.are_finite()).and(tame), low, high }
 }

@@ -1,4 +1,4 @@
-//! A bundle on its way through a tree: boxes for all rays, triangles for groups of them.
+//! A bundle on its way through a tree: boxes for all rays, triangles for groups of them, or for few rays one by one.
 
 use std::marker::PhantomData;
 
@@ -24,7 +24,8 @@ pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
     pub near: f32,
     pub child: Child,
-    /// A bit for every ray that may enter it: in a node, for all from the first row with such a ray on.
+    /// A bit for every ray that may enter it: in a leaf each is known to; in a node they are those of rows that may, without the rows
+    /// before the first ray that is known to.
     pub rays: u64,
 }
 
@@ -167,7 +168,7 @@ impl<Q> Goal for Walk<'_, Q> {
 impl<Q: Query> Walk<'_, Q> {
     #[inline(always)]
     pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, rays: u64) {
-        self.found.enter(self.bundle);
+        self.found.enter(self.bundle, way.wanted);
         way.measure::<S>(&self.found.limit);
         stack[0] = Entry::root(rays & way.wanted);
         let mut len = 1;
