@@ -347,7 +347,7 @@ fn shapes_that_only_the_rounded_ray_meets() {
     scene.instances[0].transform = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_4);
     assert!(scene.instances[0].transform.transform_point3(DVec3::ZERO) == DVec3::ZERO);
     let ray = |y: f32| Ray::new(Vec3::new(9.5, y, 1000.00037), Vec3::NEG_Z);
-    let rays: Vec<Ray> = (-40..=40).map(|i| ray(0.70714092 + i as f32 * 1e-6)).collect();
+    let rays: Vec<Ray> = (-40..=40).map(|i| ray(0.707_140_9 + i as f32 * 1e-6)).collect();
     let hits = assert_parity(&scene, &rays);
     assert!(hits > 0 && hits < rays.len(), "{hits} hits");
 }
@@ -356,8 +356,19 @@ fn shapes_that_only_the_rounded_ray_meets() {
 /// edges, some with ranges that begin or end at their hit, and shadow rays that start at corners. In the world and placed.
 #[test]
 fn triangles_smaller_than_pixels() {
+    // Squares, and with the last one distances from far away, leave f32.
+    for (scale, views) in [(1.0, 6), (1e-12, 3), (1e13, 3), (1e18, 3)] {
+        let hits = hits_of_small_triangles(scale, views);
+        assert!(hits > 160 * views, "at {scale:e}, of {views} views, {hits} hits");
+    }
+}
+
+/// Hits of everything that is cast from so many views, scenes being as large as said.
+fn hits_of_small_triangles(scale: f32, views: usize) -> usize {
     use twincast::math::{DAffine3, DVec3};
-    let mesh = scenes::bumpy_sphere(24, 0.2, 11);
+    let mut mesh = scenes::bumpy_sphere(24, 0.2, 11);
+    let positions = mesh.positions.iter().map(|position| *position * scale).collect();
+    mesh.positions = std::sync::Arc::new(positions);
     let mut placed = scenes::of_mesh(mesh.clone());
     let first = placed.instances.pop().expect("one instance");
     let turned = |i: f64| {
@@ -365,7 +376,7 @@ fn triangles_smaller_than_pixels() {
         DAffine3::from_scale_rotation_translation(
             DVec3::new(1.0, 0.8, 1.3),
             turn,
-            DVec3::new(0.4 * i - 0.6, 0.1, 0.3 * i),
+            DVec3::new(0.4 * i - 0.6, 0.1, 0.3 * i) * f64::from(scale),
         )
     };
     let transforms = [0.0, 1.0, 2.0].map(turned);
@@ -387,8 +398,8 @@ fn triangles_smaller_than_pixels() {
                 }
             }
         };
-        for view in 0..6 {
-            let eye = (Vec3::ONE + random.vec3() * 0.5) * [3.0, 30.0, 1000.0][view % 3];
+        for view in 0..views {
+            let eye = (Vec3::ONE + random.vec3() * 0.5) * [3.0, 30.0, 1000.0][view % 3] * scale;
             let corner = |random: &mut Random| {
                 let transform = transforms[random.below(transforms.len())];
                 let at = |i: u32| transform.transform_point3(mesh.positions[i as usize].as_dvec3()).as_vec3();
@@ -396,12 +407,12 @@ fn triangles_smaller_than_pixels() {
                 if random.unit() < 0.5 { at(a) } else { at(a).lerp(at(b), random.unit()) }
             };
             let mut rays: Vec<Ray> = (0..256)
-                .map(|k| Ray::new(eye, if k % 3 == 0 { corner(&mut random) } else { random.vec3() } - eye))
+                .map(|k| Ray::new(eye, if k % 3 == 0 { corner(&mut random) } else { random.vec3() * scale } - eye))
                 .collect();
             let shadow = |k: usize| {
                 let start = match k % 3 {
                     0 => corner(&mut random),
-                    1 => random.vec3() * 1.5,
+                    1 => random.vec3() * 1.5 * scale,
                     _ => rays[k].origin + rays[k].direction * brute.closest(&rays[k]).map_or(0.999, |hit| hit.t),
                 };
                 Ray { tmax: [1.0, 0.999][k % 2], ..Ray::new(start, eye - start) }
@@ -412,7 +423,7 @@ fn triangles_smaller_than_pixels() {
             hits += assert_parity_of(&world, &brute, &rays) + assert_parity_of(&world, &brute, &shadows);
         }
     }
-    assert!(hits > 1000, "{hits} hits");
+    hits
 }
 
 /// A tree fitted to moved vertices gives the hits of brute force; one for other triangles is refused.

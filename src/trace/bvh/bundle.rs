@@ -57,7 +57,7 @@ pub(super) struct Bundle {
     pub low: [f32; 2],
     pub high: [f32; 2],
     pub largest: f32,
-    /// The same of eight rays at a time.
+    /// The least and the largest slopes of each row of eight rays.
     pub rows: Rows,
     /// 1 / slope.
     pub reciprocal: [PerRay; 2],
@@ -254,6 +254,16 @@ impl Bundle {
         // a depth may be infinite, which leaves no slope.
         let is_small = high[2].max(-low[2]) < HUGE;
         if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
+    }
+
+    /// Whether products of three lengths, as of corners and edges, may leave f32 in a tree that reaches that far.
+    #[inline(always)]
+    pub fn may_overflow(&self, reach: Vec3) -> bool {
+        // Components of a normal are two products of edges, which are at most twice as long as corners are far; its scalar product
+        // with a corner or a direction is three: 24, and rounding.
+        let far = (Vec3::from_array(self.origin).abs() + reach).max_element();
+        let most = far.max(self.largest);
+        32.0 * most * far * far >= HUGE
     }
 
     /// The slope rectangle's reciprocals, against the boxes of a tree that reaches that far. None where they are too

@@ -3,14 +3,16 @@
 //!
 //! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
-//!   remains is tested against eight rows of eight rays at once, and the rows that may enter ray by ray, up to the first that does: those before it
-//!   take no part in that subtree. For a leaf every ray is asked.
+//!   remains is tested against eight rows of eight rays at once, and the rows that may enter ray by ray, up to the first
+//!   that does: those before it take no part in that subtree. For a leaf every ray is asked.
 //! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
 //!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes; of the others each group
-//!   of rays takes three scalar products. Leaves that few rays enter are tested ray by ray instead, against eight triangles at once ([`single`]).
+//!   of rays takes three scalar products. Leaves that few rays enter are tested ray by ray instead, against eight triangles
+//!   at once ([`single`]).
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
-//!   and v of what was noted are computed four rays at a time ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
+//!   and v of what was noted are computed four rays at a time
+//!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
 //! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
 //!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one.
 
@@ -34,7 +36,7 @@ use crate::ray::Ray;
 use found::Found;
 use octants::{Octants, Part};
 use placed::{Tour, one_by_one};
-use walk::{Entry, Walk, Way};
+use walk::{Entry, Walk, Way, few};
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
@@ -148,12 +150,14 @@ impl One {
             *entered += u32::from(place != FIXED);
             let is_bundle = place == FIXED || local.place::<S>(bundle, bvh.placements.at(place), range);
             let bundle = if place == FIXED { &*bundle } else { &*local };
-            let Some(slab) = bundle.slab(tree.tree().reach()).filter(|_| is_bundle) else {
-                one_by_one::<S, Q>(bvh, place, rays, count, single, range, found);
+            let reach = tree.tree().reach();
+            let Some(slab) = bundle.slab(reach).filter(|_| is_bundle) else {
+                one_by_one::<S, Q>(bvh, place, rays, seeing, single, range, found);
                 continue;
             };
             let way = Way::new(bundle, slab, count);
-            let walk = Walk { bvh, place, tree, rays, bundle, found, query: PhantomData::<Q> };
+            let few = few(bundle, reach);
+            let walk = Walk { bvh, place, tree, rays, bundle, found, few, query: PhantomData::<Q> };
             walk.run::<S>(stack, way, seeing);
             range.shorten::<S>(bundle, &found.sure, &found.limit);
         }

@@ -77,26 +77,28 @@ impl<'a> Tour<'a> {
     }
 }
 
-/// Traces the first `count` rays through one placed object each by itself, where they are no bundle.
+/// Traces the rays of the bit mask `seeing` through one placed object, each by itself, where they are no bundle.
 #[inline(always)]
 pub(super) fn one_by_one<S: Simd, Q: Query>(
     bvh: &Bvh,
     place: u32,
     rays: &[Ray; RAYS],
-    count: usize,
+    mut seeing: u64,
     stack: &mut Stack,
     range: &mut Range,
     found: &mut Found,
 ) {
     let place = bvh.placements.at(place);
     let level = &bvh.objects[place.placement.object as usize];
-    for (i, ray) in rays.iter().enumerate().take(count) {
+    while seeing != 0 {
+        let i = seeing.trailing_zeros() as usize % RAYS;
+        seeing &= seeing - 1;
         if range.limit.0[i] < 0.0 {
             continue;
         }
         found.compute(bvh, rays, i);
         let nearest = &mut found.nearest[i];
-        level.trace_triangles::<S, Q>(ray, Some(place), stack, nearest);
+        level.trace_triangles::<S, Q>(&rays[i], Some(place), stack, nearest);
         match nearest.hit() {
             Some(_) if Q::ANY => range.set(i, DONE, DONE),
             Some(hit) => range.set(i, hit.t.next_down(), nearest.limit()),

@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 
 use super::found::{DONE, Found};
+use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::LANES;
@@ -17,6 +18,12 @@ use crate::trace::bvh::triangles::TriangleTree;
 
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;
+
+/// The same in a tree that reaches that far. [`Edges`] must not overflow; where they might, every ray is by itself.
+#[inline(always)]
+pub(super) fn few(bundle: &Bundle, reach: Vec3) -> u32 {
+    if bundle.may_overflow(reach) { RAYS as u32 } else { FEW }
+}
 
 /// A child to be visited.
 #[derive(Clone, Copy)]
@@ -147,6 +154,8 @@ pub(super) struct Walk<'a, Q> {
     /// In the tree's coordinates.
     pub bundle: &'a Bundle,
     pub found: &'a mut Found,
+    /// As [`few`] says.
+    pub few: u32,
     pub query: PhantomData<Q>,
 }
 
@@ -182,7 +191,7 @@ impl<Q: Query> Walk<'_, Q> {
     /// Tests the blocks of a leaf; true where a limit has changed.
     #[inline(always)]
     fn visit<S: Simd>(&mut self, leaf: Entry, most: f32) -> bool {
-        if leaf.rays.count_ones() <= FEW {
+        if leaf.rays.count_ones() <= self.few {
             return self.visit_one_by_one::<S>(leaf);
         }
         let mut changed = false;
