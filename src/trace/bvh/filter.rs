@@ -3,6 +3,7 @@
 use super::block::{Block, LANES};
 use super::bundle::axes;
 use super::place::Blur;
+use super::planes;
 use super::simd::{Array, Mask, Simd, Vector};
 use super::woop::{self, Aim, Judged, SLACK, Sheared};
 use crate::math::Vec3;
@@ -130,7 +131,7 @@ impl Filter {
                 // Asked that rarely, corners are better loaded again than kept: the black box keeps them from being kept.
                 let corners = std::hint::black_box(&block.corners);
                 let corners = [along::<S>(&corners[kx]), along::<S>(&corners[ky]), along::<S>(&corners[kz])];
-                woop::height(corners, [ox, oy, oz], if BLURRED { blur.origin } else { 0.0 })
+                planes::heights(corners, [ox, oy, oz], if BLURRED { blur.origin } else { 0.0 })
             },
         );
         match judged {

@@ -39,6 +39,7 @@ impl Level {
 
     /// The box around everything where it is placed: the triangles are what is turned. The object's own box, turned, would be half as
     /// wide again for a ball.
+    ///
     /// Takes at most so many `visits` of nodes, six times over; of none, it is the box that is turned.
     pub fn placed_bounds(&self, placement: &Placement, visits: usize) -> Aabb {
         let bounds = self.bounds();

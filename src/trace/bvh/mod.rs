@@ -11,7 +11,7 @@
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `batch`, `query` | many rays, as bundles or in flight; the two questions |
 //! | `flight` | single rays, several of them in turn |
-//! | `tile`, `bundle`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
+//! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
 //! | `walk` | one ray by itself, from the root to the leaves |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
@@ -26,7 +26,7 @@
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
-//! | `block`, `woop`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
+//! | `block`, `woop`, `planes`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
 //! | `steps` | what a ray cannot but look at, counted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
@@ -67,6 +67,7 @@ mod noted;
 mod packet;
 mod place;
 mod placements;
+mod planes;
 mod preset;
 mod quad;
 mod query;

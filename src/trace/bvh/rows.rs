@@ -12,13 +12,15 @@ pub(super) const ROWS: usize = RAYS / 8;
 pub(super) struct Rows {
     pub low: [[f32; ROWS]; 2],
     pub high: [[f32; ROWS]; 2],
-    least: [[f32; ROWS]; 2],
-    most: [[f32; ROWS]; 2],
+    least_reciprocal: [[f32; ROWS]; 2],
+    most_reciprocal: [[f32; ROWS]; 2],
 }
 
 impl Rows {
-    pub const NONE: Self =
-        Self { low: [[0.0; ROWS]; 2], high: [[0.0; ROWS]; 2], least: [[0.0; ROWS]; 2], most: [[0.0; ROWS]; 2] };
+    pub const NONE: Self = {
+        let zero = [[0.0; ROWS]; 2];
+        Self { low: zero, high: zero, least_reciprocal: zero, most_reciprocal: zero }
+    };
 
     #[inline(always)]
     pub fn new<S: Simd>(slope: &[PerRay; 2]) -> Self {
@@ -31,7 +33,8 @@ impl Rows {
             let high = largest::<S>(columns);
             (rows.low[i], rows.high[i]) = (low.to_array(), high.to_array());
             // Division is monotone, also when it rounds: no ray's own reciprocal is out of this range.
-            (rows.least[i], rows.most[i]) = (one.div(high).to_array(), one.div(low).to_array());
+            rows.least_reciprocal[i] = one.div(high).to_array();
+            rows.most_reciprocal[i] = one.div(low).to_array();
         }
         rows
     }
@@ -43,7 +46,7 @@ impl Rows {
         let mut last = S::V8::splat(boxes.far[2][slot]).min(S::V8::load(limit));
         for i in 0..2 {
             let (near, far) = (S::V8::splat(boxes.near[i][slot]), S::V8::splat(boxes.far[i][slot]));
-            let (least, most) = (S::V8::load(&self.least[i]), S::V8::load(&self.most[i]));
+            let (least, most) = (S::V8::load(&self.least_reciprocal[i]), S::V8::load(&self.most_reciprocal[i]));
             first = near.mul(least).min(near.mul(most)).max(first);
             last = far.mul(least).max(far.mul(most)).min(last);
         }

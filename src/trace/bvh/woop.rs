@@ -7,20 +7,21 @@
 //! when t is out of range by more than its own. What remains is noted where there is no doubt, else goes to the exact test.
 //!
 //! With u = 2^-24, a triangle that is hit has its corners, after the shear, within S = (1 + k) s of the ray, s being the
-//! largest component of its edges and k <= 2 of the shear; so no component of a corner relative to the origin is larger
-//! than k Z + S, Z being the largest along the ray. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
+//! largest component of its edges and k of the shear; so no component of a corner relative to the origin is larger
+//! than k Z + S, Z being the largest along the ray. A single ray's k is at most 2, a bundle's rays' larger. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
 //! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
 //! function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by three such errors. A triangle that is not hit may be bounded wrongly, to no harm.
 //!
 //! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
 //! of the direction by r times the largest, r <= 2^-10, and k <= 1: the shear is off by (1 + k) r / (1 - r), so that a sheared component
-//! errs by 2 b + 2.1 r (Z + S) besides; the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
+//! errs by 2 b + 2.1 r (Z + S) besides ((1 + k) b for a larger k); the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
 //! but for their errors; and t |along| by r.
 //!
 //! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
-//! by 2 c. Only the distance from a plane ([`height`]) counts on edges that are exact, and is not asked for such corners.
+//! by 2 c. Only the distance from a plane ([`Planes`](super::planes::Planes)) counts on edges that are exact, and is not asked for such corners.
 
 use super::place::Blur;
+use super::planes::Heights;
 use super::simd::{Mask, Vector};
 use crate::math::UNIT_ROUNDOFF;
 
@@ -108,8 +109,8 @@ impl<V: Vector> Sides<V> {
 }
 
 /// The pairs, of those of the bit mask `lanes`, of which the ray may hit the triangle up to `limit`; `size` is at least the largest
-/// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `height`
-/// is asked only if corners are not `ROUNDED`.
+/// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `heights`
+/// are asked only if corners are not `ROUNDED`.
 #[inline(always)]
 pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     &Sheared { x, y, z }: &Sheared<V>,
@@ -118,7 +119,7 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     size: V,
     lanes: u32,
     blur: Blur,
-    height: impl FnOnce() -> (V, V),
+    heights: impl FnOnce() -> Heights<V>,
 ) -> Option<Judged<V>> {
     let (splat, zero) = (V::splat, V::splat(0.0));
     let blur = if BLURRED { blur } else { Blur::NONE };
@@ -153,8 +154,8 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     let is_precise = depth_error.mul(four).less(depth).and(depth.less(infinite));
     if !ROUNDED && lanes & !is_precise.bits() != 0 {
         // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
-        let (height, height_error) = height();
-        let (depth, depth_error) = (height.mul(turn), height_error.mul_add(area, splat(f32::MIN_POSITIVE)));
+        let Heights { height, error } = heights();
+        let (depth, depth_error) = (height.mul(turn), error.mul_add(area, splat(f32::MIN_POSITIVE)));
         let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
         // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
         let outside = far.less(begin).and(begin.less(infinite)).or(end.less(near).and(near.less(infinite)));
@@ -179,29 +180,4 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
 #[inline(always)]
 fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
     x[a].mul_sub(y[b], y[a].mul(x[b]))
-}
-
-/// Twice the area times the distance of the origin from the plane: the normal's product with p, which leads from the first
-/// corner to the origin; and its error. Let u = 2^-24 and N be the normal with all signs positive. Edges err by u,
-/// the normal by 4 u N, p by u (and `blur`), and the scalar product by another 3 u N p. `corners` are component by component.
-#[inline(always)]
-pub(super) fn height<V: Vector>(corners: [[V; 3]; 3], origin: [V; 3], blur: f32) -> (V, V) {
-    let (tiny, unit, blur) = (V::splat(TINY), V::splat(12.0 * UNIT_ROUNDOFF), V::splat(1.1 * blur));
-    let [(bx, cx), (by, cy), (bz, cz)] = [edges(corners[0]), edges(corners[1]), edges(corners[2])];
-    let p = [origin[0].sub(corners[0][0]), origin[1].sub(corners[1][0]), origin[2].sub(corners[2][0])];
-    let height = by.mul_sub(cz, bz.mul(cy)).mul(p[0]);
-    let height = bz.mul_sub(cx, bx.mul(cz)).mul_add(p[1], height);
-    let height = bx.mul_sub(cy, by.mul(cx)).mul_add(p[2], height);
-    let (bx, by, bz) = (bx.abs(), by.abs(), bz.abs());
-    let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
-    let off = [p[0].abs().mul_add(unit, blur), p[1].abs().mul_add(unit, blur), p[2].abs().mul_add(unit, blur)];
-    let error = by.mul_add(cz, bz.mul_add(cy, tiny)).mul_add(off[0], V::splat(f32::MIN_POSITIVE));
-    let error = bz.mul_add(cx, bx.mul_add(cz, tiny)).mul_add(off[1], error);
-    (height, bx.mul_add(cy, by.mul_add(cx, tiny)).mul_add(off[2], error))
-}
-
-/// From the first corner to the others, along one axis.
-#[inline(always)]
-fn edges<V: Vector>([a, b, c]: [V; 3]) -> (V, V) {
-    (b.sub(a), c.sub(a))
 }

@@ -7,6 +7,7 @@ use super::{Packet, RAYS};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::planes;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 use crate::trace::bvh::woop::{self, Aim, Judged, SLACK, Sheared};
@@ -101,7 +102,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
             #[inline(always)]
             || {
                 let corners = [along(block, lane, kx), along(block, lane, ky), along(block, lane, kz)];
-                woop::height(corners, [ox, oy, oz], 0.0)
+                planes::heights(corners, [ox, oy, oz], 0.0)
             },
         );
         let Some(Judged { lanes, sure, low, high }) = judged else { return Met { changed: false, open: 0 } };

@@ -21,12 +21,10 @@ use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::bundle::{Bundle, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::planes::{Heights, Planes};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 use crate::trace::bvh::woop::{Sheared, Sides};
-
-/// Against underflow of products.
-const LEAST: f32 = 1e-36;
 
 /// A block as an origin sees it, on a bundle's axes.
 struct Seen<V> {
@@ -34,19 +32,6 @@ struct Seen<V> {
     x: [V; 3],
     y: [V; 3],
     z: [V; 3],
-}
-
-/// The planes of a block's triangles.
-struct Planes<V> {
-    normal: [V; 3],
-    /// With all signs positive.
-    size: [V; 3],
-}
-
-/// How high an origin lies over each plane, as normals measure it, and how far that may be off.
-struct Heights<V> {
-    height: V,
-    error: V,
 }
 
 /// From where, and up to where, a ray looks along the bundle's axis.
@@ -73,18 +58,17 @@ struct Met<V: Vector> {
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
 
-/// From the corners to the origin, along one axis.
+/// One component of all corners.
 #[inline(always)]
-fn towards<V: Vector + Array<LANES>>(origin: f32, [a, b, c]: &[[f32; LANES]; 3]) -> [V; 3] {
-    let origin = V::splat(origin);
-    [origin.sub(V::load(a)), origin.sub(V::load(b)), origin.sub(V::load(c))]
+fn along<V: Vector + Array<LANES>>([a, b, c]: &[[f32; LANES]; 3]) -> [V; 3] {
+    [V::load(a), V::load(b), V::load(c)]
 }
 
-/// From the first corner to the others, along one axis.
+/// From the corners to the origin, along one axis.
 #[inline(always)]
-fn edges<V: Vector + Array<LANES>>([a, b, c]: &[[f32; LANES]; 3]) -> (V, V) {
-    let a = V::load(a);
-    (V::load(b).sub(a), V::load(c).sub(a))
+fn towards<V: Vector + Array<LANES>>(origin: f32, corners: &[[f32; LANES]; 3]) -> [V; 3] {
+    let (origin, [a, b, c]) = (V::splat(origin), along::<V>(corners));
+    [origin.sub(a), origin.sub(b), origin.sub(c)]
 }
 
 impl<V: Vector + Array<LANES>> Seen<V> {
@@ -99,33 +83,11 @@ impl<V: Vector + Array<LANES>> Seen<V> {
     }
 }
 
-impl<V: Vector + Array<LANES>> Planes<V> {
-    #[inline(always)]
-    fn new(block: &Block, [x, y, z]: [usize; 3]) -> Self {
-        let corners = &block.corners;
-        let [(bx, cx), (by, cy), (bz, cz)]: [(V, V); 3] = [edges(&corners[x]), edges(&corners[y]), edges(&corners[z])];
-        let normal = [by.mul_sub(cz, bz.mul(cy)), bz.mul_sub(cx, bx.mul(cz)), bx.mul_sub(cy, by.mul(cx))];
-        let (bx, by, bz, least) = (bx.abs(), by.abs(), bz.abs(), V::splat(LEAST));
-        let (cx, cy, cz) = (cx.abs(), cy.abs(), cz.abs());
-        let size = [
-            by.mul_add(cz, bz.mul_add(cy, least)),
-            bz.mul_add(cx, bx.mul_add(cz, least)),
-            bx.mul_add(cy, by.mul_add(cx, least)),
-        ];
-        Self { normal, size }
-    }
-
-    /// `blur` is how far the origin may be off.
-    #[inline(always)]
-    fn heights(&self, seen: &Seen<V>, blur: f32) -> Heights<V> {
-        let Self { normal: n, size } = self;
-        let (unit, blur) = (V::splat(12.0 * UNIT_ROUNDOFF), V::splat(1.1 * blur));
-        let p = [seen.x[0], seen.y[0], seen.z[0]];
-        let height = p[2].mul_add(n[2], p[1].mul_add(n[1], p[0].mul(n[0])));
-        let off = [p[0].abs().mul_add(unit, blur), p[1].abs().mul_add(unit, blur), p[2].abs().mul_add(unit, blur)];
-        let error = off[0].mul_add(size[0], V::splat(f32::MIN_POSITIVE));
-        Heights { height, error: off[2].mul_add(size[2], off[1].mul_add(size[1], error)) }
-    }
+/// The planes of a block's triangles, on a bundle's axes.
+#[inline(always)]
+fn planes<V: Vector + Array<LANES>>(block: &Block, [x, y, z]: [usize; 3]) -> Planes<V> {
+    let corners = &block.corners;
+    Planes::new([along(&corners[x]), along(&corners[y]), along(&corners[z])])
 }
 
 impl<Q: Query> Walk<'_, Q> {
@@ -135,12 +97,12 @@ impl<Q: Query> Walk<'_, Q> {
         let mut changed = false;
         let bundle = self.bundle;
         let (axes, blur) = (axes(bundle.axis), self.blur());
+        let is_turned = Q::ANY && bundle.is_turned;
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            let shared = Seen::new(block, axes, bundle.origin);
-            // Planes serve every origin, the heights are those of the shared one; made when a ray first asks.
-            let mut planes = None;
+            // Made when a ray first asks; planes serve every origin.
+            let (mut seen, mut planes_of, mut heights) = (None, None, None);
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
@@ -148,30 +110,28 @@ impl<Q: Query> Walk<'_, Q> {
                 if self.found.limit.0[ray] < leaf.near {
                     continue;
                 }
-                let own =
-                    if Q::ANY && bundle.is_turned { Some(Seen::new(block, axes, self.own_origin(ray))) } else { None };
-                let (sides, lanes) = sides::<S>(own.as_ref().unwrap_or(&shared), block, bundle, ray, blur);
+                if is_turned {
+                    // From the ray's own origin.
+                    (seen, heights) = (None, None);
+                }
+                let seen = seen.get_or_insert_with(
+                    #[inline(always)]
+                    || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
+                );
+                let (sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
                 if lanes == 0 {
                     continue;
                 }
-                let (planes, heights) = planes.get_or_insert_with(
+                let planes = planes_of.get_or_insert_with(
                     #[inline(always)]
-                    || {
-                        let planes = Planes::new(block, axes);
-                        let heights = planes.heights(&shared, blur.origin);
-                        (planes, heights)
-                    },
+                    || planes::<S::V8>(block, axes),
                 );
-                let (met, span) = match &own {
-                    Some(own) => {
-                        let span = self.own_span(ray);
-                        (meet::<S>(&sides, lanes, planes, &planes.heights(own, blur.origin), bundle, ray, &span), span)
-                    }
-                    None => {
-                        let span = self.span(ray);
-                        (meet::<S>(&sides, lanes, planes, heights, bundle, ray, &span), span)
-                    }
-                };
+                let heights = heights.get_or_insert_with(
+                    #[inline(always)]
+                    || planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin),
+                );
+                let span = if is_turned { self.own_span(ray) } else { self.span(ray) };
+                let met = meet::<S>(&sides, lanes, planes, heights, bundle, ray, &span);
                 if met.lanes != 0 {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &span);
                 }
