@@ -3,7 +3,7 @@
 use twincast::math::Vec3;
 use twincast::scene::{Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Isa, Options, Preset};
+use twincast::trace::bvh::{Bvh, Isa, Options, Preset, Travel};
 use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 
 use crate::accelerators::assert_accelerators;
@@ -21,18 +21,30 @@ pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> us
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
     let every = Preset::ALL.into_iter().flat_map(|preset| Isa::ALL.map(|isa| (preset, isa)));
     for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {
-        let bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
-        let packets = Width::ALL.map(|width| Batch { width, coherent: false });
-        for batch in packets.into_iter().chain([Batch { width: Width::One, coherent: true }]) {
+        let mut bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
+        let apart = |width| Batch { width, coherent: false };
+        let ways = [
+            (Travel::Alone, apart(Width::One)),
+            (Travel::InFlight, apart(Width::One)),
+            (Travel::BySize, apart(Width::Eight)),
+            (Travel::BySize, apart(Width::Sixteen)),
+            (Travel::InFlight, Batch { width: Width::One, coherent: true }),
+        ];
+        for (travel, batch) in ways {
+            bvh = bvh.travelling(travel);
             let mut hits = vec![None; rays.len()];
             bvh.closest_batch(rays, &mut hits, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(hits[i], expected[i], "{preset:?} {isa:?} {batch:?} {ray:?}");
+                assert_eq!(hits[i], expected[i], "{preset:?} {isa:?} {travel:?} {batch:?} {ray:?}");
             }
             let mut occluded = vec![false; rays.len()];
             bvh.occluded_batch(rays, &mut occluded, batch);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(occluded[i], expected[i].is_some(), "occluded {preset:?} {isa:?} {batch:?} {ray:?}");
+                assert_eq!(
+                    occluded[i],
+                    expected[i].is_some(),
+                    "occluded {preset:?} {isa:?} {travel:?} {batch:?} {ray:?}"
+                );
             }
         }
         for (ray, expected) in rays.iter().zip(&expected).take(100) {

@@ -6,7 +6,7 @@ use super::Gate;
 use crate::error::Result;
 use crate::shape::{Shape, SphereMethod, TriangleMethod};
 use crate::trace::accel::{Accel, Methods, Options};
-use crate::trace::bvh::{self, Bvh, Isa, Preset};
+use crate::trace::bvh::{self, Bvh, Isa, Preset, Travel};
 use crate::trace::{Batch, Primitives, Tracer, Width, World};
 
 /// Of a BSP tree, which takes what it gets. Hits do not depend on it.
@@ -135,9 +135,11 @@ impl Column {
                     if !isa.is_available() {
                         continue;
                     }
-                    let bvh = Bvh::build_with(world, bvh::Options { preset, isa, progress: None });
+                    let mut bvh = Bvh::build_with(world, bvh::Options { preset, isa, progress: None });
                     let name = |way: &str| format!("{}/{}/{way}", preset.name(), isa.name());
+                    // The width is nothing to it; how rays travel that make no bundle is.
                     for width in Width::ALL {
+                        bvh = bvh.travelling(if width == Width::One { Travel::Alone } else { Travel::InFlight });
                         ask(&name(&width.rays().to_string()), &bvh, Batch { width, coherent: false })?;
                     }
                     ask(&name("bundles"), &bvh, Batch { width: Width::One, coherent: true })?;

@@ -20,8 +20,15 @@ use crate::trace::spread::Spread;
 /// rays.
 struct Workspace {
     stacks: Stacks,
-    flight: Flight,
+    apart: Apart,
     tile: tile::Scratch,
+}
+
+/// For rays that make no bundle: those in flight, or one that walks alone, and what it has hit of which there was doubt.
+struct Apart {
+    flight: Flight,
+    stack: Stack,
+    doubted: Found,
 }
 
 /// One stack for the placements, one for what is below them.
@@ -30,9 +37,9 @@ struct Stacks {
     level: Stack,
 }
 
-/// Placed objects that a bundle of shadow rays may enter before the rest of its batch flies: each costs a bundle as much as dozens of rays, most
-/// of which pass it by or are in shadow already. Of 25 placements a bundle enters a few, of 2,500 one or two dozen; there flights are faster by
-/// a third, with 400 both are alike. Bundles of closest hits are faster with any number.
+/// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle as much as dozens of
+/// rays, most of which pass it by or are in shadow already. Of 2,500 placements a bundle enters two or three, and is faster by a
+/// quarter; it takes many more, far away, to get here. Bundles of closest hits are faster with any number.
 const MOST_PLACES: u32 = 10;
 
 thread_local! {
@@ -43,7 +50,8 @@ thread_local! {
 impl Workspace {
     fn new() -> Box<Self> {
         let stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        Box::new(Self { stacks, flight: Flight::new(), tile: tile::Scratch::new() })
+        let apart = Apart { flight: Flight::new(), stack: Stack::new(), doubted: Found::NONE };
+        Box::new(Self { stacks, apart, tile: tile::Scratch::new() })
     }
 }
 
@@ -62,7 +70,7 @@ impl Bvh {
     /// With room for a flight, that of the thread.
     pub(super) fn with_flight(&self, fly: impl FnOnce(&mut Flight)) {
         let mut workspace = WORKSPACE.take().unwrap_or_else(Workspace::new);
-        fly(&mut workspace.flight);
+        fly(&mut workspace.apart.flight);
         WORKSPACE.set(Some(workspace));
     }
 
@@ -110,12 +118,12 @@ impl Bvh {
         );
     }
 
-    /// Many rays among triangles, in flight together; hits are computed several at a time. Also tells t in f64, for the last 64 of
-    /// them: that of ray i in the place of `first` + i.
+    /// Many rays among triangles, in flight together or one after the other; hits are computed several at a time. Also tells t in
+    /// f64, for the last 64 of them: that of ray i in the place of `first` + i.
     #[inline(always)]
-    fn fly<S: Simd, Q: Query>(
+    fn trace_apart<S: Simd, Q: Query>(
         &self,
-        flight: &mut Flight,
+        apart: &mut Apart,
         first: usize,
         rays: &[Ray],
         answers: &mut [Q::Answer],
@@ -125,33 +133,27 @@ impl Bvh {
         if !self.has_triangles() {
             return;
         }
-        let mut answer = Answers::<Q> { bvh: self, rays, answers, first, t };
-        let (mut fixed, mut placed) = (Pending::NONE, Pending::NONE);
-        flight::trace::<S, Q>(
-            flight,
-            self,
-            rays,
-            #[inline(always)]
-            |i, found| {
-                if found.is_noted() && Q::ANY {
-                    answer.answers[i] = Q::answer(Some(SOMETHING));
-                } else if found.is_noted() {
-                    let pending = if found.place == FIXED { &mut fixed } else { &mut placed };
-                    if pending.push(i, found) {
-                        answer.compute::<S>(pending);
-                    }
-                } else if found.is_hit() {
-                    let nearest = found.nearest(self, &rays[i]);
-                    answer.take(i, nearest.t(), nearest.hit());
-                }
-            },
-        );
-        for pending in [&mut fixed, &mut placed] {
-            if pending.count > 0 {
-                pending.fill_up();
-                answer.compute::<S>(pending);
-            }
+        let answers = Answers::<Q> { bvh: self, rays, answers, first, t };
+        let mut arrivals = Arrivals { answers, fixed: Pending::NONE, placed: Pending::NONE };
+        let Apart { flight, stack, doubted } = apart;
+        if self.travels_alone(rays.len()) {
+            self.walk_one_by_one::<S, Q>(
+                stack,
+                doubted,
+                rays,
+                #[inline(always)]
+                |i, found| arrivals.take::<S>(i, found),
+            );
+        } else {
+            flight::trace::<S, Q>(
+                flight,
+                self,
+                rays,
+                #[inline(always)]
+                |i, found| arrivals.take::<S>(i, found),
+            );
         }
+        arrivals.finish::<S>();
     }
 
     fn has_triangles(&self) -> bool {
@@ -164,7 +166,7 @@ impl Bvh {
         !has_shapes && self.moving.is_empty() && self.unbounded.is_empty()
     }
 
-    /// Many rays: in bundles of 64 where they are bundles, else in flight.
+    /// Many rays: in bundles of 64 where they are bundles, else apart.
     #[inline(always)]
     fn trace<S: Simd, Q: Query>(
         &self,
@@ -173,7 +175,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
         coherent: bool,
     ) {
-        let Workspace { stacks, flight, tile } = workspace;
+        let Workspace { stacks, apart, tile } = workspace;
         let is_all = self.has_only_triangles();
         let mut in_bundles = coherent && self.has_triangles();
         let (mut all, mut all_answers) = (rays, answers);
@@ -189,7 +191,7 @@ impl Bvh {
                 let first = open.trailing_zeros() as usize;
                 let end = if in_bundles { first + (open >> first).trailing_ones() as usize } else { rays.len() };
                 let run = first..end;
-                self.fly::<S, Q>(flight, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                self.trace_apart::<S, Q>(apart, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             if !is_all {
@@ -274,7 +276,45 @@ impl Pending {
     }
 }
 
-/// Where answers of a flight go.
+/// Rays that have arrived, whose hits are computed four at a time.
+struct Arrivals<'a, Q: Query> {
+    answers: Answers<'a, Q>,
+    fixed: Pending,
+    placed: Pending,
+}
+
+impl<Q: Query> Arrivals<'_, Q> {
+    /// What ray `i` has found.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, i: usize, found: &Found) {
+        let Self { answers, fixed, placed } = self;
+        if found.is_noted() && Q::ANY {
+            answers.answers[i] = Q::answer(Some(SOMETHING));
+        } else if found.is_noted() {
+            let pending = if found.place == FIXED { fixed } else { placed };
+            if pending.push(i, found) {
+                answers.compute::<S>(pending);
+            }
+        } else if found.is_hit() {
+            let nearest = found.nearest(answers.bvh, &answers.rays[i]);
+            answers.take(i, nearest.t(), nearest.hit());
+        }
+    }
+
+    /// Those that are no four.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self) {
+        let Self { answers, fixed, placed } = self;
+        for pending in [fixed, placed] {
+            if pending.count > 0 {
+                pending.fill_up();
+                answers.compute::<S>(pending);
+            }
+        }
+    }
+}
+
+/// Where answers go.
 struct Answers<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],

@@ -9,7 +9,7 @@
 //! | `cache` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `batch`, `query` | many rays, as bundles or in flight; the two questions |
+//! | `batch`, `query` | many rays, as bundles, in flight or alone; the two questions |
 //! | `flight` | single rays, several of them in turn |
 //! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
 //! | `walk` | one ray by itself, from the root to the leaves |
@@ -18,7 +18,7 @@
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
-//! | `alone` | one ray at a time, with the normal of what it hits; or with a visitor that says what counts |
+//! | `alone` | one ray at a time: many of them among few triangles, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
 //! | `scratch` | what both need of a thread |
 //! | `boxes` | a tree over boxes of the caller's |
@@ -87,7 +87,7 @@ mod triangles;
 mod walk;
 mod woop;
 
-pub use alone::{Search, SingleRay, TriangleFound};
+pub use alone::{Search, SingleRay, Travel, TriangleFound};
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use discs::Discs;
@@ -123,6 +123,7 @@ pub struct Bvh {
     unbounded: Unbounded,
     preset: Preset,
     isa: Isa,
+    travel: Travel,
 }
 
 /// A part's ids, as hits name them.
@@ -167,7 +168,16 @@ impl Bvh {
         let objects: Vec<Level> = levels.collect();
         let placements = PlacementTree::build(&world.placements, &objects, options);
         let moving = MovingTree::build(&world.placements, &objects, options);
-        Self { fixed, objects, placements, moving, unbounded: Unbounded::new(world), preset, isa }
+        Self {
+            fixed,
+            objects,
+            placements,
+            moving,
+            unbounded: Unbounded::new(world),
+            preset,
+            isa,
+            travel: Travel::default(),
+        }
     }
 
     /// Memory the trees hold, in bytes.

@@ -1,4 +1,5 @@
-//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one.
+//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one, and for many rays where nothing
+//! has to be waited for ([`many`]).
 //!
 //! An interface that hands over single rays (Embree's C functions) can have neither flights nor bundles, and wants the
 //! triangle's normal with the hit. So the ray walks by itself ([`super::walk`]), what it hits is noted and computed at the end
@@ -11,6 +12,7 @@
 //! Only the fixed triangles are asked: shapes and placements are those of [`Tracer`](crate::Tracer).
 
 mod found;
+mod many;
 mod row;
 
 use std::ops::ControlFlow;
@@ -31,6 +33,7 @@ use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
 pub use found::TriangleFound;
+pub use many::Travel;
 pub use row::SingleRay;
 
 /// Whether a search goes on, up to some t.
@@ -67,10 +70,9 @@ impl Bvh {
         }
     }
 
-    /// Walks, and notes what is hit; none for a ray that is not valid.
+    /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
     #[inline(always)]
-    fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, scratch: &mut Scratch) -> Option<Noted> {
-        let Scratch { stack, found: [found, ..] } = scratch;
+    fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, stack: &mut Stack, found: &mut Found) -> Option<Noted> {
         let triangles = &self.fixed.triangles;
         let tree = triangles.tree();
         let (slab, filter) = ray.ready::<S>(tree.reach_row())?;
@@ -177,12 +179,13 @@ impl Kernel for Alone<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { bvh, ray, scratch, found } = self;
-        let Some(noted) = bvh.walk_alone::<S, Closest>(ray, scratch) else { return false };
+        let Scratch { stack, found: [doubted, ..] } = scratch;
+        let Some(noted) = bvh.walk_alone::<S, Closest>(ray, stack, doubted) else { return false };
         if noted.id != NONE {
             *found = bvh.sure_triangle::<S>(ray, noted.id);
             return true;
         }
-        let computed = if noted.is_doubted { bvh.computed_triangle(&scratch.found[0]) } else { None };
+        let computed = if noted.is_doubted { bvh.computed_triangle(doubted) } else { None };
         computed.is_some_and(|computed| {
             *found = computed;
             true
@@ -202,8 +205,9 @@ impl Kernel for AnyAlone<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { bvh, ray, scratch } = self;
-        let noted = bvh.walk_alone::<S, Occluded>(ray, scratch);
-        noted.is_some_and(|noted| noted.id != NONE || noted.is_doubted && scratch.found[0].is_hit())
+        let Scratch { stack, found: [doubted, ..] } = scratch;
+        let noted = bvh.walk_alone::<S, Occluded>(ray, stack, doubted);
+        noted.is_some_and(|noted| noted.id != NONE || noted.is_doubted && doubted.is_hit())
     }
 }
 
