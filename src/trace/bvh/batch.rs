@@ -9,7 +9,7 @@ use super::noted::Rays;
 use super::placements::{FIXED, walk_over};
 use super::query::{Closest, Query, SOMETHING};
 use super::simd::Simd;
-use super::walk::{Stack, Visit};
+use super::walk::{Stacks, Visit};
 use super::{Bvh, bundle, isa, tile};
 use crate::ray::{Hit, Ray};
 use crate::trace::Batch;
@@ -24,17 +24,10 @@ struct Workspace {
     tile: tile::Scratch,
 }
 
-/// For rays that make no bundle: those in flight, or one that walks alone, and what it has hit of which there was doubt.
+/// For rays that make no bundle: those in flight, or what one that walks alone has hit of which there was doubt.
 struct Apart {
     flight: Flight,
-    stack: Stack,
     doubted: Found,
-}
-
-/// One stack for the placements, one for what is below them.
-struct Stacks {
-    upper: Stack,
-    level: Stack,
 }
 
 /// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle as much as dozens of
@@ -49,9 +42,8 @@ thread_local! {
 
 impl Workspace {
     fn new() -> Box<Self> {
-        let stacks = Stacks { upper: Stack::new(), level: Stack::new() };
-        let apart = Apart { flight: Flight::new(), stack: Stack::new(), doubted: Found::NONE };
-        Box::new(Self { stacks, apart, tile: tile::Scratch::new() })
+        let apart = Apart { flight: Flight::new(), doubted: Found::NONE };
+        Box::new(Self { stacks: Stacks::new(), apart, tile: tile::Scratch::new() })
     }
 }
 
@@ -123,6 +115,7 @@ impl Bvh {
     #[inline(always)]
     fn trace_apart<S: Simd, Q: Query>(
         &self,
+        stacks: &mut Stacks,
         apart: &mut Apart,
         first: usize,
         rays: &[Ray],
@@ -135,10 +128,10 @@ impl Bvh {
         }
         let answers = Answers::<Q> { bvh: self, rays, answers, first, t };
         let mut arrivals = Arrivals { answers, fixed: Pending::NONE, placed: Pending::NONE };
-        let Apart { flight, stack, doubted } = apart;
+        let Apart { flight, doubted } = apart;
         if self.travels_alone(rays.len()) {
             self.walk_one_by_one::<S, Q>(
-                stack,
+                stacks,
                 doubted,
                 rays,
                 #[inline(always)]
@@ -191,7 +184,7 @@ impl Bvh {
                 let first = open.trailing_zeros() as usize;
                 let end = if in_bundles { first + (open >> first).trailing_ones() as usize } else { rays.len() };
                 let run = first..end;
-                self.trace_apart::<S, Q>(apart, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                self.trace_apart::<S, Q>(stacks, apart, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             if !is_all {

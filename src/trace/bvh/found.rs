@@ -7,7 +7,6 @@
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
-use super::placements::FIXED;
 use super::query::Query;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
@@ -161,10 +160,10 @@ impl Found {
         }
     }
 
-    /// As it was when it was left: a ray's [`Self::range`], and what is noted of the fixed triangles.
+    /// As it was when it was left: a ray's [`Self::range`], and what is noted, and where that is.
     #[inline(always)]
-    pub fn resume(&mut self, [sure, limit]: [f32; 2], noted: u32) {
-        (self.sure, self.limit, self.noted, self.place) = (sure, limit, noted, FIXED);
+    pub fn resume(&mut self, [sure, limit]: [f32; 2], noted: u32, place: u32) {
+        (self.sure, self.limit, self.noted, self.place) = (sure, limit, noted, place);
     }
 
     /// Up to where a hit is the nearest for sure, and up to where one is wanted.

@@ -22,6 +22,7 @@ pub(super) struct PlacementTree {
     places: Vec<Place>,
     has_triangles: bool,
     has_shapes: bool,
+    object_bytes: usize,
     spread: Spread,
 }
 
@@ -102,8 +103,9 @@ impl PlacementTree {
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());
+        let object_bytes = objects.iter().map(|level| level.triangles.bytes()).sum();
         let spread = spread_over(places.iter().map(|place| &place.placement), objects);
-        Self { tree, places, has_triangles, has_shapes, spread }
+        Self { tree, places, has_triangles, has_shapes, object_bytes, spread }
     }
 
     /// Whether nothing is placed.
@@ -150,6 +152,11 @@ impl PlacementTree {
     #[inline(always)]
     pub fn at(&self, number: u32) -> &Place {
         &self.places[number as usize]
+    }
+
+    /// Memory that rays among triangles go through, in bytes: it and the triangles of all objects.
+    pub fn bytes_with_objects(&self) -> usize {
+        self.bytes() + self.object_bytes
     }
 
     /// Memory it holds, in bytes.

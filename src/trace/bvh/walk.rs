@@ -73,6 +73,18 @@ impl Stack {
     }
 }
 
+/// One stack for the placements, one for what is below them.
+pub(super) struct Stacks {
+    pub upper: Stack,
+    pub level: Stack,
+}
+
+impl Stacks {
+    pub const fn new() -> Self {
+        Self { upper: Stack::new(), level: Stack::new() }
+    }
+}
+
 thread_local! {
     /// Stacks that are not in use: who visits a leaf may cast rays of its own.
     #[expect(clippy::vec_box, reason = "boxes are moved in and out, stacks of some kilobytes are not")]

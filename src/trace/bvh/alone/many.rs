@@ -8,9 +8,11 @@ use super::{Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::found::{Found, NONE};
+use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::walk::Stack;
+use crate::trace::bvh::walk::{self, Stacks, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,11 +22,11 @@ pub enum Travel {
     BySize,
     /// Several of them in turn, in every scene.
     InFlight,
-    /// One after the other, wherever they can: in scenes without placed triangles.
+    /// One after the other, in every scene.
     Alone,
 }
 
-/// A tree of that many bytes stays in the cache, for the most part: with 10 MiB both ways were alike where 32 MiB of cache were shared with
+/// Trees of that many bytes stay in the cache, for the most part: with 10 MiB both ways were alike where 32 MiB of cache were shared with
 /// others, with 23 MiB flights were faster by a fifteenth, with 110 MiB by a seventh.
 const CACHED: usize = 12 << 20;
 
@@ -40,37 +42,92 @@ impl Bvh {
 
     /// Whether so many rays that make no bundle had better walk alone.
     pub(in crate::trace::bvh) fn travels_alone(&self, rays: usize) -> bool {
-        !self.placements.has_triangles()
-            && match self.travel {
-                Travel::BySize => rays < FEW || self.fixed.triangles.bytes() <= CACHED,
-                Travel::InFlight => false,
-                Travel::Alone => true,
-            }
+        let bytes = || self.fixed.triangles.bytes() + self.placements.bytes_with_objects();
+        match self.travel {
+            Travel::BySize => rays < FEW || bytes() <= CACHED,
+            Travel::InFlight => false,
+            Travel::Alone => true,
+        }
     }
 
-    /// Answers all rays among the fixed triangles: `done` is told of each that has hit something what it has found.
+    /// Answers all rays among triangles that stand still: `done` is told of each that has hit something what it has found.
     #[inline(always)]
     pub(in crate::trace::bvh) fn walk_one_by_one<S: Simd, Q: Query>(
         &self,
-        stack: &mut Stack,
+        stacks: &mut Stacks,
         found: &mut Found,
         rays: &[Ray],
         mut done: impl FnMut(usize, &Found),
     ) {
+        let has_placements = self.placements.has_triangles();
+        let reach = self.placements.reach().max(self.fixed.triangles.tree().reach()).extend(0.0).to_array();
         for (i, ray) in rays.iter().enumerate() {
             // Of a single ray it would count as 0, and so would NaN.
             let is_valid = ray.tmin >= 0.0;
             if !is_valid {
                 continue;
             }
-            let Some(noted) = self.walk_alone::<S, Q>(&SingleRay::from(ray), stack, found) else { continue };
-            let Noted { sure, limit, id, is_doubted } = noted;
+            let single = SingleRay::from(ray);
+            let noted = if has_placements {
+                self.walk_from_place_to_place::<S, Q>(&single, ray, &reach, stacks, found)
+            } else {
+                self.walk_alone::<S, Q>(&single, &mut stacks.level, found)
+            };
+            let Some(Noted { sure, limit, id, place, is_doubted }) = noted else { continue };
             if id != NONE {
-                found.resume([sure, limit], id);
+                found.resume([sure, limit], id, place);
             }
             if id != NONE || is_doubted {
                 done(i, found);
             }
         }
+    }
+
+    /// As [`Self::walk_alone`], and then through placed objects, which may be all there is. `ray` is the same ray again, `reach` that of all
+    /// that is walked through in the world.
+    #[inline(always)]
+    fn walk_from_place_to_place<S: Simd, Q: Query>(
+        &self,
+        single: &SingleRay,
+        ray: &Ray,
+        reach: &[f32; 4],
+        stacks: &mut Stacks,
+        found: &mut Found,
+    ) -> Option<Noted> {
+        let Stacks { upper, level: lower } = stacks;
+        let ready = single.ready::<S, false>(reach, Blur::NONE)?;
+        let mut noted = Noted::nothing(single);
+        let fixed = &self.fixed.triangles;
+        if !fixed.tree().is_empty() {
+            self.walk_through::<S, Q, false>(FIXED, fixed, &ready, single, lower, &mut noted, found);
+            if Q::ANY && noted.is_hit(found) {
+                return Some(noted);
+            }
+        }
+        walk::single::<S, Q>(
+            upper,
+            self.placements.tree(),
+            &ready.0,
+            noted.limit,
+            #[inline(always)]
+            |leaf| {
+                for number in leaf.blocks() {
+                    let place = self.placements.at(number);
+                    let triangles = &self.objects[place.placement.object as usize].triangles;
+                    if triangles.tree().is_empty() {
+                        continue;
+                    }
+                    let (local, blur) = place.local::<S>(ray);
+                    let local = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur);
+                    let Some(local) = local else { continue };
+                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, &mut noted, found);
+                    if Q::ANY && noted.is_hit(found) {
+                        return Visit::Stop;
+                    }
+                }
+                Visit::Until(noted.limit)
+            },
+        );
+        Some(noted)
     }
 }

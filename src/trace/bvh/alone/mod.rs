@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::candidates;
-use super::filter::Candidates;
+use super::filter::{Candidates, Filter};
 use super::found::{Found, NONE};
 use super::isa::{self, Kernel};
 use super::place::Blur;
@@ -28,6 +28,8 @@ use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
 use super::scratch::{Scratch, with_scratch};
 use super::simd::Simd;
+use super::slab::SlabRay;
+use super::triangles::TriangleTree;
 use super::walk::{self, Stack, Visit, with_stack};
 use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
@@ -73,32 +75,44 @@ impl Bvh {
     /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
     #[inline(always)]
     fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, stack: &mut Stack, found: &mut Found) -> Option<Noted> {
-        let triangles = &self.fixed.triangles;
-        let tree = triangles.tree();
-        let (slab, filter) = ray.ready::<S>(tree.reach_row())?;
-        // Rounded up, for t is rounded before it is held against it.
-        let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
-        // What lies so far that t overflows is in doubt, whose decision is that it is not hit.
-        let mut noted = Noted { sure: ray.tmax.min(f32::MAX), limit, id: NONE, is_doubted: false };
+        let ready = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;
+        let mut noted = Noted::nothing(ray);
+        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &ready, ray, stack, &mut noted, found);
+        Some(noted)
+    }
+
+    /// The same through the triangles at `place`, with the ray that is ready for them, and `ray` in the world. It is the ray that is meant if
+    /// it is not `BLURRED`.
+    #[expect(clippy::too_many_arguments, reason = "a place, a ray, and what it has found")]
+    #[inline(always)]
+    fn walk_through<S: Simd, Q: Query, const BLURRED: bool>(
+        &self,
+        place: u32,
+        triangles: &TriangleTree,
+        (slab, filter): &(SlabRay, Filter),
+        ray: &SingleRay,
+        stack: &mut Stack,
+        noted: &mut Noted,
+        found: &mut Found,
+    ) {
         walk::single::<S, Q>(
             stack,
-            tree,
-            &slab,
+            triangles.tree(),
+            slab,
             noted.limit,
             #[inline(always)]
             |leaf| {
                 for index in leaf.blocks() {
                     let mut scratch = None;
                     let block = triangles.block(index, &mut scratch);
-                    let candidates = filter.candidates::<S, false>(block, noted.limit);
-                    if candidates.lanes != 0 && noted.offer::<Q>(self, found, index, block, &candidates, ray) {
+                    let candidates = filter.candidates::<S, BLURRED>(block, noted.limit);
+                    if candidates.lanes != 0 && noted.offer::<Q>(self, found, place, index, block, &candidates, ray) {
                         return Visit::Stop;
                     }
                 }
                 Visit::Until(noted.limit)
             },
         );
-        Some(noted)
     }
 }
 
@@ -111,17 +125,36 @@ struct Noted {
     limit: f32,
     /// Found without doubt, but not computed yet: block and lane.
     id: u32,
+    /// Where that triangle is: the number of a placement, or [`FIXED`].
+    place: u32,
     /// Whether anything was decided at once.
     is_doubted: bool,
 }
 
 impl Noted {
-    /// Takes the candidates of block `index`. Whether that is enough.
+    /// Nothing yet.
+    #[inline(always)]
+    fn nothing(ray: &SingleRay) -> Self {
+        // Rounded up, for t is rounded before it is held against it.
+        let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
+        // What lies so far that t overflows is in doubt, whose decision is that it is not hit.
+        Self { sure: ray.tmax.min(f32::MAX), limit, id: NONE, place: FIXED, is_doubted: false }
+    }
+
+    /// Whether there is any hit; `found` is what was decided.
+    #[inline(always)]
+    fn is_hit(&self, found: &Found) -> bool {
+        self.id != NONE || self.is_doubted && found.is_hit()
+    }
+
+    /// Takes the candidates of block `index` of the triangles at `place`. Whether that is enough.
+    #[expect(clippy::too_many_arguments, reason = "in registers")]
     #[inline(always)]
     fn offer<Q: Query>(
         &mut self,
         bvh: &Bvh,
         found: &mut Found,
+        place: u32,
         index: u32,
         block: &Block,
         candidates: &Candidates,
@@ -134,7 +167,8 @@ impl Noted {
             let (low, high) = (candidates.low[lane], candidates.high[lane]);
             if candidates.sure >> lane & 1 != 0 {
                 if ray.begin() <= low && high <= self.sure {
-                    (self.sure, self.limit, self.id) = (low, high, LANES as u32 * index + lane as u32);
+                    (self.sure, self.limit) = (low, high);
+                    (self.id, self.place) = (LANES as u32 * index + lane as u32, place);
                     if Q::ANY {
                         return true;
                     }
@@ -144,7 +178,7 @@ impl Noted {
                     continue;
                 }
             }
-            *self = self.decide(bvh, found, index, block, lane, ray);
+            *self = self.decide(bvh, found, place, index, block, lane, ray);
             if Q::ANY && found.is_hit() {
                 return true;
             }
@@ -155,14 +189,24 @@ impl Noted {
     /// Decides whether the ray hits one triangle of a block. By value, so that it need not lie in memory before.
     #[cold]
     #[inline(never)]
-    fn decide(self, bvh: &Bvh, found: &mut Found, index: u32, block: &Block, lane: usize, ray: &SingleRay) -> Self {
+    #[expect(clippy::too_many_arguments, reason = "in registers")]
+    fn decide(
+        self,
+        bvh: &Bvh,
+        found: &mut Found,
+        place: u32,
+        index: u32,
+        block: &Block,
+        lane: usize,
+        ray: &SingleRay,
+    ) -> Self {
         if !self.is_doubted {
             found.start([self.sure, self.limit]);
         }
-        found.resume([self.sure, self.limit], self.id);
-        found.decide(bvh, FIXED, index, block, lane, &ray.ray());
+        found.resume([self.sure, self.limit], self.id, self.place);
+        found.decide(bvh, place, index, block, lane, &ray.ray());
         let [sure, limit] = found.range();
-        Self { sure, limit, id: NONE, is_doubted: true }
+        Self { sure, limit, id: NONE, place, is_doubted: true }
     }
 }
 
@@ -207,7 +251,7 @@ impl Kernel for AnyAlone<'_> {
         let Self { bvh, ray, scratch } = self;
         let Scratch { stack, found: [doubted, ..] } = scratch;
         let noted = bvh.walk_alone::<S, Occluded>(ray, stack, doubted);
-        noted.is_some_and(|noted| noted.id != NONE || noted.is_doubted && doubted.is_hit())
+        noted.is_some_and(|noted| noted.is_hit(doubted))
     }
 }
 

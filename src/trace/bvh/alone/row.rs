@@ -52,9 +52,13 @@ impl SingleRay {
         if self.tmin > 0.0 { self.tmin } else { 0.0 }
     }
 
-    /// None where it [is not valid](Ray::is_valid). `reach` is the tree's.
+    /// None where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not `BLURRED`, it is the ray that is meant.
     #[inline(always)]
-    pub(super) fn ready<S: Simd>(&self, reach: &[f32; 4]) -> Option<(SlabRay, Filter)> {
+    pub(super) fn ready<S: Simd, const BLURRED: bool>(
+        &self,
+        reach: &[f32; 4],
+        blur: Blur,
+    ) -> Option<(SlabRay, Filter)> {
         let splat = S::V4::splat;
         let Self { origin: o, direction: d, time, .. } = self;
         let tmin = self.begin();
@@ -64,15 +68,22 @@ impl SingleRay {
         let shorten = splat(1.0).div(largest);
         let slope = direction.mul(shorten);
         let inverse = splat(1.0).div(direction);
-        let farthest = inverse.abs().mul(origin.abs().add(S::V4::load(reach)));
+        let (steep, span) = (inverse.abs(), origin.abs().add(S::V4::load(reach)));
+        let farthest = steep.mul(span);
+        let (mut width, mut most) = (farthest.mul(splat(6.5 * UNIT_ROUNDOFF)), farthest);
+        if BLURRED {
+            let longest = span.max(span.yzx()).max(span.yzx().yzx());
+            let stray = longest.mul_add(splat(1.1 * blur.direction), splat(1.1 * blur.origin));
+            width = steep.mul_add(stray, width);
+            most = most.max(width);
+        }
         // False for NaN, which infinities become here or there.
-        let is_usual = splat(STEEPEST).at_most(slope.abs()).and(farthest.less(splat(HUGE)));
+        let is_usual = splat(STEEPEST).at_most(slope.abs()).and(most.less(splat(HUGE)));
         let is_usual = is_usual.and(splat(f32::MIN_POSITIVE).at_most(largest));
-        let width = farthest.mul(splat(6.5 * UNIT_ROUNDOFF));
         let offset = splat(0.0).sub(origin.mul(inverse));
         let (mut reciprocal, mut near, mut far) = (inverse, offset.sub(width), offset.add(width));
         if is_usual.bits() & 0b111 != 0b111 {
-            let [r, n, f] = unusual(self, reach)?;
+            let [r, n, f] = unusual(self, reach, blur)?;
             (reciprocal, near, far) = (S::V4::load(&r), S::V4::load(&n), S::V4::load(&f));
         }
         let in_range = tmin <= self.tmax;
@@ -103,19 +114,18 @@ impl SingleRay {
         let width = 1.0 + if p > q { p } else { q };
         let begin = tmin * along.abs() * (1.0 - SLACK);
         let origin = [origin[x], origin[y], origin[z]];
-        Some((slab, Filter::of_eight([x, y, z], origin, shear, [width, along, shorten, begin], Blur::NONE)))
+        Some((slab, Filter::of_eight([x, y, z], origin, shear, [width, along, shorten, begin], blur)))
     }
 }
 
 /// The long way, for rays along an axis, far away, or not valid: reciprocals, near and far offsets.
 #[cold]
 #[inline(never)]
-fn unusual(ray: &SingleRay, &[x, y, z, _]: &[f32; 4]) -> Option<[[f32; 4]; 3]> {
+fn unusual(ray: &SingleRay, &[x, y, z, _]: &[f32; 4], blur: Blur) -> Option<[[f32; 4]; 3]> {
     let ray = ray.ray();
     if !ray.is_valid() {
         return None;
     }
-    let SlabRay { reciprocal, near_offset, far_offset, .. } =
-        SlabRay::new::<Portable>(&ray, Vec3::new(x, y, z), Blur::NONE);
+    let SlabRay { reciprocal, near_offset, far_offset, .. } = SlabRay::new::<Portable>(&ray, Vec3::new(x, y, z), blur);
     Some([reciprocal, near_offset, far_offset])
 }

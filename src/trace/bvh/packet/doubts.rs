@@ -49,7 +49,7 @@ impl<'a> Doubts<'a> {
                 self.known |= bit;
             }
             let (index, triangle) = (id / LANES as u32, id as usize % LANES);
-            found.resume([octet.sure[lane], octet.limit[lane]], octet.noted(lane));
+            found.resume([octet.sure[lane], octet.limit[lane]], octet.noted(lane), FIXED);
             found.decide(bvh, FIXED, index, block, triangle, &ray);
             octet.forget(lane);
             if Q::ANY && found.is_hit() {
