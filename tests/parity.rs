@@ -9,7 +9,7 @@ use twincast::{Batch, Hit, Ray, Tracer, Width, World};
 use crate::accelerators::assert_accelerators;
 use crate::scenes::{self, Random};
 
-/// Closest hits by single rays and packets, with every preset and instruction set, and occlusion, against brute force.
+/// Closest hits and occlusion by rays alone, in flight and in bundles, with every preset and instruction set, against brute force.
 #[track_caller]
 pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
     let world = World::new(scene).expect("the scene is sound");
@@ -22,16 +22,12 @@ pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> us
     let every = Preset::ALL.into_iter().flat_map(|preset| Isa::ALL.map(|isa| (preset, isa)));
     for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {
         let mut bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
-        let apart = |width| Batch { width, coherent: false };
-        let ways = [
-            (Travel::Alone, apart(Width::One)),
-            (Travel::InFlight, apart(Width::One)),
-            (Travel::BySize, apart(Width::Eight)),
-            (Travel::BySize, apart(Width::Sixteen)),
-            (Travel::InFlight, Batch { width: Width::One, coherent: true }),
-        ];
-        for (travel, batch) in ways {
+        let travels = [Travel::BySize, Travel::Alone, Travel::InFlight];
+        let ways = travels.into_iter().flat_map(|travel| [(travel, false), (travel, true)]);
+        // By size they are alone: worlds of tests are small.
+        for (travel, coherent) in ways.filter(|way| *way != (Travel::BySize, true)) {
             bvh = bvh.travelling(travel);
+            let batch = Batch { width: Width::One, coherent };
             let mut hits = vec![None; rays.len()];
             bvh.closest_batch(rays, &mut hits, batch);
             for (i, ray) in rays.iter().enumerate() {
@@ -324,14 +320,25 @@ fn products_that_overflow() {
     // Edges of 1e12 far up along a ray as steep as a bundle takes it, beside a triangle that makes the ray enter their leaf.
     let beyond = [[-1.7e18, -1.7e18, 1.7e18], [-1.7e18 + 1e12, -1.7e18, 1.7e18], [-1.7e18, -1.7e18 + 1e12, 1.7e18]];
     let steep = [[1.8e18, -1.8e18, 0.0], [1.8e18, 1.8e18, -1.8e18], [-1.8e18, -1.7e18, 1.8e18]];
-    let few = |first: Vec3, second: Vec3| [first, second].map(|direction| Ray::new(Vec3::ZERO, direction)).to_vec();
-    let level = few(Vec3::new(0.3, 0.2, 1.0), Vec3::new(0.31, 0.2, 1.0));
-    let oblique = few(Vec3::new(0.9, 0.9, 1.0), Vec3::new(16.0, 16.0, 1.0));
+    // As many as make a bundle, from the one to the other.
+    let many = |first: Vec3, second: Vec3| -> Vec<Ray> {
+        (0..64_u8).map(|i| Ray::new(Vec3::ZERO, first.lerp(second, f32::from(i) / 63.0))).collect()
+    };
+    let level = many(Vec3::new(0.3, 0.2, 1.0), Vec3::new(0.31, 0.2, 1.0));
+    let oblique = many(Vec3::new(0.9, 0.9, 1.0), Vec3::new(16.0, 16.0, 1.0));
+    let short = many(Vec3::new(0.3, 0.2, 1.0) * 1e-30, Vec3::new(0.3, 0.21, 1.0) * 1e-30);
+    // To the edge, and to a corner, of triangles whose volumes just stay within f32.
+    let edge = many(Vec3::new(0.5, 0.5, 0.5), Vec3::new(0.499_999_7, 0.500_000_3, 0.500_000_1));
+    let corner = many(Vec3::new(3.0, -1.0, 1.0), Vec3::new(2.999_999, -0.999_999, 1.0));
     let cases = [
         (mesh(&[ahead(1e13, 2e13), ahead(2e13, 4e13)]), level.clone()),
         (mesh(&[ahead(2e13, 4e13), ahead(1e13, 2e13)]), level.clone()),
-        (mesh(&[ahead(3e8, 3e7)]), few(Vec3::new(0.1, 0.05, 1.0), Vec3::new(0.1, 0.06, 1.0))),
-        (mesh(&[ahead(1e10, 2e10)]), few(Vec3::new(0.3, 0.2, 1.0) * 1e-30, Vec3::new(0.3, 0.21, 1.0) * 1e-30)),
+        (mesh(&[ahead(2e11, 2e11)]), edge.clone()),
+        (mesh(&[ahead(2e11, 2e11)]), corner.clone()),
+        (mesh(&[ahead(5e11, 4e11), ahead(3e11, 3e11)]), edge),
+        (mesh(&[ahead(6e11, 6e11)]), corner),
+        (mesh(&[ahead(3e8, 3e7)]), many(Vec3::new(0.1, 0.05, 1.0), Vec3::new(0.1, 0.06, 1.0))),
+        (mesh(&[ahead(1e10, 2e10)]), short),
         (mesh(&[ahead(0.01, 5e9)]), level),
         (mesh(&[steep]), oblique.clone()),
         (mesh(&[steep, beyond]), oblique),
@@ -345,6 +352,62 @@ fn products_that_overflow() {
             }
         }
     }
+}
+
+/// Shadow rays that are so much longer than the scene is wide that only products with their lengths overflow.
+#[test]
+fn shadow_rays_from_far_away() {
+    // What all coordinates of rays are multiples of, so that they end in one point indeed.
+    const STEP: f32 = 33_554_432.0;
+    let (across, high) = (439_999_266_816.0, 549_990_694_912.0);
+    let corners =
+        [[across, high, -high], [across, -high, high], [-across, -high, -high]].map(|corner| Vec3::from(corner));
+    let light = Vec3::new(2459.0, 0.0, 1639.0) * STEP;
+    let mut random = Random::new(6);
+    // Close to the edges, some outside.
+    let rays = (0..64 * 60).map(|_| {
+        let side = random.below(3);
+        let along = corners[side].lerp(corners[(side + 1) % 3], random.unit());
+        let towards = along + (corners[(side + 2) % 3] - along) * (random.unit() - 0.2) * 0.05;
+        let direction = ((light - towards) * 600.0 / STEP).round() * STEP;
+        Ray { tmax: 1.0, ..Ray::new(light - direction, direction) }
+    });
+    let mut rays: Vec<Ray> = rays.collect();
+    // Next to each other what goes the same way.
+    rays.sort_by(|a, b| a.direction.x.total_cmp(&b.direction.x));
+    assert!(rays.iter().all(|ray| ray.origin + ray.direction == light));
+    let hits = assert_parity(&scenes::of_mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2]])), &rays);
+    assert!(hits > 2000 && hits < rays.len(), "{hits} of {} hits", rays.len());
+}
+
+/// Numbers so small that they are multiples of the least: of boxes that are entered so soon none is left out, and of triangles in one
+/// place the first is hit.
+#[test]
+fn numbers_that_are_not_normal() {
+    let square = [Vec3::ZERO, Vec3::X, Vec3::ONE - Vec3::Z, Vec3::Y].map(|corner| corner * 0.01);
+    let triangles = (0..40).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
+    let world = World::new(&scenes::of_mesh(Mesh::new(square.to_vec(), triangles))).expect("sound");
+    let mut random = Random::new(8);
+    let centre = world.centre.as_vec3();
+    let rays = (0..4000).map(|i| {
+        let beside = 1.0 + (random.unit() - 0.5) * [1e-7, 1e-6, 1e-3][i % 3];
+        let origin = Vec3::new(0.02, -0.0125, 0.011) + random.vec3() * 0.002;
+        let target = square[1].lerp(square[2], random.unit()) * Vec3::new(beside, 1.0, 1.0);
+        Ray::new(origin - centre, (target - origin) * 1e38 * [90.0, 60.0, 30.0][i / 3 % 3])
+    });
+    let rays: Vec<Ray> = rays.collect();
+    let hits = assert_parity_of(&world, &Brute::new(&world), &rays);
+    assert!(hits > 1000 && hits < 3000, "{hits} of {} hits", rays.len());
+
+    // Corners as close as that to where rays start.
+    let near = [[0.0, 0.0, 2e-39], [1e-38, 1e-38, 4e-39], [2e-38, 1e-38, 4e-39]].map(|corner| Vec3::from(corner));
+    let mesh = Mesh::new(near.into_iter().chain(near.map(|corner| -corner)).collect(), vec![[0, 1, 2], [3, 4, 5]]);
+    let rays = (0..64_u8).map(|i| {
+        let (p, q) = (f32::from(i % 8) / 8.0, f32::from(i / 8) / 8.0);
+        Ray::new(Vec3::ZERO, Vec3::new(0.1 + p * 0.8, 0.05 + q * 0.8, 1.0))
+    });
+    let hits = assert_parity(&scenes::of_mesh(mesh), &rays.collect::<Vec<_>>());
+    assert!(hits > 10, "{hits} hits");
 }
 
 /// A ray that is rounded in an object's coordinates may meet a shape which it passes in the world.
@@ -453,14 +516,18 @@ fn refitted_trees() {
     for preset in Preset::ALL {
         let mut bvh = Bvh::build_with(&before, preset.into());
         bvh.refit(&after).expect("the same triangles");
-        let mut hits = 0;
-        for ray in &rays {
-            let expected = brute.closest(ray);
-            assert_eq!(bvh.closest(ray), expected, "{preset:?} {ray:?}");
-            assert_eq!(bvh.occluded(ray), expected.is_some());
-            hits += usize::from(expected.is_some());
+        let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
+        assert!(expected.iter().flatten().count() > 500);
+        for travel in [Travel::Alone, Travel::InFlight] {
+            bvh = bvh.travelling(travel);
+            let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+            bvh.closest_batch(&rays, &mut hits, Batch::default());
+            bvh.occluded_batch(&rays, &mut occluded, Batch::default());
+            for (i, ray) in rays.iter().enumerate() {
+                assert_eq!(hits[i], expected[i], "{preset:?} {travel:?} {ray:?}");
+                assert_eq!(occluded[i], expected[i].is_some(), "{preset:?} {travel:?} {ray:?}");
+            }
         }
-        assert!(hits > 500, "{hits} hits");
         let error = bvh.refit(&instanced).expect_err("other objects");
         assert!(error.to_string().contains("build the tree anew"), "{error}");
         let fewer = World::new(&scenes::of_mesh(scenes::bumpy_sphere(29, 0.2, 7))).expect("sound");

@@ -12,6 +12,14 @@ use crate::trace::{Batch, Primitives, Tracer, Width, World};
 /// Of a BSP tree, which takes what it gets. Hits do not depend on it.
 const BSP_TIME: Duration = Duration::from_millis(200);
 
+/// How the native tracer may be asked. To it widths of batches are nothing.
+const NATIVE_WAYS: [(&str, Travel, bool); 4] = [
+    ("alone", Travel::Alone, false),
+    ("flights", Travel::InFlight, false),
+    ("bundles, alone", Travel::Alone, true),
+    ("bundles, flights", Travel::InFlight, true),
+];
+
 /// A column of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
@@ -105,7 +113,7 @@ impl Column {
         match self {
             Self::Native => {
                 let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available()).count();
-                Preset::ALL.len() * isas * (Width::ALL.len() + 1)
+                Preset::ALL.len() * isas * NATIVE_WAYS.len()
             }
             Self::Accel(_) => 1,
             Self::Triangle(_) | Self::Sphere(_) => classics(),
@@ -137,12 +145,10 @@ impl Column {
                     }
                     let mut bvh = Bvh::build_with(world, bvh::Options { preset, isa, progress: None });
                     let name = |way: &str| format!("{}/{}/{way}", preset.name(), isa.name());
-                    // The width is nothing to it; how rays travel that make no bundle is.
-                    for width in Width::ALL {
-                        bvh = bvh.travelling(if width == Width::One { Travel::Alone } else { Travel::InFlight });
-                        ask(&name(&width.rays().to_string()), &bvh, Batch { width, coherent: false })?;
+                    for (way, travel, coherent) in NATIVE_WAYS {
+                        bvh = bvh.travelling(travel);
+                        ask(&name(way), &bvh, Batch { width: Width::One, coherent })?;
                     }
-                    ask(&name("bundles"), &bvh, Batch { width: Width::One, coherent: true })?;
                 }
                 Ok(())
             }

@@ -285,8 +285,8 @@ impl Bundle {
         for (i, axis) in axes.into_iter().enumerate() {
             let span = self.origin[axis].abs() + reach[axis];
             // Origin and box are subtracted (2 u of the span), the slope is off by 2 u (in an object's coordinates by
-            // 4.25 u), its reciprocal and the product by another each.
-            let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * span + self.blur);
+            // 4.25 u), its reciprocal and the product by another each, or by the least number that there is.
+            let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * span + self.blur + f32::MIN_POSITIVE);
             slab.near_origin[i] = self.origin[axis] + pad;
             slab.far_origin[i] = self.origin[axis] - pad;
             (slab.near[i], slab.far[i]) =

@@ -16,8 +16,8 @@
 //! 8 u s^2 a component, and product and sum by as much again.
 //!
 //! In an object's coordinates slopes are off by 4 u of themselves and u / 4, not by 2 u: that makes 55 u of the first two. All
-//! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b. Nothing may overflow:
-//! [`Bundle::may_overflow`].
+//! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b. Nothing may overflow
+//! ([`Bundle::may_overflow`]) but C . N, whose C is as long as the ray: that counts only where it is finite.
 
 use super::block::{Block, LANES};
 use super::bundle::{Bundle, axes};

@@ -12,6 +12,7 @@ use super::block::LANES;
 use super::bundle::{Bundle, axes};
 use super::rows::{ROWS, Rows};
 use super::simd::{Array, Mask, Simd, Vector};
+use super::slab::HUGE;
 use crate::math::UNIT_ROUNDOFF;
 
 /// Rectangles of slopes around eight triangles.
@@ -48,8 +49,8 @@ impl Footprints {
         // Half as much again and more, for what is rounded here, and for 1 / z being off itself.
         let pad = error.mul(splat(1.5)).mul(one.add(largest)).div(nearest);
         let pad = largest.mul_add(splat(4.0 * u), splat(8.0 * u * bundle.largest)).add(pad);
-        // Where a corner is not in front for sure, the triangle may be seen anywhere; NaN included.
-        let in_front = error.mul(splat(4.0)).less(nearest);
+        // Where a corner is not in front for sure, or 1 / z is too large, the triangle may be seen anywhere; NaN included.
+        let in_front = error.mul_add(splat(4.0), splat(1.0 / HUGE)).less(nearest);
         let mut seen = Self { low: [[0.0; LANES]; 2], high: [[0.0; LANES]; 2] };
         for i in 0..2 {
             let (low, high) = (least[i].sub(pad), most[i].add(pad));

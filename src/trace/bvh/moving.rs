@@ -41,6 +41,11 @@ impl MovingTree {
         &self.tree
     }
 
+    /// How far rays of placed shapes stray from where they are in the world.
+    pub fn spread(&self) -> &Spread {
+        &self.spread
+    }
+
     /// The placement with that number, at time 0.
     pub fn at(&self, number: u32) -> &Placement {
         &self.placements[number as usize]

@@ -57,6 +57,14 @@ pub(super) fn spread_over<'a>(placements: impl IntoIterator<Item = &'a Placement
     })
 }
 
+/// A ray made ready for the boxes of what is placed, which strays by `spread`.
+#[inline(always)]
+pub(super) fn among_boxes<S: Simd>(tree: &Tree, ray: &Ray, spread: &Spread) -> SlabRay {
+    // Rounded up.
+    let origin = (spread.of(ray).max_element() * 1.01) as f32;
+    SlabRay::new::<S>(ray, tree.reach(), Blur { origin, ..Blur::NONE })
+}
+
 /// Calls `enter` with the number of every placement whose box the ray enters, or may enter where it strays by `spread`; it says how far
 /// the ray still looks.
 #[inline(always)]
@@ -68,9 +76,7 @@ pub(super) fn walk_over<S: Simd, Q: Query>(
     stack: &mut Stack,
     mut enter: impl FnMut(u32) -> Visit,
 ) {
-    // Rounded up.
-    let origin = (spread.of(ray).max_element() * 1.01) as f32;
-    let slab = SlabRay::new::<S>(ray, tree.reach(), Blur { origin, ..Blur::NONE });
+    let slab = among_boxes::<S>(tree, ray, spread);
     walk::single::<S, Q>(
         stack,
         tree,

@@ -4,7 +4,8 @@
 //! sum and the offset below round by less than 5 u |1/d| (|bound| + |origin|) together, fused or not. The near and far t
 //! are moved apart by 6 u |1/d| (reach + |origin|), where the reach is the largest coordinate in the tree: an exact hit
 //! is never lost, and there is slack for the rounding of the hit's own t. (Ize 2013, *Robust BVH ray traversal*, moves the
-//! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations.)
+//! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations.) What is no normal number
+//! rounds by more than that: hence another 2^-126.
 //!
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
 //! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows is left
@@ -101,7 +102,7 @@ impl<V: Vector> Slabs<V> {
         let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
         let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));
         let steep = reciprocal.abs();
-        let width = steep.mul(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)));
+        let width = steep.mul_add(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span).less(splat(HUGE)).and(width.less(splat(HUGE)));
         let offset = zero.sub(o).mul(reciprocal);
         let open = S::V4::select(is_negative, splat(-OPEN), splat(OPEN));
@@ -214,7 +215,7 @@ pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3, blur: Blur) -> ([Read
         let kept = S::V8::select(d.abs().less(smallest), least, d);
         let reciprocal = splat(1.0).div(kept);
         let steep = reciprocal.abs();
-        let width = steep.mul(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray));
+        let width = steep.mul_add(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span[axis]).less(splat(HUGE)).and(width.less(splat(HUGE)));
         let offset = zero.sub(origin[axis]).mul(reciprocal);
         let open = S::V8::select(is_negative, splat(-OPEN), splat(OPEN));

@@ -6,6 +6,7 @@ use super::Bvh;
 use super::level::Level;
 use super::node::{Child, Tree};
 use super::place::{Blur, Place};
+use super::placements::among_boxes;
 use super::simd::{Mask, Portable};
 use super::slab::SlabRay;
 use crate::ray::Ray;
@@ -34,11 +35,11 @@ impl Bvh {
         }
         let limit = self.closest(ray).map_or(ray.tmax, |hit| hit.t);
         count_level(&mut steps, &self.fixed, (ray, Blur::NONE), Some(ray), limit);
-        let world = SlabRay::new::<Portable>(ray, self.placements.tree().reach(), Blur::NONE);
+        let world = among_boxes::<Portable>(self.placements.tree(), ray, self.placements.spread());
         for number in items(&mut steps, self.placements.tree(), &world, limit) {
             self.count_object(&mut steps, self.placements.at(number), ray, limit);
         }
-        let world = SlabRay::new::<Portable>(ray, self.moving.tree().reach(), Blur::NONE);
+        let world = among_boxes::<Portable>(self.moving.tree(), ray, self.moving.spread());
         for number in items(&mut steps, self.moving.tree(), &world, limit) {
             let placement = self.moving.at(number).at(ray.moment()).into_owned();
             let reach = self.objects[placement.object as usize].triangles.tree().reach();

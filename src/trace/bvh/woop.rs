@@ -8,9 +8,10 @@
 //!
 //! With u = 2^-24, a triangle that is hit has its corners, after the shear, within S = (1 + k) s of the ray, s being the
 //! largest component of its edges and k of the shear; so no component of a corner relative to the origin is larger
-//! than k Z + S, Z being the largest along the ray. A single ray's k is at most 2, a bundle's rays' larger. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
+//! than k Z + S, Z being the largest along the ray. A single ray's k is at most 1, a packet's rays' 2, a bundle's 16. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
 //! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
-//! function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by three such errors. A triangle that is not hit may be bounded wrongly, to no harm.
+//! function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by three such errors. A triangle that is not hit may be bounded wrongly, to no harm. Bounds
+//! of t are 2^-126 wider, for t that is no normal number.
 //!
 //! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
 //! of the direction by r times the largest, r <= 2^-10, and k <= 1: the shear is off by (1 + k) r / (1 - r), so that a sheared component
@@ -89,7 +90,8 @@ impl<V: Vector> Sides<V> {
         Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound }
     }
 
-    /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected.
+    /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected where the bound has, too; so it has where shears
+    /// are at most 2, sheared corners being below 1e20.
     #[inline(always)]
     pub fn passed(&self) -> u32 {
         !self.bound.less(self.most.min(V::splat(0.0).sub(self.least))).bits()
@@ -171,8 +173,8 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     Some(Judged {
         lanes,
         sure: sides.inside().and(precise).and(apart),
-        low: near.div(most_square).mul(aim.shorten.mul(splat(1.0 - slack))),
-        high: far.div(least_square).mul(aim.shorten.mul(splat(1.0 + slack))),
+        low: near.div(most_square).mul_add(aim.shorten.mul(splat(1.0 - slack)), splat(-f32::MIN_POSITIVE)),
+        high: far.div(least_square).mul_add(aim.shorten.mul(splat(1.0 + slack)), splat(f32::MIN_POSITIVE)),
     })
 }
 

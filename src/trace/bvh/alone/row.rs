@@ -70,7 +70,7 @@ impl SingleRay {
         let inverse = splat(1.0).div(direction);
         let (steep, span) = (inverse.abs(), origin.abs().add(S::V4::load(reach)));
         let farthest = steep.mul(span);
-        let (mut width, mut most) = (farthest.mul(splat(6.5 * UNIT_ROUNDOFF)), farthest);
+        let (mut width, mut most) = (farthest.mul_add(splat(6.5 * UNIT_ROUNDOFF), splat(f32::MIN_POSITIVE)), farthest);
         if BLURRED {
             let longest = span.max(span.yzx()).max(span.yzx().yzx());
             let stray = longest.mul_add(splat(1.1 * blur.direction), splat(1.1 * blur.origin));

@@ -45,6 +45,9 @@ pub(super) struct Beam {
 /// Directions longer than this have reciprocals that may vanish.
 const LONGEST: f32 = 1e30;
 
+/// The scene is at least that wide in t: the pad is several times the least number that there is, by which products round.
+const LEAST: f32 = 2.0 * f32::MIN_POSITIVE;
+
 /// Share of the scene that the rays of a beam may be apart.
 const WIDE: f32 = 1.0 / 16.0;
 
@@ -91,7 +94,9 @@ impl Beam {
         let pad = span.mul_add(splat(10.0 * UNIT_ROUNDOFF), splat(stray));
         let (shortest, longest) = (splat(1.0).div(high), splat(1.0).div(low));
         let steepest = shortest.abs().max(longest.abs());
-        if steepest.mul(span.add(pad)).less(splat(HUGE)).bits() & 0b111 != 0b111 {
+        let gentlest = shortest.abs().min(longest.abs());
+        let is_normal = splat(LEAST).at_most(gentlest.mul(span)).or(span.at_most(splat(0.0)));
+        if steepest.mul(span.add(pad)).less(splat(HUGE)).and(is_normal).bits() & 0b111 != 0b111 {
             return None;
         }
         let is_backward = low.less(splat(0.0));

@@ -278,7 +278,8 @@ impl<Q: Query> Walk<'_, Q> {
         let size = x.abs().add(y.abs()).add(z.abs());
         let steep = n[0].abs().add(n[1].abs()).add(n[2].abs());
         let error = size.mul_add(splat(edges.normal_error[lane]), steep.mul(splat(edges.corner_error[lane])));
-        error.add(splat(TINY)).less(side).bits()
+        // A length of a ray may leave f32 where those of the bundle do not: then nothing is known.
+        error.add(splat(TINY)).less(side).and(side.less(splat(f32::INFINITY))).bits()
     }
 
     /// What the bounds leave open.
