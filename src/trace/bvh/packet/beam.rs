@@ -8,7 +8,8 @@
 //! direction would then vary apart from each other, which rays that start in one point do not.
 //!
 //! With u = 2^-24, the subtraction, the reciprocal and the product round by 3 u |1/d| (|bound| + |origin|); the origin is moved by 10 u
-//! of this span, which leaves room for the rounding of the hit's own t. Small components of directions are replaced as for single rays.
+//! of this span, which leaves room for the rounding of the hit's own t; where t is no normal number, one product for either side
+//! keeps their order. Small components of directions are replaced as for single rays.
 
 use super::Packet;
 use crate::math::{Aabb, UNIT_ROUNDOFF};
@@ -44,9 +45,6 @@ pub(super) struct Beam {
 
 /// Directions longer than this have reciprocals that may vanish.
 const LONGEST: f32 = 1e30;
-
-/// The scene is at least that wide in t: the pad is several times the least number that there is, by which products round.
-const LEAST: f32 = 2.0 * f32::MIN_POSITIVE;
 
 /// Share of the scene that the rays of a beam may be apart.
 const WIDE: f32 = 1.0 / 16.0;
@@ -94,9 +92,7 @@ impl Beam {
         let pad = span.mul_add(splat(10.0 * UNIT_ROUNDOFF), splat(stray));
         let (shortest, longest) = (splat(1.0).div(high), splat(1.0).div(low));
         let steepest = shortest.abs().max(longest.abs());
-        let gentlest = shortest.abs().min(longest.abs());
-        let is_normal = splat(LEAST).at_most(gentlest.mul(span)).or(span.at_most(splat(0.0)));
-        if steepest.mul(span.add(pad)).less(splat(HUGE)).and(is_normal).bits() & 0b111 != 0b111 {
+        if steepest.mul(span.add(pad)).less(splat(HUGE)).bits() & 0b111 != 0b111 {
             return None;
         }
         let is_backward = low.less(splat(0.0));
