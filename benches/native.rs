@@ -12,7 +12,7 @@ use twincast::lab::bench::{Kind, Subject};
 use twincast::math::Vec3;
 use twincast::scene::{Geometry, Material, Mesh, terrain};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{Bvh, Options, Preset};
+use twincast::trace::bvh::{Bvh, Options, Preset, Travel};
 use twincast::{Batch, Ray, Scene, Shape, Sphere, Tracer, Width, World};
 
 fn world(mesh: Mesh) -> World {
@@ -78,15 +78,21 @@ fn boxes(c: &mut Criterion) {
     assert!(hits.iter().all(Option::is_none), "what was measured are boxes");
 }
 
-/// Rays of `twincast bench` on a terrain of 180,000 triangles, one by one and in bundles.
+/// Rays of `twincast bench` on a terrain of 180,000 triangles, alone, in flight and in bundles.
 fn rays(c: &mut Criterion) {
     let (subject, _) = Subject::new("terrain300", UpAxis::Y).expect("made by rule");
-    let bvh = Bvh::build(&subject.world);
+    let mut bvh = Bvh::build(&subject.world);
     let mut group = c.benchmark_group("rays");
     for set in subject.view.rays(&subject.world, &bvh, &[Kind::Primary, Kind::Diffuse, Kind::Shadow], 256) {
         group.throughput(Throughput::Elements(set.rays.len() as u64));
         let (mut hits, mut occluded) = (vec![None; set.rays.len()], vec![false; set.rays.len()]);
-        for (name, width) in [("single", Width::One), ("bundles", Width::Eight)] {
+        let ways = [
+            ("alone", Travel::Alone, Width::One),
+            ("flights", Travel::InFlight, Width::One),
+            ("bundles", Travel::BySize, Width::Eight),
+        ];
+        for (name, travel, width) in ways {
+            bvh = bvh.travelling(travel);
             let batch = set.kind.batch(width);
             if width != Width::One && !batch.coherent {
                 continue;

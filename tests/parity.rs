@@ -360,8 +360,7 @@ fn shadow_rays_from_far_away() {
     // What all coordinates of rays are multiples of, so that they end in one point indeed.
     const STEP: f32 = 33_554_432.0;
     let (across, high) = (439_999_266_816.0, 549_990_694_912.0);
-    let corners =
-        [[across, high, -high], [across, -high, high], [-across, -high, -high]].map(|corner| Vec3::from(corner));
+    let corners = [[across, high, -high], [across, -high, high], [-across, -high, -high]].map(Vec3::from);
     let light = Vec3::new(2459.0, 0.0, 1639.0) * STEP;
     let mut random = Random::new(6);
     // Close to the edges, some outside.
@@ -401,7 +400,7 @@ fn numbers_that_are_not_normal() {
     }
 
     // Corners as close as that to where rays start.
-    let near = [[0.0, 0.0, 2e-39], [1e-38, 1e-38, 4e-39], [2e-38, 1e-38, 4e-39]].map(|corner| Vec3::from(corner));
+    let near = [[0.0, 0.0, 2e-39], [1e-38, 1e-38, 4e-39], [2e-38, 1e-38, 4e-39]].map(Vec3::from);
     let mesh = Mesh::new(near.into_iter().chain(near.map(|corner| -corner)).collect(), vec![[0, 1, 2], [3, 4, 5]]);
     let rays = (0..64_u8).map(|i| {
         let (p, q) = (f32::from(i % 8) / 8.0, f32::from(i / 8) / 8.0);

@@ -11,7 +11,7 @@ use crate::math::{Aabb, DMat3, DVec3, UNIT_ROUNDOFF, gamma64};
 use crate::ray::Ray;
 
 /// How much of the coordinates a hit of a shape may lie beside where the ray is: 2^-24 for the rounding of the ray, and as much again
-/// for hits at rims, which may lie 2^-26 of their t beside the shape.
+/// for hits at rims, which may lie 2^-26 of their t beside the shape; twice that.
 pub(super) const SHAPE_ERROR: f64 = 4.0 * UNIT_ROUNDOFF as f64;
 
 /// The largest row sum of |B M - 1|, doubled, rounding and all; huge where the inverse is worth nothing.
@@ -25,7 +25,7 @@ pub(super) fn residual(placement: &Placement) -> f64 {
     if residual <= 1.0 { residual } else { 1e30 }
 }
 
-/// How far rays that are rounded in objects may be from where they are in the world.
+/// That distance, by the origin of a ray.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spread {
     of_origin: DMat3,
@@ -41,7 +41,8 @@ impl Spread {
         let residual = if moved <= 1.0 { moved.max(residual(placement)) } else { 1e30 };
         let reach = bounds.min.abs().max(bounds.max.abs()).as_dvec3();
         let ones = DMat3::from_cols(DVec3::ONE, DVec3::ONE, DVec3::ONE);
-        // From the size of coordinates in the object to the error in the world.
+        // From the size of coordinates in the object to the error in the world. Origin and direction are rounded each, the latter for as long
+        // as the shape is away: at most the origin and the shape are together.
         let error = forward * (DMat3::IDENTITY * (4.0 * SHAPE_ERROR) + ones * (2.0 * residual));
         let matrix = error * inverse;
         let constant = matrix * translation + error * reach;

@@ -1,5 +1,5 @@
-//! Many rays: among triangles in bundles where they are bundles, else in flight, and hits computed several at a time; then one by
-//! one among everything else, of which there is little.
+//! Many rays: among triangles in bundles where they are bundles, else in flight or alone, and hits computed several at a time; then one
+//! by one among everything else, of which there is little.
 
 use std::cell::Cell;
 

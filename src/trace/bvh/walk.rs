@@ -1,5 +1,5 @@
-//! One ray from the root to the leaves, by itself: among shapes, for all hits, and among the triangles of a placed object where the
-//! ray's bundle is none. Other rays among triangles travel in flights ([`super::flight`]).
+//! One ray from the root to the leaves, by itself: among shapes, for all hits, and among triangles where it is alone ([`super::alone`]).
+//! Other rays among triangles travel in bundles ([`super::tile`]) or flights ([`super::flight`]).
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 

@@ -9,7 +9,8 @@
 //!
 //! Callers with rules of their own about what counts (masks, filters) are shown each triangle that is hit.
 //!
-//! Only the fixed triangles are asked: shapes and placements are those of [`Tracer`](crate::Tracer).
+//! A caller's single ray is asked of the fixed triangles only: shapes and placements are those of [`Tracer`](crate::Tracer), whose many rays
+//! go on from place to place.
 
 mod found;
 mod many;
