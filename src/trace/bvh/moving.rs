@@ -41,7 +41,7 @@ impl MovingTree {
         &self.tree
     }
 
-    /// How far rays of placed shapes stray from where they are in the world.
+    /// As [`spread_over`] says.
     pub fn spread(&self) -> &Spread {
         &self.spread
     }
