@@ -30,15 +30,14 @@ render: build ## render the README's scene to out/gallery.exr and out/gallery.pn
 test: packages ## run every test
 	$(CARGO) test --locked
 
-check: packages ## formatting, lints, documentation, and everything once more without default features
+check: packages ## formatting, lints, documentation, and the program once more without default features
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
-	$(CARGO) clippy --locked -p twincast-python --all-targets -- -D warnings
-	$(CARGO) clippy --locked -p twincast-rtc --all-targets -- -D warnings
+	$(CARGO) clippy --locked -p twincast-python -p twincast-rtc --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
-	$(CARGO) test --locked --no-default-features
+	$(CARGO) test --locked --no-default-features --test twincast
 
 stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg
 	@mkdir -p out/stress

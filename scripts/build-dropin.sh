@@ -2,20 +2,26 @@
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
 #
-# DROPIN_PROFILE=test builds slower libraries with every debug assertion, in less time: for tests.
+# DROPIN_PROFILE=test builds slower libraries with every debug assertion, on what the tests without default features were compiled with
+# (`make check`): nothing but the interface is compiled then.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 cargo=${CARGO:-cargo}
 profile=${DROPIN_PROFILE:-foreign}
 built=target/$profile
-[[ $profile != test ]] || built=target/debug
+# Beside the tests, since what they depend on may have features that the interface does without.
+beside=()
+if [[ $profile == test ]]; then
+    built=target/debug
+    beside=(-p twincast --lib --test twincast)
+fi
 mkdir -p target/dropin
 
 # One version at a time: the library is compiled once, the interface for each.
 build() {
-    local version=$1 features=$2 name=libembree$1.so.$1
-    $cargo build --locked --profile "$profile" -p twincast-rtc --no-default-features --features "$features"
+    local version=$1 features=twincast-rtc/$2 name=libembree$1.so.$1
+    $cargo build --locked --profile "$profile" -p twincast-rtc "${beside[@]}" --no-default-features --features "$features"
     cp "$built/libtwincast_rtc.so" "target/dropin/$name"
     nm -D --defined-only "target/dropin/$name" | awk '$3 ~ /^rtc/ { print $3 }' | sort >"target/dropin/exported-$version"
     sort "ffi/rtc/symbols-$version.txt" | diff - "target/dropin/exported-$version" || {
@@ -30,4 +36,4 @@ build() {
 }
 
 build 3 v3
-build 4 "v4${COMPACT_RAY_HIT:+,compact-ray-hit}"
+build 4 "v4${COMPACT_RAY_HIT:+,twincast-rtc/compact-ray-hit}"
