@@ -38,6 +38,7 @@ check: packages ## formatting, lints, documentation, and the program once more w
 	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
 	$(CARGO) test --locked --no-default-features --test twincast
+	$(CARGO) test --locked --no-default-features --doc
 
 stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg
 	@mkdir -p out/stress

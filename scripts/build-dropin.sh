@@ -2,8 +2,8 @@
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
 #
-# DROPIN_PROFILE=test builds slower libraries with every debug assertion, on what the tests without default features were compiled with
-# (`make check`): nothing but the interface is compiled then.
+# DROPIN_PROFILE=test builds slower libraries with every debug assertion, on what the tests without default features are compiled with:
+# after `make check` nothing but the interface is left to compile.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
