@@ -203,3 +203,123 @@ impl<V: Vector> Filters<V> {
 fn pick<V: Vector>(is_x: V::Mask, is_y: V::Mask, v: [V; 3], next: usize) -> V {
     V::select(is_x, v[next % 3], V::select(is_y, v[(1 + next) % 3], v[(2 + next) % 3]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::UNIT_ROUNDOFF;
+    use crate::shape::triangle;
+    use crate::trace::bvh::isa::{self, Isa, Kernel};
+    use crate::trace::bvh::noted::{Rays, widen};
+    use crate::trace::bvh::quad::Quad;
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
+
+    struct Test<'a>(&'a Filter, &'a Block, f32);
+
+    impl Kernel for Test<'_> {
+        type Output = Candidates;
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Candidates {
+            self.0.candidates::<S, false>(self.1, self.2)
+        }
+    }
+
+    /// Eight triangles around `at`, of about that size; `thin` times as wide as long.
+    fn block(random: &mut Random, at: Vec3, size: f32, thin: f32) -> Block {
+        let mut block = Block::EMPTY;
+        for primitive in 0..LANES as u32 {
+            let a = at + random.vec3() * size;
+            let (along, across) = (random.vec3() * size, random.vec3() * size * thin);
+            block.push([a, a + along, a + along * random.unit() + across], 0, primitive);
+        }
+        block
+    }
+
+    /// t, u and v of a hit that is sure.
+    fn computed(ray: &Ray, corners: [Vec3; 3]) -> [f32; 3] {
+        let corners = corners.map(|p| p.to_array().map(|x| widen::<Portable>(&[x; 4])));
+        let Rays { origin, direction } = Rays::new::<Portable>([ray; 4]);
+        let numbers = Quad::new(origin, direction, corners).numbers();
+        [numbers.t32[0], numbers.u[0], numbers.v[0]]
+    }
+
+    /// Held against the exact test, for triangles from larger than their distance to a millionth of it, at any scale, thin ones among them, by rays that
+    /// pass through them, along their edges and beside them: none that is hit is left out; what is sure is hit, between the bounds, and computed in f64 as there.
+    #[test]
+    fn bounds_hold() {
+        let mut random = Random::new(1);
+        let (mut hits, mut sures, mut slender) = (0, 0, 0);
+        for case in 0..30_000usize {
+            let size = [3.0, 0.3, 1e-2, 1e-3, 1e-4, 1e-6][case % 6];
+            let thin = [1.0, 0.05, 1e-5][case / 6 % 3];
+            let scale = [1.0, 1e-9, 1e6, 1e13][case / 18 % 4];
+            let (origin, at) = (random.vec3() * scale, random.vec3() * scale);
+            let block = block(&mut random, at, size * scale, thin);
+            let [a, b, c] = block.triangle(case % LANES);
+            let (u, v) = (random.unit().abs(), if case % 5 == 0 { 0.0 } else { random.unit().abs() });
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            // Some start on what they aim at.
+            let aim = a + (b - a) * u + (c - a) * v;
+            let origin = if case % 7 == 0 { aim } else { origin };
+            let direction = if case % 7 == 0 { random.vec3() } else { (aim - origin) * [1.0, 1e-3, 10.0][case % 3] };
+            let range = [0.0, f32::INFINITY, 0.99, 1.01];
+            let (tmin, tmax) = (range[case / 3 % 2 * 2], range[1 + case / 9 % 2 * 2]);
+            let ray = Ray { tmin, tmax, ..Ray::new(origin, direction) };
+            if !ray.is_valid() {
+                continue;
+            }
+            let filter = Filter::new(&ray, Blur::NONE);
+            let limit = ray.tmax.next_up();
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let Candidates { lanes, sure, low, high } = isa::dispatch(isa, Test(&filter, &block, limit));
+                for lane in 0..LANES {
+                    let hit = triangle::intersect(&ray, &block.triangle(lane));
+                    let context = format!("{case} {isa:?} {ray:?} {:?}", block.triangle(lane));
+                    hits += u32::from(hit.is_some());
+                    assert!(hit.is_none() || lanes >> lane & 1 != 0, "left out: {context}");
+                    if (lanes & sure) >> lane & 1 == 0 {
+                        continue;
+                    }
+                    let (low, high) = (low[lane], high[lane]);
+                    // Out of range, it may be missed.
+                    let Some(hit) = hit else {
+                        assert!(low < ray.tmin || high > ray.tmax, "not hit: {context}");
+                        continue;
+                    };
+                    let t = hit.t as f32;
+                    assert!(low <= t && t <= high, "{low} {t} {high}: {context}");
+                    assert_eq!(computed(&ray, block.triangle(lane)), [t, hit.u as f32, hit.v as f32], "{context}");
+                    sures += 1;
+                    slender += u32::from(thin < 0.1);
+                }
+            }
+        }
+        assert!(
+            hits > 40_000 && sures > 20_000 && slender > 1000,
+            "{hits} hits, {sures} sure, {slender} of them slender"
+        );
+    }
+
+    /// However small for its distance, a triangle that a ray passes through leaves little doubt about t.
+    #[test]
+    fn bounds_of_t_are_narrow() {
+        let mut random = Random::new(2);
+        for case in 0..2000 {
+            let size = [1e-1, 1e-2, 1e-3, 1e-4][case % 4];
+            let at = Vec3::new(1.0, 2.0, 3.0);
+            let a = Vec3::new(0.3, -0.2, 0.1) * size;
+            let corners =
+                [at + a, at + a + Vec3::new(-1.0, 1.0, 0.0) * size, at + a - Vec3::new(1.0, 1.0, -1.0) * size];
+            let mut block = Block::EMPTY;
+            block.push(corners, 0, 0);
+            let (u, v) = (0.33 + 0.1 * random.unit(), 0.33 + 0.1 * random.unit());
+            let target = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
+            let ray = Ray::new(Vec3::ZERO, target);
+            let Candidates { sure, low, high, .. } =
+                isa::dispatch(Isa::Portable, Test(&Filter::new(&ray, Blur::NONE), &block, f32::INFINITY));
+            assert_eq!(sure, 1, "{case}");
+            assert!(high[0] - low[0] < 4096.0 * UNIT_ROUNDOFF, "{case}: {} to {}", low[0], high[0]);
+        }
+    }
+}

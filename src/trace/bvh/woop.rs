@@ -10,13 +10,23 @@
 //! largest component of its edges and k of the shear; so no component of a corner relative to the origin is larger
 //! than k Z + S, Z being the largest along the ray. A single ray's k is at most 1, a packet's rays' 2, a bundle's 16. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
 //! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
-//! function by 4 e S + 2 e^2 and its own rounding 4 u S^2, t by three such errors. A triangle that is not hit may be bounded wrongly, to no harm. Bounds
-//! of t are 2^-126 wider, for t that is no normal number.
+//! function by B = 4 e S + 2 e^2 + 4 u S^2. A triangle that is not hit may be bounded wrongly, to no harm.
+//!
+//! **Depth.** The ray meets the plane at the mean T of the corners' depths z, weighted with the edge functions E, which have one sign. So T is
+//! between the least and the largest z, which are less than s apart. With functions e that are off by up to B each, and a the magnitude of their sum, the
+//! mean is T', and T - T' = sum((E - e) (z - T')) / sum(E): errors of the weights are multiplied by differences of depths, not by depths. For a > 16 B the sum of E
+//! is more than 13/16 a, that of the magnitudes of e less than 5/4 a, and T' at most s / 8 outside; so T - T' is less than 3 B s / a. The rounding of z, e and the
+//! quotient adds less than 10 u L. Bounds of t are 2^-126 wider, for t that is no normal number.
+//!
+//! **f64.** [`triangle::intersect`](crate::shape::triangle::intersect) asks for exact arithmetic where t is off by 2^-27 of itself, counting a unit of 2^-48. What is
+//! inside for sure, with a > 16 B and T more than four times what it is off by, does not come to that: the products that are counted are at most 20 s^2 L for
+//! shears up to 1, and a T is more than 16 B times the larger of s and T, B more than 6 u s (L + 3 s), so that they are less than 2^21 a T. For larger shears
+//! both grow alike.
 //!
 //! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
 //! of the direction by r times the largest, r <= 2^-10, and k <= 1: the shear is off by (1 + k) r / (1 - r), so that a sheared component
-//! errs by 2 b + 2.1 r (Z + S) besides ((1 + k) b for a larger k); the corners' depths by b, which the sum of edges times depths multiplies by the sum of edges, all of one sign
-//! but for their errors; and t |along| by r.
+//! errs by 2 b + 2.1 r (Z + S) besides ((1 + k) b for a larger k); the corners' depths, and so their mean, by b, and s by 2 b, which together is less than 3/2 b; and
+//! t |along| by r.
 //!
 //! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
 //! by 2 c. Only the distance from a plane ([`Planes`](super::planes::Planes)) counts on edges that are exact, and is not asked for such corners.
@@ -24,6 +34,7 @@
 use super::place::Blur;
 use super::planes::Heights;
 use super::simd::{Mask, Vector};
+use super::slab::HUGE;
 use crate::math::UNIT_ROUNDOFF;
 
 /// Slack of t for its own rounding and that of products with it.
@@ -60,6 +71,27 @@ pub(super) struct Judged<V: Vector> {
     pub sure: V::Mask,
     pub low: V,
     pub high: V,
+}
+
+/// Where the rays of some pairs meet the planes.
+pub(super) struct Met<V: Vector> {
+    /// A bit for each pair that is left.
+    pub lanes: u32,
+    /// The pairs that meet without doubt, between `near` and `far` along the third axis, and so that t, u and v can be computed in f64.
+    pub sure: V::Mask,
+    /// Twice the area of the triangle as the ray sees it, by which the following are multiplied.
+    pub area: V,
+    pub near: V,
+    pub far: V,
+}
+
+/// How far a ray looks along the third axis, and which way it runs.
+pub(super) struct Span<V> {
+    /// Least and largest depth, rounded outwards.
+    pub begin: V,
+    pub end: V,
+    /// 1 or, against the axis, -1.
+    pub forward: V,
 }
 
 /// The edge functions of pairs, and the bound on their error.
@@ -105,8 +137,54 @@ impl<V: Vector> Sides<V> {
 
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
-    pub fn inside(&self) -> V::Mask {
+    fn inside(&self) -> V::Mask {
         self.bound.less(self.least.max(V::splat(0.0).sub(self.most)))
+    }
+
+    /// The pairs, of those of the bit mask `lanes`, whose triangle the ray may meet within `span`. `z` are the corners' depths, which may be off by `blur`, and
+    /// `size` is as before. `heights` are asked only if corners are not `ROUNDED`.
+    #[inline(always)]
+    pub fn meet<const ROUNDED: bool>(
+        &self,
+        z: [V; 3],
+        size: V,
+        blur: Option<f32>,
+        span: &Span<V>,
+        lanes: u32,
+        heights: impl FnOnce() -> Heights<V>,
+    ) -> Met<V> {
+        let (splat, zero, infinite) = (V::splat, V::splat(0.0), V::splat(f32::INFINITY));
+        let Self { u, v, w, bound, .. } = *self;
+        let determinant = u.add(v).add(w);
+        let area = determinant.abs();
+        // All depths times the area. The corners' are counted from them to the origin.
+        let turn = V::select(determinant.less(zero), span.forward, zero.sub(span.forward));
+        let depth = u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2]))).mul(turn);
+        // What has overflowed says nothing, not even by its sign: one product may be infinite where another is not, and is larger.
+        let finite = area.less(splat(HUGE)).and(depth.abs().less(infinite));
+        let tame = bound.mul(splat(16.0)).less(area).and(finite);
+        // 4, not 3; and room for products that underflow.
+        let of_edges = bound.mul(size).mul_add(splat(4.0), splat(16.0 * f32::MIN_POSITIVE));
+        let of_depth = z[0].abs().add(size).mul(splat(12.0 * UNIT_ROUNDOFF));
+        let of_depth = if let Some(blur) = blur { of_depth.add(splat(2.0 * blur)) } else { of_depth };
+        let off = of_depth.mul_add(area, of_edges);
+        let (near, far) = (depth.sub(off), depth.add(off));
+        let (begin, end) = (span.begin.mul(area), span.end.mul(area));
+        let mut lanes = lanes & !far.less(begin).or(end.less(near)).and(tame).bits();
+        let is_precise = off.mul(splat(4.0)).less(depth).and(tame);
+        if !ROUNDED && lanes & !is_precise.bits() != 0 {
+            // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
+            let Heights { height, error } = heights();
+            let area_error = bound.mul_add(splat(4.0), area.mul(splat(SLACK)));
+            let (least, most) = (area.sub(area_error), area.add(area_error));
+            let (begin, end) = (span.begin.mul(least), span.end.mul(most));
+            let height = zero.sub(height.mul(turn));
+            let (near, far) = (height.sub(error), height.add(error));
+            let outside = far.less(begin).or(end.less(near)).and(height.abs().less(infinite));
+            // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
+            lanes &= !outside.and(zero.less(least)).bits();
+        }
+        Met { lanes, sure: self.inside().and(is_precise), area, near, far }
     }
 }
 
@@ -115,7 +193,7 @@ impl<V: Vector> Sides<V> {
 /// are asked only if corners are not `ROUNDED`.
 #[inline(always)]
 pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
-    &Sheared { x, y, z }: &Sheared<V>,
+    sheared: &Sheared<V>,
     aim: &Aim<V>,
     limit: V,
     size: V,
@@ -123,58 +201,31 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
     blur: Blur,
     heights: impl FnOnce() -> Heights<V>,
 ) -> Option<Judged<V>> {
-    let (splat, zero) = (V::splat, V::splat(0.0));
+    let splat = V::splat;
     let blur = if BLURRED { blur } else { Blur::NONE };
-    let sides = Sides::new(&Sheared { x, y, z }, aim.width, size, blur);
-    let Sides { u, v, w, bound, .. } = sides;
+    let sides = Sides::new(sheared, aim.width, size, blur);
     let passed = sides.passed() & lanes;
     if passed == 0 {
         return None;
     }
-    let deep = z[0].abs().add(size);
-    let Blur { origin: blur, direction } = blur;
-    let slack = SLACK + 2.0 * direction;
-    // t |along| = depth / determinant, both multiplied by the determinant.
-    let determinant = u.add(v).add(w);
-    let area = determinant.abs();
-    let error = bound.mul_add(splat(4.0), area.mul(splat(SLACK))).mul(area);
-    let square = determinant.mul(determinant);
-    let (least_square, most_square) = (square.sub(error), square.add(error));
-    let begin = least_square.mul(if BLURRED { aim.begin.mul(splat(1.0 - slack)) } else { aim.begin });
-    let end = most_square.mul(limit.mul(aim.along.abs()).mul(splat(1.0 + slack)));
-    let turn = V::select(aim.along.less(zero), zero.sub(determinant), determinant);
-    let depth = zero.sub(u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2])))).mul(turn);
-    // The sum of all edges is at most the determinant and 6 bounds.
-    let depth_error = error.mul_add(deep, splat(f32::MIN_POSITIVE));
-    let depth_error = if BLURRED { most_square.mul_add(splat(1.6 * blur), depth_error) } else { depth_error };
-    let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
-    // What is too large for f32 is neither rejected for it nor sure.
-    let infinite = splat(f32::INFINITY);
-    let outside = far.less(begin).and(begin.less(infinite)).or(end.less(near).and(near.less(infinite)));
-    let mut lanes = passed & !outside.bits();
-    let four = splat(4.0);
-    let is_precise = depth_error.mul(four).less(depth).and(depth.less(infinite));
-    if !ROUNDED && lanes & !is_precise.bits() != 0 {
-        // The origin is close to the plane, for the size of the triangle: mostly a ray that starts on it.
-        let Heights { height, error } = heights();
-        let (depth, depth_error) = (height.mul(turn), error.mul_add(area, splat(f32::MIN_POSITIVE)));
-        let (near, far) = (depth.sub(depth_error), depth.add(depth_error));
-        // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
-        let outside = far.less(begin).and(begin.less(infinite)).or(end.less(near).and(near.less(infinite)));
-        lanes &= !outside.and(zero.less(least_square)).bits();
-    }
+    let slack = SLACK + 2.0 * blur.direction;
+    let span = Span {
+        begin: if BLURRED { aim.begin.mul(splat(1.0 - slack)) } else { aim.begin },
+        end: limit.mul(aim.along.abs()).mul(splat(1.0 + slack)),
+        forward: V::select(aim.along.less(splat(0.0)), splat(-1.0), splat(1.0)),
+    };
+    let off = BLURRED.then_some(blur.origin);
+    let Met { lanes, sure, area, near, far } = sides.meet::<ROUNDED>(sheared.z, size, off, &span, passed, heights);
     if lanes == 0 {
         return None;
     }
-    // Precise to a quarter in f32 is more than enough in f64, unless the origin all but touches the triangle: both
-    // count the same products of components, but f64 is wanted 2^18 times as precise, and is 2^29 times.
-    let precise = error.mul(four).less(square).and(square.less(infinite)).and(is_precise);
-    let apart = size.mul(splat(1.0 / 32.0)).less(deep);
+    let inverse = splat(1.0).div(area);
+    let (near, far) = (near.mul(inverse), far.mul(inverse));
     Some(Judged {
         lanes,
-        sure: sides.inside().and(precise).and(apart),
-        low: near.div(most_square).mul_add(aim.shorten.mul(splat(1.0 - slack)), splat(-f32::MIN_POSITIVE)),
-        high: far.div(least_square).mul_add(aim.shorten.mul(splat(1.0 + slack)), splat(f32::MIN_POSITIVE)),
+        sure,
+        low: near.mul_add(aim.shorten.mul(splat(1.0 - slack)), splat(-f32::MIN_POSITIVE)),
+        high: far.mul_add(aim.shorten.mul(splat(1.0 + slack)), splat(f32::MIN_POSITIVE)),
     })
 }
 

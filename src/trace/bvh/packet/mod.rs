@@ -29,6 +29,7 @@ use crate::math::Vec3;
 use crate::ray::Ray;
 use beam::Beam;
 use doubts::Doubts;
+use octet::Octet;
 
 /// Rays of a packet.
 pub(super) const RAYS: usize = Packet::RAYS;
@@ -225,7 +226,8 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
             let Scratch { stack, found } = scratch;
             let mut doubts = Doubts::new(found);
-            let octets = way::trace::<S, Closest, N>(bvh, &asked, &beam, stack, &mut doubts);
+            let mut octets = [Octet::nothing(); N];
+            way::trace::<S, Closest, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);
             for (number, hits) in hits.iter_mut().enumerate() {
                 let (packet, lanes) = (asked.packets[number % N], asked.lanes[number % N]);
                 finish::finish::<S>(bvh, number, packet, lanes, &octets[number % N], &doubts, hits);
@@ -262,7 +264,8 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
             let Scratch { stack, found } = scratch;
             let mut doubts = Doubts::new(found);
-            let octets = way::trace::<S, Occluded, N>(bvh, &asked, &beam, stack, &mut doubts);
+            let mut octets = [Octet::nothing(); N];
+            way::trace::<S, Occluded, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);
             for (occluded, octet) in occluded.iter_mut().zip(&octets) {
                 *occluded = octet.hit;
             }

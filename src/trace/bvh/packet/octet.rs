@@ -9,7 +9,7 @@ use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::planes;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Vector};
 use crate::trace::bvh::woop::{self, Aim, Judged, SLACK, Sheared};
 
 /// Eight rays made ready for triangles, and what they have hit so far.
@@ -45,39 +45,49 @@ pub(super) struct Met {
 }
 
 impl<V: Vector + Array<RAYS>> Octet<V> {
+    /// No ray.
     #[inline(always)]
-    pub fn new<S: Simd<V8 = V>>(packet: &Packet, lanes: u32, axes: [usize; 3]) -> Self {
+    pub fn nothing() -> Self {
+        let zero = V::splat(0.0);
+        Self {
+            origin: [zero; 3],
+            shear: [zero; 2],
+            aim: Aim { width: zero, along: zero, shorten: zero, begin: zero },
+            tmin: zero,
+            limit: [DONE; RAYS],
+            sure: [DONE; RAYS],
+            noted: [f32::from_bits(NONE); RAYS],
+            asked: 0,
+            hit: 0,
+        }
+    }
+
+    /// Takes the rays of a packet: in place, as it is large for a value that is returned.
+    #[inline(always)]
+    pub fn fill(&mut self, packet: &Packet, lanes: u32, axes: [usize; 3]) {
         let [x, y, z] = axes;
-        let [ox, oy, oz] = [V::load(&packet.origin[x]), V::load(&packet.origin[y]), V::load(&packet.origin[z])];
+        self.origin = [V::load(&packet.origin[x]), V::load(&packet.origin[y]), V::load(&packet.origin[z])];
         let [dx, dy, along] =
             [V::load(&packet.direction[x]), V::load(&packet.direction[y]), V::load(&packet.direction[z])];
         let reciprocal = V::splat(1.0).div(along);
         let negative = V::splat(0.0).sub(reciprocal);
         let shear = [dx.mul(negative), dy.mul(negative)];
         let (tmin, tmax) = (V::load(&packet.tmin).max(V::splat(0.0)), V::load(&packet.tmax));
-        // Rounded up, for t is rounded before it is held against it.
-        let limit = tmax.mul_add(V::splat(1.0 + SLACK), V::splat(f32::MIN_POSITIVE));
-        let mut octet = Self {
-            origin: [ox, oy, oz],
-            shear,
-            aim: Aim {
-                width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
-                along,
-                shorten: reciprocal.abs(),
-                begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
-            },
-            tmin,
-            limit: limit.to_array(),
-            // As of single rays.
-            sure: tmax.min(V::splat(f32::MAX)).to_array(),
-            noted: [f32::from_bits(NONE); RAYS],
-            asked: lanes,
-            hit: 0,
+        (self.shear, self.tmin) = (shear, tmin);
+        self.aim = Aim {
+            width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
+            along,
+            shorten: reciprocal.abs(),
+            begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
         };
+        // Rounded up, for t is rounded before it is held against it.
+        self.limit = tmax.mul_add(V::splat(1.0 + SLACK), V::splat(f32::MIN_POSITIVE)).to_array();
+        // As of single rays.
+        self.sure = tmax.min(V::splat(f32::MAX)).to_array();
+        self.asked = lanes;
         if lanes != 0xff {
-            super::each(!lanes).for_each(|lane| octet.finish(lane));
+            super::each(!lanes).for_each(|lane| self.finish(lane));
         }
-        octet
     }
 
     /// One triangle, lane `lane` of a block; `id` is its number.

@@ -9,7 +9,7 @@ use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 use crate::trace::bvh::walk::{self, Stack, Visit};
 
-/// Walks, and notes what is hit; what is decided at once is in `doubts`.
+/// Walks, and notes in `octets` what is hit; what is decided at once is in `doubts`.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
     bvh: &Bvh,
@@ -17,11 +17,11 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
     beam: &Beam,
     stack: &mut Stack,
     doubts: &mut Doubts<'_>,
-) -> [Octet<S::V8>; N] {
+    octets: &mut [Octet<S::V8>; N],
+) {
     let triangles = &bvh.fixed.triangles;
-    let mut octets = [Octet::new::<S>(asked.packets[0], asked.lanes[0], beam.axes); N];
-    for (number, octet) in octets.iter_mut().enumerate().skip(1) {
-        *octet = Octet::new::<S>(asked.packets[number], asked.lanes[number], beam.axes);
+    for (number, octet) in octets.iter_mut().enumerate() {
+        octet.fill(asked.packets[number], asked.lanes[number], beam.axes);
     }
     let mut most = beam.limit;
     walk::single::<S, Q>(
@@ -51,7 +51,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
                     }
                 }
                 if changed {
-                    most = farthest::<S, N>(&octets);
+                    most = farthest::<S, N>(octets);
                     if Q::ANY && most < 0.0 {
                         return Visit::Stop;
                     }
@@ -60,7 +60,6 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
             Visit::Until(most)
         },
     );
-    octets
 }
 
 /// The farthest t that any ray wants.

@@ -9,10 +9,8 @@
 //! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
 //! off by b counts as (1 + k) b, not 2 b. With k up to 16 the functions may overflow for triangles that are hit; then they say nothing.
 //!
-//! **t'.** Height over slope, as for all rays at once: edge functions of small triangles far away leave t' open by a hundredth of
-//! itself and more. With N the normal computed with all signs positive, and |d| <= D on the bundle's axes, d being (p, q, 1): N is
-//! off by 4 u of itself, d by 4.25 u D at most, and the slope, with its products and sums, by 12 u N D; a corner relative to the
-//! origin by u and b, and the height by 10 u N times that, and b N.
+//! **t'.** The mean of the corners' depths, with the bounds that it has there. The planes of triangles are asked where these are not precise, as for a ray
+//! that starts on one.
 
 use super::found::DONE;
 use super::walk::{Entry, Walk};
@@ -21,10 +19,10 @@ use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::bundle::{Bundle, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
-use crate::trace::bvh::planes::{Heights, Planes};
+use crate::trace::bvh::planes::Planes;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
-use crate::trace::bvh::woop::{Sheared, Sides};
+use crate::trace::bvh::woop::{Judged, Met, Sheared, Sides, Span};
 
 /// A block as an origin sees it, on a bundle's axes.
 struct Seen<V> {
@@ -35,7 +33,7 @@ struct Seen<V> {
 }
 
 /// From where, and up to where, a ray looks along the bundle's axis.
-struct Span {
+struct Range {
     /// Rounded down.
     first: f32,
     /// Rounded up.
@@ -44,16 +42,6 @@ struct Span {
     sure: f32,
     /// Rounded up.
     limit: f32,
-}
-
-/// The triangles of a block that a ray may hit.
-struct Met<V: Vector> {
-    /// A bit for each of them.
-    lanes: u32,
-    /// Those that it hits without doubt, at a t' between `low` and `high`.
-    sure: V::Mask,
-    low: V,
-    high: V,
 }
 
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
@@ -83,13 +71,6 @@ impl<V: Vector + Array<LANES>> Seen<V> {
     }
 }
 
-/// The planes of a block's triangles, on a bundle's axes.
-#[inline(always)]
-fn planes<V: Vector + Array<LANES>>(block: &Block, [x, y, z]: [usize; 3]) -> Planes<V> {
-    let corners = &block.corners;
-    Planes::new([along(&corners[x]), along(&corners[y]), along(&corners[z])])
-}
-
 impl<Q: Query> Walk<'_, Q> {
     /// Tests the blocks of a leaf ray by ray; true where a limit has changed.
     #[inline(always)]
@@ -101,8 +82,8 @@ impl<Q: Query> Walk<'_, Q> {
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            // Made when a ray first asks; planes serve every origin.
-            let (mut seen, mut planes_of, mut heights) = (None, None, None);
+            // Made when a ray first asks.
+            let mut seen = None;
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
@@ -112,28 +93,15 @@ impl<Q: Query> Walk<'_, Q> {
                 }
                 if is_turned {
                     // From the ray's own origin.
-                    (seen, heights) = (None, None);
+                    seen = None;
                 }
                 let seen = seen.get_or_insert_with(
                     #[inline(always)]
                     || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
                 );
-                let (sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
-                if lanes == 0 {
-                    continue;
-                }
-                let planes = planes_of.get_or_insert_with(
-                    #[inline(always)]
-                    || planes::<S::V8>(block, axes),
-                );
-                let heights = heights.get_or_insert_with(
-                    #[inline(always)]
-                    || planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin),
-                );
-                let span = if is_turned { self.own_span(ray) } else { self.span(ray) };
-                let met = meet::<S>(&sides, lanes, planes, heights, bundle, ray, &span);
-                if met.lanes != 0 {
-                    changed |= self.take::<S>(ray, LANES as u32 * index, &met, &span);
+                let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
+                if let Some(met) = meet::<S>(seen, block, bundle, ray, blur, &range) {
+                    changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
                 }
             }
         }
@@ -142,10 +110,10 @@ impl<Q: Query> Walk<'_, Q> {
 
     /// Takes what a ray may hit in the block whose first triangle is `first`; true where its limit has changed.
     #[inline(always)]
-    fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Met<S::V8>, span: &Span) -> bool {
-        let &Met { lanes: mut open, sure, low, high } = met;
-        let sure = sure.and(S::V8::splat(span.begin).at_most(low));
-        if Q::ANY && sure.and(high.less(S::V8::splat(span.sure))).bits() & open != 0 {
+    fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Judged<S::V8>, range: &Range) -> bool {
+        let &Judged { lanes: mut open, sure, low, high } = met;
+        let sure = sure.and(S::V8::splat(range.begin).at_most(low));
+        if Q::ANY && sure.and(high.less(S::V8::splat(range.sure))).bits() & open != 0 {
             (self.found.sure.0[ray], self.found.limit.0[ray]) = (DONE, DONE);
             return true;
         }
@@ -173,17 +141,17 @@ impl<Q: Query> Walk<'_, Q> {
 
     /// Of a ray that starts where the bundle does.
     #[inline(always)]
-    fn span(&self, ray: usize) -> Span {
+    fn range(&self, ray: usize) -> Range {
         let Self { bundle, found, .. } = self;
-        Span { first: bundle.first, begin: bundle.begin.0[ray], sure: found.sure.0[ray], limit: found.limit.0[ray] }
+        Range { first: bundle.first, begin: bundle.begin.0[ray], sure: found.sure.0[ray], limit: found.limit.0[ray] }
     }
 
     /// Of a turned ray, from its own origin.
     #[inline(always)]
-    fn own_span(&self, ray: usize) -> Span {
+    fn own_range(&self, ray: usize) -> Range {
         let depth = self.bundle.depth.0[ray];
         let (tmin, tmax) = (self.rays[ray].tmin * depth, self.rays[ray].tmax * depth);
-        Span {
+        Range {
             first: tmin * (1.0 - SLACK) - TINY,
             begin: tmin * (1.0 + SLACK) + TINY,
             sure: tmax * (1.0 - SLACK) - TINY,
@@ -215,53 +183,53 @@ impl<Q: Query> Walk<'_, Q> {
     }
 }
 
-/// A ray's edge functions, and a bit for every triangle that these leave.
+/// The triangles of a block that a ray may hit, and where.
 #[inline(always)]
-fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
+fn meet<S: Simd>(
+    Seen { x, y, z }: &Seen<S::V8>,
+    block: &Block,
+    bundle: &Bundle,
+    ray: usize,
+    blur: Blur,
+    range: &Range,
+) -> Option<Judged<S::V8>> {
     let splat = S::V8::splat;
     let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
     let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
-    let Seen { x, y, z } = seen;
     let sheared = Sheared {
         x: [z[0].mul_add(sx, x[0]), z[1].mul_add(sx, x[1]), z[2].mul_add(sx, x[2])],
         y: [z[0].mul_add(sy, y[0]), z[1].mul_add(sy, y[1]), z[2].mul_add(sy, y[2])],
         z: *z,
     };
     let width = sx.abs().max(sy.abs()).add(splat(1.0));
-    let sides = Sides::new(&sheared, width, splat(block.size), blur);
+    let size = splat(block.size);
+    let sides = Sides::new(&sheared, width, size, blur);
     let lanes = (sides.passed() | !sides.are_finite().bits()) & block.lanes;
-    (sides, lanes)
-}
-
-/// Where a ray meets the planes of those triangles that its edge functions leave.
-#[inline(always)]
-fn meet<S: Simd>(
-    sides: &Sides<S::V8>,
-    lanes: u32,
-    planes: &Planes<S::V8>,
-    &Heights { height, error }: &Heights<S::V8>,
-    bundle: &Bundle,
-    ray: usize,
-    span: &Span,
-) -> Met<S::V8> {
-    let (splat, zero) = (S::V8::splat, S::V8::splat(0.0));
-    let Planes { normal: [nx, ny, nz], size: [sx, sy, sz] } = planes;
+    if lanes == 0 {
+        return None;
+    }
     // A turned bundle runs against its rays.
-    let way = if bundle.is_turned { -1.0 } else { 1.0 };
-    let (p, q) = (splat(way * bundle.slope[0].0[ray]), splat(way * bundle.slope[1].0[ray]));
-    let slope = p.mul_add(*nx, q.mul_add(*ny, nz.mul(splat(way * bundle.forward))));
-    let slope_error = sx.add(*sy).add(*sz).mul(splat(16.0 * UNIT_ROUNDOFF * bundle.largest));
-    // t' = -height / slope. Turned so that it is positive where the slope is.
-    let turned = S::V8::select(height.less(zero), slope, zero.sub(slope));
-    let (height, steep, four) = (height.abs(), turned.abs(), splat(4.0));
-    let infinite = splat(f32::INFINITY);
-    let known = slope_error.mul(four).less(steep).and(steep.less(infinite)).and(height.less(infinite));
-    let low = height.sub(error).div(steep.add(slope_error)).mul(splat(1.0 - SLACK));
-    let high = height.add(error).div(steep.sub(slope_error)).mul(splat(1.0 + SLACK));
-    let behind = turned.less(zero).and(error.less(height));
-    let outside = behind.or(splat(span.limit).less(low)).or(high.less(splat(span.first)));
-    let lanes = lanes & !known.and(outside).bits();
-    // Known to a quarter in f32, both are precise enough in f64.
-    let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
-    Met { lanes, sure: sides.inside().and(sides.are_finite()).and(tame), low, high }
+    let way = if bundle.is_turned { -bundle.forward } else { bundle.forward };
+    let span = Span { begin: splat(range.first), end: splat(range.limit), forward: splat(way) };
+    let Met { lanes, sure, area, near, far } = sides.meet::<false>(
+        *z,
+        size,
+        Some(blur.origin),
+        &span,
+        lanes,
+        #[inline(always)]
+        || {
+            let [kx, ky, kz] = axes(bundle.axis);
+            let corners = std::hint::black_box(&block.corners);
+            let corners = [along(&corners[kx]), along(&corners[ky]), along(&corners[kz])];
+            Planes::new(corners).heights([x[0], y[0], z[0]], blur.origin)
+        },
+    );
+    if lanes == 0 {
+        return None;
+    }
+    let inverse = splat(1.0).div(area);
+    // What is apart stays so when t is rounded.
+    let (nearer, farther) = (inverse.mul(splat(1.0 - SLACK)), inverse.mul(splat(1.0 + SLACK)));
+    Some(Judged { lanes, sure, low: near.mul(nearer), high: far.mul(farther) })
 }
