@@ -166,7 +166,7 @@ impl<V: Vector> Sides<V> {
         // 4, not 3; and room for products that underflow.
         let of_edges = bound.mul(size).mul_add(splat(4.0), splat(16.0 * f32::MIN_POSITIVE));
         let of_depth = z[0].abs().add(size).mul(splat(12.0 * UNIT_ROUNDOFF));
-        let of_depth = if let Some(blur) = blur { of_depth.add(splat(2.0 * blur)) } else { of_depth };
+        let of_depth = if let Some(blur) = blur { of_depth.add(splat(1.6 * blur)) } else { of_depth };
         let off = of_depth.mul_add(area, of_edges);
         let (near, far) = (depth.sub(off), depth.add(off));
         let (begin, end) = (span.begin.mul(area), span.end.mul(area));

@@ -71,6 +71,13 @@ impl<V: Vector + Array<LANES>> Seen<V> {
     }
 }
 
+/// The planes of a block's triangles, on a bundle's axes.
+#[inline(always)]
+fn planes_of<V: Vector + Array<LANES>>(block: &Block, [x, y, z]: [usize; 3]) -> Planes<V> {
+    let corners = &block.corners;
+    Planes::new([along(&corners[x]), along(&corners[y]), along(&corners[z])])
+}
+
 impl<Q: Query> Walk<'_, Q> {
     /// Tests the blocks of a leaf ray by ray; true where a limit has changed.
     #[inline(always)]
@@ -82,8 +89,8 @@ impl<Q: Query> Walk<'_, Q> {
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            // Made when a ray first asks.
-            let mut seen = None;
+            // Made when a ray first asks; planes serve every origin.
+            let (mut seen, mut planes) = (None, None);
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
@@ -100,7 +107,7 @@ impl<Q: Query> Walk<'_, Q> {
                     || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
                 );
                 let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
-                if let Some(met) = meet::<S>(seen, block, bundle, ray, blur, &range) {
+                if let Some(met) = meet::<S>(seen, block, &mut planes, bundle, ray, blur, &range) {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
                 }
             }
@@ -188,6 +195,7 @@ impl<Q: Query> Walk<'_, Q> {
 fn meet<S: Simd>(
     Seen { x, y, z }: &Seen<S::V8>,
     block: &Block,
+    planes: &mut Option<Planes<S::V8>>,
     bundle: &Bundle,
     ray: usize,
     blur: Blur,
@@ -219,10 +227,11 @@ fn meet<S: Simd>(
         lanes,
         #[inline(always)]
         || {
-            let [kx, ky, kz] = axes(bundle.axis);
-            let corners = std::hint::black_box(&block.corners);
-            let corners = [along(&corners[kx]), along(&corners[ky]), along(&corners[kz])];
-            Planes::new(corners).heights([x[0], y[0], z[0]], blur.origin)
+            let planes = planes.get_or_insert_with(
+                #[inline(always)]
+                || planes_of::<S::V8>(block, axes(bundle.axis)),
+            );
+            planes.heights([x[0], y[0], z[0]], blur.origin)
         },
     );
     if lanes == 0 {
