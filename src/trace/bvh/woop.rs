@@ -137,7 +137,7 @@ impl<V: Vector> Sides<V> {
 
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
-    fn inside(&self) -> V::Mask {
+    pub fn inside(&self) -> V::Mask {
         self.bound.less(self.least.max(V::splat(0.0).sub(self.most)))
     }
 

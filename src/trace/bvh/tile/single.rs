@@ -9,8 +9,10 @@
 //! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
 //! off by b counts as (1 + k) b, not 2 b. With k up to 16 the functions may overflow for triangles that are hit; then they say nothing.
 //!
-//! **t'.** The mean of the corners' depths, with the bounds that it has there. The planes of triangles are asked where these are not precise, as for a ray
-//! that starts on one.
+//! **t'.** In the world it is the mean of the corners' depths, with the bounds that it has there, and planes are asked only where these are not precise,
+//! as for a ray that starts on one. In an object's coordinates that is so for most rays, and planes are asked at once: height over slope. With N the normal
+//! computed with all signs positive, and |d| <= D on the bundle's axes, d being (p, q, 1): N is off by 4 u of itself, d by 4.25 u D at most, and the slope,
+//! with its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that, and b N.
 
 use super::found::DONE;
 use super::walk::{Entry, Walk};
@@ -19,7 +21,7 @@ use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::bundle::{Bundle, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
-use crate::trace::bvh::planes::Planes;
+use crate::trace::bvh::planes::{Heights, Planes};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 use crate::trace::bvh::woop::{Judged, Met, Sheared, Sides, Span};
@@ -90,7 +92,7 @@ impl<Q: Query> Walk<'_, Q> {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
             // Made when a ray first asks; planes serve every origin.
-            let (mut seen, mut planes) = (None, None);
+            let (mut seen, mut planes, mut heights) = (None, None, None);
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
@@ -100,14 +102,31 @@ impl<Q: Query> Walk<'_, Q> {
                 }
                 if is_turned {
                     // From the ray's own origin.
-                    seen = None;
+                    (seen, heights) = (None, None);
                 }
                 let seen = seen.get_or_insert_with(
                     #[inline(always)]
                     || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
                 );
+                let (sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
+                if lanes == 0 {
+                    continue;
+                }
                 let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
-                if let Some(met) = meet::<S>(seen, block, &mut planes, bundle, ray, blur, &range) {
+                let met = if self.place == FIXED {
+                    meet_between_corners::<S>(&sides, lanes, seen, &mut planes, block, bundle, &range)
+                } else {
+                    let planes = planes.get_or_insert_with(
+                        #[inline(always)]
+                        || planes_of::<S::V8>(block, axes),
+                    );
+                    let heights = heights.get_or_insert_with(
+                        #[inline(always)]
+                        || planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin),
+                    );
+                    meet_planes::<S>(&sides, lanes, planes, heights, bundle, ray, &range)
+                };
+                if let Some(met) = met {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
                 }
             }
@@ -159,7 +178,8 @@ impl<Q: Query> Walk<'_, Q> {
         let depth = self.bundle.depth.0[ray];
         let (tmin, tmax) = (self.rays[ray].tmin * depth, self.rays[ray].tmax * depth);
         Range {
-            first: tmin * (1.0 - SLACK) - TINY,
+            // Not a little below 0, whose products are slow.
+            first: (tmin * (1.0 - SLACK) - TINY).max(0.0),
             begin: tmin * (1.0 + SLACK) + TINY,
             sure: tmax * (1.0 - SLACK) - TINY,
             limit: tmax * (1.0 + SLACK) + TINY,
@@ -190,48 +210,53 @@ impl<Q: Query> Walk<'_, Q> {
     }
 }
 
-/// The triangles of a block that a ray may hit, and where.
+/// A ray's edge functions, and a bit for every triangle that these leave.
 #[inline(always)]
-fn meet<S: Simd>(
-    Seen { x, y, z }: &Seen<S::V8>,
-    block: &Block,
-    planes: &mut Option<Planes<S::V8>>,
-    bundle: &Bundle,
-    ray: usize,
-    blur: Blur,
-    range: &Range,
-) -> Option<Judged<S::V8>> {
+fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
     let splat = S::V8::splat;
     let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
     let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
+    let Seen { x, y, z } = seen;
     let sheared = Sheared {
         x: [z[0].mul_add(sx, x[0]), z[1].mul_add(sx, x[1]), z[2].mul_add(sx, x[2])],
         y: [z[0].mul_add(sy, y[0]), z[1].mul_add(sy, y[1]), z[2].mul_add(sy, y[2])],
         z: *z,
     };
     let width = sx.abs().max(sy.abs()).add(splat(1.0));
-    let size = splat(block.size);
-    let sides = Sides::new(&sheared, width, size, blur);
+    let sides = Sides::new(&sheared, width, splat(block.size), blur);
     let lanes = (sides.passed() | !sides.are_finite().bits()) & block.lanes;
-    if lanes == 0 {
-        return None;
-    }
+    (sides, lanes)
+}
+
+/// Where a ray meets the triangles that its edge functions leave: by the mean of the corners' depths.
+#[inline(always)]
+fn meet_between_corners<S: Simd>(
+    sides: &Sides<S::V8>,
+    lanes: u32,
+    Seen { x, y, z }: &Seen<S::V8>,
+    planes: &mut Option<Planes<S::V8>>,
+    block: &Block,
+    bundle: &Bundle,
+    range: &Range,
+) -> Option<Judged<S::V8>> {
+    let splat = S::V8::splat;
     // A turned bundle runs against its rays.
     let way = if bundle.is_turned { -bundle.forward } else { bundle.forward };
     let span = Span { begin: splat(range.first), end: splat(range.limit), forward: splat(way) };
     let Met { lanes, sure, area, near, far } = sides.meet::<false>(
         *z,
-        size,
-        Some(blur.origin),
+        splat(block.size),
+        None,
         &span,
         lanes,
         #[inline(always)]
         || {
-            let planes = planes.get_or_insert_with(
-                #[inline(always)]
-                || planes_of::<S::V8>(block, axes(bundle.axis)),
-            );
-            planes.heights([x[0], y[0], z[0]], blur.origin)
+            // Not by a closure within a closure, which may miss the instruction set.
+            let known = match planes {
+                Some(known) => known,
+                None => planes.insert(planes_of::<S::V8>(block, axes(bundle.axis))),
+            };
+            known.heights([x[0], y[0], z[0]], 0.0)
         },
     );
     if lanes == 0 {
@@ -241,4 +266,40 @@ fn meet<S: Simd>(
     // What is apart stays so when t is rounded.
     let (nearer, farther) = (inverse.mul(splat(1.0 - SLACK)), inverse.mul(splat(1.0 + SLACK)));
     Some(Judged { lanes, sure, low: near.mul(nearer), high: far.mul(farther) })
+}
+
+/// The same by their planes.
+#[inline(always)]
+fn meet_planes<S: Simd>(
+    sides: &Sides<S::V8>,
+    lanes: u32,
+    planes: &Planes<S::V8>,
+    &Heights { height, error }: &Heights<S::V8>,
+    bundle: &Bundle,
+    ray: usize,
+    range: &Range,
+) -> Option<Judged<S::V8>> {
+    let (splat, zero) = (S::V8::splat, S::V8::splat(0.0));
+    let Planes { normal: [nx, ny, nz], size: [sx, sy, sz] } = planes;
+    // A turned bundle runs against its rays.
+    let way = if bundle.is_turned { -1.0 } else { 1.0 };
+    let (p, q) = (splat(way * bundle.slope[0].0[ray]), splat(way * bundle.slope[1].0[ray]));
+    let slope = p.mul_add(*nx, q.mul_add(*ny, nz.mul(splat(way * bundle.forward))));
+    let slope_error = sx.add(*sy).add(*sz).mul(splat(16.0 * UNIT_ROUNDOFF * bundle.largest));
+    // t' = -height / slope. Turned so that it is positive where the slope is.
+    let turned = S::V8::select(height.less(zero), slope, zero.sub(slope));
+    let (height, steep, four) = (height.abs(), turned.abs(), splat(4.0));
+    let infinite = splat(f32::INFINITY);
+    let known = slope_error.mul(four).less(steep).and(steep.less(infinite)).and(height.less(infinite));
+    let low = height.sub(error).div(steep.add(slope_error)).mul(splat(1.0 - SLACK));
+    let high = height.add(error).div(steep.sub(slope_error)).mul(splat(1.0 + SLACK));
+    let behind = turned.less(zero).and(error.less(height));
+    let outside = behind.or(splat(range.limit).less(low)).or(high.less(splat(range.first)));
+    let lanes = lanes & !known.and(outside).bits();
+    // Known to a quarter in f32, both are precise enough in f64.
+    let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
+    (lanes != 0).then(
+        #[inline(always)]
+        || Judged { lanes, sure: sides.inside().and(sides.are_finite()).and(tame), low, high },
+    )
 }
