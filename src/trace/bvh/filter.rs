@@ -249,11 +249,18 @@ mod tests {
     #[test]
     fn bounds_hold() {
         let mut random = Random::new(1);
-        let (mut hits, mut sures, mut slender) = (0, 0, 0);
-        for case in 0..30_000usize {
-            let size = [3.0, 0.3, 1e-2, 1e-3, 1e-4, 1e-6][case % 6];
-            let thin = [1.0, 0.05, 1e-5][case / 6 % 3];
-            let scale = [1.0, 1e-9, 1e6, 1e13][case / 18 % 4];
+        let mut pick = |of: [f32; 4]| of[(4.0 * random.unit().abs()) as usize % 4];
+        let cases: Vec<[f32; 6]> = (0..30_000)
+            .map(|case| {
+                let size = if case % 2 == 0 { [3.0, 0.3, 1e-2, 1e-3] } else { [1e-2, 1e-3, 1e-4, 1e-6] };
+                let (size, thin) = (pick(size), pick([1.0, 1.0, 0.05, 1e-5]));
+                let (scale, long) = (pick([1.0, 1e-9, 1e6, 1e13]), pick([1.0, 1e-3, 10.0, 1.0]));
+                [size, thin, scale, long, pick([0.0, 0.0, 0.0, 0.99]), pick([f32::INFINITY, f32::INFINITY, 1.01, 0.5])]
+            })
+            .collect();
+        // Of each instruction set.
+        let (mut hits, mut sures, mut slender, mut small) = ([0; 3], [0; 3], [0; 3], [0; 3]);
+        for (case, [size, thin, scale, long, tmin, tmax]) in cases.into_iter().enumerate() {
             let (origin, at) = (random.vec3() * scale, random.vec3() * scale);
             let block = block(&mut random, at, size * scale, thin);
             let [a, b, c] = block.triangle(case % LANES);
@@ -262,21 +269,19 @@ mod tests {
             // Some start on what they aim at.
             let aim = a + (b - a) * u + (c - a) * v;
             let origin = if case % 7 == 0 { aim } else { origin };
-            let direction = if case % 7 == 0 { random.vec3() } else { (aim - origin) * [1.0, 1e-3, 10.0][case % 3] };
-            let range = [0.0, f32::INFINITY, 0.99, 1.01];
-            let (tmin, tmax) = (range[case / 3 % 2 * 2], range[1 + case / 9 % 2 * 2]);
-            let ray = Ray { tmin, tmax, ..Ray::new(origin, direction) };
+            let direction = if case % 7 == 0 { random.vec3() } else { (aim - origin) * long };
+            let ray = Ray { tmin: tmin / long, tmax: tmax / long, ..Ray::new(origin, direction) };
             if !ray.is_valid() {
                 continue;
             }
             let filter = Filter::new(&ray, Blur::NONE);
             let limit = ray.tmax.next_up();
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for (set, isa) in Isa::ALL.into_iter().enumerate().filter(|(_, isa)| isa.is_available()) {
                 let Candidates { lanes, sure, low, high } = isa::dispatch(isa, Test(&filter, &block, limit));
                 for lane in 0..LANES {
                     let hit = triangle::intersect(&ray, &block.triangle(lane));
                     let context = format!("{case} {isa:?} {ray:?} {:?}", block.triangle(lane));
-                    hits += u32::from(hit.is_some());
+                    hits[set] += u32::from(hit.is_some());
                     assert!(hit.is_none() || lanes >> lane & 1 != 0, "left out: {context}");
                     if (lanes & sure) >> lane & 1 == 0 {
                         continue;
@@ -290,15 +295,63 @@ mod tests {
                     let t = hit.t as f32;
                     assert!(low <= t && t <= high, "{low} {t} {high}: {context}");
                     assert_eq!(computed(&ray, block.triangle(lane)), [t, hit.u as f32, hit.v as f32], "{context}");
-                    sures += 1;
-                    slender += u32::from(thin < 0.1);
+                    sures[set] += 1;
+                    slender[set] += u32::from(thin < 0.1);
+                    small[set] += u32::from(size < 1e-3);
                 }
             }
         }
-        assert!(
-            hits > 40_000 && sures > 20_000 && slender > 1000,
-            "{hits} hits, {sures} sure, {slender} of them slender"
-        );
+        for (set, _) in Isa::ALL.into_iter().enumerate().filter(|(_, isa)| isa.is_available()) {
+            let [hits, sures, slender, small] = [hits[set], sures[set], slender[set], small[set]];
+            let found = format!("{hits} hits, {sures} sure, {slender} of them slender, {small} small");
+            assert!(hits > 10_000 && sures > 5000 && slender > 300 && small > 200, "{found}");
+        }
+    }
+
+    /// Triangles that are seen edge-on, from far beside them: edge functions are then but the rounding of their products, and may agree.
+    #[test]
+    fn rounding_alone_is_no_hit() {
+        let known = [
+            (
+                Ray::new(
+                    Vec3::new(-0.309_933_57, 0.396_746_37, -2.456_245_7e-4),
+                    Vec3::new(-1.055_873_1e-3, -3.528_853_4e-4, 1.0),
+                ),
+                [
+                    Vec3::ZERO,
+                    Vec3::new(0.013_442_36, -0.017_240_98, 0.019_604_3),
+                    Vec3::new(0.012_856_27, -0.016_495_37, 0.022_335),
+                ],
+            ),
+            (
+                Ray::new(Vec3::new(0.580_546_1, 0.506_399_1, -0.009_349_72), Vec3::Z),
+                [
+                    Vec3::ZERO,
+                    Vec3::new(0.010_273_74, 0.008_961_57, 0.018_269_79),
+                    Vec3::new(-0.004_306_1, -0.003_756_13, 0.033_902_32),
+                ],
+            ),
+        ];
+        let mut cases = Vec::from(known);
+        let mut random = Random::new(3);
+        for _ in 0..200_000 {
+            // A triangle in a plane that all but contains the ray.
+            let across = random.vec3().with_z(0.0).normalize();
+            let far = 0.3 + random.unit().abs();
+            let mut in_plane = || across * (random.unit() * 0.03) + Vec3::Z * (random.unit() * 0.03);
+            let corners = [in_plane(), in_plane(), in_plane()];
+            cases.push((Ray::new(across * far - Vec3::Z * 0.01, Vec3::Z), corners));
+        }
+        for (ray, corners) in cases {
+            let mut block = Block::EMPTY;
+            block.push(corners, 0, 0);
+            let filter = Filter::new(&ray, Blur::NONE);
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let Candidates { lanes, sure, .. } = isa::dispatch(isa, Test(&filter, &block, f32::INFINITY));
+                let hit = triangle::intersect(&ray, &corners);
+                assert!(lanes & sure == 0 || hit.is_some(), "{isa:?} {ray:?} {corners:?}");
+            }
+        }
     }
 
     /// However small for its distance, a triangle that a ray passes through leaves little doubt about t.

@@ -1,5 +1,5 @@
 //! Rays against triangles in f32, a lane a pair, with bounds on the rounding: one ray and eight triangles ([`super::filter`]), or eight
-//! rays and one triangle ([`super::packet`]); of a ray in a bundle, the edge functions alone ([`super::tile`]).
+//! rays and one triangle ([`super::packet`]); or a ray of a bundle and eight triangles ([`super::tile`]).
 //!
 //! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
 //! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it
@@ -10,17 +10,19 @@
 //! largest component of its edges and k of the shear; so no component of a corner relative to the origin is larger
 //! than k Z + S, Z being the largest along the ray. A single ray's k is at most 1, a packet's rays' 2, a bundle's 16. With L = Z + S a sheared component errs by e = (3 + 5 k) u L (a subtraction, k u Z + u S;
 //! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
-//! function by B = 4 e S + 2 e^2 + 4 u S^2. A triangle that is not hit may be bounded wrongly, to no harm.
+//! function by B = 4 e S + 2 e^2 + 4 u S^2. A triangle that is not hit may be bounded wrongly: to no harm where it is
+//! rejected for it. But one that is seen edge-on from far beside it has edge functions that are nothing but rounding, of u times its distance squared, and these may
+//! agree by more than B. So nothing is sure but where all sheared corners, as computed, are within S + e.
 //!
 //! **Depth.** The ray meets the plane at the mean T of the corners' depths z, weighted with the edge functions E, which have one sign. So T is
 //! between the least and the largest z, which are less than s apart. With functions e that are off by up to B each, and a the magnitude of their sum, the
 //! mean is T', and T - T' = sum((E - e) (z - T')) / sum(E): errors of the weights are multiplied by differences of depths, not by depths. For a > 16 B the sum of E
-//! is more than 13/16 a, that of the magnitudes of e less than 5/4 a, and T' at most s / 8 outside; so T - T' is less than 3 B s / a. The rounding of z, e and the
-//! quotient adds less than 10 u L. Bounds of t are 2^-126 wider, for t that is no normal number.
+//! is more than 13/16 a, that of the magnitudes of e less than 5/4 a, and T' at most s / 8 outside; so T - T' is less than 3 B s / a. The rounding of z, of products, sums and
+//! the quotient adds less than 10 u (Z + s). Bounds of t are 2^-126 wider, for t that is no normal number.
 //!
 //! **f64.** [`triangle::intersect`](crate::shape::triangle::intersect) asks for exact arithmetic where t is off by 2^-27 of itself, counting a unit of 2^-48. What is
-//! inside for sure, with a > 16 B and T more than four times what it is off by, does not come to that: the products that are counted are at most 20 s^2 L for
-//! shears up to 1, and a T is more than 16 B times the larger of s and T, B more than 6 u s (L + 3 s), so that they are less than 2^21 a T. For larger shears
+//! inside for sure, with a > 16 B and T' more than four times what it is off by, does not come to that: with H = Z + s, the products that are counted are at most 4 s^2 H
+//! for a ray along the axis, and a T more than 12 B times the larger of s and T, B more than 6 u s (H + 4 s), so that they are less than 2^20 a T. For larger shears
 //! both grow alike.
 //!
 //! A ray in an object's coordinates is not quite the one that is meant ([`Blur`]). With its origin off by b, and each component
@@ -95,6 +97,7 @@ pub(super) struct Span<V> {
 }
 
 /// The edge functions of pairs, and the bound on their error.
+#[derive(Clone, Copy)]
 pub(super) struct Sides<V> {
     u: V,
     v: V,
@@ -102,6 +105,8 @@ pub(super) struct Sides<V> {
     least: V,
     most: V,
     bound: V,
+    /// S + e: where sheared corners are farther from the ray, the triangle is not hit, and the bound means nothing.
+    within: V,
 }
 
 impl<V: Vector> Sides<V> {
@@ -113,13 +118,14 @@ impl<V: Vector> Sides<V> {
         let reach = width.mul(size);
         let deep = z[0].abs().add(size);
         // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
-        // less than e.
+        // about e at most.
         // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
         let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * blur.direction - 4.0 * UNIT_ROUNDOFF));
         let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
         let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur.origin)));
-        let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
-        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound }
+        let within = e.add(reach);
+        let bound = within.mul(e).mul_add(splat(6.0), splat(TINY));
+        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound, within }
     }
 
     /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected where the bound has, too; so it has where shears
@@ -137,16 +143,19 @@ impl<V: Vector> Sides<V> {
 
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
-    pub fn inside(&self) -> V::Mask {
-        self.bound.less(self.least.max(V::splat(0.0).sub(self.most)))
+    pub fn inside(&self, &Sheared { x, y, .. }: &Sheared<V>) -> V::Mask {
+        let wide = x[0].abs().max(x[1].abs()).max(x[2].abs());
+        let high = y[0].abs().max(y[1].abs()).max(y[2].abs());
+        let is_bounded = wide.max(high).at_most(self.within);
+        self.bound.less(self.least.max(V::splat(0.0).sub(self.most))).and(is_bounded)
     }
 
-    /// The pairs, of those of the bit mask `lanes`, whose triangle the ray may meet within `span`. `z` are the corners' depths, which may be off by `blur`, and
-    /// `size` is as before. `heights` are asked only if corners are not `ROUNDED`.
+    /// The pairs, of those of the bit mask `lanes`, whose triangle the ray may meet within `span`. Depths of corners may be off by `blur`; the rest
+    /// is as before. `heights` are asked only if corners are not `ROUNDED`.
     #[inline(always)]
     pub fn meet<const ROUNDED: bool>(
         &self,
-        z: [V; 3],
+        sheared: &Sheared<V>,
         size: V,
         blur: Option<f32>,
         span: &Span<V>,
@@ -154,7 +163,7 @@ impl<V: Vector> Sides<V> {
         heights: impl FnOnce() -> Heights<V>,
     ) -> Met<V> {
         let (splat, zero, infinite) = (V::splat, V::splat(0.0), V::splat(f32::INFINITY));
-        let Self { u, v, w, bound, .. } = *self;
+        let (Self { u, v, w, bound, .. }, z) = (*self, sheared.z);
         let determinant = u.add(v).add(w);
         let area = determinant.abs();
         // All depths times the area. The corners' are counted from them to the origin.
@@ -184,7 +193,7 @@ impl<V: Vector> Sides<V> {
             // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
             lanes &= !outside.and(zero.less(least)).bits();
         }
-        Met { lanes, sure: self.inside().and(is_precise), area, near, far }
+        Met { lanes, sure: self.inside(sheared).and(is_precise), area, near, far }
     }
 }
 
@@ -215,7 +224,7 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
         forward: V::select(aim.along.less(splat(0.0)), splat(-1.0), splat(1.0)),
     };
     let off = BLURRED.then_some(blur.origin);
-    let Met { lanes, sure, area, near, far } = sides.meet::<ROUNDED>(sheared.z, size, off, &span, passed, heights);
+    let Met { lanes, sure, area, near, far } = sides.meet::<ROUNDED>(sheared, size, off, &span, passed, heights);
     if lanes == 0 {
         return None;
     }

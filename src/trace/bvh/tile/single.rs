@@ -108,13 +108,13 @@ impl<Q: Query> Walk<'_, Q> {
                     #[inline(always)]
                     || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
                 );
-                let (sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
+                let (sheared, sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
                 if lanes == 0 {
                     continue;
                 }
                 let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
                 let met = if self.place == FIXED {
-                    meet_between_corners::<S>(&sides, lanes, seen, &mut planes, block, bundle, &range)
+                    meet_between_corners::<S>(&sides, &sheared, lanes, seen, &mut planes, block, bundle, &range)
                 } else {
                     let planes = planes.get_or_insert_with(
                         #[inline(always)]
@@ -124,7 +124,7 @@ impl<Q: Query> Walk<'_, Q> {
                         #[inline(always)]
                         || planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin),
                     );
-                    meet_planes::<S>(&sides, lanes, planes, heights, bundle, ray, &range)
+                    meet_planes::<S>(&sides, &sheared, lanes, planes, heights, bundle, ray, &range)
                 };
                 if let Some(met) = met {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
@@ -212,7 +212,13 @@ impl<Q: Query> Walk<'_, Q> {
 
 /// A ray's edge functions, and a bit for every triangle that these leave.
 #[inline(always)]
-fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
+fn sides<S: Simd>(
+    seen: &Seen<S::V8>,
+    block: &Block,
+    bundle: &Bundle,
+    ray: usize,
+    blur: Blur,
+) -> (Sheared<S::V8>, Sides<S::V8>, u32) {
     let splat = S::V8::splat;
     let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
     let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
@@ -225,13 +231,15 @@ fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize
     let width = sx.abs().max(sy.abs()).add(splat(1.0));
     let sides = Sides::new(&sheared, width, splat(block.size), blur);
     let lanes = (sides.passed() | !sides.are_finite().bits()) & block.lanes;
-    (sides, lanes)
+    (sheared, sides, lanes)
 }
 
 /// Where a ray meets the triangles that its edge functions leave: by the mean of the corners' depths.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "a ray, a block, and what is known of both")]
 fn meet_between_corners<S: Simd>(
     sides: &Sides<S::V8>,
+    sheared: &Sheared<S::V8>,
     lanes: u32,
     Seen { x, y, z }: &Seen<S::V8>,
     planes: &mut Option<Planes<S::V8>>,
@@ -244,7 +252,7 @@ fn meet_between_corners<S: Simd>(
     let way = if bundle.is_turned { -bundle.forward } else { bundle.forward };
     let span = Span { begin: splat(range.first), end: splat(range.limit), forward: splat(way) };
     let Met { lanes, sure, area, near, far } = sides.meet::<false>(
-        *z,
+        sheared,
         splat(block.size),
         None,
         &span,
@@ -270,8 +278,10 @@ fn meet_between_corners<S: Simd>(
 
 /// The same by their planes.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "as above")]
 fn meet_planes<S: Simd>(
     sides: &Sides<S::V8>,
+    sheared: &Sheared<S::V8>,
     lanes: u32,
     planes: &Planes<S::V8>,
     &Heights { height, error }: &Heights<S::V8>,
@@ -300,6 +310,6 @@ fn meet_planes<S: Simd>(
     let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
     (lanes != 0).then(
         #[inline(always)]
-        || Judged { lanes, sure: sides.inside().and(sides.are_finite()).and(tame), low, high },
+        || Judged { lanes, sure: sides.inside(sheared).and(sides.are_finite()).and(tame), low, high },
     )
 }
