@@ -12,7 +12,8 @@
 //! of the other component a subtraction, the shear's two roundings and a product, 4 k u Z; the last subtraction, u S; the rest is spare), an edge
 //! function by B = 4 e S + 2 e^2 + 4 u S^2. A triangle that is not hit may be bounded wrongly: to no harm where it is
 //! rejected for it. But one that is seen edge-on from far beside it has edge functions that are nothing but rounding, of u times its distance squared, and these may
-//! agree by more than B. So nothing is sure but where all sheared corners, as computed, are within S + e.
+//! agree by more than B. So nothing is sure but where the sheared corners, as computed, lie on both sides of the ray in x and in y. They are then within S + 2 e of
+//! it, and twice the triangle's area, as the ray sees it, is at most (S + 2 e)^2; where that is more than 3 B, e is less than S / 14, and B has room for the 2 e.
 //!
 //! **Depth.** The ray meets the plane at the mean T of the corners' depths z, weighted with the edge functions E, which have one sign. So T is
 //! between the least and the largest z, which are less than s apart. With functions e that are off by up to B each, and a the magnitude of their sum, the
@@ -105,8 +106,6 @@ pub(super) struct Sides<V> {
     least: V,
     most: V,
     bound: V,
-    /// S + e: where sheared corners are farther from the ray, the triangle is not hit, and the bound means nothing.
-    within: V,
 }
 
 impl<V: Vector> Sides<V> {
@@ -123,9 +122,8 @@ impl<V: Vector> Sides<V> {
         let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * blur.direction - 4.0 * UNIT_ROUNDOFF));
         let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
         let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur.origin)));
-        let within = e.add(reach);
-        let bound = within.mul(e).mul_add(splat(6.0), splat(TINY));
-        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound, within }
+        let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
+        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound }
     }
 
     /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected where the bound has, too; so it has where shears
@@ -144,9 +142,7 @@ impl<V: Vector> Sides<V> {
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
     pub fn inside(&self, &Sheared { x, y, .. }: &Sheared<V>) -> V::Mask {
-        let wide = x[0].abs().max(x[1].abs()).max(x[2].abs());
-        let high = y[0].abs().max(y[1].abs()).max(y[2].abs());
-        let is_bounded = wide.max(high).at_most(self.within);
+        let is_bounded = on_both_sides(x).and(on_both_sides(y));
         self.bound.less(self.least.max(V::splat(0.0).sub(self.most))).and(is_bounded)
     }
 
@@ -236,6 +232,12 @@ pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
         low: near.mul_add(aim.shorten.mul(splat(1.0 - slack)), splat(-f32::MIN_POSITIVE)),
         high: far.mul_add(aim.shorten.mul(splat(1.0 + slack)), splat(f32::MIN_POSITIVE)),
     })
+}
+
+/// Where a triangle has corners on both sides.
+#[inline(always)]
+fn on_both_sides<V: Vector>([a, b, c]: [V; 3]) -> V::Mask {
+    a.differs_in_sign(b).or(a.differs_in_sign(c))
 }
 
 /// The edge function of the edge from corner `a` to corner `b`, each of which is at (x, y).

@@ -107,6 +107,10 @@ impl Vector for V16 {
         M16(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })
     }
     #[inline(always)]
+    fn differs_in_sign(self, other: Self) -> M16 {
+        M16(unsafe { _mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(self.0, other.0))) })
+    }
+    #[inline(always)]
     fn select(mask: M16, yes: Self, no: Self) -> Self {
         Self(unsafe { _mm512_mask_blend_ps(mask.0, no.0, yes.0) })
     }

@@ -81,6 +81,8 @@ pub(super) trait Vector: Copy {
     fn at_most(self, other: Self) -> Self::Mask;
     /// Where self is less than other; not for NaN.
     fn less(self, other: Self) -> Self::Mask;
+    /// Where one has a minus sign, be it that of a zero, and the other has not.
+    fn differs_in_sign(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The largest lane; NaN are passed over or not.

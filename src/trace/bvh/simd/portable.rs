@@ -144,6 +144,15 @@ impl<const N: usize> Vector for [f32; N] {
         )
     }
     #[inline(always)]
+    fn differs_in_sign(self, other: Self) -> Bits {
+        compare(
+            self,
+            other,
+            #[inline(always)]
+            |a, b| a.is_sign_negative() != b.is_sign_negative(),
+        )
+    }
+    #[inline(always)]
     fn select(Bits(mask): Bits, yes: Self, no: Self) -> Self {
         std::array::from_fn(
             #[inline(always)]

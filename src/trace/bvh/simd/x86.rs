@@ -141,11 +141,11 @@ pub struct V8(pub __m256);
 #[derive(Clone, Copy)]
 pub struct D4(__m256d);
 
-/// All bits of a lane of four, or none.
+/// One truth a lane of four: its highest bit.
 #[derive(Clone, Copy)]
 pub struct M4(__m128);
 
-/// All bits of a lane of eight, or none.
+/// One truth a lane of eight: its highest bit.
 #[derive(Clone, Copy)]
 pub struct M8(__m256);
 
@@ -216,6 +216,10 @@ impl Vector for V4 {
     #[inline(always)]
     fn less(self, other: Self) -> M4 {
         M4(unsafe { _mm_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn differs_in_sign(self, other: Self) -> M4 {
+        M4(unsafe { _mm_xor_ps(self.0, other.0) })
     }
     #[inline(always)]
     fn select(mask: M4, yes: Self, no: Self) -> Self {
@@ -296,6 +300,10 @@ impl Vector for V8 {
         M8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
     }
     #[inline(always)]
+    fn differs_in_sign(self, other: Self) -> M8 {
+        M8(unsafe { _mm256_xor_ps(self.0, other.0) })
+    }
+    #[inline(always)]
     fn select(mask: M8, yes: Self, no: Self) -> Self {
         Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask.0) })
     }
@@ -347,8 +355,8 @@ impl Group for V8 {
         let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
         unsafe {
             let at = values.as_mut_ptr().cast();
-            let value = _mm256_set1_epi32(value as i32);
-            _mm256_storeu_si256(at, _mm256_blendv_epi8(_mm256_loadu_si256(at), value, _mm256_castps_si256(mask.0)));
+            let value = _mm256_set1_ps(f32::from_bits(value));
+            _mm256_storeu_ps(at, _mm256_blendv_ps(_mm256_loadu_ps(at), value, mask.0));
         }
     }
 }
