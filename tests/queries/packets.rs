@@ -86,6 +86,12 @@ fn packets(rays: &[Ray; 16]) -> [Packet; 2] {
     packets
 }
 
+fn closest<const N: usize>(bvh: &Bvh, asked: &Asked<'_, N>) -> [PacketHits; N] {
+    let mut told = None;
+    bvh.closest_packets(asked, |hits| told = Some(hits.clone()));
+    told.expect("it tells")
+}
+
 /// Hit and normal of a lane, as bits.
 fn lane(hits: &PacketHits, i: usize) -> Option<(Hit, [u32; 3])> {
     let hit = Hit {
@@ -105,14 +111,12 @@ fn assert_packets(bvh: &Bvh, brute: &Brute, rays: &[Ray; 16], asked: u32, name: 
     let packets = packets(rays);
     let lanes = [asked & 0xff, asked >> 8];
     let asked = Asked { packets: packets.each_ref(), lanes };
-    let mut together = [PacketHits::NONE, PacketHits::NONE];
-    bvh.closest_packets(&asked, &mut together);
+    let together = closest(bvh, &asked);
     let occluded = bvh.occluded_packets(&asked);
     let mut hit_count = 0;
     for (half, packet) in packets.iter().enumerate() {
         let asked = Asked { packets: [packet], lanes: [lanes[half]] };
-        let mut by_itself = [PacketHits::NONE];
-        bvh.closest_packets(&asked, &mut by_itself);
+        let by_itself = closest(bvh, &asked);
         let [occluded_by_itself] = bvh.occluded_packets(&asked);
         for i in 0..8 {
             let own = &rays[8 * half + i];
@@ -187,8 +191,6 @@ fn packets_in_an_empty_world_hit_nothing() {
     let bvh = Bvh::build(&world);
     let packets = packets(&[Ray::new(Vec3::ZERO, Vec3::X); 16]);
     let asked = Asked { packets: packets.each_ref(), lanes: [0xff; 2] };
-    let mut hits = [PacketHits { lanes: 7, ..PacketHits::NONE }, PacketHits::NONE];
-    bvh.closest_packets(&asked, &mut hits);
-    assert_eq!(hits.map(|hits| hits.lanes), [0, 0]);
+    assert_eq!(closest(&bvh, &asked).map(|hits| hits.lanes), [0, 0]);
     assert_eq!(bvh.occluded_packets(&asked), [0, 0]);
 }

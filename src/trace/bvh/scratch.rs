@@ -6,18 +6,27 @@
 use std::cell::RefCell;
 
 use super::found::Found;
-use super::packet;
+use super::packet::{self, PacketHits};
 use super::walk::Stack;
 
-/// Room for a walk, and for what rays have hit of which there was doubt: that of a single ray is the first.
+/// Room for a walk, for what rays have hit of which there was doubt, that of a single ray being the first, and for the hits of packets.
 pub(super) struct Scratch {
     pub stack: Stack,
     pub found: [Found; packet::MOST * packet::RAYS],
+    pub hits: [PacketHits; packet::MOST],
+}
+
+impl Scratch {
+    const NEW: Self = Self {
+        stack: Stack::new(),
+        found: [Found::NONE; packet::MOST * packet::RAYS],
+        hits: [PacketHits::NONE; packet::MOST],
+    };
 }
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> =
-        const { RefCell::new(Scratch { stack: Stack::new(), found: [Found::NONE; packet::MOST * packet::RAYS] }) };
+        const { RefCell::new(Scratch::NEW) };
 }
 
 /// Lends it to `work`, which calls nobody who might ask for it again.

@@ -129,15 +129,13 @@ pub fn intersect_lanes(
         lanes.set_hit(lane, unsafe { &(*own).hit });
     };
     let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
-        let mut hits = [PacketHits::NONE; 2];
-        solid.closest_packets(asked, &mut hits);
-        tell(committed, query, lanes, first, &hits[0]);
-        tell(committed, query, lanes, first + RAYS, &hits[1]);
+        solid.closest_packets(asked, |[low, high]| {
+            tell(committed, query, lanes, first, low);
+            tell(committed, query, lanes, first + RAYS, high);
+        });
     };
     let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
-        let mut hits = [PacketHits::NONE];
-        solid.closest_packets(asked, &mut hits);
-        tell(committed, query, lanes, first, &hits[0]);
+        solid.closest_packets(asked, |[hits]| tell(committed, query, lanes, first, hits));
     };
     Called { lanes, count, is_valid }.each(committed, query, false, alone, two, one);
 }

@@ -224,7 +224,7 @@ impl Kernel for Alone<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { bvh, ray, scratch, found } = self;
-        let Scratch { stack, found: [doubted, ..] } = scratch;
+        let Scratch { stack, found: [doubted, ..], .. } = scratch;
         let Some(noted) = bvh.walk_alone::<S, Closest>(ray, stack, doubted) else { return false };
         if noted.id != NONE {
             *found = bvh.sure_triangle::<S>(ray, noted.id);
@@ -250,7 +250,7 @@ impl Kernel for AnyAlone<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { bvh, ray, scratch } = self;
-        let Scratch { stack, found: [doubted, ..] } = scratch;
+        let Scratch { stack, found: [doubted, ..], .. } = scratch;
         let noted = bvh.walk_alone::<S, Occluded>(ray, stack, doubted);
         noted.is_some_and(|noted| noted.is_hit(doubted))
     }

@@ -4,12 +4,12 @@
 //! least that a slab's distance from an origin may be, no ray enters it before x times the least magnitude of 1 / d, if it is ahead of the
 //! origins; with x the largest, none leaves it after x times the largest. What is behind gives something below 0 either way, which as an entry means
 //! the same as 0, and as an exit that nothing is met.
-//! Kept as distance times reciprocal, and not as bound / d less origin / d as a single ray does ([`super::super::slab`]), since origin and
-//! direction would then vary apart from each other, which rays that start in one point do not.
+//! The one origin and the one reciprocal of a side belong together, so the product may be computed as that of a single ray is ([`super::super::slab`]), bound
+//! times reciprocal and an offset. Intervals of origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
 //!
-//! With u = 2^-24, the subtraction, the reciprocal and the product round by 3 u |1/d| (|bound| + |origin|); the origin is moved by 10 u
-//! of this span, which leaves room for the rounding of the hit's own t; where t is no normal number, one product for either side
-//! keeps their order. Small components of directions are replaced as for single rays.
+//! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| + |origin|) together, fused or
+//! not; the origin is moved by 10 u of this span, which leaves room for the rounding of the hit's own t. Offsets are another 2^-124 apart, for what is no normal
+//! number, be it flushed to zero. Small components of directions are replaced as for single rays.
 
 use super::Packet;
 use crate::math::{Aabb, UNIT_ROUNDOFF};
@@ -30,11 +30,11 @@ pub(super) struct Beam {
     pub is_wide: bool,
     /// On each axis whether a box's upper side is met first.
     is_backward: [bool; 3],
-    /// What is subtracted from the sides that are met first: on each axis the origin farthest on, and the pad. One number more, here and
+    /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal. One number more, here and
     /// below, as a vector is stored.
-    near_origin: [f32; 4],
-    /// What is subtracted from the sides that are met last: the origin farthest back, less the pad.
-    far_origin: [f32; 4],
+    near_offset: [f32; 4],
+    /// Of the sides that are met last: less the origin farthest back, without the pad, times the reciprocal.
+    far_offset: [f32; 4],
     /// 1 / direction, of the least magnitude.
     least: [f32; 4],
     /// The same of the largest.
@@ -100,15 +100,20 @@ impl Beam {
         let extent = (bounds.max - bounds.min).max_element();
         let apart = high.sub(low).mul_add(splat(extent / depth), last.sub(first));
         let backward = is_backward.bits();
+        let least = S::V4::select(is_backward, longest, shortest);
+        let most = S::V4::select(is_backward, shortest, longest);
+        let (near_origin, far_origin) = (S::V4::select(is_backward, back, on), S::V4::select(is_backward, on, back));
+        let tiny = splat(4.0 * f32::MIN_POSITIVE);
+        let zero = splat(0.0);
         Some(Self {
             axes: axes(along),
             limit: tmax.next_up(),
             is_wide: apart.less(splat(WIDE * extent)).bits() & 0b111 != 0b111,
             is_backward: [backward & 1 != 0, backward & 2 != 0, backward & 4 != 0],
-            near_origin: S::V4::select(is_backward, back, on).to_array(),
-            far_origin: S::V4::select(is_backward, on, back).to_array(),
-            least: S::V4::select(is_backward, longest, shortest).to_array(),
-            most: S::V4::select(is_backward, shortest, longest).to_array(),
+            near_offset: zero.sub(near_origin.mul_add(least, tiny)).to_array(),
+            far_offset: zero.sub(far_origin.mul_sub(most, tiny)).to_array(),
+            least: least.to_array(),
+            most: most.to_array(),
             tmin: least_t(tmin),
         })
     }
@@ -118,10 +123,9 @@ impl Beam {
     fn between<V: Vector>(&self, near_side: [V; 3], far_side: [V; 3], limit: f32) -> (V::Mask, V) {
         let (mut near, mut far) = (V::splat(self.tmin), V::splat(limit));
         for axis in 0..3 {
-            let first = near_side[axis].sub(V::splat(self.near_origin[axis]));
-            let last = far_side[axis].sub(V::splat(self.far_origin[axis]));
-            near = first.mul(V::splat(self.least[axis])).max(near);
-            far = last.mul(V::splat(self.most[axis])).min(far);
+            let first = near_side[axis].mul_add(V::splat(self.least[axis]), V::splat(self.near_offset[axis]));
+            let last = far_side[axis].mul_add(V::splat(self.most[axis]), V::splat(self.far_offset[axis]));
+            (near, far) = (first.max(near), last.min(far));
         }
         (near.at_most(far), near)
     }

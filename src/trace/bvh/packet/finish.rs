@@ -4,7 +4,6 @@ use super::octet::Octet;
 use super::{Doubts, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Lane;
-use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::noted::{Rays, widen};
 use crate::trace::bvh::quad::{Numbers, Quad};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
@@ -20,21 +19,21 @@ pub(super) fn finish<S: Simd>(
     doubts: &Doubts<'_>,
     hits: &mut PacketHits,
 ) {
-    hits.lanes = 0;
-    for half in 0..RAYS / 4 {
-        let first = 4 * half;
-        let ids = [octet.noted(first), octet.noted(first + 1), octet.noted(first + 2), octet.noted(first + 3)];
-        let [a, b, c, d] = ids;
-        // NONE is the largest number.
-        let some = a.min(b).min(c.min(d));
-        if some == NONE {
-            continue;
+    hits.lanes = octet.hit;
+    if octet.hit != 0 {
+        let mut ids = octet.all_noted();
+        if octet.hit != 0xff {
+            // Anything that can be computed will do for the others.
+            let some = ids[octet.hit.trailing_zeros() as usize % RAYS];
+            super::each(!octet.hit).for_each(|lane| ids[lane] = some);
         }
-        let known = |id: u32| if id == NONE { some } else { id };
-        four::<S>(bvh, packet, half, [known(a), known(b), known(c), known(d)], hits);
-        let named =
-            u32::from(a != NONE) | u32::from(b != NONE) << 1 | u32::from(c != NONE) << 2 | u32::from(d != NONE) << 3;
-        hits.lanes |= named << first;
+        let [a, b, c, d, e, f, g, h] = ids;
+        if octet.hit & 0x0f != 0 {
+            four::<S>(bvh, packet, 0, [a, b, c, d], hits);
+        }
+        if octet.hit & 0xf0 != 0 {
+            four::<S>(bvh, packet, 1, [e, f, g, h], hits);
+        }
     }
     doubts.tell(bvh, number, lanes & !hits.lanes, hits);
 }

@@ -179,13 +179,20 @@ impl PacketHits {
 }
 
 impl Bvh {
-    /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits.
-    pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, hits: &mut [PacketHits; N]) {
+    /// [`Bvh::closest_triangle`] of each ray of a packet, or of two that go together, with the same bits: `tell` reads them where they lie, in the
+    /// thread's own memory, and calls none of these functions meanwhile.
+    #[inline]
+    pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, tell: impl FnOnce(&[PacketHits; N])) {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
         if self.fixed.triangles.tree().is_empty() {
-            return hits.iter_mut().for_each(|hits| hits.lanes = 0);
+            return tell(&[PacketHits::NONE; N]);
         }
-        with_scratch(|scratch| isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch, hits }));
+        with_scratch(|scratch| {
+            isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch });
+            if let Some(hits) = scratch.hits.first_chunk() {
+                tell(hits);
+            }
+        });
     }
 
     /// [`Bvh::occludes`] of each ray of a packet, or of two that go together: a bit for each that is occluded.
@@ -213,7 +220,6 @@ struct ClosestPackets<'a, const N: usize> {
     bvh: &'a Bvh,
     asked: &'a Asked<'a, N>,
     scratch: &'a mut Scratch,
-    hits: &'a mut [PacketHits; N],
 }
 
 impl<const N: usize> Kernel for ClosestPackets<'_, N> {
@@ -221,26 +227,26 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, asked, scratch, hits } = self;
+        let Self { bvh, asked, scratch } = self;
         let mut own = None;
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
-            let Scratch { stack, found } = scratch;
+            let Scratch { stack, found, hits } = scratch;
             let mut doubts = Doubts::new(found);
             let mut octets = [Octet::nothing(); N];
             way::trace::<S, Closest, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);
-            for (number, hits) in hits.iter_mut().enumerate() {
-                let (packet, lanes) = (asked.packets[number % N], asked.lanes[number % N]);
-                finish::finish::<S>(bvh, number, packet, lanes, &octets[number % N], &doubts, hits);
+            for (number, octet) in octets.iter().enumerate() {
+                let (packet, lanes) = (asked.packets[number], asked.lanes[number]);
+                finish::finish::<S>(bvh, number, packet, lanes, octet, &doubts, &mut hits[number]);
             }
             return;
         }
         let mut found = TriangleFound::NONE;
-        for (number, hits) in hits.iter_mut().enumerate() {
-            let rays = asked.packets[number % N].singles::<S>();
-            hits.lanes = 0;
-            for lane in each(asked.lanes[number % N]) {
+        for (number, packet) in asked.packets.iter().enumerate() {
+            let rays = packet.singles::<S>();
+            scratch.hits[number].lanes = 0;
+            for lane in each(asked.lanes[number]) {
                 if bvh.closest_alone(&rays[lane], scratch, &mut found) {
-                    hits.put(lane, &found);
+                    scratch.hits[number].put(lane, &found);
                 }
             }
         }
@@ -262,7 +268,7 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
         let Self { bvh, asked, scratch, occluded } = self;
         let mut own = None;
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
-            let Scratch { stack, found } = scratch;
+            let Scratch { stack, found, .. } = scratch;
             let mut doubts = Doubts::new(found);
             let mut octets = [Octet::nothing(); N];
             way::trace::<S, Occluded, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);

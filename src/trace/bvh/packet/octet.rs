@@ -29,7 +29,7 @@ pub(super) struct Octet<V> {
     noted: [f32; RAYS],
     /// A bit for each ray that is asked for.
     asked: u32,
-    /// A bit for each ray that has a hit, where any will do.
+    /// A bit for each ray that has a hit noted, or where any will do that was decided to have one.
     pub hit: u32,
 }
 
@@ -131,14 +131,20 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
     }
 
     /// What is noted for a ray.
-    #[inline(always)]
     pub fn noted(&self, lane: usize) -> u32 {
         self.noted[lane % RAYS].to_bits()
+    }
+
+    /// What is noted for each ray.
+    #[inline(always)]
+    pub fn all_noted(&self) -> [u32; RAYS] {
+        bytemuck::cast(self.noted)
     }
 
     /// What was noted for a ray has been computed.
     pub fn forget(&mut self, lane: usize) {
         self.noted[lane % RAYS] = f32::from_bits(NONE);
+        self.hit &= !(1 << lane);
     }
 
     /// A ray that wants no more.
