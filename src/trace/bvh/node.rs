@@ -140,8 +140,11 @@ impl Node {
     }
 }
 
-/// The largest coordinate's magnitude on each axis.
+/// The largest coordinate's magnitude on each axis; of no box zero, and not infinity.
 fn reach(bounds: Aabb) -> [f32; 4] {
+    if bounds.is_empty() {
+        return [0.0; 4];
+    }
     let Vec3 { x, y, z } = bounds.min.abs().max(bounds.max.abs());
     [x, y, z, 0.0]
 }
@@ -239,7 +242,7 @@ impl Tree {
         f64::from(most) + f64::from(8.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
     }
 
-    /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to.
+    /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to. Zero for no items.
     #[inline]
     pub fn reach(&self) -> Vec3 {
         let [x, y, z, _] = self.reach;
@@ -312,5 +315,16 @@ impl Tree {
     /// All nodes, so that leaves can be renamed.
     pub fn nodes_mut(&mut self) -> &mut [Node] {
         self.nodes.make_mut()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_reaches_nowhere() {
+        // Infinity would make rays that also go through another tree enter all of it.
+        assert_eq!(Tree::new(Vec::new()).reach(), Vec3::ZERO);
     }
 }
