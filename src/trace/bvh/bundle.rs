@@ -18,9 +18,10 @@ use super::node::{Node, WIDTH};
 use super::place::Place;
 use super::query::Query;
 use super::range::Range;
+use super::ready::columns;
 use super::rows::Rows;
 use super::simd::{Array, Group, Mask, Simd, Vector};
-use super::slab::{HUGE, columns};
+use super::slab::HUGE;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 

@@ -9,6 +9,7 @@
 //! | `cache` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
+//! | `ready` | rays made ready eight at a time |
 //! | `batch`, `query` | many rays, as bundles, in flight or alone; the two questions |
 //! | `flight` | single rays, several of them in turn |
 //! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
@@ -74,6 +75,7 @@ mod query;
 #[cfg(test)]
 mod random;
 mod range;
+mod ready;
 mod refit;
 mod room;
 mod rows;

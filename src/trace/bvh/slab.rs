@@ -15,7 +15,6 @@
 //! component: at the t of a hit, at most the largest span over that component, it is off by b + r span, and the pad is wider
 //! by this over the component.
 
-use super::filter::{Filter, Filters};
 use super::node::Node;
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
@@ -45,7 +44,7 @@ pub(super) const HUGE: f32 = 1e37;
 
 /// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
 /// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
-const OPEN: f32 = f32::MIN_POSITIVE;
+pub(super) const OPEN: f32 = f32::MIN_POSITIVE;
 
 impl SlabRay {
     /// `reach` is the tree's.
@@ -81,16 +80,16 @@ impl SlabRay {
 }
 
 /// The slabs of a ray, an axis a lane; the fourth means nothing.
-struct Slabs<V: Vector> {
-    reciprocal: V,
-    near: V,
-    far: V,
-    is_negative: V::Mask,
+pub(super) struct Slabs<V: Vector> {
+    pub reciprocal: V,
+    pub near: V,
+    pub far: V,
+    pub is_negative: V::Mask,
 }
 
 impl<V: Vector> Slabs<V> {
     #[inline(always)]
-    fn new<S: Simd<V4 = V>>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+    pub fn new<S: Simd<V4 = V>>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let splat = S::V4::splat;
         let (o, d, zero) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction), splat(0.0));
         let largest = ray.direction.abs().max_element();
@@ -119,154 +118,7 @@ pub(super) fn least_t(tmin: f32) -> f32 {
     (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
 }
 
-/// A ray made ready for nodes and for triangles of the world, in rows that eight rays are turned into at once.
-#[derive(Clone, Copy)]
-pub(super) struct ReadyRay {
-    rows: [[f32; 8]; 4],
-}
-
-impl ReadyRay {
-    /// None.
-    pub const NONE: Self = Self { rows: [[0.0; 8]; 4] };
-
-    #[inline(always)]
-    pub fn slab(&self) -> SlabRay {
-        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, ..], _, [x, y, z, ..]] = self.rows;
-        SlabRay {
-            reciprocal: [rx, ry, rz, 0.0],
-            near_offset: [nx, ny, nz, 0.0],
-            far_offset: [fx, fy, fz, 0.0],
-            side: [x.to_bits(), y.to_bits(), z.to_bits()],
-            tmin,
-        }
-    }
-
-    #[inline(always)]
-    pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
-            self.rows;
-        let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
-        let blur = Blur { origin: b, direction: r };
-        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
-    }
-
-    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
-    #[inline(always)]
-    pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
-        let Slabs { reciprocal, near, far, is_negative } = Slabs::new::<S>(ray, reach, blur);
-        let sides = S::V4::select(is_negative, S::V4::splat(f32::from_bits(1)), S::V4::splat(0.0));
-        let filter = Filter::new(ray, blur);
-        let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
-        let [ax, ay, az] = [axis(ax), axis(ay), axis(az)];
-        let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), near.to_array());
-        let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
-        Self {
-            rows: [
-                [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, begin],
-                [fx, fy, fz, width, x, y, z, shorten],
-                [p, q, along, ax, ay, az, 0.0, 0.0],
-                [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
-            ],
-        }
-    }
-
-    /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.
-    #[inline(always)]
-    pub fn end(&self) -> [f32; 2] {
-        let [.., tmax, limit] = self.rows[2];
-        [tmax, limit]
-    }
-}
-
 #[inline(always)]
 fn lanes<S: Simd>(v: Vec3) -> S::V4 {
     S::V4::load(&[v.x, v.y, v.z, 0.0])
-}
-
-/// The number of an axis as bits of a number.
-#[inline(always)]
-const fn axis(number: usize) -> f32 {
-    f32::from_bits(number as u32)
-}
-
-/// As [`SlabRay::new`] and [`Filter::new`] for eight rays; and a bit for each that [is valid](Ray::is_valid). Origins are off by what
-/// the blur says, and besides, as directions are, by its second part of their largest component: that is [`Blur::NONE`],
-/// or rays were rounded.
-#[inline(always)]
-pub(super) fn ready<S: Simd>(rays: &[Ray; 8], reach: Vec3, blur: Blur) -> ([ReadyRay; 8], u32) {
-    let splat = S::V8::splat;
-    let zero = splat(0.0);
-    let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
-    let (origin, direction) = ([x, y, z], [dx, dy, dz]);
-    let largest = dx.abs().max(dy.abs()).max(dz.abs());
-    let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
-    let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
-    let farthest = x.abs().max(y.abs()).max(z.abs());
-    let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
-    let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * blur.direction));
-    let stray = stray.mul_add(span[0].max(span[1]).max(span[2]), off.mul(splat(1.1)));
-    let mut finite = zero;
-    let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
-    for axis in 0..3 {
-        let d = direction[axis];
-        finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
-        let is_negative = d.less(zero);
-        let least = S::V8::select(is_negative, zero.sub(smallest), smallest);
-        let kept = S::V8::select(d.abs().less(smallest), least, d);
-        let reciprocal = splat(1.0).div(kept);
-        let steep = reciprocal.abs();
-        let width = steep.mul_add(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
-        let is_small = steep.mul(span[axis]).less(splat(HUGE)).and(width.less(splat(HUGE)));
-        let offset = zero.sub(origin[axis]).mul(reciprocal);
-        let open = S::V8::select(is_negative, splat(-OPEN), splat(OPEN));
-        reciprocals[axis] = S::V8::select(is_small, reciprocal, open);
-        near[axis] = S::V8::select(is_small, offset.sub(width), splat(-f32::MAX));
-        far[axis] = S::V8::select(is_small, offset.add(width), splat(f32::MAX));
-        sides[axis] = S::V8::select(is_negative, splat(f32::from_bits(1)), zero);
-    }
-    // As `least_t`.
-    let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
-    let filter = Filters::new(origin, direction, tmin);
-    let [rx, ry, rz] = reciprocals;
-    let [nx, ny, nz] = near;
-    let [fx, fy, fz] = far;
-    let [x, y, z] = filter.origin;
-    let first = S::transpose([rx, ry, rz, least, nx, ny, nz, filter.begin]);
-    let second = S::transpose([fx, fy, fz, filter.width, x, y, z, filter.shorten]);
-    let [p, q] = filter.shear;
-    let [kx, ky, kz] = filter.axes;
-    // Rounded up, for t is rounded before it is held against it.
-    let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
-    let third = S::transpose([p, q, filter.along, kx, ky, kz, tmax, limit]);
-    let fourth = S::transpose([sides[0], sides[1], sides[2], off, splat(blur.direction), zero, zero, zero]);
-    let mut ready = [ReadyRay::NONE; 8];
-    for i in 0..8 {
-        let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];
-        ready[i] = ReadyRay { rows };
-    }
-    let in_range = zero.at_most(tmin).and(tmin.at_most(tmax));
-    let directed = splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
-    (ready, in_range.and(directed).bits())
-}
-
-/// Eight rays, field by field: origin, direction, tmin, tmax.
-#[inline(always)]
-pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8] {
-    // Written out: a closure mapped over the array may miss the instruction set.
-    S::transpose([
-        row::<S>(a),
-        row::<S>(b),
-        row::<S>(c),
-        row::<S>(d),
-        row::<S>(e),
-        row::<S>(f),
-        row::<S>(g),
-        row::<S>(h),
-    ])
-}
-
-/// Its origin, direction, tmin and tmax.
-#[inline(always)]
-pub(super) fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax, .. }: &Ray) -> S::V8 {
-    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
 }

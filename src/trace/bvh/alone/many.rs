@@ -7,11 +7,14 @@
 use super::{Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
+use crate::trace::bvh::filter::Filter;
 use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::ready::ReadyRays;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::slab::SlabRay;
 use crate::trace::bvh::walk::{self, Stacks, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
@@ -60,19 +63,19 @@ impl Bvh {
         mut done: impl FnMut(usize, &Found),
     ) {
         let has_placements = self.placements.has_triangles();
-        let reach = self.placements.reach().max(self.fixed.triangles.tree().reach()).extend(0.0).to_array();
-        for (i, ray) in rays.iter().enumerate() {
-            // Of a single ray what is below 0 would count as 0, and so would NaN.
-            if ray.tmin.is_nan() || ray.tmin < 0.0 {
-                continue;
-            }
-            let single = SingleRay::from(ray);
-            let noted = if has_placements {
-                self.walk_from_place_to_place::<S, Q>(&single, ray, &reach, stacks, found)
+        let fixed = &self.fixed.triangles;
+        let reach = self.placements.reach().max(fixed.tree().reach());
+        let mut waiting = ReadyRays::new(rays, reach, Blur::NONE);
+        while let Some(i) = waiting.next::<S>() {
+            let (ray, ready) = (&rays[i], waiting.ready());
+            let (single, ready) = (SingleRay::from(ray), (ready.slab(), ready.filter()));
+            let mut noted = Noted::nothing(&single);
+            if has_placements {
+                self.walk_from_place_to_place::<S, Q>(&single, ray, &ready, stacks, &mut noted, found);
             } else {
-                self.walk_alone::<S, Q>(&single, &mut stacks.level, found)
-            };
-            let Some(Noted { sure, limit, id, place, is_doubted }) = noted else { continue };
+                self.walk_through::<S, Q, false>(FIXED, fixed, &ready, &single, &mut stacks.level, &mut noted, found);
+            }
+            let Noted { sure, limit, id, place, is_doubted } = noted;
             if id != NONE {
                 found.resume([sure, limit], id, place);
             }
@@ -82,25 +85,24 @@ impl Bvh {
         }
     }
 
-    /// As [`Self::walk_alone`], and then through placed objects, which may be all there is. `ray` is the same ray again, `reach` that of all
-    /// that is walked through in the world.
+    /// Through the fixed triangles, and then through placed objects, which may be all there is. `ray` is the same ray again, which is `ready` for the
+    /// world.
     #[inline(always)]
     fn walk_from_place_to_place<S: Simd, Q: Query>(
         &self,
         single: &SingleRay,
         ray: &Ray,
-        reach: &[f32; 4],
+        ready: &(SlabRay, Filter),
         stacks: &mut Stacks,
+        noted: &mut Noted,
         found: &mut Found,
-    ) -> Option<Noted> {
+    ) {
         let Stacks { upper, level: lower } = stacks;
-        let ready = single.ready::<S, false>(reach, Blur::NONE)?;
-        let mut noted = Noted::nothing(single);
         let fixed = &self.fixed.triangles;
         if !fixed.tree().is_empty() {
-            self.walk_through::<S, Q, false>(FIXED, fixed, &ready, single, lower, &mut noted, found);
+            self.walk_through::<S, Q, false>(FIXED, fixed, ready, single, lower, noted, found);
             if Q::ANY && noted.is_hit(found) {
-                return Some(noted);
+                return;
             }
         }
         walk::single::<S, Q>(
@@ -119,7 +121,7 @@ impl Bvh {
                     let (local, blur) = place.local::<S>(ray);
                     let local = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur);
                     let Some(local) = local else { continue };
-                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, &mut noted, found);
+                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, noted, found);
                     if Q::ANY && noted.is_hit(found) {
                         return Visit::Stop;
                     }
@@ -127,6 +129,5 @@ impl Bvh {
                 Visit::Until(noted.limit)
             },
         );
-        Some(noted)
     }
 }

@@ -27,6 +27,7 @@ use super::isa::{self, Kernel};
 use super::place::Blur;
 use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
+use super::ready::ReadyRay;
 use super::scratch::{Scratch, with_scratch};
 use super::simd::Simd;
 use super::slab::SlabRay;
@@ -45,24 +46,14 @@ pub type Search = ControlFlow<(), f32>;
 impl Bvh {
     /// The nearest fixed triangle that `ray` hits, into `found`. Whether there is one.
     pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
-        with_scratch(|scratch| self.closest_alone(ray, scratch, found))
+        let is_empty = self.fixed.triangles.tree().is_empty();
+        !is_empty && with_scratch(|scratch| isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found }))
     }
 
     /// Whether `ray` hits any fixed triangle.
     pub fn occludes(&self, ray: &SingleRay) -> bool {
-        with_scratch(|scratch| self.occluded_alone(ray, scratch))
-    }
-
-    /// [`Self::closest_triangle`], for who has room for the walk.
-    #[inline(always)]
-    pub(super) fn closest_alone(&self, ray: &SingleRay, scratch: &mut Scratch, found: &mut TriangleFound) -> bool {
-        !self.fixed.triangles.tree().is_empty() && isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found })
-    }
-
-    /// [`Self::occludes`], likewise.
-    #[inline(always)]
-    pub(super) fn occluded_alone(&self, ray: &SingleRay, scratch: &mut Scratch) -> bool {
-        !self.fixed.triangles.tree().is_empty() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch })
+        let is_empty = self.fixed.triangles.tree().is_empty();
+        !is_empty && with_scratch(|scratch| isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch }))
     }
 
     /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
@@ -71,6 +62,46 @@ impl Bvh {
         if !self.fixed.triangles.tree().is_empty() && ray.is_valid() {
             with_stack(|stack| isa::dispatch(self.isa, VisitAll { bvh: self, ray, stack, visitor }));
         }
+    }
+
+    /// [`Self::closest_triangle`] of a ray that is ready: `ray` is the same.
+    #[inline(always)]
+    pub(super) fn closest_ready<S: Simd>(
+        &self,
+        ray: &SingleRay,
+        ready: &ReadyRay,
+        stack: &mut Stack,
+        doubted: &mut Found,
+        found: &mut TriangleFound,
+    ) -> bool {
+        let noted = self.walk_ready::<S, Closest>(ray, ready, stack, doubted);
+        noted.compute::<S>(self, ray, doubted, found)
+    }
+
+    /// [`Self::occludes`], likewise.
+    #[inline(always)]
+    pub(super) fn occluded_ready<S: Simd>(
+        &self,
+        ray: &SingleRay,
+        ready: &ReadyRay,
+        stack: &mut Stack,
+        doubted: &mut Found,
+    ) -> bool {
+        self.walk_ready::<S, Occluded>(ray, ready, stack, doubted).is_hit(doubted)
+    }
+
+    #[inline(always)]
+    fn walk_ready<S: Simd, Q: Query>(
+        &self,
+        ray: &SingleRay,
+        ready: &ReadyRay,
+        stack: &mut Stack,
+        found: &mut Found,
+    ) -> Noted {
+        let mut noted = Noted::nothing(ray);
+        let ready = (ready.slab(), ready.filter());
+        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &ready, ray, stack, &mut noted, found);
+        noted
     }
 
     /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
@@ -146,6 +177,20 @@ impl Noted {
     #[inline(always)]
     fn is_hit(&self, found: &Found) -> bool {
         self.id != NONE || self.is_doubted && found.is_hit()
+    }
+
+    /// The hit, of a fixed triangle, into `found`; `doubted` is what was decided. Whether there is any.
+    #[inline(always)]
+    fn compute<S: Simd>(&self, bvh: &Bvh, ray: &SingleRay, doubted: &Found, found: &mut TriangleFound) -> bool {
+        if self.id != NONE {
+            *found = bvh.sure_triangle::<S>(ray, self.id);
+            return true;
+        }
+        let computed = if self.is_doubted { bvh.computed_triangle(doubted) } else { None };
+        computed.is_some_and(|computed| {
+            *found = computed;
+            true
+        })
     }
 
     /// Takes the candidates of block `index` of the triangles at `place`. Whether that is enough.
@@ -226,15 +271,7 @@ impl Kernel for Alone<'_> {
         let Self { bvh, ray, scratch, found } = self;
         let Scratch { stack, found: [doubted, ..], .. } = scratch;
         let Some(noted) = bvh.walk_alone::<S, Closest>(ray, stack, doubted) else { return false };
-        if noted.id != NONE {
-            *found = bvh.sure_triangle::<S>(ray, noted.id);
-            return true;
-        }
-        let computed = if noted.is_doubted { bvh.computed_triangle(doubted) } else { None };
-        computed.is_some_and(|computed| {
-            *found = computed;
-            true
-        })
+        noted.compute::<S>(bvh, ray, doubted, found)
     }
 }
 

@@ -14,21 +14,22 @@
 //! then, would be bound by latency again.
 
 mod ground;
+mod list;
 mod traveller;
-mod waiting;
 
 use super::Bvh;
 use super::found::Found;
 use super::leaves::Leaves;
 use super::place::Blur;
 use super::query::Query;
+use super::ready::ReadyRays;
 use super::simd::Simd;
 use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;
 use ground::{Ground, Placed, Plain, Rounded};
+use list::List;
 use std::hint::select_unpredictable;
 use traveller::{Step, Traveller};
-use waiting::{List, Waiting};
 
 /// Rays in flight.
 const RAYS: usize = 32;
@@ -103,7 +104,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     if G::HAS_PLACEMENTS {
         bounds = bounds.union(bvh.placements.tree().bounds());
     }
-    let mut waiting = Waiting::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
+    let mut waiting = ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
     let mut lists = [List::EMPTY; Step::COUNT];
     for k in 0..RAYS {
         let Some(ray) = waiting.next::<S>() else { break };

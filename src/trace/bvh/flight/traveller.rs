@@ -10,8 +10,8 @@ use crate::trace::bvh::found::Found;
 use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::ready::ReadyRay;
 use crate::trace::bvh::simd::{Mask, Simd};
-use crate::trace::bvh::slab::ReadyRay;
 
 /// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
 /// placements, and each has [`Child::NONE`] at its bottom.

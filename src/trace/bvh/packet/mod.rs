@@ -13,6 +13,7 @@
 //! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
 //! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
 
+mod apart;
 mod beam;
 mod doubts;
 mod finish;
@@ -27,6 +28,7 @@ use super::scratch::{Scratch, with_scratch};
 use super::simd::{Array, Mask, Simd, Vector};
 use crate::math::Vec3;
 use crate::ray::Ray;
+use apart::{ClosestApart, OccludedApart};
 use beam::Beam;
 use doubts::Doubts;
 use octet::Octet;
@@ -240,15 +242,8 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
             }
             return;
         }
-        let mut found = TriangleFound::NONE;
-        for (number, packet) in asked.packets.iter().enumerate() {
-            let rays = packet.singles::<S>();
-            scratch.hits[number].lanes = 0;
-            for lane in each(asked.lanes[number]) {
-                if bvh.closest_alone(&rays[lane], scratch, &mut found) {
-                    scratch.hits[number].put(lane, &found);
-                }
-            }
+        for (number, (packet, lanes)) in asked.packets.into_iter().zip(asked.lanes).enumerate() {
+            isa::dispatch(bvh.isa, ClosestApart { bvh, number, packet, lanes, scratch });
         }
     }
 }
@@ -277,11 +272,8 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
             }
             return;
         }
-        for (number, occluded) in occluded.iter_mut().enumerate() {
-            let rays = asked.packets[number % N].singles::<S>();
-            for lane in each(asked.lanes[number % N]) {
-                *occluded |= u32::from(bvh.occluded_alone(&rays[lane], scratch)) << lane;
-            }
+        for (occluded, (packet, lanes)) in occluded.iter_mut().zip(asked.packets.into_iter().zip(asked.lanes)) {
+            *occluded = isa::dispatch(bvh.isa, OccludedApart { bvh, packet, lanes, scratch });
         }
     }
 }

@@ -1,0 +1,76 @@
+//! Rays of a packet that go their own ways: made ready together, they walk one after the other.
+
+use super::{Packet, RAYS, each};
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::alone::{SingleRay, TriangleFound};
+use crate::trace::bvh::isa::Kernel;
+use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::ready::{ReadyRay, ready};
+use crate::trace::bvh::scratch::Scratch;
+use crate::trace::bvh::simd::Simd;
+
+/// The nearest hits of those rays of packet `number` that `lanes` has a bit for.
+pub(super) struct ClosestApart<'a> {
+    pub bvh: &'a Bvh,
+    pub number: usize,
+    pub packet: &'a Packet,
+    pub lanes: u32,
+    pub scratch: &'a mut Scratch,
+}
+
+impl Kernel for ClosestApart<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, number, packet, lanes, scratch: Scratch { stack, found: [doubted, ..], hits } } = self;
+        let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
+        let mut found = TriangleFound::NONE;
+        hits[number].lanes = 0;
+        for lane in each(lanes & valid) {
+            if bvh.closest_ready::<S>(&rays[lane], &ready[lane], stack, doubted, &mut found) {
+                hits[number].put(lane, &found);
+            }
+        }
+    }
+}
+
+/// A bit for each of the rays with a bit in `lanes` that is occluded.
+pub(super) struct OccludedApart<'a> {
+    pub bvh: &'a Bvh,
+    pub packet: &'a Packet,
+    pub lanes: u32,
+    pub scratch: &'a mut Scratch,
+}
+
+impl Kernel for OccludedApart<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let Self { bvh, packet, lanes, scratch: Scratch { stack, found: [doubted, ..], .. } } = self;
+        let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
+        let mut occluded = 0;
+        for lane in each(lanes & valid) {
+            occluded |= u32::from(bvh.occluded_ready::<S>(&rays[lane], &ready[lane], stack, doubted)) << lane;
+        }
+        occluded
+    }
+}
+
+/// The rays of a packet, each by itself.
+struct Apart {
+    rays: [SingleRay; RAYS],
+    ready: [ReadyRay; RAYS],
+    /// A bit for each that is valid.
+    valid: u32,
+}
+
+impl Apart {
+    #[inline(always)]
+    fn new<S: Simd>(bvh: &Bvh, packet: &Packet) -> Self {
+        let rows = packet.rows::<S>();
+        let (ready, valid) = ready::<S>(rows, bvh.fixed.triangles.tree().reach(), Blur::NONE);
+        Self { rays: packet.singles::<S>(), ready, valid }
+    }
+}
