@@ -46,20 +46,25 @@ pub type Search = ControlFlow<(), f32>;
 impl Bvh {
     /// The nearest fixed triangle that `ray` hits, into `found`. Whether there is one.
     pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
-        let is_empty = self.fixed.triangles.tree().is_empty();
-        !is_empty && with_scratch(|scratch| isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found }))
+        with_scratch(|scratch| self.has_fixed() && isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found }))
     }
 
     /// Whether `ray` hits any fixed triangle.
     pub fn occludes(&self, ray: &SingleRay) -> bool {
-        let is_empty = self.fixed.triangles.tree().is_empty();
-        !is_empty && with_scratch(|scratch| isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch }))
+        with_scratch(|scratch| self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch }))
+    }
+
+    /// Whether there are fixed triangles. Asked by who has borrowed [`Scratch`], not before: what the borrower was given is then read piece by piece, as it
+    /// was written, and not in one go, which would have to wait for the pieces.
+    #[inline(always)]
+    pub(super) fn has_fixed(&self) -> bool {
+        !self.fixed.triangles.tree().is_empty()
     }
 
     /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
     /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
     pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> Search) {
-        if !self.fixed.triangles.tree().is_empty() && ray.is_valid() {
+        if self.has_fixed() && ray.is_valid() {
             with_stack(|stack| isa::dispatch(self.isa, VisitAll { bvh: self, ray, stack, visitor }));
         }
     }

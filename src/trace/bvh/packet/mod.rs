@@ -186,11 +186,12 @@ impl Bvh {
     #[inline]
     pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, tell: impl FnOnce(&[PacketHits; N])) {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
-        if self.fixed.triangles.tree().is_empty() {
-            return tell(&[PacketHits::NONE; N]);
-        }
         with_scratch(|scratch| {
-            isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch });
+            if self.has_fixed() {
+                isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch });
+            } else {
+                scratch.hits.iter_mut().for_each(|hits| hits.lanes = 0);
+            }
             if let Some(hits) = scratch.hits.first_chunk() {
                 tell(hits);
             }
@@ -201,11 +202,10 @@ impl Bvh {
     pub fn occluded_packets<const N: usize>(&self, asked: &Asked<'_, N>) -> [u32; N] {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
         let mut occluded = [0; N];
-        if self.fixed.triangles.tree().is_empty() {
-            return occluded;
-        }
         with_scratch(|scratch| {
-            isa::dispatch(self.isa, OccludedPackets { bvh: self, asked, scratch, occluded: &mut occluded });
+            if self.has_fixed() {
+                isa::dispatch(self.isa, OccludedPackets { bvh: self, asked, scratch, occluded: &mut occluded });
+            }
         });
         occluded
     }
