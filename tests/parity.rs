@@ -412,6 +412,24 @@ fn numbers_that_are_not_normal() {
     });
     let hits = assert_parity(&scenes::of_mesh(mesh), &rays.collect::<Vec<_>>());
     assert!(hits > 10, "{hits} hits");
+
+    // Rays through the corner of a box, at t = 2^-104 and exactly: what is a share of such lengths vanishes.
+    let (mut random, least) = (Random::new(12), f32::from_bits(1));
+    let mut hits = 0;
+    for _ in 0..40 {
+        let mut number = || ((random.unit() - 0.5) * 8e5).round();
+        let corner = Vec3::new(number(), number(), number());
+        let [b, c] = [0.2, 0.7].map(|share| (corner * Vec3::new(share, 0.5, 1.0 - share)).round());
+        let corners = [corner, b, c].map(|corner| corner * least);
+        let mirrored = corners.map(|corner| -corner);
+        let mesh = Mesh::new([corners, mirrored].concat(), vec![[0, 1, 2], [3, 4, 5]]);
+        let rays = (0..100).map(|i| {
+            let (origin, corner) = (Vec3::new(number(), number(), number()), if i % 2 == 0 { corner } else { -corner });
+            Ray::new(origin * least, (corner - origin) * 2.0_f32.powi(-45))
+        });
+        hits += assert_parity(&scenes::of_mesh(mesh), &rays.collect::<Vec<_>>());
+    }
+    assert_eq!(hits, 4000);
 }
 
 /// A ray that is rounded in an object's coordinates may meet a shape which it passes in the world.

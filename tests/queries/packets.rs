@@ -185,6 +185,35 @@ fn packets_meet_what_lies_at_the_ends_of_their_ranges() {
     assert!(hit_count > 5000, "{hit_count} hits");
 }
 
+/// A plate that is the least number or some of them away from where rays start: what is a share of that vanishes.
+#[test]
+fn packets_meet_what_is_the_least_number_away() {
+    let mut random = Random::new(5);
+    let mut hit_count = 0;
+    for _ in 0..100 {
+        let plate = random.below(1 << 20) as u32;
+        let (below, height) = (f32::from_bits(plate.saturating_sub(1 + random.below(8) as u32)), f32::from_bits(plate));
+        let corner = |x: f32, y: f32| [Vec3::new(x, y, height), Vec3::new(x, y, -height)];
+        let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)].concat();
+        let scene = Scene::from_geometries(
+            vec![Geometry::Mesh(Mesh::new(corners, vec![[0, 2, 4], [1, 3, 5]]))],
+            vec![Material::default()],
+        );
+        let world = World::new(&scene).expect("a world");
+        let brute = Brute::new(&world);
+        let steepness = 10.0_f32.powf(-15.0 * random.unit());
+        let rays = std::array::from_fn(|i| {
+            let along = f32::from_bits(steepness.to_bits() + i as u32 % 3);
+            Ray::new(Vec3::new(0.25, -0.5, below), Vec3::new(0.948_278, 0.913_099_1, along))
+        });
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
+            hit_count += assert_packets(&bvh, &brute, &rays, 0xffff, &format!("{isa:?} {plate} {steepness:e}"));
+        }
+    }
+    assert!(hit_count > 1000, "{hit_count} hits");
+}
+
 #[test]
 fn packets_in_an_empty_world_hit_nothing() {
     let world = World::new(&Scene::from_geometries(Vec::new(), vec![Material::default()])).expect("a world");

@@ -136,7 +136,7 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     let farthest = x.abs().max(y.abs()).max(z.abs());
     let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
     let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * blur.direction));
-    let stray = stray.mul_add(span[0].max(span[1]).max(span[2]), off.mul(splat(1.1)));
+    let stray = stray.mul_add(span[0].max(span[1]).max(span[2]), off.mul_add(splat(1.1), splat(f32::MIN_POSITIVE)));
     let mut finite = zero;
     let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
     for axis in 0..3 {
@@ -149,6 +149,7 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
         let steep = reciprocal.abs();
         let width = steep.mul_add(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span[axis]).less(splat(HUGE)).and(width.less(splat(HUGE)));
+        let is_small = is_small.and(splat(OPEN).at_most(steep));
         let offset = zero.sub(origin[axis]).mul(reciprocal);
         let open = S::V8::select(is_negative, splat(-OPEN), splat(OPEN));
         reciprocals[axis] = S::V8::select(is_small, reciprocal, open);

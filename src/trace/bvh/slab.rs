@@ -5,11 +5,11 @@
 //! are moved apart by 6 u |1/d| (reach + |origin|), where the reach is the largest coordinate in the tree: an exact hit
 //! is never lost, and there is slack for the rounding of the hit's own t. (Ize 2013, *Robust BVH ray traversal*, moves the
 //! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations.) What is no normal number
-//! rounds by more than that: hence another 2^-126.
+//! rounds by more than that: hence another 2^-126, of t and of lengths.
 //!
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
-//! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows is left
-//! open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
+//! far the ray strays then: 1/d stays finite, and no 0 * infinity arises. An axis on which something still overflows, or 1/d is no normal number, which may be
+//! flushed to zero, is left open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
 //!
 //! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the largest
 //! component: at the t of a hit, at most the largest span over that component, it is off by b + r span, and the pad is wider
@@ -96,13 +96,15 @@ impl<V: Vector> Slabs<V> {
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
         let span = o.abs().add(lanes::<S>(reach));
         let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element()
-            + 1.1 * blur.origin;
+            + 1.1 * blur.origin
+            + f32::MIN_POSITIVE;
         let is_negative = d.less(zero);
         let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
         let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));
         let steep = reciprocal.abs();
         let width = steep.mul_add(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span).less(splat(HUGE)).and(width.less(splat(HUGE)));
+        let is_small = is_small.and(splat(OPEN).at_most(steep));
         let offset = zero.sub(o).mul(reciprocal);
         let open = S::V4::select(is_negative, splat(-OPEN), splat(OPEN));
         let reciprocal = S::V4::select(is_small, reciprocal, open);

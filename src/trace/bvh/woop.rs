@@ -13,7 +13,8 @@
 //! function by B = 4 e S + 2 e^2 + 4 u S^2. A triangle that is not hit may be bounded wrongly: to no harm where it is
 //! rejected for it. But one that is seen edge-on from far beside it has edge functions that are nothing but rounding, of u times its distance squared, and these may
 //! agree by more than B. So nothing is sure but where the sheared corners, as computed, lie on both sides of the ray in x and in y. They are then within S + 2 e of
-//! it, and twice the triangle's area, as the ray sees it, is at most (S + 2 e)^2; where that is more than 3 B, e is less than S / 14, and B has room for the 2 e.
+//! it, and twice the triangle's area, as the ray sees it, is at most (S + 2 e)^2; where that is more than 3 B, of the B that is computed, 6 e (S + e), e is less than S / 14, and this B
+//! has room for the 2 e.
 //!
 //! **Depth.** The ray meets the plane at the mean T of the corners' depths z, weighted with the edge functions E, which have one sign. So T is
 //! between the least and the largest z, which are less than s apart. With functions e that are off by up to B each, and a the magnitude of their sum, the

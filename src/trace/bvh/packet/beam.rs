@@ -8,8 +8,8 @@
 //! times reciprocal and an offset. Intervals of origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
 //!
 //! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| + |origin|) together, fused or
-//! not; the origin is moved by 10 u of this span, which leaves room for the rounding of the hit's own t. Offsets are another 2^-124 apart, for what is no normal
-//! number, be it flushed to zero. Small components of directions are replaced as for single rays.
+//! not; the origin is moved by 10 u of this span, which leaves room for the rounding of the hit's own t. It is moved by another 2^-126, and each offset by 2^-124,
+//! for lengths and t that are no normal numbers, be they flushed to zero. Small components of directions are replaced as for single rays.
 
 use super::Packet;
 use crate::math::{Aabb, UNIT_ROUNDOFF};
@@ -33,7 +33,7 @@ pub(super) struct Beam {
     /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal. One number more, here and
     /// below, as a vector is stored.
     near_offset: [f32; 4],
-    /// Of the sides that are met last: less the origin farthest back, without the pad, times the reciprocal.
+    /// Of the sides that are met last: less the origin farthest back, moved back by the pad, times the reciprocal.
     far_offset: [f32; 4],
     /// 1 / direction, of the least magnitude.
     least: [f32; 4],
@@ -89,7 +89,7 @@ impl Beam {
         let [rx, ry, rz] = bounds.min.abs().max(bounds.max.abs()).to_array();
         let span = first.abs().max(last.abs()).add(S::V4::load(&[rx, ry, rz, 0.0]));
         let stray = if is_clamped { 4.0 * (smallest / depth) * span.largest() } else { 0.0 };
-        let pad = span.mul_add(splat(10.0 * UNIT_ROUNDOFF), splat(stray));
+        let pad = span.mul_add(splat(10.0 * UNIT_ROUNDOFF), splat(stray + f32::MIN_POSITIVE));
         let (shortest, longest) = (splat(1.0).div(high), splat(1.0).div(low));
         let steepest = shortest.abs().max(longest.abs());
         if steepest.mul(span.add(pad)).less(splat(HUGE)).bits() & 0b111 != 0b111 {
