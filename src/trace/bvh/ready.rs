@@ -5,7 +5,7 @@
 use super::filter::{Filter, Filters};
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
-use super::slab::{HUGE, OPEN, SMALLEST, SlabRay, Slabs, least_t};
+use super::slab::{SMALLEST, SlabRay, Slabs, least_t};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -43,7 +43,7 @@ impl ReadyRay {
     /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
     #[inline(always)]
     pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
-        let Slabs { reciprocal, near, far, is_negative } = Slabs::new::<S>(ray, reach, blur);
+        let Slabs { reciprocal, near, far, is_negative } = Slabs::of_ray::<S>(ray, reach, blur);
         let sides = S::V4::select(is_negative, S::V4::splat(f32::from_bits(1)), S::V4::splat(0.0));
         let filter = Filter::new(ray, blur);
         let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
@@ -142,20 +142,9 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     for axis in 0..3 {
         let d = direction[axis];
         finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
-        let is_negative = d.less(zero);
-        let least = S::V8::select(is_negative, zero.sub(smallest), smallest);
-        let kept = S::V8::select(d.abs().less(smallest), least, d);
-        let reciprocal = splat(1.0).div(kept);
-        let steep = reciprocal.abs();
-        let width = steep.mul_add(span[axis].mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
-        let is_small = steep.mul(span[axis]).less(splat(HUGE)).and(width.less(splat(HUGE)));
-        let is_small = is_small.and(splat(OPEN).at_most(steep));
-        let offset = zero.sub(origin[axis]).mul(reciprocal);
-        let open = S::V8::select(is_negative, splat(-OPEN), splat(OPEN));
-        reciprocals[axis] = S::V8::select(is_small, reciprocal, open);
-        near[axis] = S::V8::select(is_small, offset.sub(width), splat(-f32::MAX));
-        far[axis] = S::V8::select(is_small, offset.add(width), splat(f32::MAX));
-        sides[axis] = S::V8::select(is_negative, splat(f32::from_bits(1)), zero);
+        let slabs = Slabs::new(origin[axis], d, span[axis], smallest, stray);
+        (reciprocals[axis], near[axis], far[axis]) = (slabs.reciprocal, slabs.near, slabs.far);
+        sides[axis] = S::V8::select(slabs.is_negative, splat(f32::from_bits(1)), zero);
     }
     // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);

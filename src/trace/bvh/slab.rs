@@ -44,13 +44,13 @@ pub(super) const HUGE: f32 = 1e37;
 
 /// The magnitude of 1/d on an axis that is open: products with coordinates are finite, those with the bounds of an empty slot are
 /// not. Offsets are the largest numbers then, so that every box is entered at once, and not left.
-pub(super) const OPEN: f32 = f32::MIN_POSITIVE;
+const OPEN: f32 = f32::MIN_POSITIVE;
 
 impl SlabRay {
     /// `reach` is the tree's.
     #[inline(always)]
     pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
-        let Slabs { reciprocal, near, far, is_negative } = Slabs::new::<S>(ray, reach, blur);
+        let Slabs { reciprocal, near, far, is_negative } = Slabs::of_ray::<S>(ray, reach, blur);
         let negative = is_negative.bits();
         Self {
             reciprocal: reciprocal.to_array(),
@@ -79,7 +79,7 @@ impl SlabRay {
     }
 }
 
-/// The slabs of a ray, an axis a lane; the fourth means nothing.
+/// Slabs, each in a lane: of one ray an axis a lane, or of one axis a ray a lane.
 pub(super) struct Slabs<V: Vector> {
     pub reciprocal: V,
     pub near: V,
@@ -88,28 +88,37 @@ pub(super) struct Slabs<V: Vector> {
 }
 
 impl<V: Vector> Slabs<V> {
+    /// Of one ray; the fourth lane means nothing.
     #[inline(always)]
-    pub fn new<S: Simd<V4 = V>>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
+    pub fn of_ray<S: Simd<V4 = V>>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let splat = S::V4::splat;
-        let (o, d, zero) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction), splat(0.0));
+        let (o, d) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction));
         let largest = ray.direction.abs().max_element();
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
         let span = o.abs().add(lanes::<S>(reach));
         let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element()
             + 1.1 * blur.origin
             + f32::MIN_POSITIVE;
-        let is_negative = d.less(zero);
-        let least = S::V4::select(is_negative, splat(-smallest), splat(smallest));
-        let reciprocal = splat(1.0).div(S::V4::select(d.abs().less(splat(smallest)), least, d));
+        Self::new(o, d, span, splat(smallest), splat(stray))
+    }
+
+    /// `span` is the origin's magnitude and the reach, `smallest` what a direction's component is at least taken to be, and `stray` how far the ray may be off besides
+    /// rounding, with room for lengths that are no normal numbers.
+    #[inline(always)]
+    pub fn new(origin: V, direction: V, span: V, smallest: V, stray: V) -> Self {
+        let (splat, zero) = (V::splat, V::splat(0.0));
+        let is_negative = direction.less(zero);
+        let least = V::select(is_negative, zero.sub(smallest), smallest);
+        let reciprocal = splat(1.0).div(V::select(direction.abs().less(smallest), least, direction));
         let steep = reciprocal.abs();
-        let width = steep.mul_add(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), splat(stray)), splat(f32::MIN_POSITIVE));
+        let width = steep.mul_add(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span).less(splat(HUGE)).and(width.less(splat(HUGE)));
         let is_small = is_small.and(splat(OPEN).at_most(steep));
-        let offset = zero.sub(o).mul(reciprocal);
-        let open = S::V4::select(is_negative, splat(-OPEN), splat(OPEN));
-        let reciprocal = S::V4::select(is_small, reciprocal, open);
-        let near = S::V4::select(is_small, offset.sub(width), splat(-f32::MAX));
-        let far = S::V4::select(is_small, offset.add(width), splat(f32::MAX));
+        let offset = zero.sub(origin).mul(reciprocal);
+        let open = V::select(is_negative, splat(-OPEN), splat(OPEN));
+        let reciprocal = V::select(is_small, reciprocal, open);
+        let near = V::select(is_small, offset.sub(width), splat(-f32::MAX));
+        let far = V::select(is_small, offset.add(width), splat(f32::MAX));
         Self { reciprocal, near, far, is_negative }
     }
 }

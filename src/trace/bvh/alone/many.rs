@@ -7,14 +7,12 @@
 use super::{Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::filter::Filter;
 use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::ReadyRays;
+use crate::trace::bvh::ready::{ReadyRay, ReadyRays};
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::slab::SlabRay;
 use crate::trace::bvh::walk::{self, Stacks, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
@@ -63,19 +61,16 @@ impl Bvh {
         mut done: impl FnMut(usize, &Found),
     ) {
         let has_placements = self.placements.has_triangles();
-        let fixed = &self.fixed.triangles;
-        let reach = self.placements.reach().max(fixed.tree().reach());
+        let reach = self.placements.reach().max(self.fixed.triangles.tree().reach());
         let mut waiting = ReadyRays::new(rays, reach, Blur::NONE);
         while let Some(i) = waiting.next::<S>() {
             let (ray, ready) = (&rays[i], waiting.ready());
-            let (single, ready) = (SingleRay::from(ray), (ready.slab(), ready.filter()));
-            let mut noted = Noted::nothing(&single);
-            if has_placements {
-                self.walk_from_place_to_place::<S, Q>(&single, ray, &ready, stacks, &mut noted, found);
+            let single = SingleRay::from(ray);
+            let Noted { sure, limit, id, place, is_doubted } = if has_placements {
+                self.walk_from_place_to_place::<S, Q>(&single, ray, ready, stacks, found)
             } else {
-                self.walk_through::<S, Q, false>(FIXED, fixed, &ready, &single, &mut stacks.level, &mut noted, found);
-            }
-            let Noted { sure, limit, id, place, is_doubted } = noted;
+                self.walk_ready::<S, Q>(&single, ready, &mut stacks.level, found)
+            };
             if id != NONE {
                 found.resume([sure, limit], id, place);
             }
@@ -85,24 +80,25 @@ impl Bvh {
         }
     }
 
-    /// Through the fixed triangles, and then through placed objects, which may be all there is. `ray` is the same ray again, which is `ready` for the
+    /// As [`Self::walk_ready`], and then through placed objects, which may be all there is. `ray` is the same ray again, which is `ready` for the
     /// world.
     #[inline(always)]
     fn walk_from_place_to_place<S: Simd, Q: Query>(
         &self,
         single: &SingleRay,
         ray: &Ray,
-        ready: &(SlabRay, Filter),
+        ready: &ReadyRay,
         stacks: &mut Stacks,
-        noted: &mut Noted,
         found: &mut Found,
-    ) {
+    ) -> Noted {
         let Stacks { upper, level: lower } = stacks;
+        let mut noted = Noted::nothing(single);
+        let ready = (ready.slab(), ready.filter());
         let fixed = &self.fixed.triangles;
         if !fixed.tree().is_empty() {
-            self.walk_through::<S, Q, false>(FIXED, fixed, ready, single, lower, noted, found);
+            self.walk_through::<S, Q, false>(FIXED, fixed, &ready, single, lower, &mut noted, found);
             if Q::ANY && noted.is_hit(found) {
-                return;
+                return noted;
             }
         }
         walk::single::<S, Q>(
@@ -121,7 +117,7 @@ impl Bvh {
                     let (local, blur) = place.local::<S>(ray);
                     let local = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur);
                     let Some(local) = local else { continue };
-                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, noted, found);
+                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, &mut noted, found);
                     if Q::ANY && noted.is_hit(found) {
                         return Visit::Stop;
                     }
@@ -129,5 +125,6 @@ impl Bvh {
                 Visit::Until(noted.limit)
             },
         );
+        noted
     }
 }

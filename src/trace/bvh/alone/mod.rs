@@ -95,6 +95,7 @@ impl Bvh {
         self.walk_ready::<S, Occluded>(ray, ready, stack, doubted).is_hit(doubted)
     }
 
+    /// As [`Self::walk_alone`], of a ray that is ready.
     #[inline(always)]
     fn walk_ready<S: Simd, Q: Query>(
         &self,
