@@ -177,6 +177,10 @@ impl Bvh {
             let (rays, answers);
             (rays, all) = all.split_at(chunk);
             (answers, all_answers) = all_answers.split_at_mut(chunk);
+            if in_bundles {
+                // The next bundle, while this one is traced: rays come from memory mostly, which nothing else tells ahead.
+                S::prefetch_all(&all[..bundle::RAYS.min(all.len())]);
+            }
             let traced = if in_bundles { tile::trace::<S, Q>(tile, self, rays, answers) } else { 0 };
             // The others, in runs: all of them, where there are no bundles.
             let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - rays.len()) } else { 1 };

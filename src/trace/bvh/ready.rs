@@ -90,6 +90,8 @@ impl<'a> ReadyRays<'a> {
         while self.next < self.rays.len() {
             let index = self.next;
             if index.is_multiple_of(8) {
+                let (_, following) = self.rays[index..].split_at(8.min(self.rays.len() - index));
+                S::prefetch_all(&following[..8.min(following.len())]);
                 match self.rays[index..].first_chunk() {
                     Some(eight) => (self.ready, self.valid) = ready::<S>(columns::<S>(eight), self.reach, self.blur),
                     None => {

@@ -44,6 +44,13 @@ pub(super) trait Simd {
     );
     /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
     fn prefetch(address: *const u8);
+    /// Has all of these loaded.
+    #[inline(always)]
+    fn prefetch_all<T>(values: &[T]) {
+        for offset in (0..size_of_val(values)).step_by(256) {
+            Self::prefetch(values.as_ptr().cast::<u8>().wrapping_add(offset));
+        }
+    }
     /// Where a value is, or would be.
     #[inline(always)]
     fn address<T>(values: &[T], index: u32) -> *const u8 {
