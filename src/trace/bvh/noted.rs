@@ -5,7 +5,7 @@ use super::Bvh;
 use super::block::Lane;
 use super::level::Through;
 use super::placements::FIXED;
-use super::quad::{Numbers, Quad};
+use super::quad::{Numbers, Quad, Seen};
 use super::simd::{Array, Doubles, Simd};
 use super::triangles::TriangleTree;
 use crate::math::Vec3;
@@ -31,6 +31,12 @@ impl<D: Doubles> Rays<D> {
 #[inline(always)]
 fn columns<S: Simd>([a, b, c, d]: [Vec3; 4]) -> [S::D4; 3] {
     [widen::<S>(&[a.x, b.x, c.x, d.x]), widen::<S>(&[a.y, b.y, c.y, d.y]), widen::<S>(&[a.z, b.z, c.z, d.z])]
+}
+
+/// One point for all four.
+#[inline(always)]
+pub(super) fn splat<S: Simd>(p: Vec3) -> [S::D4; 3] {
+    [S::D4::splat(p.x.into()), S::D4::splat(p.y.into()), S::D4::splat(p.z.into())]
 }
 
 #[inline(always)]
@@ -62,6 +68,35 @@ impl TriangleTree {
             self.hit(&triangles[3], t32[3], u[3], v[3]),
         ];
         (t, hits)
+    }
+
+    /// A triangle that rays hit for sure which all start in `origin`; `id` is as in [`Self::offer_one`].
+    #[inline(always)]
+    pub fn shared<S: Simd>(&self, origin: [S::D4; 3], id: u32) -> Shared<S::D4> {
+        let mut scratch = None;
+        let triangle = self.leaves().lane(id, &mut scratch);
+        let [a, b, c] = triangle.block.triangle(triangle.lane);
+        let corners = [splat::<S>(a), splat::<S>(b), splat::<S>(c)];
+        Shared { id, seen: Seen::new(origin, corners), hit: self.hit(&triangle, 0.0, 0.0, 0.0) }
+    }
+}
+
+/// A triangle that is hit by several rays from one origin: what the rays have in common is computed once.
+pub(super) struct Shared<D> {
+    /// The triangle's.
+    pub id: u32,
+    seen: Seen<D>,
+    /// The ids are the triangle's.
+    hit: Hit,
+}
+
+impl<D: Doubles> Shared<D> {
+    /// As [`TriangleTree::hits`].
+    #[inline(always)]
+    pub fn hits(&self, direction: [D; 3]) -> ([f64; 4], [Hit; 4]) {
+        let Numbers { t, t32, u, v } = self.seen.along(direction).numbers();
+        let hit = |i: usize| Hit { t: t32[i], u: u[i], v: v[i], ..self.hit };
+        (t, [hit(0), hit(1), hit(2), hit(3)])
     }
 }
 

@@ -5,7 +5,36 @@
 use super::simd::{Array, Doubles};
 use crate::shape::triangle;
 
-/// Four triangles as seen from the origins of four rays: numbers as in [`triangle`](crate::shape::triangle).
+/// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers of a hit with.
+pub(super) struct Seen<D> {
+    /// Opposite to the second and third corner.
+    sides: [[D; 3]; 2],
+    normal: [D; 3],
+    height: D,
+}
+
+impl<D: Doubles> Seen<D> {
+    /// Of the corners in the world.
+    #[inline(always)]
+    pub fn new(origin: [D; 3], [pa, pb, pc]: [[D; 3]; 3]) -> Self {
+        let (a, c) = (minus(pa, origin), minus(pc, origin));
+        let (eb, ec) = (minus(pa, pc), minus(pb, pa));
+        let normal = cross(eb, ec);
+        Self { sides: [cross(c, eb), cross(a, ec)], normal, height: dot(a, normal) }
+    }
+
+    #[inline(always)]
+    pub fn along(&self, direction: [D; 3]) -> Quad<D> {
+        let [b, c] = self.sides;
+        Quad {
+            volumes: [dot(direction, b), dot(direction, c)],
+            slope: dot(direction, self.normal),
+            height: self.height,
+        }
+    }
+}
+
+/// The same along the rays' directions: numbers as in [`triangle`](crate::shape::triangle).
 pub(super) struct Quad<D> {
     /// The volumes opposite to the second and third corner.
     volumes: [D; 2],
@@ -24,15 +53,8 @@ pub(super) struct Numbers {
 impl<D: Doubles> Quad<D> {
     /// Of the corners in the world.
     #[inline(always)]
-    pub fn new(origin: [D; 3], direction: [D; 3], [pa, pb, pc]: [[D; 3]; 3]) -> Self {
-        let (a, c) = (minus(pa, origin), minus(pc, origin));
-        let (eb, ec) = (minus(pa, pc), minus(pb, pa));
-        let normal = cross(eb, ec);
-        Self {
-            volumes: [dot(direction, cross(c, eb)), dot(direction, cross(a, ec))],
-            slope: dot(direction, normal),
-            height: dot(a, normal),
-        }
+    pub fn new(origin: [D; 3], direction: [D; 3], corners: [[D; 3]; 3]) -> Self {
+        Seen::new(origin, corners).along(direction)
     }
 
     /// A bit for each triangle, of those that are hit for sure and whose corners were rounded in f64, for which

@@ -5,10 +5,10 @@ use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
 use crate::trace::bvh::found::NONE;
-use crate::trace::bvh::noted::{Rays, widen};
+use crate::trace::bvh::noted::{Rays, Shared, splat, widen};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::{Doubles, Simd};
+use crate::trace::bvh::simd::Simd;
 use crate::trace::nearest::Nearest;
 
 /// What the rays of a bundle have hit so far.
@@ -83,6 +83,8 @@ impl Found {
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
     ) {
+        // Neighbours mostly hit the same triangle.
+        let mut shared: Option<Shared<S::D4>> = None;
         for chunk in 0..count.div_ceil(4) {
             let chunk = chunk % (RAYS / 4);
             let ids: [u32; 4] = self.noted.as_chunks().0[chunk];
@@ -93,7 +95,23 @@ impl Found {
             let [pa, pb, pc, pd] = places;
             // NONE and FIXED are the largest numbers.
             let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            let computed = self.computed >> (4 * chunk) & 0b1111;
+            if some == NONE && computed == 0 {
+                *answers = [Q::MISS; 4];
+                continue;
+            }
             if some != NONE && pa.min(pb).min(pc.min(pd)) == FIXED {
+                if some == all {
+                    let shared = match &shared {
+                        Some(shared) if shared.id == all => shared,
+                        _ => shared
+                            .insert(bvh.fixed.triangles.shared::<S>(splat::<S>(Vec3::from_array(bundle.origin)), all)),
+                    };
+                    let (exact, [a, b, c, d]) = shared.hits(directions::<S>(bundle, chunk));
+                    *t = exact;
+                    *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
+                    continue;
+                }
                 let noted = named(&ids);
                 let ids = if all == NONE { repeated(&ids, noted) } else { ids };
                 let (exact, hits) = bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), ids);
@@ -109,12 +127,11 @@ impl Found {
             } else if some != NONE {
                 answer_some::<S, Q>(bvh, bundle, rays, chunk, &ids, &places, t, answers);
             }
-            for lane in 0..4 {
-                let ray = 4 * chunk + lane;
-                if ids[lane] == NONE {
-                    let is_hit = self.computed >> ray & 1 != 0;
-                    answers[lane] = if is_hit { Q::answer(self.nearest[ray].hit()) } else { Q::MISS };
-                    t[lane] = self.nearest[ray].t();
+            for lane in (0..4).filter(|lane| ids[*lane] == NONE) {
+                answers[lane] = Q::MISS;
+                if computed >> lane & 1 != 0 {
+                    let nearest = &self.nearest[4 * chunk + lane];
+                    (t[lane], answers[lane]) = (nearest.t(), Q::answer(nearest.hit()));
                 }
             }
         }
@@ -183,9 +200,12 @@ fn repeated(values: &[u32; 4], lanes: u32) -> [u32; 4] {
 /// The rays of a chunk, as they were given.
 #[inline(always)]
 fn four<S: Simd>(bundle: &Bundle, chunk: usize) -> Rays<S::D4> {
+    Rays { origin: splat::<S>(Vec3::from_array(bundle.origin)), direction: directions::<S>(bundle, chunk) }
+}
+
+#[inline(always)]
+fn directions<S: Simd>(bundle: &Bundle, chunk: usize) -> [S::D4; 3] {
     let [x, y, z] = &bundle.direction;
     let lanes = |d: &PerRay| d.0.as_chunks().0[chunk];
-    let direction = [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))];
-    let [x, y, z] = bundle.origin;
-    Rays { origin: [S::D4::splat(x.into()), S::D4::splat(y.into()), S::D4::splat(z.into())], direction }
+    [widen::<S>(&lanes(x)), widen::<S>(&lanes(y)), widen::<S>(&lanes(z))]
 }

@@ -41,7 +41,7 @@ use walk::{Entry, Walk, Way, few};
 /// Working memory, made once a batch.
 pub(super) struct Scratch {
     one: One,
-    /// t of the closest hits of the last bundle.
+    /// t of the closest hits of the last bundle, where there are any.
     pub t: [f64; RAYS],
     /// How many placed objects the last bundles entered.
     pub entered: u32,
