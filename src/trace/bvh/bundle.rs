@@ -336,25 +336,34 @@ pub(super) struct Boxes {
 }
 
 impl BundleSlab {
-    /// The children that some ray of the bundle may enter with t' from `begin` to `limit`, as a bit mask; where it enters
-    /// each at the earliest; and the boxes.
+    /// The boxes of a node's children; t' is at least `begin`.
     #[inline(always)]
-    pub fn enter<S: Simd>(&self, node: &Node, begin: f32, limit: f32) -> (u32, [f32; WIDTH], Boxes) {
+    pub fn boxes<S: Simd>(&self, node: &Node, begin: f32) -> Boxes {
         let splat = S::V8::splat;
         let forward = splat(self.forward);
         let near_along = S::V8::load(&node.bounds[self.near[2]]).sub(splat(self.near_origin[2])).mul(forward);
         let far_along = S::V8::load(&node.bounds[self.far[2]]).sub(splat(self.far_origin[2])).mul(forward);
-        let (mut near, mut far) = (near_along.max(splat(begin)), far_along.min(splat(limit)));
-        let mut boxes = Boxes { near: [near.to_array(); 3], far: [far_along.to_array(); 3] };
+        let mut boxes = Boxes { near: [near_along.max(splat(begin)).to_array(); 3], far: [far_along.to_array(); 3] };
         for i in 0..2 {
-            let first = S::V8::load(&node.bounds[self.near[i]]).sub(splat(self.near_origin[i]));
-            let last = S::V8::load(&node.bounds[self.far[i]]).sub(splat(self.far_origin[i]));
+            boxes.near[i] = S::V8::load(&node.bounds[self.near[i]]).sub(splat(self.near_origin[i])).to_array();
+            boxes.far[i] = S::V8::load(&node.bounds[self.far[i]]).sub(splat(self.far_origin[i])).to_array();
+        }
+        boxes
+    }
+
+    /// The children that some ray of the bundle may enter with t' up to `limit`, as a bit mask; and where it enters each at the
+    /// earliest.
+    #[inline(always)]
+    pub fn enter<S: Simd>(&self, boxes: &Boxes, limit: f32) -> (u32, [f32; WIDTH]) {
+        let splat = S::V8::splat;
+        let (mut near, mut far) = (S::V8::load(&boxes.near[2]), S::V8::load(&boxes.far[2]).min(splat(limit)));
+        for i in 0..2 {
+            let (first, last) = (S::V8::load(&boxes.near[i]), S::V8::load(&boxes.far[i]));
             let [a, b] = self.reciprocal[i];
             let (a, b) = (splat(a), splat(b));
             near = first.mul(a).min(first.mul(b)).max(near);
             far = last.mul(a).max(last.mul(b)).min(far);
-            (boxes.near[i], boxes.far[i]) = (first.to_array(), last.to_array());
         }
-        (near.at_most(far).bits(), near.to_array(), boxes)
+        (near.at_most(far).bits(), near.to_array())
     }
 }

@@ -91,40 +91,33 @@ impl<Q: Query> Walk<'_, Q> {
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block(index, &mut scratch);
-            // Made when a ray first asks; planes serve every origin.
-            let (mut seen, mut planes, mut heights) = (None, None, None);
+            let mut seen = Seen::new(block, axes, self.start(leaf.rays.trailing_zeros() as usize % RAYS, is_turned));
+            // Made when a ray first asks; they serve every origin.
+            let mut planes = None;
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
+                if is_turned && rays != leaf.rays {
+                    seen = Seen::new(block, axes, self.own_origin(ray));
+                }
                 rays &= rays - 1;
                 if self.found.limit.0[ray] < leaf.near {
                     continue;
                 }
-                if is_turned {
-                    // From the ray's own origin.
-                    (seen, heights) = (None, None);
-                }
-                let seen = seen.get_or_insert_with(
-                    #[inline(always)]
-                    || Seen::new(block, axes, if is_turned { self.own_origin(ray) } else { bundle.origin }),
-                );
-                let (sheared, sides, lanes) = sides::<S>(seen, block, bundle, ray, blur);
+                let (sheared, sides, lanes) = sides::<S>(&seen, block, bundle, ray, blur);
                 if lanes == 0 {
                     continue;
                 }
                 let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
                 let met = if self.place == FIXED {
-                    meet_between_corners::<S>(&sides, &sheared, lanes, seen, &mut planes, block, bundle, &range)
+                    meet_between_corners::<S>(&sides, &sheared, lanes, &seen, &mut planes, block, bundle, &range)
                 } else {
                     let planes = planes.get_or_insert_with(
                         #[inline(always)]
                         || planes_of::<S::V8>(block, axes),
                     );
-                    let heights = heights.get_or_insert_with(
-                        #[inline(always)]
-                        || planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin),
-                    );
-                    meet_planes::<S>(&sides, &sheared, lanes, planes, heights, bundle, ray, &range)
+                    let heights = planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin);
+                    meet_planes::<S>(&sides, &sheared, lanes, planes, &heights, bundle, ray, &range)
                 };
                 if let Some(met) = met {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
@@ -184,6 +177,12 @@ impl<Q: Query> Walk<'_, Q> {
             sure: tmax * (1.0 - SLACK) - TINY,
             limit: tmax * (1.0 + SLACK) + TINY,
         }
+    }
+
+    /// Where a ray starts, as far as its bundle's way tells: turned rays are looked at from their own origins.
+    #[inline(always)]
+    fn start(&self, ray: usize, is_turned: bool) -> [f32; 3] {
+        if is_turned { self.own_origin(ray) } else { self.bundle.origin }
     }
 
     /// Where a turned ray starts.

@@ -19,7 +19,13 @@ use crate::trace::bvh::triangles::TriangleTree;
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;
 
-/// The same in a tree that reaches that far. [`Edges`] must not overflow; where they might, every ray is by itself.
+/// Rays that are asked at every box, without their rows before them.
+const FEW_AT_NODES: u32 = 16;
+
+/// Rays of which each is held against the eight boxes of a node by itself.
+const ONE_BY_ONE: u32 = 3;
+
+/// [`FEW`] in a tree that reaches that far. [`Edges`] must not overflow; where they might, every ray is by itself.
 #[inline(always)]
 pub(super) fn few(bundle: &Bundle, reach: Vec3) -> u32 {
     if bundle.may_overflow(reach) { RAYS as u32 } else { FEW }
@@ -31,8 +37,8 @@ pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
     pub near: f32,
     pub child: Child,
-    /// A bit for every ray that may enter it: in a leaf each is known to; in a node they are those of rows that may, without the rows
-    /// before the first ray that is known to.
+    /// A bit for every ray that may enter it: in a leaf, and where few came to its parent, each is known to; else they are those of rows that
+    /// may, without the rows before the first ray that is known to.
     pub rays: u64,
 }
 
@@ -91,14 +97,23 @@ impl<'a> Way<'a> {
                 return Some(next);
             }
             let node = tree.node(next.child);
-            let (mut mask, near, boxes) = self.slab.enter::<S>(node, self.bundle.first, self.most);
+            let boxes = self.slab.boxes::<S>(node, self.bundle.first);
+            let (mut mask, near, known) = if next.rays.count_ones() <= ONE_BY_ONE {
+                let (mask, near, rays) = self.enter_one_by_one::<S>(goal.limit(), &boxes, next.rays);
+                (mask, near, Some(rays))
+            } else {
+                let (mask, near) = self.slab.enter::<S>(&boxes, self.most);
+                (mask, near, None)
+            };
             let base = *len;
             while mask != 0 {
                 let slot = mask.trailing_zeros() as usize % WIDTH;
                 mask &= mask - 1;
                 let child = node.child[slot];
-                let rays = rows::rays(self.bundle.rows.enter::<S>(&boxes, slot, &self.most_of)) & next.rays;
-                let rays = self.entering::<S>(goal.limit(), &boxes, slot, rays, child.is_leaf());
+                let rays = match &known {
+                    Some(rays) => rays[slot],
+                    None => self.entering::<S>(goal.limit(), &boxes, slot, next.rays, child.is_leaf()),
+                };
                 if rays == 0 {
                     continue;
                 }
@@ -119,10 +134,45 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// Those of the rays that enter the box: each of them, or just all from the first row with such a ray on.
+    /// The children that the rays enter, where each is entered at the earliest, and by which.
     #[inline(always)]
-    fn entering<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, rays: u64, each: bool) -> u64 {
+    fn enter_one_by_one<S: Simd>(
+        &self,
+        limit: &PerRay,
+        boxes: &Boxes,
+        mut rays: u64,
+    ) -> (u32, [f32; WIDTH], [u64; WIDTH]) {
         let splat = S::V8::splat;
+        let [p, q] = &self.bundle.reciprocal;
+        let [px, qx, zx] = &boxes.near;
+        let [py, qy, zy] = &boxes.far;
+        let (mut all, mut near, mut rays_of) = (0, splat(f32::INFINITY), [0; WIDTH]);
+        while rays != 0 {
+            let ray = rays.trailing_zeros() as usize % RAYS;
+            rays &= rays - 1;
+            let (p, q) = (splat(p.0[ray]), splat(q.0[ray]));
+            let first = S::V8::load(px).mul(p).max(S::V8::load(qx).mul(q)).max(S::V8::load(zx));
+            let last = S::V8::load(py).mul(p).min(S::V8::load(qy).mul(q));
+            let last = last.min(S::V8::load(zy).min(splat(limit.0[ray])));
+            let mut mask = first.at_most(last).bits();
+            (all, near) = (all | mask, near.min(first));
+            while mask != 0 {
+                rays_of[mask.trailing_zeros() as usize % WIDTH] |= 1 << ray;
+                mask &= mask - 1;
+            }
+        }
+        (all, near.to_array(), rays_of)
+    }
+
+    /// Those of the rays that enter the box: each of them in a leaf, or where they are few; else just all from the first row with such
+    /// a ray on, of rows that may.
+    #[inline(always)]
+    fn entering<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, mut rays: u64, is_leaf: bool) -> u64 {
+        let splat = S::V8::splat;
+        let are_few = rays.count_ones() <= FEW_AT_NODES;
+        if !are_few {
+            rays &= rows::rays(self.bundle.rows.enter::<S>(boxes, slot, &self.most_of));
+        }
         let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
         let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
         let (mut entering, mut open) = (0, rays);
@@ -134,7 +184,7 @@ impl<'a> Way<'a> {
             let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
             let last = far[0].mul(p).min(far[1].mul(q)).min(far[2].min(limit));
             let enter = u64::from(first.at_most(last).bits()) << (8 * row) & rays;
-            if enter != 0 && !each {
+            if enter != 0 && !is_leaf && !are_few {
                 return rays & !0 << (8 * row);
             }
             entering |= enter;
