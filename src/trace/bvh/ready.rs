@@ -5,7 +5,7 @@
 use super::filter::{Filter, Filters};
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
-use super::slab::{SMALLEST, SlabRay, Slabs, least_t};
+use super::slab::{SlabRay, Slabs, least_t};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -133,20 +133,15 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     let [x, y, z, dx, dy, dz, tmin, tmax] = columns;
     let (origin, direction) = ([x, y, z], [dx, dy, dz]);
     let largest = dx.abs().max(dy.abs()).max(dz.abs());
-    let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
-    let span = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
     let farthest = x.abs().max(y.abs()).max(z.abs());
     let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
-    let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * blur.direction));
-    let stray = stray.mul_add(span[0].max(span[1]).max(span[2]), off.mul_add(splat(1.1), splat(f32::MIN_POSITIVE)));
+    let slabs = Slabs::of_rays(origin, direction, reach, off, blur.direction);
     let mut finite = zero;
     let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
     for axis in 0..3 {
-        let d = direction[axis];
-        finite = d.mul_add(zero, origin[axis].mul_add(zero, finite));
-        let slabs = Slabs::new(origin[axis], d, span[axis], smallest, stray);
-        (reciprocals[axis], near[axis], far[axis]) = (slabs.reciprocal, slabs.near, slabs.far);
-        sides[axis] = S::V8::select(slabs.is_negative, splat(f32::from_bits(1)), zero);
+        finite = direction[axis].mul_add(zero, origin[axis].mul_add(zero, finite));
+        (reciprocals[axis], near[axis], far[axis]) = (slabs[axis].reciprocal, slabs[axis].near, slabs[axis].far);
+        sides[axis] = S::V8::select(slabs[axis].is_negative, splat(f32::from_bits(1)), zero);
     }
     // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);

@@ -80,6 +80,7 @@ impl SlabRay {
 }
 
 /// Slabs, each in a lane: of one ray an axis a lane, or of one axis a ray a lane.
+#[derive(Clone, Copy)]
 pub(super) struct Slabs<V: Vector> {
     pub reciprocal: V,
     pub near: V,
@@ -102,10 +103,27 @@ impl<V: Vector> Slabs<V> {
         Self::new(o, d, span, splat(smallest), splat(stray))
     }
 
+    /// Of as many rays as there are lanes, axis by axis. Origins are off by `off`, directions by `turn` of their largest component.
+    #[inline(always)]
+    pub fn of_rays(origin: [V; 3], direction: [V; 3], reach: Vec3, off: V, turn: f32) -> [Self; 3] {
+        let splat = V::splat;
+        let ([x, y, z], [dx, dy, dz]) = (origin, direction);
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
+        let [sx, sy, sz] = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
+        let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * turn));
+        let stray = stray.mul_add(sx.max(sy).max(sz), off.mul_add(splat(1.1), splat(f32::MIN_POSITIVE)));
+        [
+            Self::new(x, dx, sx, smallest, stray),
+            Self::new(y, dy, sy, smallest, stray),
+            Self::new(z, dz, sz, smallest, stray),
+        ]
+    }
+
     /// `span` is the origin's magnitude and the reach, `smallest` what a direction's component is at least taken to be, and `stray` how far the ray may be off besides
     /// rounding, with room for lengths that are no normal numbers.
     #[inline(always)]
-    pub fn new(origin: V, direction: V, span: V, smallest: V, stray: V) -> Self {
+    fn new(origin: V, direction: V, span: V, smallest: V, stray: V) -> Self {
         let (splat, zero) = (V::splat, V::splat(0.0));
         let is_negative = direction.less(zero);
         let least = V::select(is_negative, zero.sub(smallest), smallest);

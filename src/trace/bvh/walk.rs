@@ -104,6 +104,11 @@ pub(super) fn with_stack<R>(work: impl FnOnce(&mut Stack) -> R) -> R {
 pub(super) trait Enter {
     /// The children in which something may be hit up to `limit`; and where each is entered, not below 0.
     fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8);
+    /// Of these children, a bit each, those that are worth a visit: what enters all of them together may ask each more closely.
+    #[inline(always)]
+    fn select<S: Simd>(&self, _node: &Node, children: u32) -> u32 {
+        children
+    }
 }
 
 impl Enter for SlabRay {
@@ -131,7 +136,7 @@ pub(super) fn single<S: Simd, Q: Query>(
         while !next.child.is_leaf() {
             let node = tree.node(next.child);
             let (mask, near) = ray.enter::<S>(node, limit);
-            let (mask, Near(near)) = (mask.bits(), &Near(near.to_array()));
+            let (mask, Near(near)) = (ray.select::<S>(node, mask.bits()), &Near(near.to_array()));
             if mask == 0 {
                 break;
             }

@@ -29,7 +29,7 @@ pub(super) struct Beam {
     /// Whether rays are so far apart, for the size of the scene, that they have little in common.
     pub is_wide: bool,
     /// On each axis whether a box's upper side is met first.
-    is_backward: [bool; 3],
+    pub is_backward: [bool; 3],
     /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal. One number more, here and
     /// below, as a vector is stored.
     near_offset: [f32; 4],

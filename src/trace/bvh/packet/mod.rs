@@ -4,7 +4,7 @@
 //! ([`super::tile`]), whose making takes longer than eight rays do. So as little as possible is made ready:
 //!
 //! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal directions, at
-//!   little more than what a single ray costs; no ray is asked by itself.
+//!   little more than what a single ray costs. Rays are asked only if any hit will do, and at leaves ([`Party`](party::Party)).
 //! - **Triangles**: the beam rejects most of a block by their boxes. Of the others each is tested against eight rays, a lane a ray
 //!   ([`Octet`]), by the test and with the bounds of single rays ([`super::woop`]).
 //! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
@@ -18,6 +18,7 @@ mod beam;
 mod doubts;
 mod finish;
 mod octet;
+mod party;
 mod way;
 
 use super::Bvh;

@@ -2,6 +2,7 @@
 
 use super::beam::Beam;
 use super::octet::Octet;
+use super::party::Party;
 use super::{Asked, Doubts, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::LANES;
@@ -24,10 +25,12 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
         octet.fill(asked.packets[number], asked.lanes[number], beam.axes);
     }
     let mut most = beam.limit;
+    let party = Party::<Q, S::V8, N>::new(beam, asked, triangles.tree().reach());
+    party.shorten(octets);
     walk::single::<S, Q>(
         stack,
         triangles.tree(),
-        beam,
+        &party,
         most,
         #[inline(always)]
         |leaf| {
@@ -51,6 +54,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
                     }
                 }
                 if changed {
+                    party.shorten(octets);
                     most = farthest::<S, N>(octets);
                     if Q::ANY && most < 0.0 {
                         return Visit::Stop;
