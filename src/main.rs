@@ -1,5 +1,5 @@
 //! `twincast`: arguments, then the library, then an exit code.
 
-fn main() -> std::process::ExitCode {
+fn main() {
     twincast::cli::main()
 }

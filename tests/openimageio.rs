@@ -29,6 +29,19 @@ fn openimageio() -> String {
     libraries.into_iter().find(|name| name.starts_with("libOpenImageIO.so")).expect("a picture takes OpenImageIO")
 }
 
+/// One of the libraries behind it starts threads, and crashes if it is destroyed before they have begun.
+#[test]
+fn the_program_ends_without_destroying_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = folder.path().join("a.png").to_string_lossy().into_owned();
+    let args = ["render", SCENE, "-o", &picture, "--size", "8x8", "--spp", "1"];
+    let output = command().env("LD_DEBUG", "files").args(args).output().expect("the program runs");
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && words.contains("calling init: "), "{words}");
+    let ends: Vec<_> = words.lines().filter(|line| line.contains("calling fini: ")).collect();
+    assert!(ends.is_empty(), "{ends:?}");
+}
+
 #[test]
 fn it_is_loaded_for_pictures_and_for_nothing_else() {
     let asked_for = openimageio();

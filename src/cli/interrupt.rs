@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::leave::leave;
 use crate::error::{Error, Result};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -14,7 +15,7 @@ pub(super) fn install() -> Result<&'static AtomicBool> {
     }
     ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            leave(130);
         }
     })
     .map_err(|error| Error::Unavailable(format!("Ctrl-C cannot be handled: {error}")))?;

@@ -21,6 +21,7 @@ mod explain;
 mod frames;
 mod info;
 mod interrupt;
+mod leave;
 mod make;
 mod man;
 mod metadata;
@@ -39,7 +40,6 @@ mod trial;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
-use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
@@ -105,9 +105,9 @@ Exit codes:
   5    a backend or feature that is not in this build
   130  interrupted";
 
-/// Runs the program on the process's own arguments.
-pub fn main() -> ExitCode {
-    ExitCode::from(main_with(std::env::args_os()))
+/// Runs the program on the process's own arguments, and ends the process with its exit code.
+pub fn main() -> ! {
+    leave::leave(main_with(std::env::args_os()))
 }
 
 /// Runs the program on these arguments, of which the first is its name, and returns its exit code.
