@@ -257,6 +257,13 @@ impl Bundle {
         if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
 
+    /// The area across the bundle's axis that belongs to each of `count` rays, at t'.
+    #[inline(always)]
+    pub fn grain(&self, t: f32, count: usize) -> f32 {
+        let [p, q] = [self.high[0] - self.low[0], self.high[1] - self.low[1]];
+        p * q * t * t / count as f32
+    }
+
     /// Whether products of three lengths, as of corners and edges, may leave f32 in a tree that reaches that far.
     #[inline(always)]
     pub fn may_overflow(&self, reach: Vec3) -> bool {

@@ -166,6 +166,13 @@ impl Found {
         (self.sure, self.limit, self.noted, self.place) = (sure, limit, noted, place);
     }
 
+    /// As it was when it was left: a ray's [`Self::range`], and what was computed.
+    #[inline(always)]
+    pub fn take(&mut self, range: [f32; 2], nearest: Nearest) {
+        self.start(range);
+        (self.nearest, self.is_computed) = (nearest, true);
+    }
+
     /// Up to where a hit is the nearest for sure, and up to where one is wanted.
     #[inline(always)]
     pub fn range(&self) -> [f32; 2] {

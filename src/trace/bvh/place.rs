@@ -52,6 +52,8 @@ pub(super) struct Place {
     absolute: f64,
     /// At least what the error of a corner in the world is relative to: [`Corners::slack`](crate::shape::triangle::Corners::slack).
     pub slack: f64,
+    /// The [grain](super::triangles::TriangleTree::grain) of its triangles in the world, if [that of the object](Self::with_grain) was told.
+    pub grain: f32,
 }
 
 impl Place {
@@ -78,8 +80,15 @@ impl Place {
             relative: quotient * stretch,
             absolute: offset + quotient * stretch * away,
             slack: farthest.max_element(),
+            grain: 0.0,
             placement,
         }
+    }
+
+    /// The same, given the grain of the object's triangles.
+    pub fn with_grain(self, grain: f32) -> Self {
+        let volume = self.placement.to_world.as_daffine3().matrix3.determinant().abs();
+        Self { grain: grain * volume.cbrt().powi(2) as f32, ..self }
     }
 
     pub fn through(&self) -> Through<'_> {

@@ -102,8 +102,9 @@ impl PlacementTree {
         let (tree, order) = tree_over(placements, |placement| placement.motion.is_none(), objects, options);
         let place = |i: usize| {
             let placement = placements[i].clone();
-            let reach = objects[placement.object as usize].triangles.tree().reach();
-            Place::new(placement, reach)
+            let triangles = &objects[placement.object as usize].triangles;
+            let (reach, grain) = (triangles.tree().reach(), triangles.grain());
+            Place::new(placement, reach).with_grain(grain)
         };
         let places: Vec<Place> = order.into_iter().map(place).collect();
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));

@@ -112,6 +112,11 @@ impl TriangleTree {
         })
     }
 
+    /// How large they are, about: the area that their box shows to one side, over their number.
+    pub fn grain(&self) -> f32 {
+        if self.count == 0 { 0.0 } else { self.tree.bounds().half_area() / (3.0 * self.count as f32) }
+    }
+
     /// Triangles that can be hit.
     pub fn count(&self) -> usize {
         self.count

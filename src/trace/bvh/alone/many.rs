@@ -13,7 +13,7 @@ use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::ready::{ReadyRay, ReadyRays};
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::walk::{self, Stacks, Visit};
+use crate::trace::bvh::walk::{self, Stack, Stacks, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,15 +109,7 @@ impl Bvh {
             #[inline(always)]
             |leaf| {
                 for number in leaf.blocks() {
-                    let place = self.placements.at(number);
-                    let triangles = &self.objects[place.placement.object as usize].triangles;
-                    if triangles.tree().is_empty() {
-                        continue;
-                    }
-                    let (local, blur) = place.local::<S>(ray);
-                    let local = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur);
-                    let Some(local) = local else { continue };
-                    self.walk_through::<S, Q, true>(number, triangles, &local, single, lower, &mut noted, found);
+                    self.walk_place::<S, Q>(number, single, ray, lower, &mut noted, found);
                     if Q::ANY && noted.is_hit(found) {
                         return Visit::Stop;
                     }
@@ -126,5 +118,26 @@ impl Bvh {
             },
         );
         noted
+    }
+
+    /// Goes on through the triangles of one placed object. `ray` is the same ray again.
+    #[inline(always)]
+    pub(in crate::trace::bvh) fn walk_place<S: Simd, Q: Query>(
+        &self,
+        number: u32,
+        single: &SingleRay,
+        ray: &Ray,
+        stack: &mut Stack,
+        noted: &mut Noted,
+        found: &mut Found,
+    ) {
+        let place = self.placements.at(number);
+        let triangles = &self.objects[place.placement.object as usize].triangles;
+        if triangles.tree().is_empty() {
+            return;
+        }
+        let (local, blur) = place.local::<S>(ray);
+        let Some(local) = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur) else { return };
+        self.walk_through::<S, Q, true>(number, triangles, &local, single, stack, noted, found);
     }
 }

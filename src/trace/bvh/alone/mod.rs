@@ -156,23 +156,23 @@ impl Bvh {
 
 /// What a ray has hit so far, as [`Found`] is, which is asked only where there is doubt: kept in registers.
 #[derive(Clone, Copy)]
-struct Noted {
+pub(super) struct Noted {
     /// A hit nearer than this is the nearest for sure.
-    sure: f32,
+    pub sure: f32,
     /// No hit beyond this is wanted; rounded up.
-    limit: f32,
+    pub limit: f32,
     /// Found without doubt, but not computed yet: block and lane.
-    id: u32,
+    pub id: u32,
     /// Where that triangle is: the number of a placement, or [`FIXED`].
-    place: u32,
+    pub place: u32,
     /// Whether anything was decided at once.
-    is_doubted: bool,
+    pub is_doubted: bool,
 }
 
 impl Noted {
     /// Nothing yet.
     #[inline(always)]
-    fn nothing(ray: &SingleRay) -> Self {
+    pub fn nothing(ray: &SingleRay) -> Self {
         // Rounded up, for t is rounded before it is held against it.
         let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
         // What lies so far that t overflows is in doubt, whose decision is that it is not hit.
@@ -181,7 +181,7 @@ impl Noted {
 
     /// Whether there is any hit; `found` is what was decided.
     #[inline(always)]
-    fn is_hit(&self, found: &Found) -> bool {
+    pub fn is_hit(&self, found: &Found) -> bool {
         self.id != NONE || self.is_doubted && found.is_hit()
     }
 

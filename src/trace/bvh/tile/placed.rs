@@ -1,17 +1,13 @@
 //! A bundle among placed objects: it goes through the tree of placements as through any other, and from each of them on
 //! in the object's coordinates.
 
-use super::found::{DONE, Found};
 use super::walk::{Entry, Goal, Way};
-use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
+use crate::trace::bvh::bundle::{Bundle, PerRay};
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::placements::{FIXED, PlacementTree};
-use crate::trace::bvh::query::Query;
 use crate::trace::bvh::range::Range;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::walk::Stack;
 
 /// The placements, as what a bundle looks for.
 struct Places<'a> {
@@ -63,46 +59,16 @@ impl<'a> Tour<'a> {
         Some(Self { places: Places { placements, limit: PerRay::ZERO }, way, stack, len: 1, visits_fixed })
     }
 
-    /// The next place, and a bit for every ray that may go there.
+    /// The next place, a bit for every ray that may go there, and where the first of them enters its box.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u64)> {
+    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u64, f32)> {
         if std::mem::take(&mut self.visits_fixed) {
-            return Some((FIXED, !0));
+            return Some((FIXED, !0, 0.0));
         }
         let way = self.way.as_mut()?;
         way.bundle.limit_of::<S>(range, &mut self.places.limit);
         way.measure::<S>(&self.places.limit);
         let leaf = way.next_leaf::<S>(&self.places, self.stack, &mut self.len)?;
-        Some((leaf.child.first(), leaf.rays))
-    }
-}
-
-/// Traces the rays of the bit mask `seeing` through one placed object, each by itself, where they are no bundle.
-#[inline(always)]
-pub(super) fn one_by_one<S: Simd, Q: Query>(
-    bvh: &Bvh,
-    place: u32,
-    rays: &[Ray; RAYS],
-    mut seeing: u64,
-    stack: &mut Stack,
-    range: &mut Range,
-    found: &mut Found,
-) {
-    let place = bvh.placements.at(place);
-    let level = &bvh.objects[place.placement.object as usize];
-    while seeing != 0 {
-        let i = seeing.trailing_zeros() as usize % RAYS;
-        seeing &= seeing - 1;
-        if range.limit.0[i] < 0.0 {
-            continue;
-        }
-        found.compute(bvh, rays, i);
-        let nearest = &mut found.nearest[i];
-        level.trace_triangles::<S, Q>(&rays[i], Some(place), stack, nearest);
-        match nearest.hit() {
-            Some(_) if Q::ANY => range.set(i, DONE, DONE),
-            Some(hit) => range.set(i, hit.t.next_down(), nearest.limit()),
-            None => {}
-        }
+        Some((leaf.child.first(), leaf.rays, leaf.near))
     }
 }
