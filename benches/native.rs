@@ -89,7 +89,7 @@ fn rays(c: &mut Criterion) {
         let ways = [
             ("alone", Travel::Alone, Width::One),
             ("flights", Travel::InFlight, Width::One),
-            ("bundles", Travel::BySize, Width::Eight),
+            ("bundles", Travel::Auto, Width::Eight),
         ];
         for (name, travel, width) in ways {
             bvh = bvh.travelling(travel);

@@ -23,7 +23,7 @@ pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> us
     for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {
         let mut bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
         let ways = [
-            (Travel::BySize, false),
+            (Travel::Auto, false),
             (Travel::Alone, false),
             (Travel::Alone, true),
             (Travel::InFlight, false),

@@ -1,5 +1,7 @@
 //! Rays and points as NumPy holds them: f32 or f64, of any strides, read in place.
 
+use std::ops::Range;
+
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -7,6 +9,9 @@ use pyo3::prelude::*;
 use twincast::Ray;
 use twincast::math::{DVec3, Vec3};
 use twincast::trace::precise::PreciseRay;
+
+/// Rays that a thread takes at a time.
+pub const CHUNK: usize = 1024;
 
 /// An array of three columns.
 #[derive(FromPyObject)]
@@ -31,7 +36,7 @@ pub enum Rows<'a> {
 }
 
 #[derive(Clone, Copy)]
-enum Range<'a> {
+enum Reach<'a> {
     F32(ArrayView1<'a, f32>),
     F64(ArrayView1<'a, f64>),
     All(f64),
@@ -84,7 +89,7 @@ pub struct Rays<'a> {
     /// As many, or one for all.
     directions: Rows<'a>,
     tmin: f64,
-    tmax: Range<'a>,
+    tmax: Reach<'a>,
 }
 
 impl<'a> Rays<'a> {
@@ -93,9 +98,9 @@ impl<'a> Rays<'a> {
     pub fn new(origins: &'a Points<'_>, directions: &'a Points<'_>, tmin: f64, tmax: &'a Ends<'_>) -> PyResult<Self> {
         let (origins, directions) = (origins.rows("origins")?, directions.rows("directions")?);
         let (tmax, ends) = match tmax {
-            Ends::F32(array) => (Range::F32(array.as_array()), Some(array.len())),
-            Ends::F64(array) => (Range::F64(array.as_array()), Some(array.len())),
-            Ends::All(tmax) => (Range::All(*tmax), None),
+            Ends::F32(array) => (Reach::F32(array.as_array()), Some(array.len())),
+            Ends::F64(array) => (Reach::F64(array.as_array()), Some(array.len())),
+            Ends::All(tmax) => (Reach::All(*tmax), None),
         };
         let count = origins.len();
         for (name, len) in [("directions", (directions.len() != 1).then_some(directions.len())), ("tmax", ends)] {
@@ -114,9 +119,9 @@ impl<'a> Rays<'a> {
     /// Whether they are in f32, and their range, too.
     pub fn are_f32(&self) -> bool {
         let range_is_f32 = match self.tmax {
-            Range::F32(_) => true,
-            Range::F64(_) => false,
-            Range::All(tmax) => f64::from(tmax as f32) == tmax,
+            Reach::F32(_) => true,
+            Reach::F64(_) => false,
+            Reach::All(tmax) => f64::from(tmax as f32) == tmax,
         };
         self.origins.is_f32() && self.directions.is_f32() && range_is_f32 && f64::from(self.tmin as f32) == self.tmin
     }
@@ -124,29 +129,33 @@ impl<'a> Rays<'a> {
     #[inline]
     pub fn at(&self, i: usize) -> PreciseRay {
         let tmax = match self.tmax {
-            Range::F32(tmax) => tmax[i].into(),
-            Range::F64(tmax) => tmax[i],
-            Range::All(tmax) => tmax,
+            Reach::F32(tmax) => tmax[i].into(),
+            Reach::F64(tmax) => tmax[i],
+            Reach::All(tmax) => tmax,
         };
         let direction = self.directions.at(i.min(self.directions.len() - 1));
         PreciseRay { origin: self.origins.at(i), direction, tmin: self.tmin, tmax }
     }
 
+    /// The numbers of the rays of a chunk.
+    pub fn chunk(&self, chunk: usize) -> Range<usize> {
+        chunk * CHUNK..self.len().min((chunk + 1) * CHUNK)
+    }
+
+    /// Those with these numbers.
+    pub fn some(&self, which: Range<usize>) -> Vec<PreciseRay> {
+        which.map(|i| self.at(i)).collect()
+    }
+
     /// The same in f32; for those that [are](Self::are_f32).
-    #[inline]
-    pub fn rounded(&self, i: usize) -> Ray {
-        let PreciseRay { origin, direction, tmin, tmax } = self.at(i);
-        Ray {
+    pub fn rounded(&self, which: Range<usize>) -> Vec<Ray> {
+        let rounded = |PreciseRay { origin, direction, tmin, tmax }| Ray {
             origin: origin.as_vec3(),
             direction: direction.as_vec3(),
             tmin: tmin as f32,
             tmax: tmax as f32,
             time: 0.0,
-        }
-    }
-
-    /// Those with these numbers.
-    pub fn some(&self, which: impl Iterator<Item = usize>) -> Vec<PreciseRay> {
-        which.map(|i| self.at(i)).collect()
+        };
+        which.map(|i| rounded(self.at(i))).collect()
     }
 }

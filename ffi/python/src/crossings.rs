@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::trace::precise::{PreciseHit, PreciseRay};
 
-use crate::arrays::{Ends, Points, Rays};
+use crate::arrays::{CHUNK, Ends, Points, Rays};
 use crate::pool;
-use crate::scene::{CHUNK, Scene, table};
+use crate::scene::{Scene, table};
 
 /// All hits, by ray, then by t: ray, primitive, geometry, t, (u, v), location.
 type Crossings<'py> = (
@@ -44,8 +44,8 @@ impl Scene {
         let counts = pool::run(py, threads, || {
             let mut counts = vec![0; rays.len()];
             counts.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, counts)| {
-                let (first, mut found) = (chunk * CHUNK, [0; CHUNK]);
-                self.precise.count_batch(&rays.some(first..first + counts.len()), &mut found[..counts.len()]);
+                let mut found = [0; CHUNK];
+                self.precise.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
                 counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
             });
             counts
@@ -72,7 +72,7 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let (ray, primitive, geometry, t, uv, location) = pool::run(py, threads, || {
             let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
-            let found: Vec<Found> = chunks.map(|chunk| self.found(&rays, chunk * CHUNK, most)).collect();
+            let found: Vec<Found> = chunks.map(|chunk| self.found(&rays, chunk, most)).collect();
             let count: usize = found.iter().map(|found| found.hits.len()).sum();
             let (mut ray, mut primitive, mut geometry) = (vec![0i64; count], vec![0i64; count], vec![0u32; count]);
             let (mut t, mut uv) = (vec![0f64; count], vec![0f64; 2 * count]);
@@ -116,8 +116,8 @@ impl Scene {
 
 impl Scene {
     /// The hits of the rays of one task.
-    fn found(&self, rays: &Rays<'_>, first: usize, most: usize) -> Found {
-        let rays = rays.some(first..rays.len().min(first + CHUNK));
+    fn found(&self, rays: &Rays<'_>, chunk: usize, most: usize) -> Found {
+        let rays = rays.some(rays.chunk(chunk));
         let mut found = Found { rays, ..Found::default() };
         self.precise.all_hits_batch(&found.rays, &mut found.ends, &mut found.hits);
         if most < usize::MAX {

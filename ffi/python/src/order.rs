@@ -1,34 +1,27 @@
-//! Points and rays in an order in which one is near the next.
+//! Points in an order in which one is near the next.
 //!
-//! What is asked of a point or a ray leads to a few kilobytes of the tree. Asked in the order in which they came, which is often none, most of
+//! What is asked of a point leads to a few kilobytes of the tree. Asked in the order in which they came, which is often none, most of
 //! these are fetched from far; along Morton's curve (1966, *A computer oriented geodetic data base*) the next one finds them where they
-//! are. On a mesh of 100,000 triangles distances then take half of the time, and nearest hits in f64 0.7 of it. Cells are so large that a few points
+//! are. On a mesh of 100,000 triangles distances then take half of the time. Cells are so large that a few points
 //! share one, which is as good as the finest order, and keys are counted, which costs less than to compare them.
+//!
+//! Rays are not sorted: many are in flight together, so that none waits for long, and to sort them costs more than it saves.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 use twincast::math::{DAabb, DVec3};
-use twincast::trace::precise::{Precise, PreciseRay};
 
-use crate::arrays::{Rays, Rows};
+use crate::arrays::Rows;
 
 /// So few are not worth sorting.
 const FEW: usize = 4096;
 
-/// Trees over so few triangles stay near the processor anyway.
-const SMALL: usize = 16_384;
-
 /// Bits of a key.
 const BITS: u32 = 18;
 
-/// Of an axis: a point's key has three times six bits, a ray's three for the octant and three times five.
-const POINT_BITS: u32 = BITS / 3;
-const RAY_BITS: u32 = BITS / 3 - 1;
-
-/// Of the bits of a ray's key those that name one of eight times eight times eight parts of the scene. Octants have no say in whether neighbours are near each other: rays that
-/// leave one surface in all directions are best left together.
-const PART: u32 = 0b111_111_111 << (3 * RAY_BITS - 9);
+/// Of an axis.
+const AXIS_BITS: u32 = BITS / 3;
 
 /// Each counting takes a mebibyte.
 const MOST_COUNTINGS: usize = 8;
@@ -75,30 +68,14 @@ impl Order {
 
     /// That of points; none where sorting is not worth it.
     pub fn of_points(rows: &Rows<'_>) -> Option<Self> {
-        let count = countable(rows.len())?;
+        let count = u32::try_from(rows.len()).ok().filter(|&count| count as usize > FEW)?;
         let finite = |i| Some(rows.at(i as usize)).filter(|p: &DVec3| p.is_finite());
         let bounds = (0..count).into_par_iter().filter_map(finite);
         let bounds = bounds.fold(|| DAabb::EMPTY, DAabb::include).reduce(|| DAabb::EMPTY, DAabb::union);
-        let cells = Cells::new(bounds, POINT_BITS);
-        Some(Self::by(&keys(count, |i| cells.key(rows.at(i)))))
-    }
-
-    /// That of rays, by octant and by where they enter the meshes' box; none where sorting is not worth it, or one ray is near the next already.
-    pub fn of_rays(rays: &Rays<'_>, precise: &Precise) -> Option<Self> {
-        let count = countable(rays.len())?;
-        let triangles: usize = precise.meshes().iter().map(|mesh| mesh.triangles.len()).sum();
-        if triangles <= SMALL {
-            return None;
-        }
-        let bounds = precise.bounds();
-        let cells = Cells::new(bounds, RAY_BITS);
-        let keys = keys(count, |i| {
-            let ray = rays.at(i);
-            let octant = (0..3).fold(0, |octant, axis| octant << 1 | u32::from(ray.direction[axis] < 0.0));
-            octant << (3 * RAY_BITS) | cells.key(entry(&ray, &bounds))
-        });
-        let far = keys.par_windows(2).filter(|pair| (pair[0] ^ pair[1]) & PART != 0).count();
-        (2 * far >= keys.len()).then(|| Self::by(&keys))
+        let cells = Cells::new(bounds);
+        let key = |i| cells.key(rows.at(i));
+        let keys: Vec<u32> = (0..count as usize).into_par_iter().with_min_len(FEW / 4).map(key).collect();
+        Some(Self::by(&keys))
     }
 }
 
@@ -122,22 +99,6 @@ pub fn along<T: Copy + Send + Sync>(
     }
 }
 
-fn countable(count: usize) -> Option<u32> {
-    u32::try_from(count).ok().filter(|&count| count as usize > FEW)
-}
-
-fn keys(count: u32, key: impl Fn(usize) -> u32 + Sync) -> Vec<u32> {
-    (0..count as usize).into_par_iter().with_min_len(FEW / 4).map(&key).collect()
-}
-
-/// Where a ray enters a box, or about where it passes by.
-fn entry(ray: &PreciseRay, bounds: &DAabb) -> DVec3 {
-    let inverse = ray.direction.recip();
-    let (low, high) = ((bounds.min - ray.origin) * inverse, (bounds.max - ray.origin) * inverse);
-    let t = low.min(high).max_element().max(ray.tmin);
-    ray.origin + ray.direction * t
-}
-
 /// A box, divided into cells that are numbered along the curve.
 struct Cells {
     low: DVec3,
@@ -147,8 +108,8 @@ struct Cells {
 }
 
 impl Cells {
-    fn new(bounds: DAabb, bits: u32) -> Self {
-        let last = f64::from((1 << bits) - 1);
+    fn new(bounds: DAabb) -> Self {
+        let last = f64::from((1 << AXIS_BITS) - 1);
         Self { low: bounds.min, scale: last / (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE)), last }
     }
 

@@ -5,14 +5,10 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
-use twincast::{Batch, Hit, Ray, Tracer};
+use twincast::{Batch, Hit, Tracer};
 
-use crate::arrays::{Ends, Points, Rays};
-use crate::order::{self, Order};
+use crate::arrays::{CHUNK, Ends, Points, Rays};
 use crate::{pool, value_error};
-
-/// Rays that a thread takes at a time.
-pub const CHUNK: usize = 1024;
 
 /// No triangle, or no mesh, in arrays of unsigned numbers.
 pub const INVALID: u32 = u32::MAX;
@@ -84,11 +80,15 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let first = pool::run(py, threads, || {
-            self.along(&rays, -1, |which, first| {
-                let mut hits = vec![None; which.len()];
-                self.hits(&rays, which, &mut hits);
-                first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
-            })
+            let mut first = vec![-1; rays.len()];
+            first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
+                let mut hits = [None; CHUNK];
+                let hits = self.hits(&rays, chunk, &mut hits);
+                for (first, hit) in first.iter_mut().zip(hits) {
+                    *first = hit.map_or(-1, |hit| hit.primitive.into());
+                }
+            });
+            first
         })?;
         Ok(first.into_pyarray(py))
     }
@@ -107,16 +107,15 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
         let occluded = pool::run(py, threads, || {
-            let Some(bvh) = exact else {
-                return self.along(&rays, false, |which, occluded| {
-                    self.precise.occluded_batch(&rays.some(which.iter().copied()), occluded);
-                });
-            };
-            // The first hit of any is found so soon that sorting does not pay.
-            order::along(rays.len(), None, CHUNK, false, |which, occluded| {
-                let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
-                bvh.occluded_batch(&rays, occluded, Batch::default());
-            })
+            let mut occluded = vec![false; rays.len()];
+            occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
+                let which = rays.chunk(chunk);
+                match exact {
+                    Some(bvh) => bvh.occluded_batch(&rays.rounded(which), occluded, Batch::default()),
+                    None => self.precise.occluded_batch(&rays.some(which), occluded),
+                }
+            });
+            occluded
         })?;
         Ok(occluded.into_pyarray(py))
     }
@@ -138,7 +137,6 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
-            let hits = self.along(&rays, None, |which, hits| self.hits(&rays, which, hits));
             let (mut t, mut uv) = (vec![f32::INFINITY; count], vec![0f32; 2 * count]);
             let (mut primitive, mut geometry) = (vec![INVALID; count], vec![INVALID; count]);
             let mut normal = vec![0f32; 3 * count];
@@ -146,7 +144,8 @@ impl Scene {
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = tasks.into_par_iter().zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv, normal), (primitive, geometry)))| {
-                for (i, hit) in hits[chunk * CHUNK..][..t.len()].iter().enumerate() {
+                let mut hits = [None; CHUNK];
+                for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
                     if let Some(hit) = hit {
                         t[i] = hit.t;
                         uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
@@ -175,13 +174,13 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry) = pool::run(py, threads, || {
-            let hits = self.along(&rays, None, |which, hits| self.precise_hits(&rays, which, hits));
             let (mut t, mut uv) = (vec![f64::INFINITY; count], vec![0f64; 2 * count]);
             let (mut primitive, mut geometry) = (vec![-1; count], vec![-1; count]);
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
-                for (i, hit) in hits[chunk * CHUNK..][..t.len()].iter().enumerate() {
+                let mut hits = [None; CHUNK];
+                for (i, hit) in self.precise_hits(&rays, chunk, &mut hits).iter().enumerate() {
                     if let Some(hit) = hit {
                         t[i] = hit.t;
                         uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
@@ -245,25 +244,15 @@ impl Scene {
         }
     }
 
-    /// Answers to rays, in their order; `ask` is given the numbers of some at a time, and answers that say `none`.
-    fn along<T: Copy + Send + Sync>(
-        &self,
-        rays: &Rays<'_>,
-        none: T,
-        ask: impl Fn(&[usize], &mut [T]) + Sync,
-    ) -> Vec<T> {
-        let order = Order::of_rays(rays, &self.precise);
-        order::along(rays.len(), order.as_ref(), CHUNK, none, ask)
-    }
-
-    /// The hits of the rays with these numbers. Rays and meshes in f32 need no more.
-    fn hits(&self, rays: &Rays<'_>, which: &[usize], hits: &mut [Option<Hit>]) {
+    /// The hits of a chunk of the rays. Rays and meshes in f32 need no more.
+    fn hits<'a>(&self, rays: &Rays<'_>, chunk: usize, hits: &'a mut [Option<Hit>; CHUNK]) -> &'a [Option<Hit>] {
+        let which = rays.chunk(chunk);
+        let hits = &mut hits[..which.len()];
         if let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) {
-            let rays: Vec<Ray> = which.iter().map(|&i| rays.rounded(i)).collect();
-            return bvh.closest_batch(&rays, hits, Batch::default());
+            bvh.closest_batch(&rays.rounded(which), hits, Batch::default());
+            return hits;
         }
-        let mut precise = vec![None; which.len()];
-        self.precise_hits(rays, which, &mut precise);
+        let mut precise = [None; CHUNK];
         let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
             t: t as f32,
             u: u as f32,
@@ -272,10 +261,20 @@ impl Scene {
             geometry,
             instance,
         };
+        let precise = self.precise_hits(rays, chunk, &mut precise);
         hits.iter_mut().zip(precise).for_each(|(hit, precise)| *hit = precise.map(rounded));
+        hits
     }
 
-    fn precise_hits(&self, rays: &Rays<'_>, which: &[usize], hits: &mut [Option<PreciseHit>]) {
-        self.precise.closest_batch(&rays.some(which.iter().copied()), hits);
+    fn precise_hits<'a>(
+        &self,
+        rays: &Rays<'_>,
+        chunk: usize,
+        hits: &'a mut [Option<PreciseHit>; CHUNK],
+    ) -> &'a [Option<PreciseHit>] {
+        let which = rays.chunk(chunk);
+        let hits = &mut hits[..which.len()];
+        self.precise.closest_batch(&rays.some(which), hits);
+        hits
     }
 }

@@ -1,4 +1,4 @@
-"""Many rays and points at once, which are sorted within, against few at a time, which are not; and against closed forms."""
+"""Many rays and points at once, of which the points are sorted within, against few at a time, which are not; and against closed forms."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import trimesh
 
 import twincast
 
-#: More triangles than are left as they come, and more points.
+#: More points than are left as they come.
 SPHERE = trimesh.creation.icosphere(subdivisions=5)
 MANY, FEW = 20_000, 500
 

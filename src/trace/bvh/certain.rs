@@ -2,7 +2,8 @@
 //!
 //! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has bounds for that
 //! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Where it does not, the
-//! caller is asked at once, who has the corners in f64; to give the ray up and walk it again, tried first, took a quarter of the time. Only the ids of what is hit are told; the caller computes t.
+//! caller has the corners in f64. Where a hit decides how far the ray looks, the caller is asked at once: to give the ray up and walk it again, tried first, took a quarter of the time. Where
+//! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Only ids are told; the caller computes t.
 //!
 //! What no single triangle can tell is left open, and the caller decides the ray by [`super::candidates`]: which of several hits at nearly
 //! the same t is first, and how often a ray crosses at an edge.
@@ -24,8 +25,9 @@ use crate::trace::nearest::Nearest;
 /// What is certain about a ray.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) enum Certain<'a> {
-    /// It hits these triangles and no others; [`Bvh::triangle`] has their names.
-    Hits(&'a [u32]),
+    /// It hits the `sure` triangles for sure, may hit the `open` ones, and hits no others; [`Bvh::triangle`] has their names. None is open but
+    /// where all hits are wanted.
+    Hits { sure: &'a [u32], open: &'a [u32] },
     /// Nothing.
     Doubt,
 }
@@ -105,8 +107,8 @@ impl<Q: Query> Kernel for Fly<'_, Q> {
             |ray, found| {
                 let (noted, is_noted) = ([found.noted], found.noted != NONE);
                 let is_open = found.is_in_doubt() && (Q::DOUBTS || !is_noted);
-                let hits = if is_noted { &noted[..] } else { found.sure_hits.ids() };
-                done(ray, if is_open { Certain::Doubt } else { Certain::Hits(hits) });
+                let sure = if is_noted { &noted[..] } else { found.listed.sure() };
+                done(ray, if is_open { Certain::Doubt } else { Certain::Hits { sure, open: found.listed.open() } });
             },
         );
     }
@@ -121,8 +123,8 @@ enum Any {}
 /// All hits.
 enum All {}
 
-/// Calls `take` with the id of each triangle of `candidates` that is hit, with bounds on its t, or that is in doubt even when
-/// `decide` was asked; until it says that this is enough.
+/// Calls `take` with the id of each triangle of `candidates` that is hit, with bounds on its t, or about which `decide` leaves a doubt, too; until it
+/// says that this is enough.
 #[inline(always)]
 fn each(
     index: u32,
@@ -152,10 +154,11 @@ fn each(
 
 /// What all three say of everything else: the caller never asks for an answer.
 macro_rules! query {
-    ($name:ident, $any:literal, $take:expr) => {
+    ($name:ident, any: $any:literal, all: $all:literal, $take:expr) => {
         impl Query for $name {
             const ANY: bool = $any;
             const DOUBTS: bool = !$any;
+            const IN_ORDER: bool = !$all;
             type Answer = ();
             const MISS: () = ();
             #[inline(always)]
@@ -179,7 +182,8 @@ macro_rules! query {
                 each(
                     index,
                     candidates,
-                    decide,
+                    #[inline(always)]
+                    |lane| if $all { Verdict::Doubt } else { decide(lane) },
                     #[inline(always)]
                     |id, t| take(found, id, t, ray),
                 );
@@ -188,28 +192,28 @@ macro_rules! query {
     };
 }
 
-query!(First, false, |found, id, t, ray| {
+query!(First, any: false, all: false, |found, id, t, ray| {
     let is_clear = t.is_some_and(|t| t[0] > found.limit || found.note(id, t, ray.tmin));
     if !is_clear {
-        found.sure_hits.doubt();
+        found.listed.doubt();
     }
     is_clear
 });
 
 // A doubt matters only if nothing else is hit.
-query!(Any, true, |found, id, t, ray| {
+query!(Any, any: true, all: false, |found, id, t, ray| {
     let is_hit = t.is_some_and(|t| found.note(id, t, ray.tmin));
     if !is_hit {
-        found.sure_hits.doubt();
+        found.listed.doubt();
     }
     !is_hit
 });
 
-query!(All, false, |found, id, t, ray| {
+query!(All, any: false, all: true, |found, id, t, ray| {
     match t {
-        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.sure_hits.push(id),
+        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.listed.push(id),
         Some([low, high]) if high < ray.tmin || ray.tmax < low => {}
-        _ => found.sure_hits.doubt(),
+        _ => found.listed.push_open(id),
     }
     !found.is_in_doubt()
 });

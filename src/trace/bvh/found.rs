@@ -32,36 +32,62 @@ pub(super) struct Found {
     /// Which triangle it is: block and lane.
     computed: u32,
     /// For queries that leave doubts to the caller.
-    pub sure_hits: SureHits,
+    pub listed: Listed,
 }
 
-/// All that a ray hits for sure, and whether there is doubt about more.
+/// All that a ray hits for sure, all that it may hit, and whether nothing can be said.
 #[derive(Clone, Copy)]
-pub(super) struct SureHits {
-    /// Block and lane of each.
+pub(super) struct Listed {
+    /// Block and lane of each: from the front of those that are sure, from the back of those that are not.
     ids: [u32; Self::MOST],
-    count: usize,
+    sures: usize,
+    opens: usize,
     is_in_doubt: bool,
 }
 
-impl SureHits {
+impl Listed {
     /// As many as are kept; a ray with more is in doubt.
     const MOST: usize = 24;
-    const NONE: Self = Self { ids: [NONE; Self::MOST], count: 0, is_in_doubt: false };
+    const NONE: Self = Self { ids: [NONE; Self::MOST], sures: 0, opens: 0, is_in_doubt: false };
 
     #[inline(always)]
-    pub fn push(&mut self, id: u32) {
-        if self.count < Self::MOST {
-            self.ids[self.count] = id;
-            self.count += 1;
-        } else {
-            self.is_in_doubt = true;
-        }
+    fn start(&mut self) {
+        (self.sures, self.opens, self.is_in_doubt) = (0, 0, false);
     }
 
     #[inline(always)]
-    pub fn ids(&self) -> &[u32] {
-        &self.ids[..self.count.min(Self::MOST)]
+    fn has_room(&mut self) -> bool {
+        self.is_in_doubt |= self.sures + self.opens >= Self::MOST;
+        !self.is_in_doubt
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, id: u32) {
+        if self.has_room() {
+            self.ids[self.sures] = id;
+            self.sures += 1;
+        }
+    }
+
+    /// One that may be hit.
+    #[inline(always)]
+    pub fn push_open(&mut self, id: u32) {
+        if self.has_room() {
+            self.opens += 1;
+            self.ids[Self::MOST - self.opens] = id;
+        }
+    }
+
+    /// Those that are hit for sure.
+    #[inline(always)]
+    pub fn sure(&self) -> &[u32] {
+        &self.ids[..self.sures.min(Self::MOST)]
+    }
+
+    /// Those that may be hit.
+    #[inline(always)]
+    pub fn open(&self) -> &[u32] {
+        &self.ids[Self::MOST - self.opens.min(Self::MOST)..]
     }
 
     #[inline(always)]
@@ -80,7 +106,7 @@ impl Found {
         is_computed: false,
         nearest: Nearest::NONE,
         computed: NONE,
-        sure_hits: SureHits::NONE,
+        listed: Listed::NONE,
     };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up. What lies so far that t overflows is in doubt, whose decision is that it is not
@@ -88,13 +114,13 @@ impl Found {
     #[inline(always)]
     pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
         (self.sure, self.limit, self.noted, self.is_computed) = (tmax.min(f32::MAX), limit, NONE, false);
-        (self.sure_hits.count, self.sure_hits.is_in_doubt) = (0, false);
+        self.listed.start();
     }
 
     /// Whether the ray is left to the caller.
     #[inline(always)]
     pub fn is_in_doubt(&self) -> bool {
-        self.sure_hits.is_in_doubt
+        self.listed.is_in_doubt
     }
 
     /// Notes a triangle that is hit for sure between `low` and `high`, if it is for sure within the range, and nearer than what was

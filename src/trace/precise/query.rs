@@ -1,14 +1,14 @@
 //! What rays ask of meshes in f64: the nearest hit, any hit, all hits.
 //!
-//! Each batch goes through flights first, which name what is hit for sure; t, u and v come from the corners in f64, in a step of its own
-//! ([`Sure`]). Then those that are in doubt go one by one.
+//! Each batch goes through flights first, which name what is hit for sure, and what may be where all hits are wanted; t, u and v come from the corners in f64, in a step of its own
+//! ([`Pairs`]). Then those that are in doubt go one by one.
 
 use super::frame::{self, LocalRay};
 use super::{Precise, PreciseHit, PreciseRay};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 use crate::shape::crossing::{Crossing, crossing_line};
-use crate::shape::triangle::intersect_line;
+use crate::shape::triangle::{TriangleHit, intersect_line};
 use crate::trace::bvh::{Certain, Verdict, Wanted};
 use crate::trace::crossings::Crossings;
 
@@ -26,20 +26,20 @@ impl Precise {
     /// Unless there is one answer a ray.
     pub fn closest_batch(&self, rays: &[PreciseRay], hits: &mut [Option<PreciseHit>]) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        let mut sure = Sure::default();
+        let mut pairs = Pairs::default();
         for (rays, hits) in rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)) {
             hits.fill(None);
             let mut open = Vec::new();
-            sure.clear();
+            pairs.clear();
             self.certain(Wanted::First, rays, |i, certain| match certain {
-                Certain::Hits([]) => {}
-                Certain::Hits([id, ..]) => sure.push(i, *id),
+                Certain::Hits { sure, .. } => pairs.extend(i, &sure[..sure.len().min(1)], true),
                 Certain::Doubt => open.push(i),
             });
-            for (i, hit) in sure.hits(self, rays) {
-                match hit {
-                    Some(hit) => hits[i] = Some(hit),
-                    None => open.push(i),
+            for (i, met) in pairs.meet(self, rays) {
+                match met {
+                    Met::Hit(hit) => hits[i] = Some(hit),
+                    // The range was widened: within it for sure is not within the range.
+                    Met::Nothing | Met::Touch => open.push(i),
                 }
             }
             for i in open {
@@ -58,12 +58,12 @@ impl Precise {
             occluded.fill(false);
             let mut open = Vec::new();
             self.certain(Wanted::Any, rays, |i, certain| match certain {
-                Certain::Hits([]) => {}
-                // The range was widened: within it for sure is not within the range.
-                Certain::Hits([id, ..]) if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
+                Certain::Hits { sure: [], .. } => {}
+                // As above.
+                Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
                     occluded[i] = true;
                 }
-                Certain::Hits(_) | Certain::Doubt => open.push(i),
+                Certain::Hits { .. } | Certain::Doubt => open.push(i),
             });
             for i in open {
                 occluded[i] = self.occluded(&rays[i]);
@@ -78,18 +78,30 @@ impl Precise {
     /// Unless there is one answer a ray.
     pub fn count_batch(&self, rays: &[PreciseRay], counts: &mut [u32]) {
         assert_eq!(rays.len(), counts.len(), "one count a ray");
-        let mut crossings = Crossings::default();
+        let (mut crossings, mut pairs) = (Crossings::default(), Pairs::default());
         for (rays, counts) in rays.chunks(CHUNK).zip(counts.chunks_mut(CHUNK)) {
             counts.fill(0);
-            let mut open = Vec::new();
+            let mut again = Vec::new();
+            pairs.clear();
             self.certain(Wanted::All, rays, |i, certain| match certain {
-                Certain::Hits(ids) if ids.is_empty() || is_whole(&rays[i]) => counts[i] = ids.len() as u32,
-                Certain::Hits(ids) => {
-                    counts[i] = ids.iter().filter(|&&id| self.hit(&rays[i], id).is_some()).count() as u32;
+                Certain::Hits { sure, open } => {
+                    if is_whole(&rays[i]) {
+                        counts[i] = sure.len() as u32;
+                    } else {
+                        pairs.extend(i, sure, true);
+                    }
+                    pairs.extend(i, open, false);
                 }
-                Certain::Doubt => open.push(i),
+                Certain::Doubt => again.push(i),
             });
-            for i in open {
+            for (i, met) in pairs.meet(self, rays) {
+                match met {
+                    Met::Hit(_) => counts[i] += 1,
+                    Met::Nothing => {}
+                    Met::Touch => again.push(i),
+                }
+            }
+            for i in again {
                 counts[i] = self.all(&rays[i], &mut crossings).len() as u32;
             }
         }
@@ -100,25 +112,31 @@ impl Precise {
     pub fn all_hits_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, hits: &mut Vec<PreciseHit>) {
         ends.clear();
         hits.clear();
-        let (mut crossings, mut sure) = (Crossings::default(), Sure::default());
+        let (mut crossings, mut pairs) = (Crossings::default(), Pairs::default());
         // All hits in order of arrival, and of each ray where its hits are among them.
         let (mut arrived, mut places) = (Vec::new(), Vec::new());
         for rays in rays.chunks(CHUNK) {
             places.clear();
             places.resize(rays.len(), 0..0);
-            let mut open = Vec::new();
-            sure.clear();
+            let mut again = Vec::new();
+            pairs.clear();
             self.certain(Wanted::All, rays, |i, certain| match certain {
-                Certain::Hits(ids) => {
-                    let first = sure.len();
-                    ids.iter().for_each(|&id| sure.push(i, id));
-                    places[i] = first..sure.len();
+                Certain::Hits { sure, open } => {
+                    let first = pairs.len();
+                    pairs.extend(i, sure, true);
+                    pairs.extend(i, open, false);
+                    places[i] = first..pairs.len();
                 }
-                Certain::Doubt => open.push(i),
+                Certain::Doubt => again.push(i),
             });
             arrived.clear();
-            arrived.extend(sure.hits(self, rays).map(|(_, hit)| hit));
-            for i in open {
+            for (i, met) in pairs.meet(self, rays) {
+                arrived.push(if let Met::Hit(hit) = met { Some(hit) } else { None });
+                if let Met::Touch = met {
+                    again.push(i);
+                }
+            }
+            for i in again {
                 let first = arrived.len();
                 arrived.extend(self.all(&rays[i], &mut crossings).iter().copied().map(Some));
                 places[i] = first..arrived.len();
@@ -158,9 +176,8 @@ impl Precise {
         let decide = |i: usize, geometry: u32, primitive: u32| {
             let ray: &PreciseRay = &rays[i];
             let corners = self.corners(geometry, primitive);
-            match crossing_line(ray.origin, ray.direction, &corners) {
-                Some(Crossing { touch: Some(_), .. }) if wanted == Wanted::All => Verdict::Doubt,
-                Some(Crossing { hit, .. }) if ray.has(hit.t) => {
+            match intersect_line(ray.origin, ray.direction, &corners) {
+                Some(hit) if ray.has(hit.t) => {
                     let bounds = if exact { frame::around(hit.t) } else { self.frame.bounds(ray, hit.t) };
                     bounds.map_or(Verdict::Doubt, Verdict::Hit)
                 }
@@ -228,19 +245,29 @@ impl Precise {
     }
 }
 
-/// Triangles that rays of a chunk hit for sure.
+/// Rays of a chunk, and triangles that they hit for sure or may hit.
 ///
 /// Corners are looked up for all of them at once, one step of the way at a time: the processor then waits for many cache lines together,
-/// where ray by ray it would wait for each.
+/// where pair by pair it would wait for each.
 #[derive(Default)]
-struct Sure {
-    /// Ray, and block and lane.
-    found: Vec<(u32, u32)>,
+struct Pairs {
+    /// Ray, block and lane, and whether the ray hits for sure.
+    found: Vec<(u32, u32, bool)>,
     names: Vec<(u32, u32)>,
-    corners: Vec<[u32; 3]>,
+    indices: Vec<[u32; 3]>,
+    corners: Vec<[DVec3; 3]>,
 }
 
-impl Sure {
+/// What a pair comes to.
+enum Met {
+    Hit(PreciseHit),
+    /// A miss, or a hit out of range.
+    Nothing,
+    /// A hit on an edge or in a corner, of which it was not sure that it is a hit.
+    Touch,
+}
+
+impl Pairs {
     fn clear(&mut self) {
         self.found.clear();
     }
@@ -249,34 +276,52 @@ impl Sure {
         self.found.len()
     }
 
-    fn push(&mut self, ray: usize, id: u32) {
-        self.found.push((ray as u32, id));
+    fn extend(&mut self, ray: usize, ids: &[u32], is_sure: bool) {
+        self.found.extend(ids.iter().map(|&id| (ray as u32, id, is_sure)));
     }
 
-    /// Of each the ray and the hit, in their order; none where that is out of range.
-    fn hits<'a>(
-        &'a mut self,
-        precise: &'a Precise,
-        rays: &'a [PreciseRay],
-    ) -> impl Iterator<Item = (usize, Option<PreciseHit>)> + 'a {
-        let Self { found, names, corners } = self;
+    /// Of each the ray, and what it comes to; in their order.
+    fn meet<'a>(&'a mut self, precise: &'a Precise, rays: &'a [PreciseRay]) -> impl Iterator<Item = (usize, Met)> + 'a {
+        let Self { found, names, indices, corners } = self;
         names.clear();
-        names.extend(found.iter().map(|&(_, id)| precise.bvh.triangle(id)));
+        names.extend(found.iter().map(|&(_, id, _)| precise.bvh.triangle(id)));
+        indices.clear();
+        indices.extend(names.iter().map(|&(mesh, i)| precise.meshes[mesh as usize].triangles[i as usize]));
         corners.clear();
-        corners.extend(names.iter().map(|&(mesh, i)| precise.meshes[mesh as usize].triangles[i as usize]));
+        corners.extend(names.iter().zip(&*indices).map(|(&(mesh, _), indices)| {
+            let positions = &precise.meshes[mesh as usize].positions;
+            indices.map(|i| positions[i as usize])
+        }));
         let named = names.iter().zip(&*corners);
-        found.iter().zip(named).map(|(&(ray, _), (&(geometry, primitive), corners))| {
-            let ray = ray as usize;
-            let positions = &precise.meshes[geometry as usize].positions;
-            let corners = corners.map(|i| positions[i as usize]);
-            (ray, hit_of(&rays[ray], &corners, geometry, primitive))
+        found.iter().zip(named).map(|(&(i, _, is_sure), (&(geometry, primitive), corners))| {
+            let ray = &rays[i as usize];
+            let met = if is_sure {
+                hit_of(ray, corners, geometry, primitive).map_or(Met::Nothing, Met::Hit)
+            } else {
+                open(ray, corners, geometry, primitive)
+            };
+            (i as usize, met)
         })
+    }
+}
+
+/// What a ray and a triangle that it may hit come to.
+#[cold]
+fn open(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32) -> Met {
+    match crossing_line(ray.origin, ray.direction, corners) {
+        Some(Crossing { touch: Some(_), .. }) => Met::Touch,
+        Some(Crossing { hit, .. }) => in_range(ray, hit, geometry, primitive).map_or(Met::Nothing, Met::Hit),
+        None => Met::Nothing,
     }
 }
 
 #[inline]
 fn hit_of(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32) -> Option<PreciseHit> {
-    let hit = intersect_line(ray.origin, ray.direction, corners)?;
+    in_range(ray, intersect_line(ray.origin, ray.direction, corners)?, geometry, primitive)
+}
+
+#[inline]
+fn in_range(ray: &PreciseRay, hit: TriangleHit, geometry: u32, primitive: u32) -> Option<PreciseHit> {
     let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance: 0 };
     ray.has(hit.t).then_some(hit)
 }

@@ -2,7 +2,8 @@
 //!
 //! Flights ([`super::super::flight`]) hide the time that memory takes, at the price of a list, a stack in memory and children put in order where
 //! only one is entered. Where the trees are in the cache there is little to hide, and a walk that keeps in registers what it is at is faster
-//! by up to a fifth. A few rays make no flight worth its name, whatever the trees.
+//! by up to a fifth. Rays that start far from each other find nothing near the processor that the one before has used, however small the trees. A few rays
+//! make no flight worth its name.
 
 use super::{Noted, SingleRay};
 use crate::ray::Ray;
@@ -18,9 +19,9 @@ use crate::trace::bvh::walk::{self, Stack, Stacks, Visit};
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Travel {
-    /// By the size of the tree, and by how many they are.
+    /// By the size of the trees, and by how many rays there are and how far apart they start.
     #[default]
-    BySize,
+    Auto,
     /// Several of them in turn, in every scene.
     InFlight,
     /// One after the other, in every scene.
@@ -34,6 +35,12 @@ const CACHED: usize = 12 << 20;
 /// Fewer rays than this do not wait for each other.
 const FEW: usize = 8;
 
+/// Of so many rays of a batch it is asked whether the next one starts far away.
+const SAMPLES: usize = 16;
+
+/// Farther away is another part of the scene: as a share of its farthest coordinate.
+const PART: f32 = 0.25;
+
 impl Bvh {
     /// The same tracer, whose rays travel as told.
     #[must_use]
@@ -41,14 +48,22 @@ impl Bvh {
         Self { travel, ..self }
     }
 
-    /// Whether so many rays that make no bundle had better walk alone.
-    pub(in crate::trace::bvh) fn travels_alone(&self, rays: usize) -> bool {
+    /// Whether these rays, which make no bundle, had better walk alone.
+    pub(in crate::trace::bvh) fn travels_alone(&self, rays: &[Ray]) -> bool {
         let bytes = || self.fixed.triangles.bytes() + self.placements.bytes_with_objects();
         match self.travel {
-            Travel::BySize => rays < FEW || bytes() <= CACHED,
+            Travel::Auto => rays.len() < FEW || bytes() <= CACHED && !self.are_scattered(rays),
             Travel::InFlight => false,
             Travel::Alone => true,
         }
+    }
+
+    /// Whether most rays start in another part of the scene than the one before.
+    fn are_scattered(&self, rays: &[Ray]) -> bool {
+        let far = PART * self.placements.reach().max(self.fixed.triangles.tree().reach()).max_element();
+        let every = (rays.len() / SAMPLES).max(2);
+        let pairs = || rays.chunks_exact(every).map(|some| some[1].origin - some[0].origin);
+        2 * pairs().filter(|way| way.abs().max_element() > far).count() > pairs().len()
     }
 
     /// Answers all rays among triangles that stand still: `done` is told of each that has hit something what it has found.

@@ -124,7 +124,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
         }
         for k in at_nodes.iter() {
             let traveller = flight.at(k);
-            traveller.enter::<S, G>(ground.node(traveller.space, traveller.next));
+            traveller.enter::<S, Q, G>(ground.node(traveller.space, traveller.next));
             prefetch::<S>(traveller, ground);
             lists[traveller.step::<G>()].push(k);
         }

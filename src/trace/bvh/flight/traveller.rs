@@ -71,7 +71,7 @@ pub(super) struct Traveller {
     place: u32,
     /// Children waiting to be visited, the nearest on top; above the top is room for what is not entered.
     stack: [Child; STACK + WIDTH],
-    /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it.
+    /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
     near: [u32; STACK + WIDTH],
 }
 
@@ -128,12 +128,16 @@ impl Traveller {
 
     /// One node.
     #[inline(always)]
-    pub fn enter<S: Simd, G: Ground>(&mut self, node: &Node) {
+    pub fn enter<S: Simd, Q: Query, G: Ground>(&mut self, node: &Node) {
         let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
         let len = self.len % STACK;
         let (nears, stack) = (self.near[len..].first_chunk_mut(), self.stack[len..].first_chunk_mut());
         if let (Some(nears), Some(stack)) = (nears, stack) {
-            S::far_to_near(near, mask, &node.child, nears, stack);
+            if Q::IN_ORDER {
+                S::far_to_near(near, mask, &node.child, nears, stack);
+            } else {
+                S::named_first(mask, &node.child, stack);
+            }
         }
         self.len = len + mask.bits().count_ones() as usize;
         self.pop();

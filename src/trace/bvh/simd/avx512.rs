@@ -36,6 +36,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn named_first(mask: <V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) {
+        Avx2::named_first(mask, child, named);
+    }
+
+    #[inline(always)]
     fn transpose(rows: [V8; 8]) -> [V8; 8] {
         Avx2::transpose(rows)
     }

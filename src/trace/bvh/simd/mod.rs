@@ -42,6 +42,8 @@ pub(super) trait Simd {
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
     );
+    /// Children that the mask names, in their order; then others.
+    fn named_first(mask: <Self::V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]);
     /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
     fn prefetch(address: *const u8);
     /// Has all of these loaded.

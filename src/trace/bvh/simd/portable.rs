@@ -36,6 +36,13 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn named_first(mask: Bits, child: &[Child; 8], named: &mut [Child; 8]) {
+        for (place, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
+            named[place] = child[slot];
+        }
+    }
+
+    #[inline(always)]
     fn transpose(rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
         std::array::from_fn(
             #[inline(always)]

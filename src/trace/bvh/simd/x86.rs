@@ -71,6 +71,15 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn named_first(mask: M8, child: &[Child; 8], named: &mut [Child; 8]) {
+        unsafe {
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[mask.bits() as usize % 256]));
+            let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(child.as_ptr().cast()), order);
+            _mm256_storeu_si256(named.as_mut_ptr().cast(), children);
+        }
+    }
+
+    #[inline(always)]
     fn transpose(rows: [V8; 8]) -> [V8; 8] {
         let [V8(a), V8(b), V8(c), V8(d), V8(e), V8(f), V8(g), V8(h)] = rows;
         unsafe {
