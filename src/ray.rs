@@ -6,7 +6,7 @@ use crate::math::Vec3;
 ///
 /// In memory in the order of the fields, so that what a tree is asked for, the first eight f32, is loaded as two vectors of four.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Ray {
     /// Start, in world coordinates (recentred scene units).
     pub origin: Vec3,

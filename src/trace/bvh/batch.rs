@@ -177,10 +177,6 @@ impl Bvh {
             let (rays, answers);
             (rays, all) = all.split_at(chunk);
             (answers, all_answers) = all_answers.split_at_mut(chunk);
-            if in_bundles {
-                // The next bundle, while this one is traced: rays come from memory mostly, which nothing else tells ahead.
-                S::prefetch_all(&all[..bundle::RAYS.min(all.len())]);
-            }
             let traced = if in_bundles { tile::trace::<S, Q>(tile, self, rays, answers) } else { 0 };
             // The others, in runs: all of them, where there are no bundles.
             let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - rays.len()) } else { 1 };
@@ -333,8 +329,8 @@ impl<Q: Query> Answers<'_, Q> {
         let each = [&self.rays[*a], &self.rays[*b], &self.rays[*c], &self.rays[*d]];
         let rays = Rays::new::<S>(each);
         let (t, hits) = if places[0] == FIXED {
-            let (t, [a, b, c, d]) = self.bvh.fixed.triangles.hits::<S>(&rays, *ids);
-            (t, [Some(a), Some(b), Some(c), Some(d)])
+            let four = self.bvh.fixed.triangles.hits::<S>(&rays, *ids);
+            (four.numbers.t, [Some(four.hit(0)), Some(four.hit(1)), Some(four.hit(2)), Some(four.hit(3))])
         } else {
             self.bvh.placed_hits::<S>(each, 0b1111, &rays, *ids, *places)
         };

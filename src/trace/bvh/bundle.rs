@@ -13,7 +13,10 @@
 //! the one that is meant, and directions that are rounded: each component by u, so that slopes are off by twice as much as in the
 //! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
 
+use std::marker::PhantomData;
+
 use super::filter::largest_axis;
+use super::isa::Kernel;
 use super::node::{Node, WIDTH};
 use super::place::Place;
 use super::query::Query;
@@ -27,6 +30,9 @@ use crate::ray::Ray;
 
 /// Rays in a bundle.
 pub(super) const RAYS: usize = 64;
+
+/// How many rays ahead of those of a bundle others are fetched.
+const AHEAD: usize = 3 * RAYS;
 
 /// One number for each ray.
 #[derive(Clone, Copy)]
@@ -92,6 +98,30 @@ const NOISE: f32 = UNIT_ROUNDOFF / 8.0;
 /// Slopes beyond this spoil the bounds for all rays.
 const STEEPEST: f32 = 16.0;
 
+/// Takes the rays, of which the bundle is valid only if they fit as a whole. Those that end in one point fit only if
+/// any hit is asked for.
+pub(super) struct Fill<'a, Q> {
+    pub bundle: &'a mut Bundle,
+    pub rays: &'a [Ray; RAYS],
+    pub range: &'a mut Range,
+    pub query: PhantomData<Q>,
+}
+
+impl<Q: Query> Kernel for Fill<'_, Q> {
+    type Output = Fit;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Fit {
+        let Self { bundle, rays, range, .. } = self;
+        let fit = bundle.gather::<S, Q>(rays, range);
+        if fit != Fit::Whole {
+            return fit;
+        }
+        range.open::<S>(bundle.is_turned);
+        bundle.project::<S>(range)
+    }
+}
+
 impl Bundle {
     pub fn new() -> Self {
         Self {
@@ -114,18 +144,6 @@ impl Bundle {
             first: 0.0,
             is_turned: false,
         }
-    }
-
-    /// Takes the rays, of which the bundle is valid only if they fit as a whole. Those that end in one point fit only if
-    /// any hit is asked for.
-    #[inline(always)]
-    pub fn fill<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
-        let fit = self.gather::<S, Q>(rays, range);
-        if fit != Fit::Whole {
-            return fit;
-        }
-        range.open::<S>(self.is_turned);
-        self.project::<S>(range)
     }
 
     /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need not run
@@ -162,6 +180,9 @@ impl Bundle {
         let (mut in_range, mut latest) = (u32::MAX, zero);
         for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
             let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
+            // A few at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this one is traced, held up what
+            // the tree needs. A hint, whatever follows these rays.
+            S::prefetch(rays.as_ptr().wrapping_add(AHEAD).cast());
             let (origin, direction) = ([x, y, z], [dx, dy, dz]);
             for axis in 0..3 {
                 store::<S>(&mut self.direction[axis], i, direction[axis]);

@@ -82,7 +82,7 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
 
 /// Not inlined: whoever has something better need not make room for it.
 #[inline(never)]
-fn portable<K: Kernel>(kernel: K) -> K::Output {
+pub(super) fn portable<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Portable>()
 }
 
@@ -90,6 +90,22 @@ fn portable<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<super::simd::Avx2>()
+}
+
+/// As [`with_avx2`], in a function of its own: see [`Simd::apart`].
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn avx2_apart<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<super::simd::Avx2>()
+}
+
+/// As [`with_avx512`], in a function of its own.
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+pub(super) fn avx512_apart<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<super::simd::Avx512>()
 }
 
 #[cfg(target_arch = "x86_64")]

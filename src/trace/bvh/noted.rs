@@ -1,13 +1,13 @@
 //! Hits that are noted, four at a time: t, u and v of triangles that rays hit for sure, among the fixed ones or in placed
 //! objects.
 
-use super::Bvh;
 use super::block::Lane;
 use super::level::Through;
 use super::placements::FIXED;
 use super::quad::{Numbers, Quad, Seen};
 use super::simd::{Array, Doubles, Simd};
 use super::triangles::TriangleTree;
+use super::{Bvh, PartId};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
@@ -44,13 +44,37 @@ pub(super) fn widen<S: Simd>(values: &[f32; 4]) -> S::D4 {
     S::D4::widen(S::V4::load(values))
 }
 
+/// Hits of four rays, number by number.
+pub(super) struct FourHits {
+    /// t, u and v.
+    pub numbers: Numbers,
+    primitive: [u32; 4],
+    geometry: [u32; 4],
+    instance: [u32; 4],
+}
+
+impl FourHits {
+    /// That of ray `i`.
+    #[inline(always)]
+    pub fn hit(&self, i: usize) -> Hit {
+        Hit {
+            t: self.numbers.t32[i],
+            u: self.numbers.u[i],
+            v: self.numbers.v[i],
+            primitive: self.primitive[i],
+            geometry: self.geometry[i],
+            instance: self.instance[i],
+        }
+    }
+}
+
 impl TriangleTree {
-    /// The hits of four rays, each of which hits a triangle for sure, and t in f64; `ids` as in [`Self::offer_one`].
+    /// The hits of four rays, each of which hits a triangle for sure; `ids` as in [`Self::offer_one`].
     ///
     /// The caller knows that f64 is precise enough for what [`triangle::intersect`](crate::shape::triangle::intersect) would
     /// answer.
     #[inline(always)]
-    pub fn hits<S: Simd>(&self, rays: &Rays<S::D4>, ids: [u32; 4]) -> ([f64; 4], [Hit; 4]) {
+    pub fn hits<S: Simd>(&self, rays: &Rays<S::D4>, ids: [u32; 4]) -> FourHits {
         let (mut a, mut b, mut c, mut d) = (None, None, None, None);
         let leaves = self.leaves();
         let triangles = [
@@ -60,14 +84,14 @@ impl TriangleTree {
             leaves.lane(ids[3], &mut d),
         ];
         let corners = [corner::<S>(&triangles, 0), corner::<S>(&triangles, 1), corner::<S>(&triangles, 2)];
-        let Numbers { t, t32, u, v } = Quad::new(rays.origin, rays.direction, corners).numbers();
-        let hits = [
-            self.hit(&triangles[0], t32[0], u[0], v[0]),
-            self.hit(&triangles[1], t32[1], u[1], v[1]),
-            self.hit(&triangles[2], t32[2], u[2], v[2]),
-            self.hit(&triangles[3], t32[3], u[3], v[3]),
-        ];
-        (t, hits)
+        let numbers = Quad::new(rays.origin, rays.direction, corners).numbers();
+        let (mut primitive, mut geometry, mut instance) = ([0; 4], [0; 4], [0; 4]);
+        for i in 0..4 {
+            let (part, number) = triangles[i].number();
+            let part = self.part(part);
+            (primitive[i], geometry[i], instance[i]) = (number, part.geometry, part.instance);
+        }
+        FourHits { numbers, primitive, geometry, instance }
     }
 
     /// A triangle that rays hit for sure which all start in `origin`; `id` is as in [`Self::offer_one`].
@@ -77,7 +101,8 @@ impl TriangleTree {
         let triangle = self.leaves().lane(id, &mut scratch);
         let [a, b, c] = triangle.block.triangle(triangle.lane);
         let corners = [splat::<S>(a), splat::<S>(b), splat::<S>(c)];
-        Shared { id, seen: Seen::new(origin, corners), hit: self.hit(&triangle, 0.0, 0.0, 0.0) }
+        let (part, primitive) = triangle.number();
+        Shared { id, seen: Seen::new(origin, corners), primitive, part: self.part(part) }
     }
 }
 
@@ -86,17 +111,20 @@ pub(super) struct Shared<D> {
     /// The triangle's.
     pub id: u32,
     seen: Seen<D>,
-    /// The ids are the triangle's.
-    hit: Hit,
+    primitive: u32,
+    part: PartId,
 }
 
 impl<D: Doubles> Shared<D> {
     /// As [`TriangleTree::hits`].
     #[inline(always)]
-    pub fn hits(&self, direction: [D; 3]) -> ([f64; 4], [Hit; 4]) {
-        let Numbers { t, t32, u, v } = self.seen.along(direction).numbers();
-        let hit = |i: usize| Hit { t: t32[i], u: u[i], v: v[i], ..self.hit };
-        (t, [hit(0), hit(1), hit(2), hit(3)])
+    pub fn hits(&self, direction: [D; 3]) -> FourHits {
+        FourHits {
+            numbers: self.seen.along(direction).numbers(),
+            primitive: [self.primitive; 4],
+            geometry: [self.part.geometry; 4],
+            instance: [self.part.instance; 4],
+        }
     }
 }
 
@@ -111,7 +139,7 @@ impl Bvh {
         (&self.objects[place.placement.object as usize].triangles, Some(place.through()))
     }
 
-    /// As [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise enough, exactly. Only lanes of
+    /// t in f64 and hits as of [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise enough, exactly. Only lanes of
     /// the mask matter.
     #[inline(always)]
     pub(super) fn placed_hits<S: Simd>(

@@ -52,8 +52,8 @@ impl Range {
                 let (old_sure, old_limit) = (S::Wide::at(&self.sure, group), S::Wide::at(&self.limit, group));
                 let least = least.mul(shrink).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(old_sure);
                 let most = most.mul(shrink).mul_add(splat(1.0 + SLACK), splat(TINY)).min(old_limit);
-                S::Wide::select(is_less, least, old_sure).put(&mut self.sure, group);
-                S::Wide::select(is_less, most, old_limit).put(&mut self.limit, group);
+                least.put_where(is_less, &mut self.sure.0, group);
+                most.put_where(is_less, &mut self.limit.0, group);
             }
         }
     }

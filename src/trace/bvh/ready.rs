@@ -186,6 +186,8 @@ pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8
 
 /// Its origin, direction, tmin and tmax.
 #[inline(always)]
-pub(super) fn row<S: Simd>(&Ray { origin: o, direction: d, tmin, tmax, .. }: &Ray) -> S::V8 {
-    S::V8::load(&[o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax])
+pub(super) fn row<S: Simd>(ray: &Ray) -> S::V8 {
+    // The first eight numbers of a ray, in one load; field by field, it took four instructions.
+    let [row @ .., _time] = bytemuck::cast_ref::<Ray, [f32; 9]>(ray);
+    S::V8::load(row)
 }

@@ -122,9 +122,9 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         let taken = nearest.bits();
         if taken != 0 {
             let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
-            self.limit = V::select(nearest, high, limit).to_array();
-            self.sure = V::select(nearest, low, before).to_array();
-            self.noted = V::select(nearest, splat(f32::from_bits(id)), V::load(&self.noted)).to_array();
+            V::select(nearest, high, limit).overwrite(&mut self.limit);
+            V::select(nearest, low, before).overwrite(&mut self.sure);
+            V::select(nearest, splat(f32::from_bits(id)), V::load(&self.noted)).overwrite(&mut self.noted);
             self.hit |= taken;
         }
         Met { changed: taken != 0, open: lanes & !taken & !beyond.bits() }

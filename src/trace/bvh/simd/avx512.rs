@@ -5,9 +5,10 @@
 
 use std::arch::x86_64::*;
 
-use super::x86::{Avx2, D4, V4, V8, lanewise};
+use super::x86::{Avx2, D4, V4, V8, lanewise, opaque};
 use super::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::Child;
 
 /// AVX-512 F, VL, DQ and BW.
@@ -18,6 +19,11 @@ impl Simd for Avx512 {
     type V8 = V8;
     type Wide = V16;
     type D4 = D4;
+
+    #[inline(always)]
+    fn apart<K: Kernel>(kernel: K) -> K::Output {
+        unsafe { isa::avx512_apart(kernel) }
+    }
 
     #[inline(always)]
     fn prefetch(address: *const u8) {
@@ -151,12 +157,11 @@ impl Group for V16 {
         unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) };
     }
     #[inline(always)]
-    fn put_where(mask: M16, value: u32, values: &mut [u32; RAYS], group: usize) {
-        let values: &mut [u32; 16] = &mut values.as_chunks_mut().0[group % (RAYS / 16)];
+    fn put_where(self, mask: M16, values: &mut [f32; RAYS], group: usize) {
+        let values: &mut [f32; 16] = &mut values.as_chunks_mut().0[group % (RAYS / 16)];
         unsafe {
-            let at = values.as_mut_ptr().cast::<i32>();
-            let old = _mm512_loadu_si512(at.cast());
-            _mm512_storeu_si512(at.cast(), _mm512_mask_set1_epi32(old, mask.0, value as i32));
+            let old = _mm512_loadu_ps(values.as_ptr());
+            _mm512_storeu_ps(opaque(values.as_mut_ptr()), _mm512_mask_blend_ps(mask.0, old, self.0));
         }
     }
 }

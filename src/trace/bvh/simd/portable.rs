@@ -2,6 +2,7 @@
 
 use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::Child;
 
 /// Plain arrays.
@@ -12,6 +13,11 @@ impl Simd for Portable {
     type V8 = [f32; 8];
     type Wide = [f32; 8];
     type D4 = [f64; 4];
+
+    #[inline(always)]
+    fn apart<K: Kernel>(kernel: K) -> K::Output {
+        isa::portable(kernel)
+    }
 
     #[inline(always)]
     fn prefetch(_: *const u8) {}
@@ -185,6 +191,10 @@ impl<const N: usize> Array<N> for [f32; N] {
     fn to_array(self) -> [f32; N] {
         self
     }
+    #[inline(always)]
+    fn overwrite(self, values: &mut [f32; N]) {
+        *values = self;
+    }
 }
 
 impl<T> Three for [T; 4] {
@@ -206,9 +216,9 @@ impl Group for [f32; 8] {
         values.0.as_chunks_mut().0[group % (RAYS / 8)] = self;
     }
     #[inline(always)]
-    fn put_where(Bits(mask): Bits, value: u32, values: &mut [u32; RAYS], group: usize) {
-        let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
-        for (i, slot) in values.iter_mut().enumerate() {
+    fn put_where(self, Bits(mask): Bits, values: &mut [f32; RAYS], group: usize) {
+        let values: &mut [f32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
+        for (i, (slot, value)) in values.iter_mut().zip(self).enumerate() {
             *slot = if mask >> i & 1 != 0 { value } else { *slot };
         }
     }

@@ -4,10 +4,11 @@
 //! processor first; loads and stores go through references to arrays of the vector's size.
 #![allow(unsafe_code)] // Intrinsics.
 
-use std::arch::x86_64::*;
+use std::arch::{asm, x86_64::*};
 
 use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::Child;
 
 /// A function of two vectors by its intrinsic, as a method.
@@ -29,6 +30,11 @@ impl Simd for Avx2 {
     type V8 = V8;
     type Wide = V8;
     type D4 = D4;
+
+    #[inline(always)]
+    fn apart<K: Kernel>(kernel: K) -> K::Output {
+        unsafe { isa::avx2_apart(kernel) }
+    }
 
     #[inline(always)]
     fn prefetch(address: *const u8) {
@@ -103,6 +109,15 @@ impl Simd for Avx2 {
             ]
         }
     }
+}
+
+/// The same address, of which the compiler does not know whose it is.
+#[inline(always)]
+#[expect(clippy::pointers_in_nomem_asm_block, reason = "nothing is read or written")]
+pub(super) fn opaque<T>(mut address: *mut T) -> *mut T {
+    // No instruction.
+    unsafe { asm!("/* {0} */", inout(reg) address, options(pure, nomem, nostack, preserves_flags)) };
+    address
 }
 
 /// For each set of lanes an order, a byte a lane, in which they come first.
@@ -261,6 +276,10 @@ impl Array<4> for V4 {
         unsafe { _mm_storeu_ps(values.as_mut_ptr(), self.0) };
         values
     }
+    #[inline(always)]
+    fn overwrite(self, values: &mut [f32; 4]) {
+        unsafe { _mm_storeu_ps(opaque(values.as_mut_ptr()), self.0) };
+    }
 }
 
 impl Three for V4 {
@@ -346,6 +365,10 @@ impl Array<8> for V8 {
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
         values
     }
+    #[inline(always)]
+    fn overwrite(self, values: &mut [f32; 8]) {
+        unsafe { _mm256_storeu_ps(opaque(values.as_mut_ptr()), self.0) };
+    }
 }
 
 impl Group for V8 {
@@ -360,13 +383,9 @@ impl Group for V8 {
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
     }
     #[inline(always)]
-    fn put_where(mask: M8, value: u32, values: &mut [u32; RAYS], group: usize) {
-        let values: &mut [u32; 8] = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
-        unsafe {
-            let at = values.as_mut_ptr().cast();
-            let value = _mm256_set1_ps(f32::from_bits(value));
-            _mm256_storeu_ps(at, _mm256_blendv_ps(_mm256_loadu_ps(at), value, mask.0));
-        }
+    fn put_where(self, mask: M8, values: &mut [f32; RAYS], group: usize) {
+        let values = &mut values.as_chunks_mut().0[group % (RAYS / 8)];
+        Self::select(mask, self, Self::load(values)).overwrite(values);
     }
 }
 

@@ -5,7 +5,8 @@ use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
 use crate::trace::bvh::found::NONE;
-use crate::trace::bvh::noted::{Rays, Shared, splat, widen};
+use crate::trace::bvh::isa::Kernel;
+use crate::trace::bvh::noted::{FourHits, Rays, Shared, splat, widen};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::Simd;
@@ -71,70 +72,102 @@ impl Found {
         }
         self.computed |= 1 << ray;
     }
+}
 
-    /// Computes what is noted, and answers for the first `count` rays; `bundle` is theirs in the world.
+/// Computes what is noted, and answers for the first `count` rays; `bundle` is theirs in the world.
+pub(super) struct Finish<'a, Q: Query> {
+    pub bvh: &'a Bvh,
+    pub found: &'a Found,
+    pub bundle: &'a Bundle,
+    pub rays: &'a [Ray; RAYS],
+    pub count: usize,
+    pub answers: &'a mut [Q::Answer; RAYS],
+    pub t: &'a mut [f64; RAYS],
+}
+
+impl<Q: Query> Kernel for Finish<'_, Q> {
+    type Output = ();
+
     #[inline(always)]
-    pub fn finish<S: Simd, Q: Query>(
-        &mut self,
-        bvh: &Bvh,
-        bundle: &Bundle,
-        rays: &[Ray; RAYS],
-        count: usize,
-        answers: &mut [Q::Answer; RAYS],
-        t: &mut [f64; RAYS],
-    ) {
+    fn run<S: Simd>(self) {
+        let Self { bvh, found, bundle, rays, count, answers, t } = self;
         // Neighbours mostly hit the same triangle.
         let mut shared: Option<Shared<S::D4>> = None;
+        let has_placements = bvh.placements.has_triangles();
         for chunk in 0..count.div_ceil(4) {
             let chunk = chunk % (RAYS / 4);
-            let ids: [u32; 4] = self.noted.as_chunks().0[chunk];
-            let places: [u32; 4] = self.place.as_chunks().0[chunk];
+            let ids: &[u32; 4] = &found.noted.as_chunks().0[chunk];
+            let places: &[u32; 4] = &found.place.as_chunks().0[chunk];
             let answers: &mut [Q::Answer; 4] = &mut answers.as_chunks_mut().0[chunk];
             let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
-            let [a, b, c, d] = ids;
-            let [pa, pb, pc, pd] = places;
-            // NONE and FIXED are the largest numbers.
-            let (some, all) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-            let computed = self.computed >> (4 * chunk) & 0b1111;
-            if some == NONE && computed == 0 {
-                *answers = [Q::MISS; 4];
-                continue;
-            }
-            if some != NONE && pa.min(pb).min(pc.min(pd)) == FIXED {
-                if some == all {
+            let id = ids[0];
+            if *ids == [id; 4] && (!has_placements || *places == [FIXED; 4]) {
+                if id != NONE {
                     let shared = match &shared {
-                        Some(shared) if shared.id == all => shared,
+                        Some(shared) if shared.id == id => shared,
                         _ => shared
-                            .insert(bvh.fixed.triangles.shared::<S>(splat::<S>(Vec3::from_array(bundle.origin)), all)),
+                            .insert(bvh.fixed.triangles.shared::<S>(splat::<S>(Vec3::from_array(bundle.origin)), id)),
                     };
-                    let (exact, [a, b, c, d]) = shared.hits(directions::<S>(bundle, chunk));
-                    *t = exact;
-                    *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
+                    answer::<Q>(&shared.hits(directions::<S>(bundle, chunk)), t, answers);
                     continue;
                 }
-                let noted = named(&ids);
-                let ids = if all == NONE { repeated(&ids, noted) } else { ids };
-                let (exact, hits) = bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), ids);
-                if all != NONE {
-                    let [a, b, c, d] = hits;
-                    *t = exact;
-                    *answers = [Q::answer(Some(a)), Q::answer(Some(b)), Q::answer(Some(c)), Q::answer(Some(d))];
+                if found.computed >> (4 * chunk) & 0b1111 == 0 {
+                    *answers = [Q::MISS; 4];
                     continue;
                 }
-                for lane in (0..4).filter(|lane| noted >> lane & 1 != 0) {
-                    (t[lane], answers[lane]) = (exact[lane], Q::answer(Some(hits[lane])));
-                }
-            } else if some != NONE {
-                answer_some::<S, Q>(bvh, bundle, rays, chunk, &ids, &places, t, answers);
             }
-            for lane in (0..4).filter(|lane| ids[*lane] == NONE) {
-                answers[lane] = Q::MISS;
-                if computed >> lane & 1 != 0 {
-                    let nearest = &self.nearest[4 * chunk + lane];
-                    (t[lane], answers[lane]) = (nearest.t(), Q::answer(nearest.hit()));
-                }
+            S::apart(Chunk::<Q> { bvh, found, bundle, rays, chunk, ids, places, answers, t });
+        }
+    }
+}
+
+/// Four neighbours of a bundle that have not all hit the same fixed triangle.
+struct Chunk<'a, Q: Query> {
+    bvh: &'a Bvh,
+    found: &'a Found,
+    bundle: &'a Bundle,
+    rays: &'a [Ray; RAYS],
+    chunk: usize,
+    ids: &'a [u32; 4],
+    places: &'a [u32; 4],
+    answers: &'a mut [Q::Answer; 4],
+    t: &'a mut [f64; 4],
+}
+
+impl<Q: Query> Kernel for Chunk<'_, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, found, bundle, rays, chunk, ids, places, answers, t } = self;
+        let noted = named(ids);
+        if noted != 0 && *places == [FIXED; 4] {
+            let all = noted == 0b1111;
+            let known = if all { *ids } else { repeated(ids, noted) };
+            // Those of rays that have hit nothing, or what was computed, are replaced below.
+            answer::<Q>(&bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), known), t, answers);
+            if all {
+                return;
+            }
+        } else if noted != 0 {
+            answer_some::<S, Q>(bvh, bundle, rays, chunk, ids, places, t, answers);
+        }
+        for lane in (0..4).filter(|lane| noted >> lane & 1 == 0) {
+            let ray = 4 * chunk + lane;
+            answers[lane] = Q::MISS;
+            if found.computed >> ray & 1 != 0 {
+                let nearest = &found.nearest[ray];
+                (t[lane], answers[lane]) = (nearest.t(), Q::answer(nearest.hit()));
             }
         }
+    }
+}
+
+#[inline(always)]
+fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer; 4]) {
+    *t = hits.numbers.t;
+    for (i, answer) in answers.iter_mut().enumerate() {
+        *answer = Q::answer(Some(hits.hit(i)));
     }
 }
 
@@ -164,9 +197,9 @@ fn answer_some<S: Simd, Q: Query>(
         (fixed, placed) = if places[lane] == FIXED { (fixed | bit, placed) } else { (fixed, placed | bit) };
     }
     if fixed != 0 {
-        let (exact, hits) = bvh.fixed.triangles.hits::<S>(&four, repeated(ids, fixed));
+        let hits = bvh.fixed.triangles.hits::<S>(&four, repeated(ids, fixed));
         for lane in (0..4).filter(|lane| fixed >> lane & 1 != 0) {
-            (t[lane], answers[lane]) = (exact[lane], Q::answer(Some(hits[lane])));
+            (t[lane], answers[lane]) = (hits.numbers.t[lane], Q::answer(Some(hits.hit(lane))));
         }
     }
     if placed != 0 {

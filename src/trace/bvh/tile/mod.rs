@@ -28,14 +28,14 @@ use std::marker::PhantomData;
 
 use super::Bvh;
 use super::build::MAX_DEPTH;
-use super::bundle::{Bundle, Fit, RAYS};
+use super::bundle::{Bundle, Fill, Fit, RAYS};
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::range::Range;
 use super::simd::Simd;
 use crate::ray::Ray;
 use apart::Apart;
-use found::Found;
+use found::{Finish, Found};
 use octants::{Octants, Part};
 use placed::Tour;
 use walk::{Entry, Walk, Way, few};
@@ -93,7 +93,8 @@ pub(super) fn trace<S: Simd, Q: Query>(
 ) -> u64 {
     let Scratch { one, t, entered, part } = scratch;
     *entered = 0;
-    let (mut part_answers, mut part_t) = ([Q::MISS; RAYS], [0.0; RAYS]);
+    // Of a part; filled only where there is one.
+    let mut parted = None;
     // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one loop, so
     // that what is called here, of which most of the kernel consists, is compiled once.
     let mut octants = if rays.len() == RAYS { None } else { Some(Octants::new(rays)) };
@@ -111,18 +112,20 @@ pub(super) fn trace<S: Simd, Q: Query>(
             ((Ok(rays), Ok(answers)), None) => (rays, RAYS, answers, &mut *t),
             _ => {
                 part.gather(rays, members);
-                (&part.rays, part.count, &mut part_answers, &mut part_t)
+                let (answers, t) = parted.insert(([Q::MISS; RAYS], [0.0; RAYS]));
+                (&part.rays, part.count, answers, t)
             }
         };
-        let fit = one.bundle.fill::<S, Q>(group, &mut one.range);
+        let fit =
+            S::apart(Fill::<Q> { bundle: &mut one.bundle, rays: group, range: &mut one.range, query: PhantomData });
         let is_traced = fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered);
         if is_traced {
             done |= members;
         }
-        if octants.is_some() {
+        if let (Some(_), Some((part_answers, part_t))) = (&octants, &parted) {
             if is_traced {
-                part.scatter(&part_answers, answers);
-                part.scatter(&part_t, t);
+                part.scatter(part_answers, answers);
+                part.scatter(part_t, t);
             }
         } else if fit == Fit::Parts {
             octants = Some(Octants::new(rays));
@@ -169,14 +172,16 @@ impl One {
             let few = few(bundle, reach);
             let walk = Walk { bvh, place, tree, rays, bundle, found, few, query: PhantomData::<Q> };
             walk.run::<S>(stack, way, seeing);
-            range.shorten::<S>(bundle, &found.sure, &found.limit);
+            if Q::ANY || tour.has_placements() {
+                range.shorten::<S>(bundle, &found.sure, &found.limit);
+            }
         }
         if Q::ANY {
             for (answer, limit) in answers.iter_mut().zip(&range.limit.0) {
                 *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
             }
         } else {
-            found.finish::<S, Q>(bvh, bundle, rays, count, answers, t);
+            S::apart(Finish::<Q> { bvh, found, bundle, rays, count, answers, t });
         }
         true
     }

@@ -59,6 +59,12 @@ impl<'a> Tour<'a> {
         Some(Self { places: Places { placements, limit: PerRay::ZERO }, way, stack, len: 1, visits_fixed })
     }
 
+    /// Whether there are places besides what is fixed.
+    #[inline(always)]
+    pub fn has_placements(&self) -> bool {
+        self.way.is_some()
+    }
+
     /// The next place, a bit for every ray that may go there, and where the first of them enters its box.
     #[inline(always)]
     pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u64, f32)> {

@@ -11,6 +11,7 @@ use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS, SLACK, 
 use crate::trace::bvh::edges::Edges;
 use crate::trace::bvh::footprint::Footprints;
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
+use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::rows::{self, ROWS};
 use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
@@ -294,10 +295,17 @@ impl<Q: Query> Walk<'_, Q> {
                 open = inside.without(sure).without(outside).bits();
                 if sure.bits() != 0 {
                     let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
-                    S::Wide::select(sure, high, limit).put(&mut self.found.limit, group);
-                    S::Wide::select(sure, low, before).put(&mut self.found.sure, group);
-                    S::Wide::put_where(sure, id, &mut self.found.noted, group);
-                    S::Wide::put_where(sure, self.place, &mut self.found.place, group);
+                    high.put_where(sure, &mut self.found.limit.0, group);
+                    low.put_where(sure, &mut self.found.sure.0, group);
+                    if !Q::ANY {
+                        let id = splat(f32::from_bits(id));
+                        id.put_where(sure, bytemuck::cast_mut(&mut self.found.noted), group);
+                    }
+                    // What is fixed comes first, when nothing else is noted yet.
+                    if !Q::ANY && self.place != FIXED {
+                        let place = splat(f32::from_bits(self.place));
+                        place.put_where(sure, bytemuck::cast_mut(&mut self.found.place), group);
+                    }
                     changed = true;
                 }
                 if open != 0 && self.bundle.is_turned {
