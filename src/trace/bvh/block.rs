@@ -11,20 +11,20 @@ pub(super) const LANES: usize = 8;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Block {
+    /// At least the largest component of an edge. With the corners, for whoever tests them needs it: at the end it cost a cache line more.
+    pub size: f32,
+    /// A bit for every lane that has a triangle.
+    pub lanes: u32,
     /// Component by component: that of the first corners, the second, the third.
     pub corners: [[[f32; LANES]; 3]; 3],
     pub primitive: [u32; LANES],
     pub part: [u32; LANES],
-    /// At least the largest component of an edge.
-    pub size: f32,
-    /// A bit for every lane that has a triangle.
-    pub lanes: u32,
 }
 
 impl Block {
     /// Without triangles.
     pub const EMPTY: Self =
-        Self { corners: [[[0.0; LANES]; 3]; 3], primitive: [0; LANES], part: [0; LANES], size: 0.0, lanes: 0 };
+        Self { size: 0.0, lanes: 0, corners: [[[0.0; LANES]; 3]; 3], primitive: [0; LANES], part: [0; LANES] };
 
     /// Adds a triangle, the eighth at most.
     #[inline(always)]
