@@ -20,6 +20,7 @@ mod traveller;
 use super::Bvh;
 use super::found::Found;
 use super::leaves::Leaves;
+use super::node::Child;
 use super::place::Blur;
 use super::query::Query;
 use super::ready::ReadyRays;
@@ -84,7 +85,9 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
 /// Has what will be needed soon loaded; without a branch, which nobody could predict.
 #[inline(always)]
 fn prefetch<S: Simd>(traveller: &Traveller, ground: &impl Ground) {
-    let (space, next) = (traveller.space, traveller.next);
+    // A ray that has arrived has no next; an address outside of what is there would be looked up in vain, which holds up all that follows.
+    let (space, next) =
+        (traveller.space, select_unpredictable(traveller.next == Child::NONE, Child::ROOT, traveller.next));
     let (node, leaf) = (ground.node_address::<S>(space, next), ground.leaf_address::<S>(space, next));
     S::prefetch(select_unpredictable(next.is_leaf(), leaf, node));
 }
