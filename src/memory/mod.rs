@@ -8,10 +8,12 @@
 
 mod array;
 mod mapped;
+mod prefetch;
 pub(crate) mod process;
 
 pub(crate) use array::Array;
 pub(crate) use mapped::Mapped;
+pub(crate) use prefetch::prefetch;
 
 use bytemuck::Zeroable;
 

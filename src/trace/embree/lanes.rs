@@ -13,8 +13,6 @@ pub(super) struct Lanes {
     pub direction: [Vec4; 3],
     pub tmin: Vec4,
     pub tmax: Vec4,
-    /// From 0 to 1, as Embree demands.
-    pub time: Vec4,
 }
 
 impl Lanes {
@@ -31,7 +29,6 @@ impl Lanes {
             direction: [starts.w_axis, ends.x_axis, ends.y_axis],
             tmin: ends.z_axis,
             tmax: ends.w_axis,
-            time: Vec4::from_array(rays.each_ref().map(Ray::moment)),
         }
     }
 

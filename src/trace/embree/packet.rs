@@ -19,6 +19,7 @@ use super::reach::Reach;
 use super::single::{SingleRay, SingleRayHit};
 use super::{PartIds, sys};
 use crate::math::{BVec4A, Mat4, Vec4};
+use crate::memory;
 use crate::ray::{Hit, Ray};
 
 /// Rows of a ray, or fields of a single one.
@@ -78,6 +79,7 @@ pub(super) fn each<T: Copy + Default, const G: usize>(
     let (ray_packets, more_rays) = ray_fours.as_chunks::<G>();
     let (answer_packets, more_answers) = answer_fours.as_chunks_mut::<G>();
     for (rays, answers) in ray_packets.iter().zip(answer_packets) {
+        fetch_ahead(rays);
         trace(rays, answers);
     }
     let rest = more_rays.as_flattened().iter().chain(last_rays);
@@ -88,6 +90,16 @@ pub(super) fn each<T: Copy + Default, const G: usize>(
         let mut answered = [[T::default(); 4]; G];
         trace(&packet, &mut answered);
         rest.zip(answered.as_flattened()).for_each(|(place, answer)| *place = *answer);
+    }
+}
+
+/// Has rays loaded that come soon after those of a packet: from memory mostly, as those of the native tracer's bundles are. There may be none.
+#[inline(always)]
+fn fetch_ahead<const G: usize>(rays: &Packet<Ray, G>) {
+    const AHEAD: usize = 192;
+    let ahead = rays.as_ptr().cast::<Ray>().wrapping_add(AHEAD).cast::<u8>();
+    for offset in (0..size_of_val(rays)).step_by(64) {
+        memory::prefetch(ahead.wrapping_add(offset));
     }
 }
 
@@ -122,6 +134,10 @@ impl<const G: usize> Rays<G> {
             let lanes = Lanes::new(four);
             traceable &= lanes.surely_traceable(reach);
             self.put(g, &lanes);
+            if reach.is_moving {
+                // From 0 to 1, as Embree demands.
+                self.0[ray_row::TIME][g] = Vec4::from_array(four.each_ref().map(Ray::moment));
+            }
             active.0[g] = Vec4::splat(ALL_BITS);
         }
         // One branch a packet.
@@ -137,7 +153,6 @@ impl<const G: usize> Rays<G> {
             self.0[ray_row::DIRECTION + axis][group] = lanes.direction[axis];
         }
         self.0[ray_row::TNEAR][group] = lanes.tmin;
-        self.0[ray_row::TIME][group] = lanes.time;
         self.0[ray_row::TFAR][group] = lanes.tmax;
     }
 

@@ -14,9 +14,11 @@ const MOST: f32 = 1.844e18;
 /// Times at which what moves is looked at, from 0 to this.
 const TIMES: u8 = 16;
 
-/// The largest coordinate of a ray that Embree can trace.
+/// The largest coordinate of a ray that Embree can trace, and whether it needs to know a ray's time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
+    /// Whether anything moves.
+    pub is_moving: bool,
     most: f32,
     /// Its square, less what sums of squares are rounded by.
     pub square: f32,
@@ -24,7 +26,7 @@ pub(super) struct Reach {
 
 impl Reach {
     const fn new(most: f32) -> Self {
-        Self { most, square: 0.999 * most * most }
+        Self { is_moving: false, most, square: 0.999 * most * most }
     }
 
     /// In a world.
@@ -48,7 +50,8 @@ impl Reach {
                 most = most.min(reach.unwrap_or(most));
             }
         }
-        Ok(Self::new(most))
+        let is_moving = world.placements.iter().any(|placement| placement.motion.is_some());
+        Ok(Self { is_moving, ..Self::new(most) })
     }
 
     /// Whether a ray is [valid](Ray::is_valid) and Embree can trace it; any other misses.

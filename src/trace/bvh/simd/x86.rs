@@ -7,6 +7,7 @@
 use std::arch::{asm, x86_64::*};
 
 use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
+use crate::memory;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::Child;
@@ -39,8 +40,7 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn prefetch(address: *const u8) {
         for line in 0..4 {
-            // A hint, whatever the address.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(64 * line).cast()) };
+            memory::prefetch(address.wrapping_add(64 * line));
         }
     }
 
