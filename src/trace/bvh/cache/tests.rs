@@ -1,9 +1,12 @@
 //! Files with right digests and wrong trees: what a digest cannot find.
 
+use std::mem::offset_of;
+
 use super::*;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Mesh, Scene, architecture, terrain};
+use crate::trace::bvh::block::Block;
 use crate::trace::bvh::node::{Child, WIDTH};
 use crate::trace::{Batch, Tracer};
 
@@ -199,8 +202,11 @@ fn wrong_blocks_are_refused() {
     case.refuses("does not hold its triangles", |_, words| words.swap(0, case.words.len() / 2));
 
     let case = Case::new(terrain(40), Preset::Default);
-    let (primitive, part, size, lanes) = (9 * LANES, 10 * LANES, 11 * LANES, 11 * LANES + 1);
-    for word in [0, primitive, part, size, lanes] {
+    let word = |offset: usize| offset / size_of::<u32>();
+    let (corner, primitive) = (word(offset_of!(Block, corners)), word(offset_of!(Block, primitive)));
+    let (part, size, lanes) =
+        (word(offset_of!(Block, part)), word(offset_of!(Block, size)), word(offset_of!(Block, lanes)));
+    for word in [corner, primitive, part, size, lanes] {
         case.refuses("is not of this mesh", |_, words| words[word] ^= 1);
     }
     case.refuses("is not of this mesh", |_, words| words[primitive] = none);
