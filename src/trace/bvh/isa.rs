@@ -60,7 +60,7 @@ impl Isa {
 }
 
 /// Work that is compiled for each instruction set: everything below `run` is `inline(always)`, so that it ends up in one
-/// function per instruction set.
+/// function per instruction set, but for what runs [apart](Simd::apart).
 pub(super) trait Kernel {
     type Output;
     fn run<S: Simd>(self) -> Self::Output;

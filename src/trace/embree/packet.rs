@@ -318,4 +318,15 @@ mod tests {
         }
         assert_eq!([packet.occluded(0), packet.occluded(1)], [[false; 4]; 2]);
     }
+
+    #[test]
+    fn times_are_told_where_something_moves() {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X);
+        let rays = [[0.25, -1.0, f32::NAN, 7.0].map(|time| Ray { time, ..ray })];
+        let (mut packet, mut active) = (Rays::<1>::new(), Active::new());
+        let mut reach = Reach::WORLD;
+        reach.is_moving = true;
+        packet.load(&rays, &reach, &mut active);
+        assert_eq!(packet.0[ray_row::TIME][0].to_array(), [0.25, 0.0, 0.0, 1.0]);
+    }
 }

@@ -50,8 +50,7 @@ impl Reach {
                 most = most.min(reach.unwrap_or(most));
             }
         }
-        let is_moving = world.placements.iter().any(|placement| placement.motion.is_some());
-        Ok(Self { is_moving, ..Self::new(most) })
+        Ok(Self { is_moving: world.moves(), ..Self::new(most) })
     }
 
     /// Whether a ray is [valid](Ray::is_valid) and Embree can trace it; any other misses.

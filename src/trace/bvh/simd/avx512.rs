@@ -22,6 +22,7 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn apart<K: Kernel>(kernel: K) -> K::Output {
+        // SAFETY: it is called by kernels of this instruction set.
         unsafe { isa::avx512_apart(kernel) }
     }
 

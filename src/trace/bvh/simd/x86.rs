@@ -34,6 +34,7 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn apart<K: Kernel>(kernel: K) -> K::Output {
+        // SAFETY: it is called by kernels of this instruction set.
         unsafe { isa::avx2_apart(kernel) }
     }
 
@@ -115,7 +116,7 @@ impl Simd for Avx2 {
 #[inline(always)]
 #[expect(clippy::pointers_in_nomem_asm_block, reason = "nothing is read or written")]
 pub(super) fn opaque<T>(mut address: *mut T) -> *mut T {
-    // No instruction.
+    // SAFETY: no instruction; the address comes back as it went in.
     unsafe { asm!("/* {0} */", inout(reg) address, options(pure, nomem, nostack, preserves_flags)) };
     address
 }

@@ -122,7 +122,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
         if is_traced {
             done |= members;
         }
-        if let (Some(_), Some((part_answers, part_t))) = (&octants, &parted) {
+        if let Some((part_answers, part_t)) = &parted {
             if is_traced {
                 part.scatter(part_answers, answers);
                 part.scatter(part_t, t);
