@@ -22,6 +22,9 @@ pub(super) struct Block {
 }
 
 impl Block {
+    /// Bytes of one axis's components of all corners.
+    pub const AXIS: u32 = size_of::<[[f32; LANES]; 3]>() as u32;
+
     /// Without triangles.
     pub const EMPTY: Self =
         Self { size: 0.0, lanes: 0, corners: [[[0.0; LANES]; 3]; 3], primitive: [0; LANES], part: [0; LANES] };

@@ -5,29 +5,29 @@ use super::bundle::axes;
 use super::place::Blur;
 use super::planes;
 use super::simd::{Array, Mask, Simd, Vector};
-use super::woop::{self, Aim, Judged, SLACK, Sheared};
-use crate::math::Vec3;
+use super::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
+use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
 /// A ray made ready for the f32 reject test.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filter {
-    /// The axis along which the direction is largest, before it the two that follow it.
-    axes: [usize; 3],
+    /// The axis along which the direction is largest, before it the two that follow it: of each, how many bytes after the first axis its corners are in a block.
+    pub axes: [u32; 3],
     /// Origin, in the order of `axes`.
-    origin: [f32; 3],
+    pub origin: [f32; 3],
     /// Direction along the first two axes over that along the third, negative; at most 1 in magnitude.
-    shear: [f32; 2],
-    /// 1 more than the larger of the two.
-    width: f32,
-    /// Direction along the third.
-    along: f32,
+    pub shear: [f32; 2],
+    /// As of [`Margin`].
+    pub margin: [f32; 3],
+    /// Direction along the third, negative.
+    pub against: f32,
     /// 1 over its magnitude.
-    shorten: f32,
-    /// Least t, rounded down, times the magnitude of `along`.
-    begin: f32,
+    pub shorten: f32,
+    /// Least t, rounded down, times the magnitude of `against`.
+    pub begin: f32,
     /// How far all that may be from the ray that is meant.
-    blur: Blur,
+    pub blur: Blur,
 }
 
 /// Triangles of a block that a ray may hit.
@@ -53,34 +53,15 @@ impl Filter {
         let reciprocal = 1.0 / direction[z];
         let shear = [direction[x] * -reciprocal, direction[y] * -reciprocal];
         Self {
-            axes: [x, y, z],
+            axes: [at(x), at(y), at(z)],
             origin: [origin[x], origin[y], origin[z]],
             shear,
-            width: 1.0 + shear[0].abs().max(shear[1].abs()),
-            along: direction[z],
+            margin: margin(1.0 + shear[0].abs().max(shear[1].abs()), blur.direction),
+            against: -direction[z],
             shorten: reciprocal.abs(),
             begin: ray.tmin * direction[z].abs() * (1.0 - SLACK),
             blur,
         }
-    }
-
-    /// One of those that are made ready together, by its fields.
-    #[inline(always)]
-    pub fn of_eight(
-        axes: [usize; 3],
-        origin: [f32; 3],
-        shear: [f32; 2],
-        [width, along, shorten, begin]: [f32; 4],
-        blur: Blur,
-    ) -> Self {
-        Self { axes, origin, shear, width, along, shorten, begin, blur }
-    }
-
-    /// In the order of [`Self::of_eight`].
-    #[inline(always)]
-    pub fn fields(&self) -> ([usize; 3], [f32; 3], [f32; 2], [f32; 4]) {
-        let Self { axes, origin, shear, width, along, shorten, begin, .. } = *self;
-        (axes, origin, shear, [width, along, shorten, begin])
     }
 
     /// The triangles that the ray may hit up to `limit`. If it is not `BLURRED`, it is the ray that is meant.
@@ -97,41 +78,65 @@ impl Filter {
 
     #[inline(always)]
     fn test<S: Simd, const BLURRED: bool, const ROUNDED: bool>(&self, block: &Block, limit: f32) -> Candidates {
+        let (sides, passed) = self.look::<S, BLURRED>(block);
+        if passed == 0 {
+            return Candidates::NONE;
+        }
+        self.meet::<S, BLURRED, ROUNDED>(block, &sides, passed, limit)
+    }
+
+    /// On which sides of the triangles' edges the ray passes, and a bit for each triangle that it may pass within.
+    #[inline(always)]
+    pub fn look<S: Simd, const BLURRED: bool>(&self, block: &Block) -> (Sides<S::V8>, u32) {
         let splat = S::V8::splat;
         let [kx, ky, kz] = self.axes;
-        let (cx, cy, cz) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
-        let (ox, oy, oz) = (splat(self.origin[0]), splat(self.origin[1]), splat(self.origin[2]));
+        let (cx, cy, cz) = (S::corners(block, kx), S::corners(block, ky), S::corners(block, kz));
+        let [ox, oy, oz] = self.origin_in_lanes::<S>();
         let (sx, sy) = (splat(self.shear[0]), splat(self.shear[1]));
         // From the corners to the origin, not the other way round: that spares loads.
         let mut x = [ox; 3];
         let mut y = [oy; 3];
         let mut z = [oz; 3];
         for k in 0..3 {
-            z[k] = oz.sub(S::V8::load(&cz[k]));
-            x[k] = z[k].mul_add(sx, ox.sub(S::V8::load(&cx[k])));
-            y[k] = z[k].mul_add(sy, oy.sub(S::V8::load(&cy[k])));
+            z[k] = oz.sub(cz[k]);
+            x[k] = z[k].mul_add(sx, ox.sub(cx[k]));
+            y[k] = z[k].mul_add(sy, oy.sub(cy[k]));
         }
-        let aim = Aim {
-            width: splat(self.width),
-            along: splat(self.along),
-            shorten: splat(self.shorten),
-            begin: splat(self.begin),
-        };
-        let (limit, size) = (splat(limit), splat(block.size));
-        let (seen, blur) = (Sheared { x, y, z }, self.blur);
+        let [width, of_depth, of_size] = self.margin;
+        let margin = Margin { width: splat(width), of_depth: splat(of_depth), of_size: splat(of_size) };
+        let blur = if BLURRED { Some(self.blur.origin) } else { None };
+        let sides = Sides::new(&Sheared { x, y, z }, &margin, splat(block.size), blur);
+        let passed = sides.passed() & block.lanes;
+        (sides, passed)
+    }
+
+    /// The triangles that it may hit, of those that it may pass within, after [`Self::look`]. If they are not `ROUNDED`, corners are those that are meant;
+    /// else the blur's origin has room for what they are off by.
+    #[inline(always)]
+    pub fn meet<S: Simd, const BLURRED: bool, const ROUNDED: bool>(
+        &self,
+        block: &Block,
+        sides: &Sides<S::V8>,
+        passed: u32,
+        limit: f32,
+    ) -> Candidates {
+        let splat = S::V8::splat;
+        let aim = Aim { against: splat(self.against), shorten: splat(self.shorten), begin: splat(self.begin) };
+        let blur = self.blur;
         let judged = woop::judge::<S::V8, BLURRED, ROUNDED>(
-            &seen,
+            sides,
             &aim,
-            limit,
-            size,
-            block.lanes,
+            splat(limit),
+            splat(block.size),
+            passed,
             blur,
             #[inline(always)]
             || {
                 // Asked that rarely, corners are better loaded again than kept: the black box keeps them from being kept.
-                let corners = std::hint::black_box(&block.corners);
-                let corners = [along::<S>(&corners[kx]), along::<S>(&corners[ky]), along::<S>(&corners[kz])];
-                planes::heights(corners, [ox, oy, oz], if BLURRED { blur.origin } else { 0.0 })
+                let block = std::hint::black_box(block);
+                let [kx, ky, kz] = self.axes;
+                let corners = [S::corners(block, kx), S::corners(block, ky), S::corners(block, kz)];
+                planes::heights(corners, self.origin_in_lanes::<S>(), if BLURRED { blur.origin } else { 0.0 })
             },
         );
         match judged {
@@ -141,12 +146,25 @@ impl Filter {
             None => Candidates::NONE,
         }
     }
+
+    #[inline(always)]
+    fn origin_in_lanes<S: Simd>(&self) -> [S::V8; 3] {
+        let [x, y, z] = self.origin;
+        [S::V8::splat(x), S::V8::splat(y), S::V8::splat(z)]
+    }
 }
 
-/// One component of all corners.
+/// As [`Margin::new`].
 #[inline(always)]
-fn along<S: Simd>([a, b, c]: &[[f32; LANES]; 3]) -> [S::V8; 3] {
-    [S::V8::load(a), S::V8::load(b), S::V8::load(c)]
+pub(super) fn margin(width: f32, direction: f32) -> [f32; 3] {
+    let of_depth = width * (5.0 * UNIT_ROUNDOFF) - 4.0 * UNIT_ROUNDOFF + 2.2 * direction;
+    [width, of_depth, width * (of_depth + 3.0 * UNIT_ROUNDOFF) + of_depth]
+}
+
+/// Where in a block the corners' components on an axis are.
+#[inline(always)]
+pub(super) const fn at(axis: usize) -> u32 {
+    axis as u32 * Block::AXIS
 }
 
 /// The axis of the largest component.
@@ -161,22 +179,22 @@ pub(super) fn largest_axis(v: Vec3) -> usize {
     }
 }
 
-/// Filters of eight rays with no blur, field by field.
+/// Filters of eight rays, field by field.
 pub(super) struct Filters<V> {
     /// As bits of numbers.
     pub axes: [V; 3],
     pub origin: [V; 3],
     pub shear: [V; 2],
-    pub width: V,
-    pub along: V,
+    pub margin: Margin<V>,
+    pub against: V,
     pub shorten: V,
     pub begin: V,
 }
 
 impl<V: Vector> Filters<V> {
-    /// As [`Filter::new`] for each of them.
+    /// As [`Filter::new`] for each of them; directions are off by `blur` of their largest component.
     #[inline(always)]
-    pub fn new(origin: [V; 3], direction: [V; 3], tmin: V) -> Self {
+    pub fn new(origin: [V; 3], direction: [V; 3], tmin: V, blur: V) -> Self {
         let [dx, dy, dz] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
         let is_x = dy.less(dx).and(dz.less(dx));
         let is_y = dz.less(dy).without(is_x);
@@ -185,13 +203,14 @@ impl<V: Vector> Filters<V> {
         let reciprocal = V::splat(1.0).div(along);
         let negative = V::splat(0.0).sub(reciprocal);
         let shear = [pick(is_x, is_y, direction, 1).mul(negative), pick(is_x, is_y, direction, 2).mul(negative)];
-        let numbers = [V::splat(f32::from_bits(0)), V::splat(f32::from_bits(1)), V::splat(f32::from_bits(2))];
+        let numbers =
+            [V::splat(f32::from_bits(at(0))), V::splat(f32::from_bits(at(1))), V::splat(f32::from_bits(at(2)))];
         Self {
             axes: [pick(is_x, is_y, numbers, 1), pick(is_x, is_y, numbers, 2), pick(is_x, is_y, numbers, 0)],
             origin: [pick(is_x, is_y, origin, 1), pick(is_x, is_y, origin, 2), pick(is_x, is_y, origin, 0)],
-            width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
+            margin: Margin::new(shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)), blur),
             shear,
-            along,
+            against: V::splat(0.0).sub(along),
             shorten: reciprocal.abs(),
             begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
         }

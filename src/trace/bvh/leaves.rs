@@ -28,6 +28,8 @@ pub(super) struct Numbers {
 
 /// Blocks by their numbers.
 pub(super) trait Blocks {
+    /// How many bytes they are apart.
+    const STRIDE: usize;
     /// Block `index`; `scratch` is where it may be put together.
     fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
@@ -35,6 +37,7 @@ pub(super) trait Blocks {
 }
 
 impl Blocks for [Block] {
+    const STRIDE: usize = size_of::<Block>();
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
         &self[index as usize]
@@ -46,6 +49,7 @@ impl Blocks for [Block] {
 }
 
 impl Blocks for Numbers {
+    const STRIDE: usize = size_of::<[u32; LANES]>();
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         scratch.insert(self.read(index))
@@ -102,6 +106,14 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.read(index)),
+        }
+    }
+
+    /// How many bytes blocks are apart.
+    pub fn stride(&self) -> usize {
+        match self {
+            Self::Blocks(_) => <[Block] as Blocks>::STRIDE,
+            Self::Numbers(_) => Numbers::STRIDE,
         }
     }
 

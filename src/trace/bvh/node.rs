@@ -58,7 +58,7 @@ impl Child {
         self.0
     }
 
-    /// A leaf's first block.
+    /// A leaf's first block; or a node.
     #[inline(always)]
     pub fn first(self) -> u32 {
         self.0 & ((1 << Self::COUNT_SHIFT) - 1)
@@ -104,6 +104,9 @@ pub(super) struct Node {
 }
 
 impl Node {
+    /// Bytes of a row of bounds.
+    pub const ROW: u32 = size_of::<[f32; WIDTH]>() as u32;
+
     /// A node without children.
     pub fn empty() -> Self {
         let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);

@@ -6,6 +6,7 @@ use super::filter::{Filter, Filters};
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector};
 use super::slab::{SlabRay, Slabs, least_t};
+use super::woop::Margin;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -26,36 +27,45 @@ impl ReadyRay {
             reciprocal: [rx, ry, rz, 0.0],
             near_offset: [nx, ny, nz, 0.0],
             far_offset: [fx, fy, fz, 0.0],
-            side: [x.to_bits(), y.to_bits(), z.to_bits()],
+            first: [x.to_bits(), y.to_bits(), z.to_bits()],
             tmin,
         }
     }
 
     #[inline(always)]
     pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, along, ax, ay, az, ..], [_, _, _, b, r, ..]] =
-            self.rows;
-        let axes = [ax.to_bits() as usize, ay.to_bits() as usize, az.to_bits() as usize];
-        let blur = Blur { origin: b, direction: r };
-        Filter::of_eight(axes, [x, y, z], [p, q], [width, along, shorten, begin], blur)
+        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, against, ax, ay, az, ..], last] = self.rows;
+        let [_, _, _, origin, direction, of_depth, of_size, _] = last;
+        Filter {
+            axes: [ax.to_bits(), ay.to_bits(), az.to_bits()],
+            origin: [x, y, z],
+            shear: [p, q],
+            margin: [width, of_depth, of_size],
+            against,
+            shorten,
+            begin,
+            blur: Blur { origin, direction },
+        }
     }
 
     /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
     #[inline(always)]
     pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let Slabs { reciprocal, near, far, is_negative } = Slabs::of_ray::<S>(ray, reach, blur);
-        let sides = S::V4::select(is_negative, S::V4::splat(f32::from_bits(1)), S::V4::splat(0.0));
+        let [sx, sy, sz] = SlabRay::first_rows(is_negative.bits());
+        let [sx, sy, sz] = [f32::from_bits(sx), f32::from_bits(sy), f32::from_bits(sz)];
         let filter = Filter::new(ray, blur);
-        let ([ax, ay, az], [x, y, z], [p, q], [width, along, shorten, begin]) = filter.fields();
-        let [ax, ay, az] = [axis(ax), axis(ay), axis(az)];
+        let Filter { axes: [ax, ay, az], origin: [x, y, z], shear: [p, q], against, shorten, begin, .. } = filter;
+        let [width, of_depth, of_size] = filter.margin;
+        let [ax, ay, az] = [f32::from_bits(ax), f32::from_bits(ay), f32::from_bits(az)];
         let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), near.to_array());
-        let ([fx, fy, fz, _], [sx, sy, sz, _]) = (far.to_array(), sides.to_array());
+        let [fx, fy, fz, _] = far.to_array();
         Self {
             rows: [
                 [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, begin],
                 [fx, fy, fz, width, x, y, z, shorten],
-                [p, q, along, ax, ay, az, 0.0, 0.0],
-                [sx, sy, sz, blur.origin, blur.direction, 0.0, 0.0, 0.0],
+                [p, q, against, ax, ay, az, 0.0, 0.0],
+                [sx, sy, sz, blur.origin, blur.direction, of_depth, of_size, 0.0],
             ],
         }
     }
@@ -117,12 +127,6 @@ impl<'a> ReadyRays<'a> {
     }
 }
 
-/// The number of an axis as bits of a number.
-#[inline(always)]
-const fn axis(number: usize) -> f32 {
-    f32::from_bits(number as u32)
-}
-
 /// As [`SlabRay::new`] and [`Filter::new`] for eight rays, field by field as [`columns`] has them; and a bit for each that [is valid](Ray::is_valid). Origins are off by what
 /// the blur says, and besides, as directions are, by its second part of their largest component: that is [`Blur::NONE`],
 /// or rays were rounded.
@@ -141,23 +145,26 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     for axis in 0..3 {
         finite = direction[axis].mul_add(zero, origin[axis].mul_add(zero, finite));
         (reciprocals[axis], near[axis], far[axis]) = (slabs[axis].reciprocal, slabs[axis].near, slabs[axis].far);
-        sides[axis] = S::V8::select(slabs[axis].is_negative, splat(f32::from_bits(1)), zero);
+        let up = splat(f32::from_bits(SlabRay::first_rows(0)[axis]));
+        let down = splat(f32::from_bits(SlabRay::first_rows(0b111)[axis]));
+        sides[axis] = S::V8::select(slabs[axis].is_negative, down, up);
     }
     // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
-    let filter = Filters::new(origin, direction, tmin);
+    let filter = Filters::new(origin, direction, tmin, splat(blur.direction));
+    let Margin { width, of_depth, of_size } = filter.margin;
     let [rx, ry, rz] = reciprocals;
     let [nx, ny, nz] = near;
     let [fx, fy, fz] = far;
     let [x, y, z] = filter.origin;
     let first = S::transpose([rx, ry, rz, least, nx, ny, nz, filter.begin]);
-    let second = S::transpose([fx, fy, fz, filter.width, x, y, z, filter.shorten]);
+    let second = S::transpose([fx, fy, fz, width, x, y, z, filter.shorten]);
     let [p, q] = filter.shear;
     let [kx, ky, kz] = filter.axes;
     // Rounded up, for t is rounded before it is held against it.
     let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
-    let third = S::transpose([p, q, filter.along, kx, ky, kz, tmax, limit]);
-    let fourth = S::transpose([sides[0], sides[1], sides[2], off, splat(blur.direction), zero, zero, zero]);
+    let third = S::transpose([p, q, filter.against, kx, ky, kz, tmax, limit]);
+    let fourth = S::transpose([sides[0], sides[1], sides[2], off, splat(blur.direction), of_depth, of_size, zero]);
     let mut ready = [ReadyRay::NONE; 8];
     for i in 0..8 {
         let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];

@@ -30,8 +30,8 @@ pub(super) struct SlabRay {
     pub near_offset: [f32; 4],
     /// -origin / direction, plus the pad.
     pub far_offset: [f32; 4],
-    /// On each axis 1 if a box's upper side is met first, else 0.
-    pub side: [u32; 3],
+    /// On each axis which of a node's rows has the sides that are met first, as [`SlabRay::first_rows`] says.
+    pub first: [u32; 3],
     /// Rounded down, for t is rounded before it is held against it; not below 0.
     pub tmin: f32,
 }
@@ -56,9 +56,20 @@ impl SlabRay {
             reciprocal: reciprocal.to_array(),
             near_offset: near.to_array(),
             far_offset: far.to_array(),
-            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+            first: Self::first_rows(negative),
             tmin: least_t(ray.tmin),
         }
+    }
+
+    /// The rows of bounds that a ray meets first, one of two for each axis: how many bytes after the first row they start. A bit is set for each axis
+    /// along which it goes down.
+    #[inline(always)]
+    pub fn first_rows(negative: u32) -> [u32; 3] {
+        [
+            (negative & 1) * Node::ROW,
+            (negative >> 1 & 1) * Node::ROW + 2 * Node::ROW,
+            (negative >> 2 & 1) * Node::ROW + 4 * Node::ROW,
+        ]
     }
 
     /// The children the ray may hit something in, up to `limit`; and where it enters each, not below 0.
@@ -67,9 +78,8 @@ impl SlabRay {
         let mut near = S::V8::splat(self.tmin);
         let mut far = S::V8::splat(limit);
         for axis in 0..3 {
-            let side = self.side[axis] as usize % 2;
-            let first = S::V8::load(&node.bounds[2 * axis + side]);
-            let second = S::V8::load(&node.bounds[2 * axis + 1 - side]);
+            let first = S::row(node, self.first[axis]);
+            let second = S::row(node, self.first[axis] ^ Node::ROW);
             let reciprocal = S::V8::splat(self.reciprocal[axis]);
             // The accumulator second, so that a NaN (infinity less infinity) is passed over.
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);

@@ -54,16 +54,37 @@ pub(super) struct Sheared<V> {
     pub z: [V; 3],
 }
 
-/// A ray made ready for the test, but for its origin and its shear.
+/// What the bound on the error of edge functions takes of a ray.
+#[derive(Clone, Copy)]
+pub(super) struct Margin<V> {
+    /// 1 more than the larger shear: S is so many times s.
+    pub width: V,
+    /// How much a sheared component errs for each unit of depth of the first corner, |z|; which Z is less than s above.
+    pub of_depth: V,
+    /// And for each unit of s.
+    pub of_size: V,
+}
+
+impl<V: Vector> Margin<V> {
+    /// `direction` is of [`Blur`].
+    #[inline(always)]
+    pub fn new(width: V, direction: V) -> Self {
+        let splat = V::splat;
+        // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
+        let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(-4.0 * UNIT_ROUNDOFF));
+        let of_depth = direction.mul_add(splat(2.2), of_depth);
+        Self { width, of_depth, of_size: width.mul_add(of_depth.add(splat(3.0 * UNIT_ROUNDOFF)), of_depth) }
+    }
+}
+
+/// A ray made ready for the test, but for its origin, its shear and its margin.
 #[derive(Clone, Copy)]
 pub(super) struct Aim<V> {
-    /// 1 more than the larger shear.
-    pub width: V,
-    /// Direction along the third axis.
-    pub along: V,
+    /// Direction along the third axis, negative.
+    pub against: V,
     /// 1 over its magnitude.
     pub shorten: V,
-    /// Least t, rounded down, times the magnitude of `along`.
+    /// Least t, rounded down, times the magnitude of `against`.
     pub begin: V,
 }
 
@@ -94,44 +115,58 @@ pub(super) struct Span<V> {
     /// Least and largest depth, rounded outwards.
     pub begin: V,
     pub end: V,
-    /// 1 or, against the axis, -1.
-    pub forward: V,
+    /// Less than zero where it runs along the axis, more where against it.
+    pub against: V,
 }
 
 /// The edge functions of pairs, and the bound on their error.
 #[derive(Clone, Copy)]
-pub(super) struct Sides<V> {
+pub(super) struct Sides<V: Vector> {
     u: V,
     v: V,
     w: V,
-    least: V,
-    most: V,
     bound: V,
+    /// Of [`Sheared`].
+    z: [V; 3],
+    /// The pairs whose triangle has corners on both sides of the ray, in x and in y.
+    bounded: V::Mask,
 }
 
 impl<V: Vector> Sides<V> {
-    /// `width` is as of [`Aim`]; `size` is at least the largest component of an edge.
+    /// `size` is at least the largest component of an edge, `blur` how far the ray's origin is off.
     #[inline(always)]
-    pub fn new(&Sheared { x, y, z }: &Sheared<V>, width: V, size: V, blur: Blur) -> Self {
+    pub fn new(&Sheared { x, y, z }: &Sheared<V>, margin: &Margin<V>, size: V, blur: Option<f32>) -> Self {
         let splat = V::splat;
         let (u, v, w) = (edge(x, y, 2, 1), edge(x, y, 0, 2), edge(x, y, 1, 0));
-        let reach = width.mul(size);
-        let deep = z[0].abs().add(size);
         // e, S + e, and (S + e) (5 e + 6 u (S + e)), which is more than wanted, for the rounding of the bound. 6 u (S + e) is
         // about e at most.
-        // (1 + 5 k) u and (4 + 5 k) u, one u of which is for the bound's own rounding.
-        let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(2.2 * blur.direction - 4.0 * UNIT_ROUNDOFF));
-        let of_size = of_depth.add(splat(3.0 * UNIT_ROUNDOFF));
-        let e = deep.mul_add(of_depth, reach.mul_add(of_size, splat(2.2 * blur.origin)));
-        let bound = e.add(reach).mul(e).mul_add(splat(6.0), splat(TINY));
-        Self { u, v, w, least: u.min(v).min(w), most: u.max(v).max(w), bound }
+        let of_size = margin.of_size.mul(size);
+        let of_size = if let Some(blur) = blur { of_size.add(splat(2.2 * blur)) } else { of_size };
+        let e = z[0].abs().mul_add(margin.of_depth, of_size);
+        let bound = margin.width.mul_add(size, e).mul(e).mul_add(splat(6.0), splat(TINY));
+        Self { u, v, w, bound, z, bounded: on_both_sides(x).and(on_both_sides(y)) }
+    }
+
+    /// Of no pairs.
+    #[inline(always)]
+    pub fn none() -> Self {
+        let zero = V::splat(0.0);
+        Self { u: zero, v: zero, w: zero, bound: zero, z: [zero; 3], bounded: zero.less(zero) }
+    }
+
+    /// The least and the largest edge function.
+    #[inline(always)]
+    fn extremes(&self) -> (V, V) {
+        let Self { u, v, w, .. } = *self;
+        (u.min(v).min(w), u.max(v).max(w))
     }
 
     /// A bit for each pair whose edge functions may have one sign. Whatever overflowed is not rejected where the bound has, too; so it has where shears
     /// are at most 2, sheared corners being below 1e20.
     #[inline(always)]
     pub fn passed(&self) -> u32 {
-        !self.bound.less(self.most.min(V::splat(0.0).sub(self.least))).bits()
+        let (least, most) = self.extremes();
+        !self.bound.less(most.min(V::splat(0.0).sub(least))).bits()
     }
 
     /// The pairs of which no edge function has overflowed. That of a ray with shears up to 2 does so only for triangles that it misses.
@@ -142,9 +177,9 @@ impl<V: Vector> Sides<V> {
 
     /// The pairs whose edge functions have one sign for sure.
     #[inline(always)]
-    pub fn inside(&self, &Sheared { x, y, .. }: &Sheared<V>) -> V::Mask {
-        let is_bounded = on_both_sides(x).and(on_both_sides(y));
-        self.bound.less(self.least.max(V::splat(0.0).sub(self.most))).and(is_bounded)
+    pub fn inside(&self) -> V::Mask {
+        let (least, most) = self.extremes();
+        self.bound.less(least.max(V::splat(0.0).sub(most))).and(self.bounded)
     }
 
     /// The pairs, of those of the bit mask `lanes`, whose triangle the ray may meet within `span`. Depths of corners may be off by `blur`; the rest
@@ -152,7 +187,6 @@ impl<V: Vector> Sides<V> {
     #[inline(always)]
     pub fn meet<const ROUNDED: bool>(
         &self,
-        sheared: &Sheared<V>,
         size: V,
         blur: Option<f32>,
         span: &Span<V>,
@@ -160,12 +194,12 @@ impl<V: Vector> Sides<V> {
         heights: impl FnOnce() -> Heights<V>,
     ) -> Met<V> {
         let (splat, zero, infinite) = (V::splat, V::splat(0.0), V::splat(f32::INFINITY));
-        let (Self { u, v, w, bound, .. }, z) = (*self, sheared.z);
+        let Self { u, v, w, bound, z, .. } = *self;
         let determinant = u.add(v).add(w);
         let area = determinant.abs();
         // All depths times the area. The corners' are counted from them to the origin.
-        let turn = V::select(determinant.less(zero), span.forward, zero.sub(span.forward));
-        let depth = u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2]))).mul(turn);
+        let turn = determinant.flip(span.against);
+        let depth = u.mul_add(z[0], v.mul_add(z[1], w.mul(z[2]))).flip(turn);
         // What has overflowed says nothing, not even by its sign: one product may be infinite where another is not, and is larger.
         let finite = area.less(splat(HUGE)).and(depth.abs().less(infinite));
         let tame = bound.mul(splat(16.0)).less(area).and(finite);
@@ -184,44 +218,39 @@ impl<V: Vector> Sides<V> {
             let area_error = bound.mul_add(splat(4.0), area.mul(splat(SLACK)));
             let (least, most) = (area.sub(area_error), area.add(area_error));
             let (begin, end) = (span.begin.mul(least), span.end.mul(most));
-            let height = zero.sub(height.mul(turn));
+            let height = zero.sub(height.flip(turn));
             let (near, far) = (height.sub(error), height.add(error));
             let outside = far.less(begin).or(end.less(near)).and(height.abs().less(infinite));
             // Where rounding leaves the determinant's sign open, as from far away, this has no sign either.
             lanes &= !outside.and(zero.less(least)).bits();
         }
-        Met { lanes, sure: self.inside(sheared).and(is_precise), area, near, far }
+        Met { lanes, sure: self.inside().and(is_precise), area, near, far }
     }
 }
 
-/// The pairs, of those of the bit mask `lanes`, of which the ray may hit the triangle up to `limit`; `size` is at least the largest
+/// The pairs, of those of the bit mask `passed`, of which the ray may hit the triangle up to `limit`; `size` is at least the largest
 /// component of an edge. If it is not `BLURRED`, the ray is the one that is meant. `heights`
 /// are asked only if corners are not `ROUNDED`.
 #[inline(always)]
 pub(super) fn judge<V: Vector, const BLURRED: bool, const ROUNDED: bool>(
-    sheared: &Sheared<V>,
+    sides: &Sides<V>,
     aim: &Aim<V>,
     limit: V,
     size: V,
-    lanes: u32,
+    passed: u32,
     blur: Blur,
     heights: impl FnOnce() -> Heights<V>,
 ) -> Option<Judged<V>> {
     let splat = V::splat;
     let blur = if BLURRED { blur } else { Blur::NONE };
-    let sides = Sides::new(sheared, aim.width, size, blur);
-    let passed = sides.passed() & lanes;
-    if passed == 0 {
-        return None;
-    }
     let slack = SLACK + 2.0 * blur.direction;
     let span = Span {
         begin: if BLURRED { aim.begin.mul(splat(1.0 - slack)) } else { aim.begin },
-        end: limit.mul(aim.along.abs()).mul(splat(1.0 + slack)),
-        forward: V::select(aim.along.less(splat(0.0)), splat(-1.0), splat(1.0)),
+        end: limit.mul(aim.against.abs()).mul(splat(1.0 + slack)),
+        against: aim.against,
     };
     let off = BLURRED.then_some(blur.origin);
-    let Met { lanes, sure, area, near, far } = sides.meet::<ROUNDED>(sheared, size, off, &span, passed, heights);
+    let Met { lanes, sure, area, near, far } = sides.meet::<ROUNDED>(size, off, &span, passed, heights);
     if lanes == 0 {
         return None;
     }

@@ -7,7 +7,7 @@
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 use crate::trace::bvh::bundle::axes;
-use crate::trace::bvh::filter::Filter;
+use crate::trace::bvh::filter::{self, Filter};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Vector};
 use crate::trace::bvh::slab::{HUGE, SlabRay, least_t};
@@ -95,7 +95,7 @@ impl SingleRay {
             reciprocal: reciprocal.to_array(),
             near_offset: near.to_array(),
             far_offset: far.to_array(),
-            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+            first: SlabRay::first_rows(negative),
             tmin: least_t(tmin),
         };
         // The last of those that are largest.
@@ -113,8 +113,17 @@ impl SingleRay {
         let (p, q) = (shear[0].abs(), shear[1].abs());
         let width = 1.0 + if p > q { p } else { q };
         let begin = tmin * along.abs() * (1.0 - SLACK);
-        let origin = [origin[x], origin[y], origin[z]];
-        Some((slab, Filter::of_eight([x, y, z], origin, shear, [width, along, shorten, begin], blur)))
+        let filter = Filter {
+            axes: [filter::at(x), filter::at(y), filter::at(z)],
+            origin: [origin[x], origin[y], origin[z]],
+            shear,
+            margin: filter::margin(width, blur.direction),
+            against: -along,
+            shorten,
+            begin,
+            blur,
+        };
+        Some((slab, filter))
     }
 }
 

@@ -11,12 +11,15 @@ use crate::trace::bvh::node::{Child, Node, Tree};
 use crate::trace::bvh::query::Verdict;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::triangles::TriangleTree;
+use crate::trace::bvh::woop::Sides;
 
 /// What rays travel through.
 pub(super) trait Ground {
     const HAS_PLACEMENTS: bool;
-    /// The triangles of a block that a ray may hit.
-    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates;
+    /// Which triangles of a block a ray may pass within.
+    fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32);
+    /// Which of these it may hit.
+    fn meet<S: Simd>(filter: &Filter, block: &Block, sides: &Sides<S::V8>, passed: u32, limit: f32) -> Candidates;
     /// Whether a ray, by its number, hits a triangle about which the candidates leave a doubt.
     fn decide(&self, _ray: usize, _block: &Block, _lane: usize) -> Verdict {
         Verdict::Doubt
@@ -24,25 +27,59 @@ pub(super) trait Ground {
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
     fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
-    /// Where in memory a node is.
-    fn node_address<S: Simd>(&self, space: Space, next: Child) -> *const u8;
-    /// Where in memory a leaf's first block is, or a placement.
-    fn leaf_address<S: Simd>(&self, space: Space, next: Child) -> *const u8;
+    /// Where in memory a node is, or a leaf's first block, or a placement.
+    fn address(&self, space: Space, next: Child) -> *const u8;
+}
+
+/// Where in memory children are, by their [kind](Child::kind), and how far apart.
+struct Addresses {
+    first: [*const u8; 3],
+    stride: [usize; 3],
+}
+
+impl Addresses {
+    fn new<S: Simd>(tree: &Tree, leaves: *const u8, stride: usize) -> Self {
+        let nodes = S::address(tree.nodes(), 0);
+        // A ray that has arrived has no next. An address outside of what is there would be looked up in vain, which holds up all that follows.
+        Self { first: [nodes, leaves, nodes], stride: [size_of::<Node>(), stride, 0] }
+    }
+
+    fn of_triangles<S: Simd>(triangles: &TriangleTree) -> Self {
+        let leaves = triangles.leaves();
+        Self::new::<S>(triangles.tree(), leaves.address::<S>(0), leaves.stride())
+    }
+
+    #[inline(always)]
+    fn of(&self, child: Child) -> *const u8 {
+        let kind = child.kind() % 3;
+        self.first[kind].wrapping_add(self.stride[kind] * child.first() as usize)
+    }
 }
 
 /// The triangles of the world, and nothing else.
 pub(super) struct Plain<'a, L: ?Sized> {
-    pub tree: &'a Tree,
-    pub leaves: &'a L,
+    tree: &'a Tree,
+    leaves: &'a L,
+    addresses: Addresses,
+}
+
+impl<'a, L: Blocks + ?Sized> Plain<'a, L> {
+    pub fn new<S: Simd>(tree: &'a Tree, leaves: &'a L) -> Self {
+        Self { tree, leaves, addresses: Addresses::new::<S>(tree, leaves.address::<S>(0), L::STRIDE) }
+    }
 }
 
 impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
     const HAS_PLACEMENTS: bool = false;
 
     #[inline(always)]
-    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
+    fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32) {
         // The bounds of a ray in the world cost less, and are tighter.
-        filter.candidates::<S, false>(block, limit)
+        filter.look::<S, false>(block)
+    }
+    #[inline(always)]
+    fn meet<S: Simd>(filter: &Filter, block: &Block, sides: &Sides<S::V8>, passed: u32, limit: f32) -> Candidates {
+        filter.meet::<S, false, false>(block, sides, passed, limit)
     }
     #[inline(always)]
     fn node(&self, _: Space, child: Child) -> &Node {
@@ -53,19 +90,22 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
         self.leaves.block(index, scratch)
     }
     #[inline(always)]
-    fn node_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
-        S::address(self.tree.nodes(), next.node())
-    }
-    #[inline(always)]
-    fn leaf_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
-        self.leaves.address::<S>(next.first())
+    fn address(&self, _: Space, next: Child) -> *const u8 {
+        self.addresses.of(next)
     }
 }
 
 /// The triangles of the world, rounded from others, as rays may be; and who knows the others.
 pub(super) struct Rounded<'a> {
-    pub triangles: &'a TriangleTree,
-    pub decide: Decide<'a>,
+    triangles: &'a TriangleTree,
+    decide: Decide<'a>,
+    addresses: Addresses,
+}
+
+impl<'a> Rounded<'a> {
+    pub fn new<S: Simd>(triangles: &'a TriangleTree, decide: Decide<'a>) -> Self {
+        Self { triangles, decide, addresses: Addresses::of_triangles::<S>(triangles) }
+    }
 }
 
 /// Says whether a ray, by its number, hits a triangle, by its geometry and its primitive.
@@ -75,8 +115,12 @@ impl Ground for Rounded<'_> {
     const HAS_PLACEMENTS: bool = false;
 
     #[inline(always)]
-    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
-        filter.rounded_candidates::<S>(block, limit)
+    fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32) {
+        filter.look::<S, true>(block)
+    }
+    #[inline(always)]
+    fn meet<S: Simd>(filter: &Filter, block: &Block, sides: &Sides<S::V8>, passed: u32, limit: f32) -> Candidates {
+        filter.meet::<S, true, true>(block, sides, passed, limit)
     }
     #[cold]
     #[inline(never)]
@@ -93,12 +137,8 @@ impl Ground for Rounded<'_> {
         self.triangles.block(index, scratch)
     }
     #[inline(always)]
-    fn node_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
-        S::address(self.triangles.tree().nodes(), next.node())
-    }
-    #[inline(always)]
-    fn leaf_address<S: Simd>(&self, _: Space, next: Child) -> *const u8 {
-        self.triangles.leaves().address::<S>(next.first())
+    fn address(&self, _: Space, next: Child) -> *const u8 {
+        self.addresses.of(next)
     }
 }
 
@@ -110,31 +150,26 @@ pub(super) struct Placed<'a>(Vec<Region<'a>>);
 struct Region<'a> {
     nodes: &'a [Node],
     triangles: &'a TriangleTree,
-    /// Where in memory leaves' first blocks or placements are, and how far apart.
-    leaves: *const u8,
-    stride: usize,
+    addresses: Addresses,
 }
 
 impl<'a> Placed<'a> {
     pub fn new<S: Simd>(bvh: &'a Bvh) -> Self {
-        let fixed = Region::new::<S>(&bvh.fixed.triangles);
-        let places = bvh.placements.places();
+        let (placements, places) = (bvh.placements.tree(), bvh.placements.places());
+        let stride = size_of_val(places) / places.len().max(1);
         let upper = Region {
-            nodes: bvh.placements.tree().nodes(),
+            nodes: placements.nodes(),
             triangles: &bvh.fixed.triangles,
-            leaves: S::address(places, 0),
-            stride: size_of_val(places) / places.len().max(1),
+            addresses: Addresses::new::<S>(placements, S::address(places, 0), stride),
         };
         let objects = bvh.objects.iter().map(|level| Region::new::<S>(&level.triangles));
-        Self([fixed, upper].into_iter().chain(objects).collect())
+        Self([Region::new::<S>(&bvh.fixed.triangles), upper].into_iter().chain(objects).collect())
     }
 }
 
 impl<'a> Region<'a> {
     fn new<S: Simd>(triangles: &'a TriangleTree) -> Self {
-        let leaves = triangles.leaves();
-        let stride = leaves.bytes() / leaves.len().max(1);
-        Self { nodes: triangles.tree().nodes(), triangles, leaves: leaves.address::<S>(0), stride }
+        Self { nodes: triangles.tree().nodes(), triangles, addresses: Addresses::of_triangles::<S>(triangles) }
     }
 }
 
@@ -142,8 +177,12 @@ impl Ground for Placed<'_> {
     const HAS_PLACEMENTS: bool = true;
 
     #[inline(always)]
-    fn candidates<S: Simd>(filter: &Filter, block: &Block, limit: f32) -> Candidates {
-        filter.candidates::<S, true>(block, limit)
+    fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32) {
+        filter.look::<S, true>(block)
+    }
+    #[inline(always)]
+    fn meet<S: Simd>(filter: &Filter, block: &Block, sides: &Sides<S::V8>, passed: u32, limit: f32) -> Candidates {
+        filter.meet::<S, true, false>(block, sides, passed, limit)
     }
     #[inline(always)]
     fn node(&self, space: Space, child: Child) -> &Node {
@@ -154,12 +193,7 @@ impl Ground for Placed<'_> {
         self.0[space.0 as usize].triangles.block(index, scratch)
     }
     #[inline(always)]
-    fn node_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
-        S::address(self.0[space.0 as usize].nodes, next.node())
-    }
-    #[inline(always)]
-    fn leaf_address<S: Simd>(&self, space: Space, next: Child) -> *const u8 {
-        let region = &self.0[space.0 as usize];
-        region.leaves.wrapping_add(region.stride * next.first() as usize)
+    fn address(&self, space: Space, next: Child) -> *const u8 {
+        self.0[space.0 as usize].addresses.of(next)
     }
 }

@@ -14,7 +14,7 @@
 //! then, would be bound by latency again.
 
 mod ground;
-mod list;
+mod set;
 mod traveller;
 
 use super::Bvh;
@@ -24,29 +24,77 @@ use super::node::Child;
 use super::place::Blur;
 use super::query::Query;
 use super::ready::ReadyRays;
-use super::simd::Simd;
+use super::simd::{Simd, Vector};
+use super::woop::Sides;
 use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;
 use ground::{Ground, Placed, Plain, Rounded};
-use list::List;
-use std::hint::select_unpredictable;
-use traveller::{Step, Traveller};
+use set::Set;
+use traveller::{Space, Traveller};
 
 /// Rays in flight.
 const RAYS: usize = 32;
 
 /// Room for a flight.
-pub(super) struct Flight([Traveller; RAYS]);
+pub(super) struct Flight {
+    travellers: [Traveller; RAYS],
+    /// What each reaches next; [`Child::NONE`] of one that has arrived, or waits to return from an object.
+    next: [Child; RAYS],
+    /// Where it does.
+    space: [Space; RAYS],
+}
 
 impl Flight {
     pub fn new() -> Self {
-        Self([Traveller::NONE; RAYS])
+        Self { travellers: [Traveller::NONE; RAYS], next: [Child::NONE; RAYS], space: [Space::UPPER; RAYS] }
     }
 
+    /// Traveller `k`'s next step leads to `next`, which is loaded meanwhile.
     #[inline(always)]
-    fn at(&mut self, k: u8) -> &mut Traveller {
-        &mut self.0[usize::from(k) % RAYS]
+    fn send<S: Simd, G: Ground>(&mut self, k: usize, next: Child, ground: &G) {
+        self.next[k] = next;
+        let space = self.travellers[k].space;
+        if G::HAS_PLACEMENTS {
+            self.space[k] = space;
+        }
+        S::prefetch(ground.address(space, next));
     }
+
+    /// Who of `flying` takes which step.
+    #[inline(always)]
+    fn steps<S: Simd, G: Ground>(&self, flying: Set) -> Steps {
+        let next = bytemuck::cast_ref(&self.next);
+        let (leaf, none) = (S::highest_bits(next), S::equal(next, Child::NONE.0));
+        let upper = if G::HAS_PLACEMENTS { S::equal(bytemuck::cast_ref(&self.space), Space::UPPER.0) } else { none };
+        Steps {
+            at_nodes: flying.of(!leaf),
+            at_leaves: flying.of(leaf & !none & !upper),
+            arrived: flying.of(none & upper),
+            at_placements: flying.of(leaf & !none & upper),
+            returning: flying.of(none & !upper),
+        }
+    }
+}
+
+/// What a traveller has seen at a leaf.
+#[derive(Clone, Copy)]
+struct Sight<V: Vector> {
+    traveller: usize,
+    leaf: Child,
+    sides: Sides<V>,
+    /// The triangles that it may pass within.
+    passed: u32,
+}
+
+/// Who takes which step in a round.
+struct Steps {
+    at_nodes: Set,
+    at_leaves: Set,
+    arrived: Set,
+    /// To enter a placement.
+    at_placements: Set,
+    /// To leave an object, or the fixed triangles, for the placements.
+    returning: Set,
 }
 
 /// Answers all rays among triangles, of which there are some: `done` is told of each valid one what it has found.
@@ -59,9 +107,9 @@ pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[R
     }
     match fixed.leaves() {
         Leaves::Blocks(blocks) => {
-            run::<S, Q, _>(flight, bvh, &Plain { tree, leaves: &blocks[..] }, rays, Blur::NONE, done);
+            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(tree, &blocks[..]), rays, Blur::NONE, done);
         }
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain { tree, leaves }, rays, Blur::NONE, done),
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(tree, leaves), rays, Blur::NONE, done),
     }
 }
 
@@ -77,19 +125,9 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
 ) {
     let triangles = &bvh.fixed.triangles;
     if !triangles.tree().is_empty() {
-        let ground = Rounded { triangles, decide };
+        let ground = Rounded::new::<S>(triangles, decide);
         run::<S, Q, _>(flight, bvh, &ground, rays, blur, done);
     }
-}
-
-/// Has what will be needed soon loaded; without a branch, which nobody could predict.
-#[inline(always)]
-fn prefetch<S: Simd>(traveller: &Traveller, ground: &impl Ground) {
-    // A ray that has arrived has no next; an address outside of what is there would be looked up in vain, which holds up all that follows.
-    let (space, next) =
-        (traveller.space, select_unpredictable(traveller.next == Child::NONE, Child::ROOT, traveller.next));
-    let (node, leaf) = (ground.node_address::<S>(space, next), ground.leaf_address::<S>(space, next));
-    S::prefetch(select_unpredictable(next.is_leaf(), leaf, node));
 }
 
 #[inline(always)]
@@ -108,47 +146,55 @@ fn run<S: Simd, Q: Query, G: Ground>(
         bounds = bounds.union(bvh.placements.tree().bounds());
     }
     let mut waiting = ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
-    let mut lists = [List::EMPTY; Step::COUNT];
+    let mut flying = Set::NOBODY;
     for k in 0..RAYS {
         let Some(ray) = waiting.next::<S>() else { break };
-        flight.at(k as u8).start::<G>(ray, waiting.ready(), has_fixed);
-        lists[Step::Node as usize].push(k as u8);
+        let next = flight.travellers[k].start::<G>(ray, waiting.ready(), has_fixed);
+        flight.send::<S, G>(k, next, ground);
+        flying.insert(k);
     }
-    while lists.iter().any(|list| !list.is_empty()) {
-        let [mut at_nodes, at_leaves, arrived, at_placements, returning] =
-            std::mem::replace(&mut lists, [List::EMPTY; Step::COUNT]);
-        for k in arrived.iter() {
-            let traveller = flight.at(k);
+    let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
+    let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
+    while !flying.is_empty() {
+        let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
+        for k in arrived {
+            let traveller = &mut flight.travellers[k];
             done(traveller.ray, &traveller.found);
             if let Some(ray) = waiting.next::<S>() {
-                traveller.start::<G>(ray, waiting.ready(), has_fixed);
-                at_nodes.push(k);
+                flight.next[k] = traveller.start::<G>(ray, waiting.ready(), has_fixed);
+                at_nodes.insert(k);
+            } else {
+                flying.remove(k);
             }
         }
-        for k in at_nodes.iter() {
-            let traveller = flight.at(k);
-            traveller.enter::<S, Q, G>(ground.node(traveller.space, traveller.next));
-            prefetch::<S>(traveller, ground);
-            lists[traveller.step::<G>()].push(k);
+        for k in at_nodes {
+            let (traveller, next) = (&mut flight.travellers[k], flight.next[k]);
+            let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
+            flight.send::<S, G>(k, next, ground);
         }
-        for k in at_leaves.iter() {
-            let traveller = flight.at(k);
-            traveller.visit::<S, Q, G>(bvh, ground, rays);
-            prefetch::<S>(traveller, ground);
-            lists[traveller.step::<G>()].push(k);
+        let mut count = 0;
+        for k in at_leaves {
+            let (traveller, leaf) = (&mut flight.travellers[k], flight.next[k]);
+            let (sides, passed) = traveller.look::<S, G>(leaf, ground);
+            sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
+            count += usize::from(passed != 0);
+            let next = traveller.pass(leaf);
+            flight.send::<S, G>(k, next, ground);
+        }
+        for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
+            let traveller = &mut flight.travellers[*k % RAYS];
+            if let Some(next) = traveller.hit::<S, Q, G>(*leaf, sides, *passed, bvh, ground, rays) {
+                flight.send::<S, G>(*k % RAYS, next, ground);
+            }
         }
         if G::HAS_PLACEMENTS {
-            for k in returning.iter() {
-                let traveller = flight.at(k);
-                traveller.leave();
-                prefetch::<S>(traveller, ground);
-                lists[traveller.step::<G>()].push(k);
+            for k in returning {
+                let next = flight.travellers[k].leave();
+                flight.send::<S, G>(k, next, ground);
             }
-            for k in at_placements.iter() {
-                let traveller = flight.at(k);
-                traveller.descend::<S>(bvh, rays);
-                prefetch::<S>(traveller, ground);
-                lists[traveller.step::<G>()].push(k);
+            for k in at_placements {
+                let next = flight.travellers[k].descend::<S>(flight.next[k], bvh, rays);
+                flight.send::<S, G>(k, next, ground);
             }
         }
     }

@@ -2,6 +2,8 @@
 
 use std::hint::select_unpredictable;
 
+use bytemuck::{Pod, Zeroable};
+
 use super::ground::Ground;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
@@ -11,7 +13,8 @@ use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::ready::ReadyRay;
-use crate::trace::bvh::simd::{Mask, Simd};
+use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::woop::Sides;
 
 /// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
 /// placements, and each has [`Child::NONE`] at its bottom.
@@ -20,7 +23,8 @@ const STACK: usize = 512;
 const _: () = assert!(2 * MAX_DEPTH * (WIDTH - 1) + 3 < STACK);
 
 /// Where a ray is: at the fixed triangles, among the placements, or (2 and more) in an object's tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Space(pub u32);
 
 impl Space {
@@ -39,21 +43,6 @@ impl Space {
     }
 }
 
-/// What a ray does next.
-pub(super) enum Step {
-    Node,
-    Leaf,
-    Arrived,
-    /// Enter a placement.
-    Placement,
-    /// Leave an object, or the fixed triangles, for the placements.
-    Return,
-}
-
-impl Step {
-    pub const COUNT: usize = 5;
-}
-
 /// A ray on its way.
 #[repr(align(64))]
 #[derive(Clone, Copy)]
@@ -65,7 +54,6 @@ pub(super) struct Traveller {
     pub ray: usize,
     /// Children on the stack.
     len: usize,
-    pub next: Child,
     pub space: Space,
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
@@ -81,20 +69,19 @@ impl Traveller {
         found: Found::NONE,
         ray: 0,
         len: 1,
-        next: Child::NONE,
         space: Space::UPPER,
         place: FIXED,
         stack: [Child::NONE; STACK + WIDTH],
         near: [0; STACK + WIDTH],
     };
 
-    /// At a root, with a ray of its own: at that of the fixed triangles, if there are any, and where there are placements, then at
-    /// theirs.
+    /// Sets out with a ray of its own, for the root of the fixed triangles, if there are any, and where there are placements, then for
+    /// theirs. What it reaches next: that root.
     #[inline(always)]
-    pub fn start<G: Ground>(&mut self, ray: usize, ready: &ReadyRay, has_fixed: bool) {
+    pub fn start<G: Ground>(&mut self, ray: usize, ready: &ReadyRay, has_fixed: bool) -> Child {
         self.ready[0] = *ready;
         self.found.start(ready.end());
-        (self.ray, self.len, self.next) = (ray, 1, Child::ROOT);
+        (self.ray, self.len) = (ray, 1);
         if G::HAS_PLACEMENTS {
             (self.place, self.space) = (FIXED, Space::UPPER);
             if has_fixed {
@@ -104,20 +91,7 @@ impl Traveller {
                 (self.len, self.space) = (3, Space::FIXED);
             }
         }
-    }
-
-    /// What it does next; without a branch, since nobody can predict it.
-    #[inline(always)]
-    pub fn step<G: Ground>(&self) -> usize {
-        let kind = self.next.kind();
-        if !G::HAS_PLACEMENTS {
-            return kind;
-        }
-        const STEPS: [[u8; 4]; 2] = [
-            [Step::Node as u8, Step::Leaf as u8, Step::Return as u8, 0],
-            [Step::Node as u8, Step::Placement as u8, Step::Arrived as u8, 0],
-        ];
-        usize::from(STEPS[usize::from(self.space == Space::UPPER)][kind % 4])
+        Child::ROOT
     }
 
     /// The ray in the space where it is.
@@ -126,90 +100,117 @@ impl Traveller {
         &self.ready[usize::from(G::HAS_PLACEMENTS && self.space.is_object())]
     }
 
-    /// One node.
+    /// One node. What it reaches next, as of all steps.
     #[inline(always)]
-    pub fn enter<S: Simd, Q: Query, G: Ground>(&mut self, node: &Node) {
+    pub fn enter<S: Simd, Q: Query, G: Ground>(&mut self, node: &Node) -> Child {
         let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
         let len = self.len % STACK;
         let (nears, stack) = (self.near[len..].first_chunk_mut(), self.stack[len..].first_chunk_mut());
         if let (Some(nears), Some(stack)) = (nears, stack) {
-            if Q::IN_ORDER {
-                S::far_to_near(near, mask, &node.child, nears, stack);
-            } else {
-                S::named_first(mask, &node.child, stack);
-            }
+            self.len = len
+                + if Q::IN_ORDER {
+                    S::far_to_near(near, mask, &node.child, nears, stack)
+                } else {
+                    S::named_first(mask, &node.child, stack)
+                };
         }
-        self.len = len + mask.bits().count_ones() as usize;
-        self.pop();
+        self.pop()
     }
 
-    /// One block of a leaf.
+    /// What it sees of one block of a leaf: what is to be told of that to [`Self::hit`], and which triangles it may pass within.
     #[inline(always)]
-    pub fn visit<S: Simd, Q: Query, G: Ground>(&mut self, bvh: &Bvh, ground: &G, rays: &[Ray]) {
-        let (index, limit) = (self.next.first(), self.found.limit);
+    pub fn look<S: Simd, G: Ground>(&self, leaf: Child, ground: &G) -> (Sides<S::V8>, u32) {
+        let mut scratch = None;
+        let block = ground.block(self.space, leaf.first(), &mut scratch);
+        G::look::<S>(&self.ready::<G>().filter(), block)
+    }
+
+    /// Past this block of a leaf: on to the next one, or to what is on the stack; without a branch.
+    #[inline(always)]
+    pub fn pass(&mut self, leaf: Child) -> Child {
+        let is_more = leaf.count() > 1;
+        self.len -= usize::from(!is_more);
+        select_unpredictable(is_more, leaf.rest(), self.stack[self.len % STACK])
+    }
+
+    /// What it hits of a block that it has looked at, and passed; what it reaches next, if that is another child now.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "what it has seen, and where")]
+    pub fn hit<S: Simd, Q: Query, G: Ground>(
+        &mut self,
+        leaf: Child,
+        sides: &Sides<S::V8>,
+        passed: u32,
+        bvh: &Bvh,
+        ground: &G,
+        rays: &[Ray],
+    ) -> Option<Child> {
+        let (index, limit) = (leaf.first(), self.found.limit);
         let mut scratch = None;
         let block = ground.block(self.space, index, &mut scratch);
-        let filter = self.ready::<G>().filter();
-        let candidates = G::candidates::<S>(&filter, block, limit);
-        if candidates.lanes != 0 {
-            let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
-            let number = self.ray;
-            Q::take(
-                &mut self.found,
-                bvh,
-                place,
-                index,
-                block,
-                &candidates,
-                &rays[number],
-                #[inline(always)]
-                |lane| ground.decide(number, block, lane),
-            );
-            if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.found.is_in_doubt() {
-                (self.next, self.space) = (Child::NONE, Space::UPPER);
-                return;
-            }
-            if self.found.limit < limit {
-                self.shorten();
-            }
+        let candidates = G::meet::<S>(&self.ready::<G>().filter(), block, sides, passed, limit);
+        if candidates.lanes == 0 {
+            return None;
         }
-        // On to the next block, or to what is on the stack; without a branch.
-        let is_more = self.next.count() > 1;
-        self.len -= usize::from(!is_more);
-        self.next = select_unpredictable(is_more, self.next.rest(), self.stack[self.len % STACK]);
+        let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
+        let number = self.ray;
+        Q::take(
+            &mut self.found,
+            bvh,
+            place,
+            index,
+            block,
+            &candidates,
+            &rays[number],
+            #[inline(always)]
+            |lane| ground.decide(number, block, lane),
+        );
+        if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.found.is_in_doubt() {
+            self.space = Space::UPPER;
+            return Some(Child::NONE);
+        }
+        (self.found.limit < limit).then(
+            #[inline(always)]
+            || {
+                // What it has come to may be beyond the limit, too, if it is from the stack, above whose top it is still.
+                self.len += usize::from(leaf.count() == 1);
+                self.shorten();
+                self.pass(leaf)
+            },
+        )
     }
 
-    /// Into the placement that the leaf of the upper tree is.
+    /// Into the placement that a leaf of the upper tree is.
     #[inline(always)]
-    pub fn descend<S: Simd>(&mut self, bvh: &Bvh, rays: &[Ray]) {
-        let number = self.next.first();
+    pub fn descend<S: Simd>(&mut self, leaf: Child, bvh: &Bvh, rays: &[Ray]) -> Child {
+        let number = leaf.first();
         let place = bvh.placements.at(number);
         let object = place.placement.object;
         let tree = bvh.objects[object as usize].triangles.tree();
         if tree.is_empty() {
-            self.pop();
-            return;
+            return self.pop();
         }
         let (local, blur) = place.local::<S>(&rays[self.ray]);
         self.ready[1] = ReadyRay::new::<S>(&local, tree.reach(), blur);
         let top = self.len % STACK;
         (self.near[top], self.stack[top]) = (0, Child::NONE);
         self.len = top + 1;
-        (self.place, self.space, self.next) = (number, Space::object(object), Child::ROOT);
+        (self.place, self.space) = (number, Space::object(object));
+        Child::ROOT
     }
 
     /// Out of it again.
     #[inline(always)]
-    pub fn leave(&mut self) {
+    pub fn leave(&mut self) -> Child {
         self.space = Space::UPPER;
-        self.pop();
+        self.pop()
     }
 
     /// Goes on to the nearest; at last to [`Child::NONE`].
     #[inline(always)]
-    fn pop(&mut self) {
+    fn pop(&mut self) -> Child {
         self.len -= 1;
-        self.next = self.stack[self.len % STACK];
+        self.stack[self.len % STACK]
     }
 
     /// Leaves out what is beyond the limit.

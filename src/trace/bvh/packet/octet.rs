@@ -10,7 +10,7 @@ use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::planes;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Vector};
-use crate::trace::bvh::woop::{self, Aim, Judged, SLACK, Sheared};
+use crate::trace::bvh::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
 
 /// Eight rays made ready for triangles, and what they have hit so far.
 #[derive(Clone, Copy)]
@@ -19,6 +19,7 @@ pub(super) struct Octet<V> {
     origin: [V; 3],
     /// Direction along the first two axes over that along the third, negative.
     shear: [V; 2],
+    margin: Margin<V>,
     aim: Aim<V>,
     tmin: V,
     /// No hit beyond this is wanted; rounded up. Minus infinity for a ray that wants none any more.
@@ -52,7 +53,8 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         Self {
             origin: [zero; 3],
             shear: [zero; 2],
-            aim: Aim { width: zero, along: zero, shorten: zero, begin: zero },
+            margin: Margin { width: zero, of_depth: zero, of_size: zero },
+            aim: Aim { against: zero, shorten: zero, begin: zero },
             tmin: zero,
             limit: [DONE; RAYS],
             sure: [DONE; RAYS],
@@ -74,9 +76,9 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         let shear = [dx.mul(negative), dy.mul(negative)];
         let (tmin, tmax) = (V::load(&packet.tmin).max(V::splat(0.0)), V::load(&packet.tmax));
         (self.shear, self.tmin) = (shear, tmin);
+        self.margin = Margin::new(shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)), V::splat(0.0));
         self.aim = Aim {
-            width: shear[0].abs().max(shear[1].abs()).add(V::splat(1.0)),
-            along,
+            against: V::splat(0.0).sub(along),
             shorten: reciprocal.abs(),
             begin: tmin.mul(along.abs()).mul(V::splat(1.0 - SLACK)),
         };
@@ -102,12 +104,18 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
             x[k] = z[k].mul_add(sx, ox.sub(splat(block.corners[kx][k][lane])));
             y[k] = z[k].mul_add(sy, oy.sub(splat(block.corners[ky][k][lane])));
         }
+        let size = splat(block.size);
+        let sides = Sides::new(&Sheared { x, y, z }, &self.margin, size, None);
+        let passed = sides.passed() & self.asked;
+        if passed == 0 {
+            return Met { changed: false, open: 0 };
+        }
         let judged = woop::judge::<V, false, false>(
-            &Sheared { x, y, z },
+            &sides,
             &self.aim,
             V::load(&self.limit),
-            splat(block.size),
-            self.asked,
+            size,
+            passed,
             Blur::NONE,
             #[inline(always)]
             || {

@@ -7,9 +7,10 @@ use std::arch::x86_64::*;
 
 use super::x86::{Avx2, D4, V4, V8, lanewise, opaque};
 use super::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
-use crate::trace::bvh::node::Child;
+use crate::trace::bvh::node::{Child, Node};
 
 /// AVX-512 F, VL, DQ and BW.
 pub struct Avx512;
@@ -38,13 +39,33 @@ impl Simd for Avx512 {
         child: &[Child; 8],
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
-    ) {
-        Avx2::far_to_near(near, mask, child, sorted_near, sorted_child);
+    ) -> usize {
+        Avx2::far_to_near(near, mask, child, sorted_near, sorted_child)
     }
 
     #[inline(always)]
-    fn named_first(mask: <V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) {
-        Avx2::named_first(mask, child, named);
+    fn named_first(mask: <V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
+        Avx2::named_first(mask, child, named)
+    }
+
+    #[inline(always)]
+    fn highest_bits(numbers: &[u32; 32]) -> u32 {
+        Avx2::highest_bits(numbers)
+    }
+
+    #[inline(always)]
+    fn equal(numbers: &[u32; 32], number: u32) -> u32 {
+        Avx2::equal(numbers, number)
+    }
+
+    #[inline(always)]
+    fn row(node: &Node, offset: u32) -> V8 {
+        Avx2::row(node, offset)
+    }
+
+    #[inline(always)]
+    fn corners(block: &Block, offset: u32) -> [V8; 3] {
+        Avx2::corners(block, offset)
     }
 
     #[inline(always)]
@@ -121,6 +142,10 @@ impl Vector for V16 {
     #[inline(always)]
     fn differs_in_sign(self, other: Self) -> M16 {
         M16(unsafe { _mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(self.0, other.0))) })
+    }
+    #[inline(always)]
+    fn flip(self, other: Self) -> Self {
+        Self(unsafe { _mm512_xor_ps(self.0, _mm512_and_ps(other.0, _mm512_set1_ps(-0.0))) })
     }
     #[inline(always)]
     fn select(mask: M16, yes: Self, no: Self) -> Self {

@@ -17,10 +17,11 @@ pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::{Avx2, V8};
 
+use super::block::Block;
 use super::build::lanes::Boxes;
 use super::bundle::{PerRay, RAYS};
 use super::isa::Kernel;
-use super::node::Child;
+use super::node::{Child, Node};
 
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {
@@ -37,17 +38,25 @@ pub(super) trait Simd {
     fn apart<K: Kernel>(kernel: K) -> K::Output;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
-    /// Children that the mask names, the farthest first, by where they are entered (not below 0); then the others. Of `near`
-    /// the lowest three bits are lost.
+    /// Children that the mask names, the farthest first, by where they are entered (not below 0); then others. Of `near`
+    /// the lowest three bits are lost. How many it names.
     fn far_to_near(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,
         child: &[Child; 8],
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
-    );
-    /// Children that the mask names, in their order; then others.
-    fn named_first(mask: <Self::V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]);
+    ) -> usize;
+    /// Children that the mask names, in their order; then others. How many it names.
+    fn named_first(mask: <Self::V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) -> usize;
+    /// A bit for each number whose highest bit is set.
+    fn highest_bits(numbers: &[u32; 32]) -> u32;
+    /// A bit for each number that is `number`.
+    fn equal(numbers: &[u32; 32], number: u32) -> u32;
+    /// The row of a node's bounds that starts `offset` bytes after the first. What is no row's start means one of its rows.
+    fn row(node: &Node, offset: u32) -> Self::V8;
+    /// A component of a block's corners, `offset` bytes after that of the first axis. What is no such start means some of its numbers.
+    fn corners(block: &Block, offset: u32) -> [Self::V8; 3];
     /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
     fn prefetch(address: *const u8);
     /// Has all of these loaded.
@@ -96,6 +105,8 @@ pub(super) trait Vector: Copy {
     fn less(self, other: Self) -> Self::Mask;
     /// Where one has a minus sign, be it that of a zero, and the other has not.
     fn differs_in_sign(self, other: Self) -> Self::Mask;
+    /// With its sign changed where the other has a minus sign, be it that of a zero.
+    fn flip(self, other: Self) -> Self;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The largest lane; NaN are passed over or not.

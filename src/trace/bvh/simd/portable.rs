@@ -1,9 +1,10 @@
 //! Plain arrays, for any processor.
 
 use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
+use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
-use crate::trace::bvh::node::Child;
+use crate::trace::bvh::node::{Child, Node};
 
 /// Plain arrays.
 pub struct Portable;
@@ -29,7 +30,7 @@ impl Simd for Portable {
         child: &[Child; 8],
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
-    ) {
+    ) -> usize {
         for (len, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
             let key = near[slot].to_bits() & !7;
             let mut at = len;
@@ -39,13 +40,35 @@ impl Simd for Portable {
             }
             (sorted_near[at], sorted_child[at]) = (key, child[slot]);
         }
+        mask.bits().count_ones() as usize
     }
 
     #[inline(always)]
-    fn named_first(mask: Bits, child: &[Child; 8], named: &mut [Child; 8]) {
+    fn named_first(mask: Bits, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
         for (place, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
             named[place] = child[slot];
         }
+        mask.bits().count_ones() as usize
+    }
+
+    #[inline(always)]
+    fn highest_bits(numbers: &[u32; 32]) -> u32 {
+        (0..32).fold(0, |bits, k| bits | numbers[k] >> 31 << k)
+    }
+
+    #[inline(always)]
+    fn equal(numbers: &[u32; 32], number: u32) -> u32 {
+        (0..32).fold(0, |bits, k| bits | u32::from(numbers[k] == number) << k)
+    }
+
+    #[inline(always)]
+    fn row(node: &Node, offset: u32) -> [f32; 8] {
+        node.bounds[(offset / Node::ROW) as usize % 6]
+    }
+
+    #[inline(always)]
+    fn corners(block: &Block, offset: u32) -> [[f32; 8]; 3] {
+        block.corners[(offset / Block::AXIS) as usize % 3]
     }
 
     #[inline(always)]
@@ -163,6 +186,15 @@ impl<const N: usize> Vector for [f32; N] {
             other,
             #[inline(always)]
             |a, b| a.is_sign_negative() != b.is_sign_negative(),
+        )
+    }
+    #[inline(always)]
+    fn flip(self, other: Self) -> Self {
+        zip(
+            self,
+            other,
+            #[inline(always)]
+            |a, b| if b.is_sign_negative() { -a } else { a },
         )
     }
     #[inline(always)]

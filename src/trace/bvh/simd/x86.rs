@@ -5,12 +5,14 @@
 #![allow(unsafe_code)] // Intrinsics.
 
 use std::arch::{asm, x86_64::*};
+use std::mem::offset_of;
 
 use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
 use crate::memory;
+use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
-use crate::trace::bvh::node::Child;
+use crate::trace::bvh::node::{Child, Node};
 
 /// A function of two vectors by its intrinsic, as a method.
 macro_rules! lanewise {
@@ -46,24 +48,31 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn far_to_near(near: V8, mask: M8, child: &[Child; 8], sorted_near: &mut [u32; 8], sorted_child: &mut [Child; 8]) {
+    fn far_to_near(
+        near: V8,
+        mask: M8,
+        child: &[Child; 8],
+        sorted_near: &mut [u32; 8],
+        sorted_child: &mut [Child; 8],
+    ) -> usize {
         unsafe {
             // Numbers not below 0 are ordered as their bits are.
-            let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let keys = _mm256_or_si256(_mm256_and_si256(_mm256_castps_si256(near.0), _mm256_set1_epi32(!7)), slots);
-            let named = mask.bits() as usize;
-            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[named % 256]));
-            let mut keys = _mm256_permutevar8x32_epi32(keys, order);
-            if named.count_ones() <= 2 {
+            let named = mask.bits() as usize % 256;
+            let count = named.count_ones();
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[named]));
+            let near = _mm256_permutevar8x32_epi32(_mm256_castps_si256(near.0), order);
+            let mut keys = _mm256_or_si256(_mm256_and_si256(near, _mm256_set1_epi32(!7)), order);
+            if count <= 2 {
                 keys = exchange::<0b10>(keys, _mm256_shuffle_epi32::<0b11_10_00_01>(keys));
             } else {
-                let lanes = _mm256_set1_epi32(named.count_ones() as i32);
-                keys = _mm256_or_si256(keys, _mm256_cmpgt_epi32(_mm256_add_epi32(slots, _mm256_set1_epi32(1)), lanes));
+                let places = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 8);
+                let lanes = _mm256_set1_epi32(count as i32);
+                keys = _mm256_or_si256(keys, _mm256_cmpgt_epi32(places, lanes));
                 // Batcher 1968, Sorting networks and their applications: bitonic, all comparators one way.
                 keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
                 keys = exchange::<0b1100_1100>(keys, _mm256_shuffle_epi32::<0b00_01_10_11>(keys));
                 keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
-                if named.count_ones() > 4 {
+                if count > 4 {
                     let reverse = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
                     keys = exchange::<0b1111_0000>(keys, _mm256_permutevar8x32_epi32(keys, reverse));
                     keys = exchange::<0b1100_1100>(keys, _mm256_shuffle_epi32::<0b01_00_11_10>(keys));
@@ -74,15 +83,62 @@ impl Simd for Avx2 {
             // The lowest three bits choose.
             let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(child.as_ptr().cast()), keys);
             _mm256_storeu_si256(sorted_child.as_mut_ptr().cast(), children);
+            count as usize
         }
     }
 
     #[inline(always)]
-    fn named_first(mask: M8, child: &[Child; 8], named: &mut [Child; 8]) {
+    fn named_first(mask: M8, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
         unsafe {
-            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[mask.bits() as usize % 256]));
+            let bits = mask.bits() as usize % 256;
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[bits]));
             let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(child.as_ptr().cast()), order);
             _mm256_storeu_si256(named.as_mut_ptr().cast(), children);
+            bits.count_ones() as usize
+        }
+    }
+
+    #[inline(always)]
+    fn highest_bits(numbers: &[u32; 32]) -> u32 {
+        highest(
+            numbers,
+            #[inline(always)]
+            |eight| eight,
+        )
+    }
+
+    #[inline(always)]
+    fn equal(numbers: &[u32; 32], number: u32) -> u32 {
+        let sought = unsafe { _mm256_set1_epi32(number as i32) };
+        highest(
+            numbers,
+            #[inline(always)]
+            |eight| unsafe { _mm256_cmpeq_epi32(eight, sought) },
+        )
+    }
+
+    #[inline(always)]
+    fn row(node: &Node, offset: u32) -> V8 {
+        // The mask keeps it within the node, which is eight rows long: a compare and a branch would be two instructions, and end what the
+        // compiler sees at once.
+        const WITHIN: u32 = 7 * Node::ROW;
+        const { assert!(size_of::<Node>() as u32 == WITHIN + Node::ROW) };
+        unsafe { V8(_mm256_loadu_ps(std::ptr::from_ref(node).byte_add((offset & WITHIN) as usize).cast())) }
+    }
+
+    #[inline(always)]
+    fn corners(block: &Block, offset: u32) -> [V8; 3] {
+        // Up to seven rows of 32 bytes further the three rows that follow are within the block.
+        const WITHIN: u32 = 7 * 32;
+        const { assert!(offset_of!(Block, corners) as u32 + WITHIN + Block::AXIS <= size_of::<Block>() as u32) };
+        unsafe {
+            let first = std::ptr::from_ref(block).byte_add(offset_of!(Block, corners) + (offset & WITHIN) as usize);
+            let rows = first.cast::<[f32; 8]>();
+            [
+                V8(_mm256_loadu_ps(rows.cast())),
+                V8(_mm256_loadu_ps(rows.add(1).cast())),
+                V8(_mm256_loadu_ps(rows.add(2).cast())),
+            ]
         }
     }
 
@@ -119,6 +175,19 @@ pub(super) fn opaque<T>(mut address: *mut T) -> *mut T {
     // SAFETY: no instruction; the address comes back as it went in.
     unsafe { asm!("/* {0} */", inout(reg) address, options(pure, nomem, nostack, preserves_flags)) };
     address
+}
+
+/// The highest bits of what becomes of the numbers, eight at a time.
+#[inline(always)]
+fn highest(numbers: &[u32; 32], change: impl Fn(__m256i) -> __m256i) -> u32 {
+    let mut bits = 0;
+    for k in 0..4 {
+        unsafe {
+            let eight = change(_mm256_loadu_si256(numbers.as_ptr().add(8 * k).cast()));
+            bits |= (_mm256_movemask_ps(_mm256_castsi256_ps(eight)) as u32) << (8 * k);
+        }
+    }
+    bits
 }
 
 /// For each set of lanes an order, a byte a lane, in which they come first.
@@ -247,6 +316,10 @@ impl Vector for V4 {
         M4(unsafe { _mm_xor_ps(self.0, other.0) })
     }
     #[inline(always)]
+    fn flip(self, other: Self) -> Self {
+        Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(other.0, _mm_set1_ps(-0.0))) })
+    }
+    #[inline(always)]
     fn select(mask: M4, yes: Self, no: Self) -> Self {
         Self(unsafe { _mm_blendv_ps(no.0, yes.0, mask.0) })
     }
@@ -331,6 +404,10 @@ impl Vector for V8 {
     #[inline(always)]
     fn differs_in_sign(self, other: Self) -> M8 {
         M8(unsafe { _mm256_xor_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn flip(self, other: Self) -> Self {
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(other.0, _mm256_set1_ps(-0.0))) })
     }
     #[inline(always)]
     fn select(mask: M8, yes: Self, no: Self) -> Self {

@@ -24,7 +24,7 @@ use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::planes::{Heights, Planes};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
-use crate::trace::bvh::woop::{Judged, Met, Sheared, Sides, Span};
+use crate::trace::bvh::woop::{Judged, Margin, Met, Sheared, Sides, Span};
 
 /// A block as an origin sees it, on a bundle's axes.
 struct Seen<V> {
@@ -104,20 +104,20 @@ impl<Q: Query> Walk<'_, Q> {
                 if self.found.limit.0[ray] < leaf.near {
                     continue;
                 }
-                let (sheared, sides, lanes) = sides::<S>(&seen, block, bundle, ray, blur);
+                let (sides, lanes) = sides::<S>(&seen, block, bundle, ray, blur);
                 if lanes == 0 {
                     continue;
                 }
                 let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
                 let met = if self.place == FIXED {
-                    meet_between_corners::<S>(&sides, &sheared, lanes, &seen, &mut planes, block, bundle, &range)
+                    meet_between_corners::<S>(&sides, lanes, &seen, &mut planes, block, bundle, &range)
                 } else {
                     let planes = planes.get_or_insert_with(
                         #[inline(always)]
                         || planes_of::<S::V8>(block, axes),
                     );
                     let heights = planes.heights([seen.x[0], seen.y[0], seen.z[0]], blur.origin);
-                    meet_planes::<S>(&sides, &sheared, lanes, planes, &heights, bundle, ray, &range)
+                    meet_planes::<S>(&sides, lanes, planes, &heights, bundle, ray, &range)
                 };
                 if let Some(met) = met {
                     changed |= self.take::<S>(ray, LANES as u32 * index, &met, &range);
@@ -211,13 +211,7 @@ impl<Q: Query> Walk<'_, Q> {
 
 /// A ray's edge functions, and a bit for every triangle that these leave.
 #[inline(always)]
-fn sides<S: Simd>(
-    seen: &Seen<S::V8>,
-    block: &Block,
-    bundle: &Bundle,
-    ray: usize,
-    blur: Blur,
-) -> (Sheared<S::V8>, Sides<S::V8>, u32) {
+fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
     let splat = S::V8::splat;
     let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
     let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
@@ -228,9 +222,9 @@ fn sides<S: Simd>(
         z: *z,
     };
     let width = sx.abs().max(sy.abs()).add(splat(1.0));
-    let sides = Sides::new(&sheared, width, splat(block.size), blur);
+    let sides = Sides::new(&sheared, &Margin::new(width, splat(blur.direction)), splat(block.size), Some(blur.origin));
     let lanes = (sides.passed() | !sides.are_finite().bits()) & block.lanes;
-    (sheared, sides, lanes)
+    (sides, lanes)
 }
 
 /// Where a ray meets the triangles that its edge functions leave: by the mean of the corners' depths.
@@ -238,7 +232,6 @@ fn sides<S: Simd>(
 #[expect(clippy::too_many_arguments, reason = "a ray, a block, and what is known of both")]
 fn meet_between_corners<S: Simd>(
     sides: &Sides<S::V8>,
-    sheared: &Sheared<S::V8>,
     lanes: u32,
     Seen { x, y, z }: &Seen<S::V8>,
     planes: &mut Option<Planes<S::V8>>,
@@ -249,9 +242,8 @@ fn meet_between_corners<S: Simd>(
     let splat = S::V8::splat;
     // A turned bundle runs against its rays.
     let way = if bundle.is_turned { -bundle.forward } else { bundle.forward };
-    let span = Span { begin: splat(range.first), end: splat(range.limit), forward: splat(way) };
+    let span = Span { begin: splat(range.first), end: splat(range.limit), against: splat(-way) };
     let Met { lanes, sure, area, near, far } = sides.meet::<false>(
-        sheared,
         splat(block.size),
         None,
         &span,
@@ -280,7 +272,6 @@ fn meet_between_corners<S: Simd>(
 #[expect(clippy::too_many_arguments, reason = "as above")]
 fn meet_planes<S: Simd>(
     sides: &Sides<S::V8>,
-    sheared: &Sheared<S::V8>,
     lanes: u32,
     planes: &Planes<S::V8>,
     &Heights { height, error }: &Heights<S::V8>,
@@ -309,6 +300,6 @@ fn meet_planes<S: Simd>(
     let tame = known.and(error.mul(four).less(height)).and(zero.less(turned));
     (lanes != 0).then(
         #[inline(always)]
-        || Judged { lanes, sure: sides.inside(sheared).and(sides.are_finite()).and(tame), low, high },
+        || Judged { lanes, sure: sides.inside().and(sides.are_finite()).and(tame), low, high },
     )
 }
