@@ -62,6 +62,26 @@ pub struct Batch {
     pub coherent: bool,
 }
 
+/// Of so many pairs of neighbours it is asked whether they are alike.
+const SAMPLES: usize = 16;
+
+/// Neighbours point alike where the cosine between them is at least this: that of 5 degrees.
+const ALIKE: f32 = 0.996;
+
+impl Batch {
+    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points, and points alike.
+    #[must_use]
+    pub fn of(rays: &[Ray]) -> Self {
+        let every = (rays.len() / SAMPLES).max(2);
+        let are_alike = |pair: &[Ray]| {
+            let (a, b) = (pair[0].direction, pair[1].direction);
+            pair[0].origin == pair[1].origin && a.dot(b) >= ALIKE * a.length() * b.length()
+        };
+        let alike = rays.chunks_exact(every).filter(|some| are_alike(some)).count();
+        Self { coherent: alike > 0 && 4 * alike >= 3 * (rays.len() / every), ..Self::default() }
+    }
+}
+
 /// Rays in a packet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Width {
@@ -88,5 +108,24 @@ impl Width {
             Self::Eight => 8,
             Self::Sixteen => 16,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn rays_of_a_camera_are_coherent_and_others_are_not() {
+        let grid = || (0..4096).map(|i| Vec3::new((i % 64) as f32 / 64.0, (i / 64) as f32 / 64.0, 1.0));
+        let coherent = |rays: Vec<Ray>| Batch::of(&rays).coherent;
+        assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way)).collect()));
+        assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way * 1e-3)).collect()));
+        // From other points, to all sides, and too few to have neighbours.
+        assert!(!coherent(grid().map(|at| Ray::new(at, Vec3::Z)).collect()));
+        assert!(!coherent((0..4096).map(|i| Ray::new(Vec3::ONE, Vec3::AXES[i * i % 3])).collect()));
+        assert!(!coherent(vec![Ray::new(Vec3::ONE, Vec3::Z)]));
+        assert!(!coherent(Vec::new()));
     }
 }

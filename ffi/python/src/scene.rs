@@ -111,7 +111,10 @@ impl Scene {
             occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
                 let which = rays.chunk(chunk);
                 match exact {
-                    Some(bvh) => bvh.occluded_batch(&rays.rounded(which), occluded, Batch::default()),
+                    Some(bvh) => {
+                        let rays = rays.rounded(which);
+                        bvh.occluded_batch(&rays, occluded, Batch::of(&rays));
+                    }
                     None => self.precise.occluded_batch(&rays.some(which), occluded),
                 }
             });
@@ -249,7 +252,8 @@ impl Scene {
         let which = rays.chunk(chunk);
         let hits = &mut hits[..which.len()];
         if let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) {
-            bvh.closest_batch(&rays.rounded(which), hits, Batch::default());
+            let rays = rays.rounded(which);
+            bvh.closest_batch(&rays, hits, Batch::of(&rays));
             return hits;
         }
         let mut precise = [None; CHUNK];

@@ -129,7 +129,7 @@ impl Bvh {
         let answers = Answers::<Q> { bvh: self, rays, answers, first, t };
         let mut arrivals = Arrivals { answers, fixed: Pending::NONE, placed: Pending::NONE };
         let Apart { flight, doubted } = apart;
-        if self.travels_alone(rays) {
+        if self.travel_alone(rays.len()) {
             self.walk_one_by_one::<S, Q>(
                 stacks,
                 doubted,

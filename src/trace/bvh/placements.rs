@@ -22,7 +22,6 @@ pub(super) struct PlacementTree {
     places: Vec<Place>,
     has_triangles: bool,
     has_shapes: bool,
-    object_bytes: usize,
     spread: Spread,
 }
 
@@ -110,9 +109,8 @@ impl PlacementTree {
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());
-        let object_bytes = objects.iter().map(|level| level.triangles.bytes()).sum();
         let spread = spread_over(places.iter().map(|place| &place.placement), objects);
-        Self { tree, places, has_triangles, has_shapes, object_bytes, spread }
+        Self { tree, places, has_triangles, has_shapes, spread }
     }
 
     /// Whether nothing is placed.
@@ -159,11 +157,6 @@ impl PlacementTree {
     #[inline(always)]
     pub fn at(&self, number: u32) -> &Place {
         &self.places[number as usize]
-    }
-
-    /// Memory that rays among triangles go through, in bytes: it and the triangles of all objects.
-    pub fn bytes_with_objects(&self) -> usize {
-        self.bytes() + self.object_bytes
     }
 
     /// Memory it holds, in bytes.

@@ -1,9 +1,6 @@
-//! Many rays that make no bundle, one after the other.
+//! Some rays that make no bundle, one after the other.
 //!
-//! Flights ([`super::super::flight`]) hide the time that memory takes, at the price of a list, a stack in memory and children put in order where
-//! only one is entered. Where the trees are in the cache there is little to hide, and a walk that keeps in registers what it is at is faster
-//! by up to a fifth. Rays that start far from each other find nothing near the processor that the one before has used, however small the trees. A few rays
-//! make no flight worth its name.
+//! A few rays make no flight ([`super::super::flight`]) worth its name: they would wait for each other where there is nobody to wait for.
 
 use super::{Noted, SingleRay};
 use crate::ray::Ray;
@@ -19,7 +16,7 @@ use crate::trace::bvh::walk::{self, Stack, Stacks, Visit};
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Travel {
-    /// By the size of the trees, and by how many rays there are and how far apart they start.
+    /// By how many there are.
     #[default]
     Auto,
     /// Several of them in turn, in every scene.
@@ -28,18 +25,8 @@ pub enum Travel {
     Alone,
 }
 
-/// Trees of that many bytes stay in the cache, for the most part: with 10 MiB both ways were alike where 32 MiB of cache were shared with
-/// others, with 23 MiB flights were faster by a fifteenth, with 110 MiB by a seventh.
-const CACHED: usize = 12 << 20;
-
-/// Fewer rays than this do not wait for each other.
-const FEW: usize = 8;
-
-/// Of so many rays of a batch it is asked whether the next one starts far away.
-const SAMPLES: usize = 16;
-
-/// Farther away is another part of the scene: as a share of its farthest coordinate.
-const PART: f32 = 0.25;
+/// Fewer rays than this do not wait for each other: as many take as long alone as in a flight.
+const FEW: usize = 12;
 
 impl Bvh {
     /// The same tracer, whose rays travel as told.
@@ -48,22 +35,13 @@ impl Bvh {
         Self { travel, ..self }
     }
 
-    /// Whether these rays, which make no bundle, had better walk alone.
-    pub(in crate::trace::bvh) fn travels_alone(&self, rays: &[Ray]) -> bool {
-        let bytes = || self.fixed.triangles.bytes() + self.placements.bytes_with_objects();
+    /// Whether so many rays, which make no bundle, had better walk alone.
+    pub(in crate::trace::bvh) fn travel_alone(&self, rays: usize) -> bool {
         match self.travel {
-            Travel::Auto => rays.len() < FEW || bytes() <= CACHED && !self.are_scattered(rays),
+            Travel::Auto => rays < FEW,
             Travel::InFlight => false,
             Travel::Alone => true,
         }
-    }
-
-    /// Whether most rays start in another part of the scene than the one before.
-    fn are_scattered(&self, rays: &[Ray]) -> bool {
-        let far = PART * self.placements.reach().max(self.fixed.triangles.tree().reach()).max_element();
-        let every = (rays.len() / SAMPLES).max(2);
-        let pairs = || rays.chunks_exact(every).map(|some| some[1].origin - some[0].origin);
-        2 * pairs().filter(|way| way.abs().max_element() > far).count() > pairs().len()
     }
 
     /// Answers all rays among triangles that stand still: `done` is told of each that has hit something what it has found.
