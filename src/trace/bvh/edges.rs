@@ -109,8 +109,9 @@ impl Edges {
         let tame = zero.less(x).and(x.at_most(quarter)).and(zero.less(y)).and(y.at_most(quarter));
         let error = x.add(y).mul_add(splat(1.25), splat(16.0 * u));
         let mut stored = [[[0.0; LANES]; 3]; 4];
-        for (stored, normal) in stored.iter_mut().zip(&normals) {
-            *stored = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
+        for k in 0..4 {
+            let normal = &normals[k];
+            stored[k] = [normal[0].to_array(), normal[1].to_array(), normal[2].to_array()];
         }
         let a = turned(a, forward);
         let edges = Self {
@@ -162,8 +163,8 @@ fn size<V: Vector>(p: [V; 3]) -> V {
 #[inline(always)]
 fn ends<S: Simd>(n: &[S::V8; 3], bundle: &Bundle) -> (S::V8, S::V8) {
     let (mut least, mut most) = (n[2], n[2]);
-    for (component, (low, high)) in n.iter().zip(bundle.low.into_iter().zip(bundle.high)) {
-        let (a, b) = (component.mul(S::V8::splat(low)), component.mul(S::V8::splat(high)));
+    for i in 0..2 {
+        let (a, b) = (n[i].mul(S::V8::splat(bundle.low[i])), n[i].mul(S::V8::splat(bundle.high[i])));
         least = least.add(a.min(b));
         most = most.add(a.max(b));
     }

@@ -31,13 +31,14 @@ impl Footprints {
         let (zero, one) = (splat(0.0), splat(1.0));
         let (mut least, mut most) = ([splat(f32::INFINITY); 2], [splat(f32::NEG_INFINITY); 2]);
         let (mut far, mut nearest, mut largest) = (zero, splat(f32::INFINITY), zero);
-        let [px, qx, zx] = [&corners[p], &corners[q], &corners[along]];
-        for ((px, qx), zx) in px.iter().zip(qx).zip(zx) {
-            let z = S::V8::load(zx).sub(origin[2]).mul(forward);
+        let (components, zx) = ([&corners[p], &corners[q]], &corners[along]);
+        // By index: iterators zipped are not always taken apart, here and in `edges`.
+        for k in 0..3 {
+            let z = S::V8::load(&zx[k]).sub(origin[2]).mul(forward);
             let inverse = one.div(z);
             (far, nearest) = (z.abs().max(far), z.min(nearest));
-            for (i, component) in [px, qx].into_iter().enumerate() {
-                let x = S::V8::load(component).sub(origin[i]);
+            for i in 0..2 {
+                let x = S::V8::load(&components[i][k]).sub(origin[i]);
                 let slope = x.mul(inverse);
                 far = x.abs().max(far);
                 largest = slope.abs().max(largest);
