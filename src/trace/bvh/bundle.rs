@@ -300,14 +300,15 @@ impl Bundle {
     #[inline(always)]
     pub fn slab(&self, reach: Vec3) -> Option<BundleSlab> {
         let axes = axes(self.axis);
-        let sign = [0, 1].map(|i| if self.low[i] > 0.0 { 1.0f32 } else { -1.0 });
+        let sign = |low: f32| if low > 0.0 { 1.0f32 } else { -1.0 };
+        let sign = [sign(self.low[0]), sign(self.low[1])];
         let sign = [sign[0], sign[1], self.forward];
         let mut slab = BundleSlab {
             near: [0; 3],
             far: [0; 3],
             near_origin: [0.0; 3],
             far_origin: [0.0; 3],
-            reciprocal: [0, 1].map(|i| [1.0 / self.low[i], 1.0 / self.high[i]]),
+            reciprocal: [[1.0 / self.low[0], 1.0 / self.high[0]], [1.0 / self.low[1], 1.0 / self.high[1]]],
             forward: self.forward,
         };
         let mut is_finite = true;

@@ -215,8 +215,11 @@ fn answer_some<S: Simd, Q: Query>(
 /// A bit for each lane with a triangle.
 #[inline(always)]
 fn named(ids: &[u32; 4]) -> u32 {
-    let [a, b, c, d] = ids.map(|id| u32::from(id != NONE));
-    a | b << 1 | c << 2 | d << 3
+    let mut named = 0;
+    for lane in 0..4 {
+        named |= u32::from(ids[lane] != NONE) << lane;
+    }
+    named
 }
 
 /// The values of the lanes that are named; in the others the first of these.
