@@ -14,7 +14,8 @@ use crate::trace::nearest::Nearest;
 /// No triangle is noted.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The state of one ray.
+/// The state of one ray. What is only noted comes first, and is near what steps need as well.
+#[repr(C)]
 #[derive(Clone, Copy)]
 pub(super) struct Found {
     /// No hit beyond this is wanted; rounded up.

@@ -13,6 +13,7 @@ use crate::ray::Ray;
 /// A ray made ready.
 #[derive(Clone, Copy)]
 pub(super) struct ReadyRay {
+    /// Two that nodes take, a cache line, and two that blocks take, another.
     rows: [[f32; 8]; 4],
 }
 
@@ -22,7 +23,7 @@ impl ReadyRay {
 
     #[inline(always)]
     pub fn slab(&self) -> SlabRay {
-        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, ..], _, [x, y, z, ..]] = self.rows;
+        let [[rx, ry, rz, tmin, nx, ny, nz, _], [fx, fy, fz, x, y, z, ..], ..] = self.rows;
         SlabRay {
             reciprocal: [rx, ry, rz, 0.0],
             near_offset: [nx, ny, nz, 0.0],
@@ -34,8 +35,9 @@ impl ReadyRay {
 
     #[inline(always)]
     pub fn filter(&self) -> Filter {
-        let [[.., begin], [_, _, _, width, x, y, z, shorten], [p, q, against, ax, ay, az, ..], last] = self.rows;
-        let [_, _, _, origin, direction, of_depth, of_size, _] = last;
+        let [.., third, fourth] = self.rows;
+        let ([x, y, z, p, q, ax, ay, az], [width, of_depth, of_size, against, shorten, begin, origin, direction]) =
+            (third, fourth);
         Filter {
             axes: [ax.to_bits(), ay.to_bits(), az.to_bits()],
             origin: [x, y, z],
@@ -62,10 +64,10 @@ impl ReadyRay {
         let [fx, fy, fz, _] = far.to_array();
         Self {
             rows: [
-                [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, begin],
-                [fx, fy, fz, width, x, y, z, shorten],
-                [p, q, against, ax, ay, az, 0.0, 0.0],
-                [sx, sy, sz, blur.origin, blur.direction, of_depth, of_size, 0.0],
+                [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, 0.0],
+                [fx, fy, fz, sx, sy, sz, 0.0, 0.0],
+                [x, y, z, p, q, ax, ay, az],
+                [width, of_depth, of_size, against, shorten, begin, blur.origin, blur.direction],
             ],
         }
     }
@@ -73,7 +75,7 @@ impl ReadyRay {
     /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.
     #[inline(always)]
     pub fn end(&self) -> [f32; 2] {
-        let [.., tmax, limit] = self.rows[2];
+        let [.., tmax, limit] = self.rows[1];
         [tmax, limit]
     }
 }
@@ -157,14 +159,16 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     let [nx, ny, nz] = near;
     let [fx, fy, fz] = far;
     let [x, y, z] = filter.origin;
-    let first = S::transpose([rx, ry, rz, least, nx, ny, nz, filter.begin]);
-    let second = S::transpose([fx, fy, fz, width, x, y, z, filter.shorten]);
     let [p, q] = filter.shear;
     let [kx, ky, kz] = filter.axes;
     // Rounded up, for t is rounded before it is held against it.
     let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
-    let third = S::transpose([p, q, filter.against, kx, ky, kz, tmax, limit]);
-    let fourth = S::transpose([sides[0], sides[1], sides[2], off, splat(blur.direction), of_depth, of_size, zero]);
+    let [sx, sy, sz] = sides;
+    let Filters { against, shorten, begin, .. } = filter;
+    let first = S::transpose([rx, ry, rz, least, nx, ny, nz, zero]);
+    let second = S::transpose([fx, fy, fz, sx, sy, sz, tmax, limit]);
+    let third = S::transpose([x, y, z, p, q, kx, ky, kz]);
+    let fourth = S::transpose([width, of_depth, of_size, against, shorten, begin, off, splat(blur.direction)]);
     let mut ready = [ReadyRay::NONE; 8];
     for i in 0..8 {
         let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];

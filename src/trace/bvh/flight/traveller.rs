@@ -43,20 +43,20 @@ impl Space {
     }
 }
 
-/// A ray on its way.
-#[repr(align(64))]
+/// A ray on its way. What steps need is in as few cache lines as may be.
+#[repr(C, align(64))]
 #[derive(Clone, Copy)]
 pub(super) struct Traveller {
     /// The ray in the world, and in the object where it is.
     ready: [ReadyRay; 2],
-    pub found: Found,
-    /// Which of the rays it is.
-    pub ray: usize,
     /// Children on the stack.
     len: usize,
+    /// Which of the rays it is.
+    pub ray: usize,
     pub space: Space,
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
+    pub found: Found,
     /// Children waiting to be visited, the nearest on top; above the top is room for what is not entered.
     stack: [Child; STACK + WIDTH],
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
