@@ -62,7 +62,7 @@ pub struct Batch {
     pub coherent: bool,
 }
 
-/// Of so many pairs of neighbours it is asked whether they are alike.
+/// Of so many pairs of neighbours, or a few more, it is asked whether they are alike.
 const SAMPLES: usize = 16;
 
 /// Neighbours point alike where the cosine between them is at least this: that of 5 degrees.

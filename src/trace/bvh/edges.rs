@@ -162,11 +162,9 @@ fn size<V: Vector>(p: [V; 3]) -> V {
 /// The least and the largest scalar product with a direction of the bundle.
 #[inline(always)]
 fn ends<S: Simd>(n: &[S::V8; 3], bundle: &Bundle) -> (S::V8, S::V8) {
-    let (mut least, mut most) = (n[2], n[2]);
-    for i in 0..2 {
-        let (a, b) = (n[i].mul(S::V8::splat(bundle.low[i])), n[i].mul(S::V8::splat(bundle.high[i])));
-        least = least.add(a.min(b));
-        most = most.add(a.max(b));
-    }
-    (least, most)
+    let splat = S::V8::splat;
+    let ([p, q, r], [low_p, low_q], [high_p, high_q]) = (*n, bundle.low, bundle.high);
+    let (a, b) = (p.mul(splat(low_p)), p.mul(splat(high_p)));
+    let (c, d) = (q.mul(splat(low_q)), q.mul(splat(high_q)));
+    (r.add(a.min(b)).add(c.min(d)), r.add(a.max(b)).add(c.max(d)))
 }

@@ -30,6 +30,8 @@ pub(super) struct Numbers {
 pub(super) trait Blocks {
     /// How many bytes they are apart.
     const STRIDE: usize;
+    /// Whether corners are fetched from the mesh when a block is asked for.
+    const IS_PUT_TOGETHER: bool;
     /// Block `index`; `scratch` is where it may be put together.
     fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
@@ -38,6 +40,7 @@ pub(super) trait Blocks {
 
 impl Blocks for [Block] {
     const STRIDE: usize = size_of::<Block>();
+    const IS_PUT_TOGETHER: bool = false;
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
         &self[index as usize]
@@ -50,6 +53,7 @@ impl Blocks for [Block] {
 
 impl Blocks for Numbers {
     const STRIDE: usize = size_of::<[u32; LANES]>();
+    const IS_PUT_TOGETHER: bool = true;
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         scratch.insert(self.read(index))

@@ -19,7 +19,7 @@
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
-//! | `alone` | one ray at a time: many of them among few triangles, or one with the normal of what it hits, or with a visitor that says what counts |
+//! | `alone` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
 //! | `scratch` | what both need of a thread |
 //! | `boxes` | a tree over boxes of the caller's |

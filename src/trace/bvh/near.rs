@@ -99,9 +99,8 @@ impl Kernel for Near<'_> {
                 let at = len % STACK;
                 let (nears, stack) = (waiting.near[at..].first_chunk_mut(), waiting.children[at..].first_chunk_mut());
                 if let (Some(nears), Some(stack)) = (nears, stack) {
-                    S::far_to_near(near, mask, &node.child, nears, stack);
+                    len = at + S::far_to_near(near, mask, &node.child, nears, stack);
                 }
-                len = at + mask.bits().count_ones() as usize;
                 continue;
             }
             for index in child.blocks() {

@@ -1,5 +1,5 @@
-//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one, and for many rays where nothing
-//! has to be waited for ([`many`]).
+//! One ray at a time among the triangles of the world, for callers who cannot wait for a second one, and for so few rays that
+//! they make no flight ([`some`]).
 //!
 //! An interface that hands over single rays (Embree's C functions) can have neither flights nor bundles, and wants the
 //! triangle's normal with the hit. So the ray walks by itself ([`super::walk`]), what it hits is noted and computed at the end
@@ -13,8 +13,8 @@
 //! go on from place to place.
 
 mod found;
-mod many;
 mod row;
+mod some;
 
 use std::ops::ControlFlow;
 
@@ -37,8 +37,8 @@ use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
 pub use found::TriangleFound;
-pub use many::Travel;
 pub use row::SingleRay;
+pub use some::Travel;
 
 /// Whether a search goes on, up to some t.
 pub type Search = ControlFlow<(), f32>;

@@ -16,6 +16,8 @@ use crate::trace::bvh::woop::Sides;
 /// What rays travel through.
 pub(super) trait Ground {
     const HAS_PLACEMENTS: bool;
+    /// Whether blocks are put together when they are asked for, so that they had better be asked for once.
+    const IS_PUT_TOGETHER: bool = false;
     /// Which triangles of a block a ray may pass within.
     fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32);
     /// Which of these it may hit.
@@ -71,6 +73,7 @@ impl<'a, L: Blocks + ?Sized> Plain<'a, L> {
 
 impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
     const HAS_PLACEMENTS: bool = false;
+    const IS_PUT_TOGETHER: bool = L::IS_PUT_TOGETHER;
 
     #[inline(always)]
     fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32) {
@@ -142,7 +145,7 @@ impl Ground for Rounded<'_> {
     }
 }
 
-/// The triangles of the world and of objects in their places: what each space has, in one table, since rays of a list are in
+/// The triangles of the world and of objects in their places: what each space has, in one table, since rays of a round are in
 /// different ones, and nobody can predict which.
 pub(super) struct Placed<'a>(Vec<Region<'a>>);
 

@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use super::ground::Ground;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
+use crate::trace::bvh::block::Block;
 use crate::trace::bvh::build::MAX_DEPTH;
 use crate::trace::bvh::found::Found;
 use crate::trace::bvh::node::{Child, Node, WIDTH};
@@ -57,7 +58,7 @@ pub(super) struct Traveller {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
-    /// Children waiting to be visited, the nearest on top; above the top is room for what is not entered.
+    /// Children waiting to be visited, the nearest on top; above the top is room for what is stored beside.
     stack: [Child; STACK + WIDTH],
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
     near: [u32; STACK + WIDTH],
@@ -117,12 +118,21 @@ impl Traveller {
         self.pop()
     }
 
-    /// What it sees of one block of a leaf: what is to be told of that to [`Self::hit`], and which triangles it may pass within.
+    /// What it sees of a block: what is to be told of that to [`Self::hit`], and which triangles it may pass within.
     #[inline(always)]
-    pub fn look<S: Simd, G: Ground>(&self, leaf: Child, ground: &G) -> (Sides<S::V8>, u32) {
+    pub fn look<S: Simd, G: Ground>(&self, block: &Block) -> (Sides<S::V8>, u32) {
+        G::look::<S>(&self.ready::<G>().filter(), block)
+    }
+
+    /// One block of a leaf, all at once: looks at it, and takes what it hits.
+    #[inline(always)]
+    pub fn visit<S: Simd, Q: Query, G: Ground>(&mut self, leaf: Child, bvh: &Bvh, ground: &G, rays: &[Ray]) -> Child {
         let mut scratch = None;
         let block = ground.block(self.space, leaf.first(), &mut scratch);
-        G::look::<S>(&self.ready::<G>().filter(), block)
+        let (sides, passed) = self.look::<S, G>(block);
+        let next = self.pass(leaf);
+        let hit = if passed == 0 { None } else { self.hit::<S, Q, G>(leaf, block, &sides, passed, bvh, ground, rays) };
+        hit.unwrap_or(next)
     }
 
     /// Past this block of a leaf: on to the next one, or to what is on the stack; without a branch.
@@ -139,6 +149,7 @@ impl Traveller {
     pub fn hit<S: Simd, Q: Query, G: Ground>(
         &mut self,
         leaf: Child,
+        block: &Block,
         sides: &Sides<S::V8>,
         passed: u32,
         bvh: &Bvh,
@@ -146,8 +157,6 @@ impl Traveller {
         rays: &[Ray],
     ) -> Option<Child> {
         let (index, limit) = (leaf.first(), self.found.limit);
-        let mut scratch = None;
-        let block = ground.block(self.space, index, &mut scratch);
         let candidates = G::meet::<S>(&self.ready::<G>().filter(), block, sides, passed, limit);
         if candidates.lanes == 0 {
             return None;

@@ -53,7 +53,7 @@ pub(super) trait Simd {
     fn highest_bits(numbers: &[u32; 32]) -> u32;
     /// A bit for each number that is `number`.
     fn equal(numbers: &[u32; 32], number: u32) -> u32;
-    /// The row of a node's bounds that starts `offset` bytes after the first. What is no row's start means one of its rows.
+    /// The row of a node's bounds that starts `offset` bytes after the first. What is no row's start means some of its bytes.
     fn row(node: &Node, offset: u32) -> Self::V8;
     /// A component of a block's corners, `offset` bytes after that of the first axis. What is no such start means some of its numbers.
     fn corners(block: &Block, offset: u32) -> [Self::V8; 3];

@@ -1,7 +1,8 @@
 //! AVX2 and FMA.
 //!
 //! SAFETY of every block below: the vectors are made only in kernels that `isa::dispatch` runs, which asks the
-//! processor first; loads and stores go through references to arrays of the vector's size.
+//! processor first; loads and stores go through references to arrays of the vector's size, or stay within what a reference leads to, as
+//! is said where they do.
 #![allow(unsafe_code)] // Intrinsics.
 
 use std::arch::{asm, x86_64::*};
@@ -182,6 +183,7 @@ pub(super) fn opaque<T>(mut address: *mut T) -> *mut T {
 fn highest(numbers: &[u32; 32], change: impl Fn(__m256i) -> __m256i) -> u32 {
     let mut bits = 0;
     for k in 0..4 {
+        // Four times eight are what there is.
         unsafe {
             let eight = change(_mm256_loadu_si256(numbers.as_ptr().add(8 * k).cast()));
             bits |= (_mm256_movemask_ps(_mm256_castsi256_ps(eight)) as u32) << (8 * k);

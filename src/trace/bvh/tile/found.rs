@@ -215,11 +215,9 @@ fn answer_some<S: Simd, Q: Query>(
 /// A bit for each lane with a triangle.
 #[inline(always)]
 fn named(ids: &[u32; 4]) -> u32 {
-    let mut named = 0;
-    for lane in 0..4 {
-        named |= u32::from(ids[lane] != NONE) << lane;
-    }
-    named
+    let [a, b, c, d] = *ids;
+    let bit = |id: u32, lane: u32| u32::from(id != NONE) << lane;
+    bit(a, 0) | bit(b, 1) | bit(c, 2) | bit(d, 3)
 }
 
 /// The values of the lanes that are named; in the others the first of these.

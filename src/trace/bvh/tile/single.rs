@@ -229,7 +229,6 @@ fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize
 
 /// Where a ray meets the triangles that its edge functions leave: by the mean of the corners' depths.
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "a ray, a block, and what is known of both")]
 fn meet_between_corners<S: Simd>(
     sides: &Sides<S::V8>,
     lanes: u32,
@@ -269,7 +268,6 @@ fn meet_between_corners<S: Simd>(
 
 /// The same by their planes.
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "as above")]
 fn meet_planes<S: Simd>(
     sides: &Sides<S::V8>,
     lanes: u32,

@@ -1,6 +1,6 @@
 //! Some rays that make no bundle, one after the other.
 //!
-//! A few rays make no flight ([`super::super::flight`]) worth its name: they would wait for each other where there is nobody to wait for.
+//! A few rays make no flight ([`super::super::flight`]) worth its name: while one waits, none of the others has a step to take.
 
 use super::{Noted, SingleRay};
 use crate::ray::Ray;
@@ -19,13 +19,13 @@ pub enum Travel {
     /// By how many there are.
     #[default]
     Auto,
-    /// Several of them in turn, in every scene.
+    /// Several of them in turn, however few.
     InFlight,
-    /// One after the other, in every scene.
+    /// One after the other, however many.
     Alone,
 }
 
-/// Fewer rays than this do not wait for each other: as many take as long alone as in a flight.
+/// As many rays take as long one after the other as in a flight.
 const FEW: usize = 12;
 
 impl Bvh {
