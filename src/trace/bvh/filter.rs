@@ -6,7 +6,7 @@ use super::place::Blur;
 use super::planes;
 use super::simd::{Array, Mask, Simd, Vector};
 use super::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
-use crate::math::{UNIT_ROUNDOFF, Vec3};
+use crate::math::Vec3;
 use crate::ray::Ray;
 
 /// A ray made ready for the f32 reject test.
@@ -18,8 +18,7 @@ pub(super) struct Filter {
     pub origin: [f32; 3],
     /// Direction along the first two axes over that along the third, negative; at most 1 in magnitude.
     pub shear: [f32; 2],
-    /// As of [`Margin`].
-    pub margin: [f32; 3],
+    pub margin: Margin<f32>,
     /// Direction along the third, negative.
     pub against: f32,
     /// 1 over its magnitude.
@@ -56,7 +55,7 @@ impl Filter {
             axes: [at(x), at(y), at(z)],
             origin: [origin[x], origin[y], origin[z]],
             shear,
-            margin: margin(1.0 + shear[0].abs().max(shear[1].abs()), blur.direction),
+            margin: Margin::of_one(1.0 + shear[0].abs().max(shear[1].abs()), blur.direction),
             against: -direction[z],
             shorten: reciprocal.abs(),
             begin: ray.tmin * direction[z].abs() * (1.0 - SLACK),
@@ -102,10 +101,8 @@ impl Filter {
             x[k] = z[k].mul_add(sx, ox.sub(cx[k]));
             y[k] = z[k].mul_add(sy, oy.sub(cy[k]));
         }
-        let [width, of_depth, of_size] = self.margin;
-        let margin = Margin { width: splat(width), of_depth: splat(of_depth), of_size: splat(of_size) };
         let blur = if BLURRED { Some(self.blur.origin) } else { None };
-        let sides = Sides::new(&Sheared { x, y, z }, &margin, splat(block.size), blur);
+        let sides = Sides::new(&Sheared { x, y, z }, &self.margin.splat(), splat(block.size), blur);
         let passed = sides.passed() & block.lanes;
         (sides, passed)
     }
@@ -152,13 +149,6 @@ impl Filter {
         let [x, y, z] = self.origin;
         [S::V8::splat(x), S::V8::splat(y), S::V8::splat(z)]
     }
-}
-
-/// As [`Margin::new`].
-#[inline(always)]
-pub(super) fn margin(width: f32, direction: f32) -> [f32; 3] {
-    let of_depth = width * (5.0 * UNIT_ROUNDOFF) - 4.0 * UNIT_ROUNDOFF + 2.2 * direction;
-    [width, of_depth, width * (of_depth + 3.0 * UNIT_ROUNDOFF) + of_depth]
 }
 
 /// Where in a block the corners' components on an axis are.

@@ -28,8 +28,6 @@ pub(super) struct Numbers {
 
 /// Blocks by their numbers.
 pub(super) trait Blocks {
-    /// How many bytes they are apart.
-    const STRIDE: usize;
     /// Whether corners are fetched from the mesh when a block is asked for.
     const IS_PUT_TOGETHER: bool;
     /// Block `index`; `scratch` is where it may be put together.
@@ -39,7 +37,6 @@ pub(super) trait Blocks {
 }
 
 impl Blocks for [Block] {
-    const STRIDE: usize = size_of::<Block>();
     const IS_PUT_TOGETHER: bool = false;
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
@@ -52,7 +49,6 @@ impl Blocks for [Block] {
 }
 
 impl Blocks for Numbers {
-    const STRIDE: usize = size_of::<[u32; LANES]>();
     const IS_PUT_TOGETHER: bool = true;
     #[inline(always)]
     fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
@@ -110,14 +106,6 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.read(index)),
-        }
-    }
-
-    /// How many bytes blocks are apart.
-    pub fn stride(&self) -> usize {
-        match self {
-            Self::Blocks(_) => <[Block] as Blocks>::STRIDE,
-            Self::Numbers(_) => Numbers::STRIDE,
         }
     }
 

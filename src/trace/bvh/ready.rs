@@ -42,7 +42,7 @@ impl ReadyRay {
             axes: [ax.to_bits(), ay.to_bits(), az.to_bits()],
             origin: [x, y, z],
             shear: [p, q],
-            margin: [width, of_depth, of_size],
+            margin: Margin { width, of_depth, of_size },
             against,
             shorten,
             begin,
@@ -58,7 +58,7 @@ impl ReadyRay {
         let [sx, sy, sz] = [f32::from_bits(sx), f32::from_bits(sy), f32::from_bits(sz)];
         let filter = Filter::new(ray, blur);
         let Filter { axes: [ax, ay, az], origin: [x, y, z], shear: [p, q], against, shorten, begin, .. } = filter;
-        let [width, of_depth, of_size] = filter.margin;
+        let Margin { width, of_depth, of_size } = filter.margin;
         let [ax, ay, az] = [f32::from_bits(ax), f32::from_bits(ay), f32::from_bits(az)];
         let ([rx, ry, rz, _], [nx, ny, nz, _]) = (reciprocal.to_array(), near.to_array());
         let [fx, fy, fz, _] = far.to_array();

@@ -55,7 +55,7 @@ pub(super) struct Sheared<V> {
 }
 
 /// What the bound on the error of edge functions takes of a ray.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Margin<V> {
     /// 1 more than the larger shear: S is so many times s.
     pub width: V,
@@ -74,6 +74,22 @@ impl<V: Vector> Margin<V> {
         let of_depth = width.mul_add(splat(5.0 * UNIT_ROUNDOFF), splat(-4.0 * UNIT_ROUNDOFF));
         let of_depth = direction.mul_add(splat(2.2), of_depth);
         Self { width, of_depth, of_size: width.mul_add(of_depth.add(splat(3.0 * UNIT_ROUNDOFF)), of_depth) }
+    }
+}
+
+impl Margin<f32> {
+    /// As [`Margin::new`], of one ray.
+    #[inline(always)]
+    pub fn of_one(width: f32, direction: f32) -> Self {
+        let of_depth = width * (5.0 * UNIT_ROUNDOFF) - 4.0 * UNIT_ROUNDOFF + 2.2 * direction;
+        Self { width, of_depth, of_size: width * (of_depth + 3.0 * UNIT_ROUNDOFF) + of_depth }
+    }
+
+    /// In every lane.
+    #[inline(always)]
+    pub fn splat<V: Vector>(self) -> Margin<V> {
+        let Self { width, of_depth, of_size } = self;
+        Margin { width: V::splat(width), of_depth: V::splat(of_depth), of_size: V::splat(of_size) }
     }
 }
 
@@ -274,4 +290,19 @@ fn on_both_sides<V: Vector>([a, b, c]: [V; 3]) -> V::Mask {
 #[inline(always)]
 fn edge<V: Vector>(x: [V; 3], y: [V; 3], a: usize, b: usize) -> V {
     x[a].mul_sub(y[b], y[a].mul(x[b]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_rays_margin_is_that_of_many() {
+        for width in [1.0, 1.25, 1.7, 2.0, 17.0] {
+            for direction in [0.0, UNIT_ROUNDOFF, 1e-3, f32::INFINITY] {
+                let of_many = Margin::<[f32; 4]>::new([width; 4], [direction; 4]);
+                assert_eq!(Margin::of_one(width, direction).splat(), of_many, "{width} {direction}");
+            }
+        }
+    }
 }

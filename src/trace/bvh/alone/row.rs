@@ -11,7 +11,7 @@ use crate::trace::bvh::filter::{self, Filter};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Vector};
 use crate::trace::bvh::slab::{HUGE, SlabRay, least_t};
-use crate::trace::bvh::woop::SLACK;
+use crate::trace::bvh::woop::{Margin, SLACK};
 
 /// A ray by itself, in the order in which Embree's `RTCRay` begins: a caller's can be read where it is.
 #[repr(C)]
@@ -117,7 +117,7 @@ impl SingleRay {
             axes: [filter::at(x), filter::at(y), filter::at(z)],
             origin: [origin[x], origin[y], origin[z]],
             shear,
-            margin: filter::margin(width, blur.direction),
+            margin: Margin::of_one(width, blur.direction),
             against: -along,
             shorten,
             begin,

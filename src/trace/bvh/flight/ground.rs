@@ -48,7 +48,7 @@ impl Addresses {
 
     fn of_triangles<S: Simd>(triangles: &TriangleTree) -> Self {
         let leaves = triangles.leaves();
-        Self::new::<S>(triangles.tree(), leaves.address::<S>(0), leaves.stride())
+        Self::new::<S>(triangles.tree(), leaves.address::<S>(0), leaves.bytes() / leaves.len().max(1))
     }
 
     #[inline(always)]
@@ -66,8 +66,9 @@ pub(super) struct Plain<'a, L: ?Sized> {
 }
 
 impl<'a, L: Blocks + ?Sized> Plain<'a, L> {
-    pub fn new<S: Simd>(tree: &'a Tree, leaves: &'a L) -> Self {
-        Self { tree, leaves, addresses: Addresses::new::<S>(tree, leaves.address::<S>(0), L::STRIDE) }
+    /// `leaves` are those of the triangles.
+    pub fn new<S: Simd>(triangles: &'a TriangleTree, leaves: &'a L) -> Self {
+        Self { tree: triangles.tree(), leaves, addresses: Addresses::of_triangles::<S>(triangles) }
     }
 }
 

@@ -102,15 +102,14 @@ struct Steps {
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[Ray], done: impl FnMut(usize, &Found)) {
     let fixed = &bvh.fixed.triangles;
-    let tree = fixed.tree();
     if bvh.placements.has_triangles() {
         return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, Blur::NONE, done);
     }
     match fixed.leaves() {
         Leaves::Blocks(blocks) => {
-            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(tree, &blocks[..]), rays, Blur::NONE, done);
+            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, Blur::NONE, done);
         }
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(tree, leaves), rays, Blur::NONE, done),
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, Blur::NONE, done),
     }
 }
 
@@ -157,7 +156,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
     let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
     while !flying.is_empty() {
-        let Steps { mut at_nodes, mut at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
+        let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
         for k in arrived {
             let traveller = &mut flight.travellers[k];
             done(traveller.ray, &traveller.found);
@@ -179,23 +178,23 @@ fn run<S: Simd, Q: Query, G: Ground>(
                 let next = traveller.visit::<S, Q, G>(leaf, bvh, ground, rays);
                 flight.send::<S, G>(k, next, ground);
             }
-            at_leaves = Set::NOBODY;
-        }
-        let mut count = 0;
-        for k in at_leaves {
-            let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
-            let block = ground.block(traveller.space, leaf.first(), &mut scratch);
-            let (sides, passed) = traveller.look::<S, G>(block);
-            sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
-            count += usize::from(passed != 0);
-            let next = traveller.pass(leaf);
-            flight.send::<S, G>(k, next, ground);
-        }
-        for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
-            let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
-            let block = ground.block(traveller.space, leaf.first(), &mut scratch);
-            if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
-                flight.send::<S, G>(*k % RAYS, next, ground);
+        } else {
+            let mut count = 0;
+            for k in at_leaves {
+                let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
+                let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                let (sides, passed) = traveller.look::<S, G>(block);
+                sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
+                count += usize::from(passed != 0);
+                let next = traveller.pass(leaf);
+                flight.send::<S, G>(k, next, ground);
+            }
+            for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
+                let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
+                let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
+                    flight.send::<S, G>(*k % RAYS, next, ground);
+                }
             }
         }
         if G::HAS_PLACEMENTS {
