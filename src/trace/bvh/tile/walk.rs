@@ -10,6 +10,7 @@ use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::edges::Edges;
 use crate::trace::bvh::footprint::Footprints;
+use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
@@ -248,75 +249,7 @@ impl<Q: Query> Walk<'_, Q> {
         let mut changed = false;
         let rows = rows::rows(leaf.rays);
         for index in leaf.child.blocks() {
-            let mut scratch = None;
-            let block = self.tree.block(index, &mut scratch);
-            let Some((mut lanes, edges)) = Edges::new::<S>(block, self.bundle, most) else { continue };
-            let seen = Footprints::new::<S>(&block.corners, self.bundle);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize % LANES;
-                lanes &= lanes - 1;
-                let rows = seen.rows::<S>(lane, &self.bundle.rows) & rows;
-                changed |= self.triangle::<S>(LANES as u32 * index + lane as u32, &edges, lane, rows);
-            }
-        }
-        changed
-    }
-
-    /// One triangle against the groups of the rows that are named.
-    #[inline(always)]
-    fn triangle<S: Simd>(&mut self, id: u32, edges: &Edges, lane: usize, mut rows: u32) -> bool {
-        let splat = S::Wide::splat;
-        let (nu, nv, nw) = (normal::<S>(edges, 0, lane), normal::<S>(edges, 1, lane), normal::<S>(edges, 2, lane));
-        let bound = splat(edges.edge_error[lane]);
-        let below = splat(-edges.edge_error[lane]);
-        let is_vague = edges.is_vague >> lane & 1 != 0;
-        let (mut changed, first_t) = (false, splat(self.bundle.first));
-        while rows != 0 {
-            let group = rows.trailing_zeros() as usize / (S::Wide::LANES / 8);
-            rows &= (!0 << (S::Wide::LANES / 8)) << (group * (S::Wide::LANES / 8));
-            let p = S::Wide::at(&self.bundle.slope[0], group);
-            let q = S::Wide::at(&self.bundle.slope[1], group);
-            let (u, v, w) = (along(&nu, p, q), along(&nv, p, q), along(&nw, p, q));
-            let least = u.min(v).min(w);
-            let inside = below.at_most(least);
-            let mut open = inside.bits();
-            if is_vague {
-                // Where the bundle sees both sides, the signs must only agree.
-                open |= u.max(v).max(w).at_most(bound).bits();
-            } else if open != 0 {
-                let inverse = splat(1.0).div(along(&normal::<S>(edges, 3, lane), p, q));
-                let low = splat(edges.near_height[lane]).mul(inverse);
-                let high = splat(edges.far_height[lane]).mul(inverse);
-                let limit = S::Wide::at(&self.found.limit, group);
-                let before = S::Wide::at(&self.found.sure, group);
-                let in_range = high.less(before).and(S::Wide::at(&self.bundle.begin, group).less(low));
-                let sure = bound.less(least).and(in_range);
-                let outside = limit.less(low).or(high.less(first_t));
-                open = inside.without(sure).without(outside).bits();
-                if sure.bits() != 0 {
-                    let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
-                    high.put_where(sure, &mut self.found.limit.0, group);
-                    low.put_where(sure, &mut self.found.sure.0, group);
-                    if !Q::ANY {
-                        let id = splat(f32::from_bits(id));
-                        id.put_where(sure, bytemuck::cast_mut(&mut self.found.noted), group);
-                    }
-                    // What is fixed comes first, when nothing else is noted yet.
-                    if !Q::ANY && self.place != FIXED {
-                        let place = splat(f32::from_bits(self.place));
-                        place.put_where(sure, bytemuck::cast_mut(&mut self.found.place), group);
-                    }
-                    changed = true;
-                }
-                if open != 0 && self.bundle.is_turned {
-                    open &= !self.behind_starts::<S>(edges, lane, group);
-                }
-            }
-            while open != 0 {
-                let i = open.trailing_zeros() as usize;
-                open &= open - 1;
-                changed |= self.decide(group * S::Wide::LANES + i, id);
-            }
+            changed |= S::apart(Meeting { walk: self, index, rows, most });
         }
         changed
     }
@@ -361,6 +294,138 @@ impl<Q: Query> Walk<'_, Q> {
         found.sure.0[ray] = hit.t.next_down() * depth * (1.0 - SLACK) - TINY;
         found.limit.0[ray] = found.nearest[ray].limit() * depth * (1.0 + SLACK) + TINY;
         found.nearest[ray].limit() < before
+    }
+}
+
+/// A block of triangles and rows of a bundle's rays, of which more than a few enter its leaf.
+struct Meeting<'a, 'b, Q> {
+    walk: &'a mut Walk<'b, Q>,
+    index: u32,
+    rows: u32,
+    most: f32,
+}
+
+impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
+    /// Whether a limit has changed.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { walk, index, rows, most } = self;
+        let mut scratch = None;
+        let tree = walk.tree;
+        let block = tree.block(index, &mut scratch);
+        let bundle = walk.bundle;
+        let Some((lanes, edges)) = Edges::new::<S>(block, bundle, most) else { return false };
+        let seen = Footprints::new::<S>(&block.corners, bundle);
+        let rows = u64::from(rows & 0xff) * 0x0101_0101_0101_0101;
+        let pairs = seen.pairs::<S>(&bundle.rows) & rows & rows::rays(lanes);
+        let vague = pairs & rows::rays(edges.is_vague);
+        let mut changed = walk.sure::<S>(&edges, LANES as u32 * index, pairs & !vague);
+        if vague != 0 {
+            changed |= walk.vague::<S>(&edges, LANES as u32 * index, vague);
+        }
+        changed
+    }
+}
+
+/// Pairs of eight triangles and eight rows: of triangles and groups.
+#[inline(always)]
+const fn groups<S: Simd>(pairs: u64) -> u64 {
+    if S::Wide::LANES == 16 { (pairs | pairs >> 1) & 0x5555_5555_5555_5555 } else { pairs }
+}
+
+impl<Q: Query> Walk<'_, Q> {
+    /// Groups of rays against triangles whose front all rays see. A bit for each pair: a byte a triangle, in it a bit for each row.
+    #[inline(always)]
+    fn sure<S: Simd>(&mut self, edges: &Edges, first_id: u32, pairs: u64) -> bool {
+        let splat = S::Wide::splat;
+        let first_t = splat(self.bundle.first);
+        let mut pairs = groups::<S>(pairs);
+        let (mut doubts, mut count) = ([0u32; 64], 0);
+        let zero = splat(0.0);
+        let mut any = zero.less(zero);
+        let place = splat(f32::from_bits(self.place));
+        while pairs != 0 {
+            let pair = pairs.trailing_zeros();
+            pairs &= pairs - 1;
+            let (lane, group) = (pair as usize / 8 % LANES, pair as usize % 8 / (S::Wide::LANES / 8));
+            let p = S::Wide::at(&self.bundle.slope[0], group);
+            let q = S::Wide::at(&self.bundle.slope[1], group);
+            let u = along(&normal::<S>(edges, 0, lane), p, q);
+            let v = along(&normal::<S>(edges, 1, lane), p, q);
+            let w = along(&normal::<S>(edges, 2, lane), p, q);
+            let bound = splat(edges.edge_error[lane]);
+            let least = u.min(v).min(w);
+            let inside = zero.sub(bound).at_most(least);
+            let inverse = splat(1.0).div(along(&normal::<S>(edges, 3, lane), p, q));
+            let low = splat(edges.near_height[lane]).mul(inverse);
+            let high = splat(edges.far_height[lane]).mul(inverse);
+            let limit = S::Wide::at(&self.found.limit, group);
+            let before = S::Wide::at(&self.found.sure, group);
+            let in_range = high.less(before).and(S::Wide::at(&self.bundle.begin, group).less(low));
+            let sure = bound.less(least).and(in_range);
+            let outside = limit.less(low).or(high.less(first_t));
+            let open = inside.without(sure).without(outside).bits();
+            let (low, high) = if Q::ANY { (splat(DONE), splat(DONE)) } else { (low, high) };
+            high.put_where(sure, &mut self.found.limit.0, group);
+            low.put_where(sure, &mut self.found.sure.0, group);
+            if !Q::ANY {
+                let id = splat(f32::from_bits(first_id + lane as u32));
+                id.put_where(sure, bytemuck::cast_mut(&mut self.found.noted), group);
+            }
+            // What is fixed comes first, when nothing else is noted yet.
+            if !Q::ANY && self.place != FIXED {
+                place.put_where(sure, bytemuck::cast_mut(&mut self.found.place), group);
+            }
+            any = any.or(sure);
+            doubts[count % 64] = pair << 16 | open;
+            count += usize::from(open != 0);
+        }
+        let mut changed = any.bits() != 0;
+        for doubt in &doubts[..count] {
+            let pair = doubt >> 16;
+            let (lane, group) = (pair as usize / 8 % LANES, pair as usize % 8 / (S::Wide::LANES / 8));
+            let mut open = doubt & 0xffff;
+            if self.bundle.is_turned {
+                open &= !self.behind_starts::<S>(edges, lane, group);
+            }
+            changed |= self.decide_all::<S>(group, open, first_id + lane as u32);
+        }
+        changed
+    }
+
+    /// The same for triangles of which rays may see either side: where signs agree, it is left to be decided.
+    #[inline(always)]
+    fn vague<S: Simd>(&mut self, edges: &Edges, first_id: u32, pairs: u64) -> bool {
+        let mut pairs = groups::<S>(pairs);
+        let mut changed = false;
+        while pairs != 0 {
+            let pair = pairs.trailing_zeros();
+            pairs &= pairs - 1;
+            let (lane, group) = (pair as usize / 8 % LANES, pair as usize % 8 / (S::Wide::LANES / 8));
+            let p = S::Wide::at(&self.bundle.slope[0], group);
+            let q = S::Wide::at(&self.bundle.slope[1], group);
+            let u = along(&normal::<S>(edges, 0, lane), p, q);
+            let v = along(&normal::<S>(edges, 1, lane), p, q);
+            let w = along(&normal::<S>(edges, 2, lane), p, q);
+            let bound = S::Wide::splat(edges.edge_error[lane]);
+            let below = S::Wide::splat(-edges.edge_error[lane]);
+            let open = below.at_most(u.min(v).min(w)).bits() | u.max(v).max(w).at_most(bound).bits();
+            changed |= self.decide_all::<S>(group, open, first_id + lane as u32);
+        }
+        changed
+    }
+
+    #[inline(always)]
+    fn decide_all<S: Simd>(&mut self, group: usize, mut open: u32, id: u32) -> bool {
+        let mut changed = false;
+        while open != 0 {
+            let i = open.trailing_zeros() as usize;
+            open &= open - 1;
+            changed |= self.decide(group * S::Wide::LANES + i, id);
+        }
+        changed
     }
 }
 
