@@ -383,7 +383,7 @@ impl BundleSlab {
     /// The children that some ray of the bundle may enter with t' up to `limit`, as a bit mask; and where it enters each at the
     /// earliest.
     #[inline(always)]
-    pub fn enter<S: Simd>(&self, boxes: &Boxes, limit: f32) -> (u32, [f32; WIDTH]) {
+    pub fn enter<S: Simd>(&self, boxes: &Boxes, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
         let splat = S::V8::splat;
         let (mut near, mut far) = (S::V8::load(&boxes.near[2]), S::V8::load(&boxes.far[2]).min(splat(limit)));
         for i in 0..2 {
@@ -393,6 +393,6 @@ impl BundleSlab {
             near = first.mul(a).min(first.mul(b)).max(near);
             far = last.mul(a).max(last.mul(b)).min(far);
         }
-        (near.at_most(far).bits(), near.to_array())
+        (near.at_most(far), near)
     }
 }

@@ -7,57 +7,30 @@ use super::simd::{Array, Mask, Simd, Vector};
 /// Rows of a bundle: eight rays each.
 pub(super) const ROWS: usize = RAYS / 8;
 
-/// For each row of a bundle, the least and the largest slope on two axes, and the same of their reciprocals. Slopes have one
-/// sign on each axis.
+/// For each row of a bundle, the least and the largest slope on two axes
 pub(super) struct Rows {
     pub low: [[f32; ROWS]; 2],
     pub high: [[f32; ROWS]; 2],
-    least_reciprocal: [[f32; ROWS]; 2],
-    most_reciprocal: [[f32; ROWS]; 2],
 }
 
 impl Rows {
     pub const NONE: Self = {
         let zero = [[0.0; ROWS]; 2];
-        Self { low: zero, high: zero, least_reciprocal: zero, most_reciprocal: zero }
+        Self { low: zero, high: zero }
     };
 
     #[inline(always)]
     pub fn new<S: Simd>(slope: &[PerRay; 2]) -> Self {
         let mut rows = Self::NONE;
-        let one = S::V8::splat(1.0);
         for (i, slope) in slope.iter().enumerate() {
             let columns = columns::<S>(slope);
             let [a, b, c, d, e, f, g, h] = columns;
             let low = a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h)));
-            let high = largest::<S>(columns);
+            let high = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)));
             (rows.low[i], rows.high[i]) = (low.to_array(), high.to_array());
-            // Division is monotone, also when it rounds: no ray's own reciprocal is out of this range.
-            rows.least_reciprocal[i] = one.div(high).to_array();
-            rows.most_reciprocal[i] = one.div(low).to_array();
         }
         rows
     }
-
-    /// A bit for every row of which a ray may enter the box in that slot up to the row's limit.
-    #[inline(always)]
-    pub fn enter<S: Simd>(&self, boxes: &Boxes, slot: usize, limit: &[f32; ROWS]) -> u32 {
-        let mut first = S::V8::splat(boxes.near[2][slot]);
-        let mut last = S::V8::splat(boxes.far[2][slot]).min(S::V8::load(limit));
-        for i in 0..2 {
-            let (near, far) = (S::V8::splat(boxes.near[i][slot]), S::V8::splat(boxes.far[i][slot]));
-            let (least, most) = (S::V8::load(&self.least_reciprocal[i]), S::V8::load(&self.most_reciprocal[i]));
-            first = near.mul(least).min(near.mul(most)).max(first);
-            last = far.mul(least).max(far.mul(most)).min(last);
-        }
-        first.at_most(last).bits()
-    }
-}
-
-/// The largest value of each row.
-#[inline(always)]
-pub(super) fn most<S: Simd>(values: &PerRay) -> S::V8 {
-    largest::<S>(columns::<S>(values))
 }
 
 /// The rays of some rows.
@@ -78,11 +51,6 @@ pub(super) const fn rows(rays: u64) -> u32 {
     let rays = (rays | rays >> 1) & 0x0101_0101_0101_0101;
     // The lowest bits of the bytes, moved together into the highest byte.
     (rays.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
-}
-
-#[inline(always)]
-fn largest<S: Simd>([a, b, c, d, e, f, g, h]: [S::V8; 8]) -> S::V8 {
-    a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
 }
 
 /// Of each row the first value, the second, and so on.

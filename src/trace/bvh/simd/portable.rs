@@ -32,7 +32,7 @@ impl Simd for Portable {
         sorted_child: &mut [Child; 8],
     ) -> usize {
         for (len, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
-            let key = near[slot].to_bits() & !7;
+            let key = near[slot].to_bits() & !7 | slot as u32;
             let mut at = len;
             while at > 0 && sorted_near[at - 1] < key {
                 (sorted_near[at], sorted_child[at]) = (sorted_near[at - 1], sorted_child[at - 1]);

@@ -14,15 +14,12 @@ use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::rows::{self, ROWS};
+use crate::trace::bvh::rows;
 use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
 use crate::trace::bvh::triangles::TriangleTree;
 
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;
-
-/// Rays that are asked at every box, without their rows before them.
-const FEW_AT_NODES: u32 = 16;
 
 /// Rays of which each is held against the eight boxes of a node by itself.
 const ONE_BY_ONE: u32 = 3;
@@ -39,8 +36,7 @@ pub(super) struct Entry {
     /// Where the bundle enters it, at the earliest.
     pub near: f32,
     pub child: Child,
-    /// A bit for every ray that may enter it: in a leaf, and where few came to its parent, each is known to; else they are those of rows that
-    /// may, without the rows before the first ray that is known to.
+    /// A bit for every ray that may enter it.
     pub rays: u64,
 }
 
@@ -66,9 +62,8 @@ pub(super) struct Way<'a> {
     pub slab: BundleSlab,
     /// A bit for every ray that matters.
     pub wanted: u64,
-    /// The largest limit of all rays, and of each row.
+    /// The largest limit of all rays.
     most: f32,
-    most_of: [f32; ROWS],
 }
 
 impl<'a> Way<'a> {
@@ -76,13 +71,16 @@ impl<'a> Way<'a> {
     #[inline(always)]
     pub fn new(bundle: &'a Bundle, slab: BundleSlab, count: usize) -> Self {
         let wanted = !0 >> (RAYS - count.clamp(1, RAYS));
-        Self { bundle, slab, wanted, most: 0.0, most_of: [0.0; ROWS] }
+        Self { bundle, slab, wanted, most: 0.0 }
     }
 
     #[inline(always)]
     pub fn measure<S: Simd>(&mut self, limit: &PerRay) {
-        let most = rows::most::<S>(limit);
-        (self.most, self.most_of) = (most.largest(), most.to_array());
+        let mut most = S::Wide::at(limit, 0);
+        for group in 1..RAYS / S::Wide::LANES {
+            most = most.max(S::Wide::at(limit, group));
+        }
+        self.most = most.largest();
     }
 
     /// The next leaf of what waits on the stack.
@@ -100,37 +98,28 @@ impl<'a> Way<'a> {
             }
             let node = tree.node(next.child);
             let boxes = self.slab.boxes::<S>(node, self.bundle.first);
-            let (mut mask, near, known) = if next.rays.count_ones() <= ONE_BY_ONE {
+            let (mask, near, known) = if next.rays.count_ones() <= ONE_BY_ONE {
                 let (mask, near, rays) = self.enter_one_by_one::<S>(goal.limit(), &boxes, next.rays);
                 (mask, near, Some(rays))
             } else {
                 let (mask, near) = self.slab.enter::<S>(&boxes, self.most);
                 (mask, near, None)
             };
-            let base = *len;
-            while mask != 0 {
-                let slot = mask.trailing_zeros() as usize % WIDTH;
-                mask &= mask - 1;
-                let child = node.child[slot];
+            let (mut nears, mut children) = ([0; WIDTH], [Child::NONE; WIDTH]);
+            let count = S::far_to_near(near, mask, &node.child, &mut nears, &mut children);
+            for k in 0..count {
+                let (near, child) = (nears[k % WIDTH], children[k % WIDTH]);
+                let slot = near as usize % WIDTH;
                 let rays = match &known {
                     Some(rays) => rays[slot],
-                    None => self.entering::<S>(goal.limit(), &boxes, slot, next.rays, child.is_leaf()),
+                    None => self.entering::<S>(goal.limit(), &boxes, slot, next.rays),
                 };
-                if rays == 0 {
-                    continue;
-                }
-                let entry = Entry { near: near[slot], child, rays };
-                let mut at = *len;
-                while at > base && stack[at - 1].near < entry.near {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = entry;
-                *len += 1;
-                if entry.child.is_leaf() {
-                    goal.prefetch::<S>(entry.child);
+                stack[*len] = Entry { near: f32::from_bits(near & !7), child, rays };
+                *len += usize::from(rays != 0);
+                if child.is_leaf() {
+                    goal.prefetch::<S>(child);
                 } else {
-                    S::prefetch(S::address(tree.nodes(), entry.child.node()));
+                    S::prefetch(S::address(tree.nodes(), child.node()));
                 }
             }
         }
@@ -143,12 +132,12 @@ impl<'a> Way<'a> {
         limit: &PerRay,
         boxes: &Boxes,
         mut rays: u64,
-    ) -> (u32, [f32; WIDTH], [u64; WIDTH]) {
+    ) -> (<S::V8 as Vector>::Mask, S::V8, [u64; WIDTH]) {
         let splat = S::V8::splat;
         let [p, q] = &self.bundle.reciprocal;
         let [px, qx, zx] = &boxes.near;
         let [py, qy, zy] = &boxes.far;
-        let (mut all, mut near, mut rays_of) = (0, splat(f32::INFINITY), [0; WIDTH]);
+        let (mut all, mut near, mut rays_of) = (splat(0.0).less(splat(0.0)), splat(f32::INFINITY), [0; WIDTH]);
         while rays != 0 {
             let ray = rays.trailing_zeros() as usize % RAYS;
             rays &= rays - 1;
@@ -156,42 +145,32 @@ impl<'a> Way<'a> {
             let first = S::V8::load(px).mul(p).max(S::V8::load(qx).mul(q)).max(S::V8::load(zx));
             let last = S::V8::load(py).mul(p).min(S::V8::load(qy).mul(q));
             let last = last.min(S::V8::load(zy).min(splat(limit.0[ray])));
-            let mut mask = first.at_most(last).bits();
-            (all, near) = (all | mask, near.min(first));
+            let enter = first.at_most(last);
+            (all, near) = (all.or(enter), near.min(first));
+            let mut mask = enter.bits();
             while mask != 0 {
                 rays_of[mask.trailing_zeros() as usize % WIDTH] |= 1 << ray;
                 mask &= mask - 1;
             }
         }
-        (all, near.to_array(), rays_of)
+        (all, near, rays_of)
     }
 
-    /// Those of the rays that enter the box: each of them in a leaf, or where they are few; else just all from the first row with such
-    /// a ray on, of rows that may.
+    /// Those of the rays that enter the box in that slot.
     #[inline(always)]
-    fn entering<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, mut rays: u64, is_leaf: bool) -> u64 {
-        let splat = S::V8::splat;
-        let are_few = rays.count_ones() <= FEW_AT_NODES;
-        if !are_few {
-            rays &= rows::rays(self.bundle.rows.enter::<S>(boxes, slot, &self.most_of));
-        }
+    fn entering<S: Simd>(&self, limit: &PerRay, boxes: &Boxes, slot: usize, rays: u64) -> u64 {
+        let splat = S::Wide::splat;
         let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
         let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
-        let (mut entering, mut open) = (0, rays);
-        while open != 0 {
-            let row = open.trailing_zeros() / 8;
-            open &= !(0xff << (8 * row));
-            let [p, q] = &self.bundle.reciprocal;
-            let (p, q, limit) = (rows::row::<S>(p, row), rows::row::<S>(q, row), rows::row::<S>(limit, row));
+        let [p, q] = &self.bundle.reciprocal;
+        let mut entering = 0;
+        for group in 0..RAYS / S::Wide::LANES {
+            let (p, q, limit) = (S::Wide::at(p, group), S::Wide::at(q, group), S::Wide::at(limit, group));
             let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
             let last = far[0].mul(p).min(far[1].mul(q)).min(far[2].min(limit));
-            let enter = u64::from(first.at_most(last).bits()) << (8 * row) & rays;
-            if enter != 0 && !is_leaf && !are_few {
-                return rays & !0 << (8 * row);
-            }
-            entering |= enter;
+            entering |= u64::from(first.at_most(last).bits()) << (S::Wide::LANES * group);
         }
-        entering
+        entering & rays
     }
 }
 
