@@ -22,7 +22,7 @@ use crate::trace::bvh::triangles::TriangleTree;
 const FEW: u32 = 8;
 
 /// Rays of which each is held against the eight boxes of a node by itself.
-const ONE_BY_ONE: u32 = 3;
+const ONE_BY_ONE: usize = 3;
 
 /// [`FEW`] in a tree that reaches that far. [`Edges`] must not overflow; where they might, every ray is by itself.
 #[inline(always)]
@@ -54,6 +54,26 @@ pub(super) trait Goal {
     fn limit(&self) -> &PerRay;
     /// Has a leaf's contents loaded that will be needed soon.
     fn prefetch<S: Simd>(&self, leaf: Child);
+}
+
+/// Rays that were held against the boxes of a node one by one.
+struct OneByOne {
+    /// The bit of each; none where there are fewer.
+    ray: [u64; ONE_BY_ONE],
+    /// A bit for each child that it enters.
+    children: [u32; ONE_BY_ONE],
+}
+
+impl OneByOne {
+    /// Those that enter the child in that slot.
+    #[inline(always)]
+    fn entering(&self, slot: usize) -> u64 {
+        let mut rays = 0;
+        for (ray, children) in self.ray.iter().zip(&self.children) {
+            rays |= ray & u64::from(children >> slot & 1).wrapping_neg();
+        }
+        rays
+    }
 }
 
 /// Children that wait to be visited, the nearest on top, and the bundle's way to them.
@@ -98,7 +118,7 @@ impl<'a> Way<'a> {
             }
             let node = tree.node(next.child);
             let boxes = self.slab.boxes::<S>(node, self.bundle.first);
-            let (mask, near, known) = if next.rays.count_ones() <= ONE_BY_ONE {
+            let (mask, near, known) = if next.rays.count_ones() as usize <= ONE_BY_ONE {
                 let (mask, near, rays) = self.enter_one_by_one::<S>(goal.limit(), &boxes, next.rays);
                 (mask, near, Some(rays))
             } else {
@@ -111,7 +131,7 @@ impl<'a> Way<'a> {
                 let (near, child) = (nears[k % WIDTH], children[k % WIDTH]);
                 let slot = near as usize % WIDTH;
                 let rays = match &known {
-                    Some(rays) => rays[slot],
+                    Some(known) => known.entering(slot),
                     None => self.entering::<S>(goal.limit(), &boxes, slot, next.rays),
                 };
                 stack[*len] = Entry { near: f32::from_bits(near & !7), child, rays };
@@ -132,28 +152,27 @@ impl<'a> Way<'a> {
         limit: &PerRay,
         boxes: &Boxes,
         mut rays: u64,
-    ) -> (<S::V8 as Vector>::Mask, S::V8, [u64; WIDTH]) {
+    ) -> (<S::V8 as Vector>::Mask, S::V8, OneByOne) {
         let splat = S::V8::splat;
         let [p, q] = &self.bundle.reciprocal;
         let [px, qx, zx] = &boxes.near;
         let [py, qy, zy] = &boxes.far;
-        let (mut all, mut near, mut rays_of) = (splat(0.0).less(splat(0.0)), splat(f32::INFINITY), [0; WIDTH]);
-        while rays != 0 {
+        let (mut all, mut near) = (splat(0.0).less(splat(0.0)), splat(f32::INFINITY));
+        let mut entering = OneByOne { ray: [0; ONE_BY_ONE], children: [0; ONE_BY_ONE] };
+        // Where they are fewer, the bundle's first ray is asked in vain.
+        for k in 0..ONE_BY_ONE {
             let ray = rays.trailing_zeros() as usize % RAYS;
-            rays &= rays - 1;
+            entering.ray[k] = rays & rays.wrapping_neg();
+            rays &= rays.wrapping_sub(1);
             let (p, q) = (splat(p.0[ray]), splat(q.0[ray]));
             let first = S::V8::load(px).mul(p).max(S::V8::load(qx).mul(q)).max(S::V8::load(zx));
             let last = S::V8::load(py).mul(p).min(S::V8::load(qy).mul(q));
             let last = last.min(S::V8::load(zy).min(splat(limit.0[ray])));
             let enter = first.at_most(last);
             (all, near) = (all.or(enter), near.min(first));
-            let mut mask = enter.bits();
-            while mask != 0 {
-                rays_of[mask.trailing_zeros() as usize % WIDTH] |= 1 << ray;
-                mask &= mask - 1;
-            }
+            entering.children[k] = enter.bits();
         }
-        (all, near, rays_of)
+        (all, near, entering)
     }
 
     /// Those of the rays that enter the box in that slot.
