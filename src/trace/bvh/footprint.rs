@@ -64,13 +64,13 @@ impl Footprints {
     /// A byte for each triangle: in it a bit for every row with a ray that may hit it.
     #[inline(always)]
     pub fn pairs<S: Simd>(&self, rows: &Rows) -> u64 {
-        let mut apart_ = 0;
+        let mut misses = 0;
         for lane in 0..LANES {
             let is_apart = apart::<S>(self.low[0][lane], self.high[0][lane], &rows.low[0], &rows.high[0]);
             let is_apart = is_apart.or(apart::<S>(self.low[1][lane], self.high[1][lane], &rows.low[1], &rows.high[1]));
-            apart_ |= u64::from(is_apart.bits() & 0xff) << (8 * lane);
+            misses |= u64::from(is_apart.bits() & 0xff) << (8 * lane);
         }
-        !apart_
+        !misses
     }
 }
 

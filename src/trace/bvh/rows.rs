@@ -1,13 +1,12 @@
-//! The rays of a bundle row by row, eight rows of eight: what tells most of them at once that a box, or a triangle, does not
-//! concern them.
+//! The rays of a bundle row by row, eight rows of eight: what tells most of them at once that a triangle does not concern them.
 
-use super::bundle::{Boxes, PerRay, RAYS};
-use super::simd::{Array, Mask, Simd, Vector};
+use super::bundle::{PerRay, RAYS};
+use super::simd::{Array, Simd, Vector};
 
 /// Rows of a bundle: eight rays each.
 pub(super) const ROWS: usize = RAYS / 8;
 
-/// For each row of a bundle, the least and the largest slope on two axes
+/// For each row of a bundle, the least and the largest slope on two axes.
 pub(super) struct Rows {
     pub low: [[f32; ROWS]; 2],
     pub high: [[f32; ROWS]; 2],
@@ -71,7 +70,7 @@ fn columns<S: Simd>(values: &PerRay) -> [S::V8; 8] {
 
 /// The values of one row.
 #[inline(always)]
-pub(super) fn row<S: Simd>(values: &PerRay, row: u32) -> S::V8 {
+fn row<S: Simd>(values: &PerRay, row: u32) -> S::V8 {
     S::V8::load(&values.0.as_chunks().0[row as usize % ROWS])
 }
 

@@ -19,10 +19,12 @@
 
 mod apart;
 mod found;
+mod meeting;
 mod octants;
 mod placed;
 mod single;
 mod walk;
+mod way;
 
 use std::marker::PhantomData;
 
@@ -38,7 +40,8 @@ use apart::Apart;
 use found::{Finish, Found};
 use octants::{Octants, Part};
 use placed::Tour;
-use walk::{Entry, Walk, Way, few};
+use walk::{Walk, few};
+use way::{Entry, Way};
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {

@@ -1,7 +1,7 @@
 //! A bundle among placed objects: it goes through the tree of placements as through any other, and from each of them on
 //! in the object's coordinates.
 
-use super::walk::{Entry, Goal, Way};
+use super::way::{Entry, Goal, Way};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay};
 use crate::trace::bvh::node::{Child, Tree};
