@@ -94,6 +94,7 @@ impl<Q: Query> Kernel for Finish<'_, Q> {
         // Neighbours mostly hit the same triangle.
         let mut shared: Option<Shared<S::D4>> = None;
         let has_placements = bvh.placements.has_triangles();
+        let mut mixed = 0;
         for chunk in 0..count.div_ceil(4) {
             let chunk = chunk % (RAYS / 4);
             let ids: &[u32; 4] = &found.noted.as_chunks().0[chunk];
@@ -116,48 +117,57 @@ impl<Q: Query> Kernel for Finish<'_, Q> {
                     continue;
                 }
             }
-            S::apart(Chunk::<Q> { bvh, found, bundle, rays, chunk, ids, places, answers, t });
+            mixed |= 1 << chunk;
+        }
+        if mixed != 0 {
+            S::apart(Mixed::<Q> { bvh, found, bundle, rays, chunks: mixed, answers, t });
         }
     }
 }
 
-/// Four neighbours of a bundle that have not all hit the same fixed triangle.
-struct Chunk<'a, Q: Query> {
+/// Fours of neighbours in a bundle that have not all hit the same fixed triangle, a bit each.
+struct Mixed<'a, Q: Query> {
     bvh: &'a Bvh,
     found: &'a Found,
     bundle: &'a Bundle,
     rays: &'a [Ray; RAYS],
-    chunk: usize,
-    ids: &'a [u32; 4],
-    places: &'a [u32; 4],
-    answers: &'a mut [Q::Answer; 4],
-    t: &'a mut [f64; 4],
+    chunks: u32,
+    answers: &'a mut [Q::Answer; RAYS],
+    t: &'a mut [f64; RAYS],
 }
 
-impl<Q: Query> Kernel for Chunk<'_, Q> {
+impl<Q: Query> Kernel for Mixed<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, found, bundle, rays, chunk, ids, places, answers, t } = self;
-        let noted = named(ids);
-        if noted != 0 && *places == [FIXED; 4] {
-            let all = noted == 0b1111;
-            let known = if all { *ids } else { repeated(ids, noted) };
-            // Those of rays that have hit nothing, or what was computed, are replaced below.
-            answer::<Q>(&bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), known), t, answers);
-            if all {
-                return;
+        let Self { bvh, found, bundle, rays, mut chunks, answers, t } = self;
+        while chunks != 0 {
+            let chunk = chunks.trailing_zeros() as usize % (RAYS / 4);
+            chunks &= chunks - 1;
+            let ids: &[u32; 4] = &found.noted.as_chunks().0[chunk];
+            let places: &[u32; 4] = &found.place.as_chunks().0[chunk];
+            let answers: &mut [Q::Answer; 4] = &mut answers.as_chunks_mut().0[chunk];
+            let t: &mut [f64; 4] = &mut t.as_chunks_mut().0[chunk];
+            let noted = named(ids);
+            if noted != 0 && *places == [FIXED; 4] {
+                let all = noted == 0b1111;
+                let known = if all { *ids } else { repeated(ids, noted) };
+                // Those of rays that have hit nothing, or what was computed, are replaced below.
+                answer::<Q>(&bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), known), t, answers);
+                if all {
+                    continue;
+                }
+            } else if noted != 0 {
+                answer_some::<S, Q>(bvh, bundle, rays, chunk, ids, places, t, answers);
             }
-        } else if noted != 0 {
-            answer_some::<S, Q>(bvh, bundle, rays, chunk, ids, places, t, answers);
-        }
-        for lane in (0..4).filter(|lane| noted >> lane & 1 == 0) {
-            let ray = 4 * chunk + lane;
-            answers[lane] = Q::MISS;
-            if found.computed >> ray & 1 != 0 {
-                let nearest = &found.nearest[ray];
-                (t[lane], answers[lane]) = (nearest.t(), Q::answer(nearest.hit()));
+            for lane in (0..4).filter(|lane| noted >> lane & 1 == 0) {
+                let ray = 4 * chunk + lane;
+                answers[lane] = Q::MISS;
+                if found.computed >> ray & 1 != 0 {
+                    let nearest = &found.nearest[ray];
+                    (t[lane], answers[lane]) = (nearest.t(), Q::answer(nearest.hit()));
+                }
             }
         }
     }
