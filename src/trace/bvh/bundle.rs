@@ -178,12 +178,12 @@ impl Bundle {
         let (mut finite, mut spread) = (zero, zero);
         let (mut apart, mut size) = (zero, zero);
         let (mut in_range, mut latest) = (u32::MAX, zero);
-        // 36 cache lines a bundle, of which four are asked for at once.
+        // 36 cache lines a bundle, of which four are asked for at a time: the last four here, the others below.
         let ahead = rays.as_ptr().wrapping_add(AHEAD).cast::<u8>();
         S::prefetch(ahead.wrapping_add(256 * 8));
         for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
             let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
-            // A few at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this one is traced, held up what
+            // Some at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this one is traced, held up what
             // the tree needs. A hint, whatever follows these rays.
             S::prefetch(ahead.wrapping_add(256 * i));
             let (origin, direction) = ([x, y, z], [dx, dy, dz]);

@@ -63,7 +63,7 @@ impl Footprints {
 
     /// A byte for each triangle: in it a bit for every row with a ray that may hit it.
     #[inline(always)]
-    pub fn pairs<S: Simd>(&self, rows: &Rows) -> u64 {
+    pub fn rows<S: Simd>(&self, rows: &Rows) -> u64 {
         let mut misses = 0;
         for lane in 0..LANES {
             let is_apart = apart::<S>(self.low[0][lane], self.high[0][lane], &rows.low[0], &rows.high[0]);

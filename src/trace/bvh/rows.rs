@@ -32,11 +32,11 @@ impl Rows {
     }
 }
 
-/// The rays of some rows.
+/// All of a byte for each of eight bits: of rows their rays.
 #[inline(always)]
-pub(super) const fn rays(rows: u32) -> u64 {
+pub(super) const fn bytes(bits: u32) -> u64 {
     // A copy for each byte, of which each keeps another bit.
-    let bits = (rows as u64 & 0xff).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
+    let bits = (bits as u64 & 0xff).wrapping_mul(0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
     // Into the highest bit of the byte, and from there over all of it.
     let bits = (bits.wrapping_add(0x7f7f_7f7f_7f7f_7f7f) | bits) & 0x8080_8080_8080_8080;
     (bits >> 7).wrapping_mul(0xff)
@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn rows_are_their_rays() {
         for some in 0..256 {
-            let all = rays(some);
+            let all = bytes(some);
             assert_eq!(all, (0..64).filter(|ray| some >> (ray / 8) & 1 != 0).map(|ray| 1u64 << ray).sum::<u64>());
             assert_eq!(rows(all), some);
         }

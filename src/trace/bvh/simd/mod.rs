@@ -38,8 +38,8 @@ pub(super) trait Simd {
     fn apart<K: Kernel>(kernel: K) -> K::Output;
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
-    /// Children that the mask names, the farthest first, by where they are entered (not below 0); then others. Of `near`
-    /// the lowest three bits are lost. How many it names.
+    /// Children that the mask names, the farthest first, by where they are entered (not below 0, nor -0); then others. How many it names.
+    /// Of `near` the lowest three bits are lost: in `sorted_near` they are the child's slot.
     fn far_to_near(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,

@@ -2,7 +2,8 @@
 //!
 //! Which rows of rays may see which triangles is told for all of them at once, by [`Footprints`]. A loop over the triangles, in it one over each one's
 //! groups, in it a branch for a group that misses and another for one that hits, was ended or taken nobody could tell when: what such a branch has let
-//! begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need is computed of every pair. A hit without doubt
+//! begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need is computed of every pair, but for triangles
+//! of which a bundle sees both sides. A hit without doubt
 //! is noted in place; what is left in doubt is kept in a row, and decided when all pairs are through.
 
 use super::found::DONE;
@@ -35,13 +36,12 @@ impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
         let (tree, bundle, mut scratch) = (walk.tree, walk.bundle, None);
         let block = tree.block(index, &mut scratch);
         let Some((lanes, edges)) = Edges::new::<S>(block, bundle, most) else { return false };
-        let pairs = Footprints::new::<S>(&block.corners, bundle).pairs::<S>(&bundle.rows);
-        // The rows for each triangle.
-        let rows = u64::from(rows & 0xff) * 0x0101_0101_0101_0101;
-        let pairs = pairs & rows & rows::rays(lanes);
-        let vague = pairs & rows::rays(edges.is_vague);
+        // A byte for each triangle, in it a bit for each row.
+        let seen = Footprints::new::<S>(&block.corners, bundle).rows::<S>(&bundle.rows);
+        let seen = seen & u64::from(rows & 0xff) * 0x0101_0101_0101_0101 & rows::bytes(lanes);
+        let vague = seen & rows::bytes(edges.is_vague);
         let first = LANES as u32 * index;
-        let changed = walk.meet::<S>(&edges, first, Pairs::new::<S>(pairs & !vague));
+        let changed = walk.meet::<S>(&edges, first, Pairs::new::<S>(seen & !vague));
         changed | (vague != 0 && walk.meet_vague::<S>(&edges, first, Pairs::new::<S>(vague)))
     }
 }
@@ -50,7 +50,7 @@ impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
 struct Pairs(u64);
 
 impl Pairs {
-    /// Of pairs of a triangle and a row.
+    /// Of a byte for each triangle, in it a bit for each row.
     #[inline(always)]
     const fn new<S: Simd>(rows: u64) -> Self {
         Self(if S::Wide::LANES == 16 { (rows | rows >> 1) & 0x5555_5555_5555_5555 } else { rows })
@@ -117,8 +117,7 @@ struct Doubt {
     open: u16,
 }
 
-/// The most pairs.
-const MOST: usize = 64;
+const MOST_PAIRS: usize = 64;
 
 impl<Q: Query> Walk<'_, Q> {
     /// Triangles of the block whose first is `first`, whose fronts all rays see; true where a limit has changed.
@@ -127,7 +126,7 @@ impl<Q: Query> Walk<'_, Q> {
         let (splat, zero) = (S::Wide::splat, S::Wide::splat(0.0));
         let (bundle, found) = (self.bundle, &mut *self.found);
         let (first_t, place) = (splat(bundle.first), splat(f32::from_bits(self.place)));
-        let (mut doubts, mut count) = ([Doubt { pair: Pair(0), open: 0 }; MOST], 0);
+        let (mut doubts, mut count) = ([Doubt { pair: Pair(0), open: 0 }; MOST_PAIRS], 0);
         let mut hit = zero.less(zero);
         for pair in pairs {
             let (lane, group) = (pair.lane(), pair.group::<S>());
@@ -154,11 +153,11 @@ impl<Q: Query> Walk<'_, Q> {
                 place.put_where(sure, bytemuck::cast_mut(&mut found.place), group);
             }
             hit = hit.or(sure);
-            doubts[count % MOST] = Doubt { pair, open: open as u16 };
+            doubts[count % MOST_PAIRS] = Doubt { pair, open: open as u16 };
             count += usize::from(open != 0);
         }
         let mut changed = hit.bits() != 0;
-        for &Doubt { pair, open } in &doubts[..count.min(MOST)] {
+        for &Doubt { pair, open } in &doubts[..count.min(MOST_PAIRS)] {
             let mut open = open.into();
             if self.bundle.is_turned {
                 open &= !self.behind_starts::<S>(edges, pair);
@@ -168,7 +167,7 @@ impl<Q: Query> Walk<'_, Q> {
         changed
     }
 
-    /// Triangles of which rays may see either side: where signs agree, it is left to be decided.
+    /// Triangles of which rays may see either side: where signs agree, it is decided at once. They are so few that branches do no harm.
     #[inline(always)]
     fn meet_vague<S: Simd>(&mut self, edges: &Edges, first: u32, pairs: Pairs) -> bool {
         let mut changed = false;

@@ -1,7 +1,9 @@
 //! A bundle's way through a tree: each node's boxes against the rectangle of all slopes, and each box that this enters against all rays.
 //!
 //! No branch says which rays enter a box: it is told of all 64, whoever matters. To stop at the first, or to ask rows of rays before, took fewer
-//! instructions and more time.
+//! instructions and more time (docs/PERFORMANCE.md).
+
+use std::hint::select_unpredictable;
 
 use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS};
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
@@ -13,7 +15,7 @@ const ONE_BY_ONE: usize = 3;
 /// A child to be visited.
 #[derive(Clone, Copy)]
 pub(super) struct Entry {
-    /// Where the bundle enters it, at the earliest.
+    /// No ray enters it before that.
     pub near: f32,
     pub child: Child,
     /// A bit for every ray that may enter it.
@@ -119,9 +121,10 @@ impl<'a> Way<'a> {
         let [py, qy, zy] = &boxes.far;
         let (mut all, mut near) = (splat(0.0).less(splat(0.0)), splat(f32::INFINITY));
         let mut entering = OneByOne { ray: [0; ONE_BY_ONE], children: [0; ONE_BY_ONE] };
-        // Where they are fewer, the bundle's first ray is asked in vain.
+        // Where they are fewer, the first is asked again, and in vain.
+        let first_ray = rays;
         for k in 0..ONE_BY_ONE {
-            let ray = rays.trailing_zeros() as usize % RAYS;
+            let ray = select_unpredictable(rays == 0, first_ray, rays).trailing_zeros() as usize % RAYS;
             entering.ray[k] = rays & rays.wrapping_neg();
             rays &= rays.wrapping_sub(1);
             let (p, q) = (splat(p.0[ray]), splat(q.0[ray]));
