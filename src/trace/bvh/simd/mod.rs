@@ -165,3 +165,55 @@ pub(super) trait Doubles: Three + Copy {
     /// Of each of them the sum of its first three lanes, in their order.
     fn sums(of: [Self; 4]) -> Self;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::bvh::isa::{Isa, dispatch};
+    use crate::trace::bvh::random::Random;
+
+    struct Sort {
+        near: [f32; 8],
+        named: u32,
+        child: [Child; 8],
+    }
+
+    impl Kernel for Sort {
+        type Output = Vec<(u32, Child)>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Vec<(u32, Child)> {
+            let mut out = [1.0; 8];
+            for (slot, out) in out.iter_mut().enumerate() {
+                *out -= (self.named >> slot & 1) as f32;
+            }
+            let mask = S::V8::load(&out).at_most(S::V8::splat(0.0));
+            let (mut near, mut child) = ([0; 8], [Child::NONE; 8]);
+            let count = S::far_to_near(S::V8::load(&self.near), mask, &self.child, &mut near, &mut child);
+            near.into_iter().zip(child).take(count).collect()
+        }
+    }
+
+    /// Whichever children are named, each instruction set has them in the order of a sort: bits of `near` before slots, and the slot in the lowest.
+    #[test]
+    fn children_are_sorted_alike() {
+        let child = [3, 1, 4, 1, 5, 9, 2, 6].map(Child::inner);
+        let tiny = f32::from_bits(9);
+        let ties = [1.0, 0.0, tiny, 1.0, f32::INFINITY, 0.0, 1.0f32.next_up(), 2.0];
+        let mut random = Random::new(1);
+        let others = std::iter::repeat_with(|| [0; 8].map(|_| random.vec3().x.abs())).take(20);
+        for near in others.chain([ties, [0.0; 8]]) {
+            for named in 0..256u32 {
+                let mut expected: Vec<_> = (0..8)
+                    .filter(|slot| named >> slot & 1 != 0)
+                    .map(|slot| (near[slot].to_bits() / 8 * 8 + slot as u32, child[slot]))
+                    .collect();
+                expected.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
+                for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available()) {
+                    let sorted = dispatch(isa, Sort { near, named, child });
+                    assert_eq!(sorted, expected, "{isa:?}: {named:08b} of {near:?}");
+                }
+            }
+        }
+    }
+}

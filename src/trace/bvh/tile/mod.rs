@@ -3,11 +3,10 @@
 //!
 //! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
-//!   remains is tested against eight rows of eight rays at once, and the rows that may enter ray by ray, up to the first
-//!   that does: those before it take no part in that subtree. For a leaf every ray is asked.
+//!   remains is tested against all rays; where they are three or fewer, each of them against all boxes ([`way`]).
 //! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
-//!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes; of the others each group
-//!   of rays takes three scalar products. Leaves that few rays enter are tested ray by ray instead, against eight triangles
+//!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes, and by rows of rays; of the others each group
+//!   of rays takes four scalar products ([`meeting`]). Leaves that few rays enter are tested ray by ray instead, against eight triangles
 //!   at once ([`single`]).
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
