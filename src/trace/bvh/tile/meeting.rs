@@ -38,7 +38,8 @@ impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
         let Some((lanes, edges)) = Edges::new::<S>(block, bundle, most) else { return false };
         // A byte for each triangle, in it a bit for each row.
         let seen = Footprints::new::<S>(&block.corners, bundle).rows::<S>(&bundle.rows);
-        let seen = seen & u64::from(rows & 0xff) * 0x0101_0101_0101_0101 & rows::bytes(lanes);
+        let wanted = (u64::from(rows & 0xff) * 0x0101_0101_0101_0101) & rows::bytes(lanes);
+        let seen = seen & wanted;
         let vague = seen & rows::bytes(edges.is_vague);
         let first = LANES as u32 * index;
         let changed = walk.meet::<S>(&edges, first, Pairs::new::<S>(seen & !vague));
