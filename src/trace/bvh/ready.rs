@@ -135,13 +135,21 @@ impl<'a> ReadyRays<'a> {
 #[inline(always)]
 pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([ReadyRay; 8], u32) {
     let splat = S::V8::splat;
+    let [x, y, z, ..] = columns;
+    let farthest = x.abs().max(y.abs()).max(z.abs());
+    let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
+    ready_blurred::<S>(columns, reach, off, blur.direction)
+}
+
+/// The same of rays whose origins are off by `off`, and whose directions by `turn` of their largest component.
+#[inline(always)]
+pub(super) fn ready_blurred<S: Simd>(columns: [S::V8; 8], reach: Vec3, off: S::V8, turn: f32) -> ([ReadyRay; 8], u32) {
+    let splat = S::V8::splat;
     let zero = splat(0.0);
     let [x, y, z, dx, dy, dz, tmin, tmax] = columns;
     let (origin, direction) = ([x, y, z], [dx, dy, dz]);
     let largest = dx.abs().max(dy.abs()).max(dz.abs());
-    let farthest = x.abs().max(y.abs()).max(z.abs());
-    let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
-    let slabs = Slabs::of_rays(origin, direction, reach, off, blur.direction);
+    let slabs = Slabs::of_rays(origin, direction, reach, off, turn);
     let mut finite = zero;
     let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);
     for axis in 0..3 {
@@ -153,7 +161,7 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     }
     // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
-    let filter = Filters::new(origin, direction, tmin, splat(blur.direction));
+    let filter = Filters::new(origin, direction, tmin, splat(turn));
     let Margin { width, of_depth, of_size } = filter.margin;
     let [rx, ry, rz] = reciprocals;
     let [nx, ny, nz] = near;
@@ -168,7 +176,7 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     let first = S::transpose([rx, ry, rz, least, nx, ny, nz, zero]);
     let second = S::transpose([fx, fy, fz, sx, sy, sz, tmax, limit]);
     let third = S::transpose([x, y, z, p, q, kx, ky, kz]);
-    let fourth = S::transpose([width, of_depth, of_size, against, shorten, begin, off, splat(blur.direction)]);
+    let fourth = S::transpose([width, of_depth, of_size, against, shorten, begin, off, splat(turn)]);
     let mut ready = [ReadyRay::NONE; 8];
     for i in 0..8 {
         let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];
@@ -181,7 +189,13 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
 
 /// Eight rays, field by field: origin, direction, tmin, tmax.
 #[inline(always)]
-pub(super) fn columns<S: Simd>([a, b, c, d, e, f, g, h]: &[Ray; 8]) -> [S::V8; 8] {
+pub(super) fn columns<S: Simd>(rays: &[Ray; 8]) -> [S::V8; 8] {
+    columns_of::<S>(rays.each_ref())
+}
+
+/// The same of rays here and there.
+#[inline(always)]
+pub(super) fn columns_of<S: Simd>([a, b, c, d, e, f, g, h]: [&Ray; 8]) -> [S::V8; 8] {
     // Written out: a closure mapped over the array may miss the instruction set.
     S::transpose([
         row::<S>(a),

@@ -6,11 +6,12 @@ use super::{Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::found::{Found, NONE};
-use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::place::{Blur, EightRays, Place};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::{ReadyRay, ReadyRays};
+use crate::trace::bvh::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::triangles::TriangleTree;
 use crate::trace::bvh::walk::{self, Stack, Stacks, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
@@ -124,13 +125,43 @@ impl Bvh {
         noted: &mut Noted,
         found: &mut Found,
     ) {
-        let place = self.placements.at(number);
-        let triangles = &self.objects[place.placement.object as usize].triangles;
+        let (place, triangles) = self.object_at(number);
         if triangles.tree().is_empty() {
             return;
         }
         let (local, blur) = place.local::<S>(ray);
         let Some(local) = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur) else { return };
         self.walk_through::<S, Q, true>(number, triangles, &local, single, stack, noted, found);
+    }
+
+    /// The same of a ray that is [ready](Self::ready_at).
+    #[inline(always)]
+    pub(in crate::trace::bvh) fn walk_place_ready<S: Simd, Q: Query>(
+        &self,
+        number: u32,
+        single: &SingleRay,
+        ready: &ReadyRay,
+        stack: &mut Stack,
+        noted: &mut Noted,
+        found: &mut Found,
+    ) {
+        let (_, triangles) = self.object_at(number);
+        let ready = (ready.slab(), ready.filter());
+        self.walk_through::<S, Q, true>(number, triangles, &ready, single, stack, noted, found);
+    }
+
+    /// Eight rays made ready for a placed object, and a bit for each for which that could be done.
+    #[inline(always)]
+    pub(in crate::trace::bvh) fn ready_at<S: Simd>(&self, number: u32, rays: [&Ray; 8]) -> ([ReadyRay; 8], u32) {
+        let (place, triangles) = self.object_at(number);
+        let EightRays { columns, off, turn, known } = place.eight::<S>(columns_of::<S>(rays));
+        let (ready, valid) = ready_blurred::<S>(columns, triangles.tree().reach(), off, turn);
+        (ready, valid & known)
+    }
+
+    #[inline(always)]
+    fn object_at(&self, number: u32) -> (&Place, &TriangleTree) {
+        let place = self.placements.at(number);
+        (place, &self.objects[place.placement.object as usize].triangles)
     }
 }

@@ -8,8 +8,12 @@ use crate::trace::bvh::bundle::{RAYS, SLACK};
 use crate::trace::bvh::found::{Found as Doubted, NONE};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::range::Range;
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::ready::ReadyRay;
+use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::walk::Stack;
+
+/// So many are made ready together, up to eight; fewer each by itself.
+const MANY: u32 = 3;
 
 /// What they need.
 pub(super) struct Apart {
@@ -35,36 +39,77 @@ impl Apart {
         found: &mut Found,
     ) {
         let Self { stack, doubted } = self;
+        for group in 0..RAYS / S::Wide::LANES {
+            let done = S::Wide::at(&range.limit, group).less(S::Wide::splat(0.0)).bits();
+            seeing &= !(u64::from(done) << (S::Wide::LANES * group));
+        }
+        let mut ready = [ReadyRay::NONE; 8];
         while seeing != 0 {
-            let i = seeing.trailing_zeros() as usize % RAYS;
-            seeing &= seeing - 1;
-            if range.limit.0[i] < 0.0 {
-                continue;
+            let mut some = lowest_eight(seeing);
+            seeing &= !some;
+            let mut known = 0;
+            if some.count_ones() >= MANY {
+                (ready, known) = bvh.ready_at::<S>(place, eight(rays, some));
             }
-            let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
-            let mut noted = Noted::nothing(&single);
-            if !Q::ANY {
-                // Rounded up, as of a ray that has hit nothing yet.
-                noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
-                (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
-                if noted.id == NONE && found.computed >> i & 1 != 0 {
-                    noted.is_doubted = true;
-                    doubted.take([noted.sure, noted.limit], found.nearest[i]);
+            for ready in &ready {
+                if some == 0 {
+                    break;
                 }
-            }
-            let before = (noted.sure, noted.id);
-            bvh.walk_place::<S, Q>(place, &single, ray, stack, &mut noted, doubted);
-            if Q::ANY {
-                if noted.is_hit(doubted) {
-                    range.set(i, DONE, DONE);
+                let i = some.trailing_zeros() as usize % RAYS;
+                some &= some - 1;
+                let is_ready = known & 1 != 0;
+                known >>= 1;
+                let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
+                let mut noted = Noted::nothing(&single);
+                if !Q::ANY {
+                    // Rounded up, as of a ray that has hit nothing yet.
+                    noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
+                    (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
+                    if noted.id == NONE && found.computed >> i & 1 != 0 {
+                        noted.is_doubted = true;
+                        doubted.take([noted.sure, noted.limit], found.nearest[i]);
+                    }
                 }
-            } else if noted.is_doubted || before != (noted.sure, noted.id) {
-                range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
-                (found.noted[i], found.place[i]) = (noted.id, noted.place);
-                if noted.id == NONE {
-                    (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
+                let before = (noted.sure, noted.id);
+                if is_ready {
+                    bvh.walk_place_ready::<S, Q>(place, &single, ready, stack, &mut noted, doubted);
+                } else {
+                    bvh.walk_place::<S, Q>(place, &single, ray, stack, &mut noted, doubted);
+                }
+                if Q::ANY {
+                    if noted.is_hit(doubted) {
+                        range.set(i, DONE, DONE);
+                    }
+                } else if noted.is_doubted || before != (noted.sure, noted.id) {
+                    range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
+                    (found.noted[i], found.place[i]) = (noted.id, noted.place);
+                    if noted.id == NONE {
+                        (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
+                    }
                 }
             }
         }
     }
+}
+
+/// The lowest bits of some, as many as there are up to eight.
+#[inline(always)]
+fn lowest_eight(rays: u64) -> u64 {
+    let mut rest = rays;
+    for _ in 0..8 {
+        rest &= rest.wrapping_sub(1);
+    }
+    rays & !rest
+}
+
+/// Up to eight rays; where they are fewer, the last again.
+#[inline(always)]
+fn eight(rays: &[Ray; RAYS], mut some: u64) -> [&Ray; 8] {
+    let mut eight = [&rays[0]; 8];
+    for ray in &mut eight {
+        *ray = &rays[some.trailing_zeros() as usize % RAYS];
+        let rest = some & some.wrapping_sub(1);
+        some = if rest == 0 { some } else { rest };
+    }
+    eight
 }
