@@ -134,7 +134,7 @@ impl Bvh {
         self.walk_through::<S, Q, true>(number, triangles, &local, single, stack, noted, found);
     }
 
-    /// The same of a ray that is [ready](Self::ready_at).
+    /// The same of a ray that is [ready](Self::ready_at), through an object that has triangles.
     #[inline(always)]
     pub(in crate::trace::bvh) fn walk_place_ready<S: Simd, Q: Query>(
         &self,
