@@ -21,7 +21,7 @@
 
 use super::block::{Block, LANES};
 use super::bundle::{Bundle, axes};
-use super::simd::{Array, Mask, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::UNIT_ROUNDOFF;
 
 /// Numbers of a block of triangles; the sign is such that the bundle sees each from its front (slope > 0).
@@ -151,12 +151,6 @@ fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
 #[inline(always)]
 fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[1].mul_sub(q[2], p[2].mul(q[1])), p[2].mul_sub(q[0], p[0].mul(q[2])), p[0].mul_sub(q[1], p[1].mul(q[0]))]
-}
-
-/// The largest magnitude of a component.
-#[inline(always)]
-fn size<V: Vector>(p: [V; 3]) -> V {
-    p[0].abs().max(p[1].abs()).max(p[2].abs())
 }
 
 /// The least and the largest scalar product with a direction of the bundle.

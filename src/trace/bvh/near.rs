@@ -16,7 +16,7 @@ use super::build::MAX_DEPTH;
 use super::discs::Discs;
 use super::isa::{self, Kernel};
 use super::node::{Child, Node, WIDTH};
-use super::simd::{Array, Mask, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 
 /// What is done with a triangle: its geometry, its primitive, and its corners in the tree. Says beyond which distance none is wanted
@@ -234,7 +234,7 @@ fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower<S::V8>
     let height = dot(normal, a).abs();
     // On the inner side of each edge, seen along the normal.
     let sides = dot(normal, cross(b, bc)).min(dot(normal, cross(c, ca))).min(dot(normal, cross(a, ab)));
-    let farthest = a[0].abs().max(a[1].abs()).max(a[2].abs()).add(S::V8::splat(block.size));
+    let farthest = size(a).add(S::V8::splat(block.size));
     // What the corners and the point are off by counts as rounding does.
     let relative = S::V8::splat(32.0 * UNIT_ROUNDOFF);
     let off = farthest.mul_add(relative, S::V8::splat(8.0 * error));

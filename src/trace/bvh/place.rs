@@ -13,7 +13,7 @@
 
 use super::bundle::{PerRay, RAYS};
 use super::level::Through;
-use super::simd::{Array, Doubles, Mask, Simd, Vector};
+use super::simd::{Array, Doubles, Mask, Simd, Vector, size};
 use crate::math::{DMat3, DVec3, UNIT_ROUNDOFF, Vec3, gamma64};
 use crate::ray::Ray;
 use crate::trace::Placement;
@@ -134,11 +134,11 @@ impl Place {
         let relative =
             if self.relative < f64::from(f32::MIN_POSITIVE) { f32::MIN_POSITIVE } else { self.relative as f32 };
         let (relative, absolute) = (splat(relative), splat(self.absolute as f32));
-        let largest = size(lp, lq, lr);
-        let ratio = size(dx, dy, dz).div(largest).max(splat(f32::MIN_POSITIVE));
+        let largest = size([lp, lq, lr]);
+        let ratio = size([dx, dy, dz]).div(largest).max(splat(f32::MIN_POSITIVE));
         let turn = ratio.mul_add(relative, splat(UNIT_ROUNDOFF));
-        let computed = size(x, y, z).mul_add(relative, absolute);
-        let off = size(lx, ly, lz).mul_add(splat(UNIT_ROUNDOFF), computed);
+        let computed = size([x, y, z]).mul_add(relative, absolute);
+        let off = size([lx, ly, lz]).mul_add(splat(UNIT_ROUNDOFF), computed);
         let off = off.mul_add(splat(1.01), splat(4.0 * f32::MIN_POSITIVE));
         let known = splat(f32::MIN_POSITIVE).at_most(largest).and(largest.less(splat(f32::INFINITY)));
         let known = known.and(off.less(splat(f32::MAX))).and(turn.at_most(splat(Blur::MOST)));
@@ -186,11 +186,11 @@ impl Place {
         let mut largest = S::V4::splat(0.0);
         for i in 0..RAYS / 4 {
             let (x, y, z) = (four::<S>(&world[0], i), four::<S>(&world[1], i), four::<S>(&world[2], i));
-            largest = x.abs().max(y.abs()).max(z.abs()).max(largest);
+            largest = size([x, y, z]).max(largest);
             let (x, y, z) = (S::D4::widen(x), S::D4::widen(y), S::D4::widen(z));
             for axis in 0..3 {
                 let (a, b, c) = (S::D4::splat(mx[axis]), S::D4::splat(my[axis]), S::D4::splat(mz[axis]));
-                let direction = a.mul(x).add(b.mul(y)).add(c.mul(z));
+                let direction = row_times::<S>([a, b, c], [x, y, z]);
                 local[axis].0.as_chunks_mut().0[i] = direction.narrow().to_array();
             }
         }
@@ -216,15 +216,10 @@ pub(super) struct EightRays<V> {
     pub known: u32,
 }
 
+/// A row of a matrix times vectors.
 #[inline(always)]
 fn row_times<S: Simd>([a, b, c]: [S::D4; 3], [x, y, z]: [S::D4; 3]) -> S::D4 {
     a.mul(x).add(b.mul(y)).add(c.mul(z))
-}
-
-/// The largest magnitude.
-#[inline(always)]
-fn size<V: Vector>(x: V, y: V, z: V) -> V {
-    x.abs().max(y.abs()).max(z.abs())
 }
 
 /// The linear part.

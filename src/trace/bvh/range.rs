@@ -58,6 +58,17 @@ impl Range {
         }
     }
 
+    /// A bit for each ray that is done.
+    #[inline(always)]
+    pub fn done<S: Simd>(&self) -> u64 {
+        let mut done = 0;
+        for group in 0..RAYS / S::Wide::LANES {
+            let is_done = S::Wide::at(&self.limit, group).less(S::Wide::splat(0.0));
+            done |= u64::from(is_done.bits()) << (S::Wide::LANES * group);
+        }
+        done
+    }
+
     /// One ray's, from t.
     pub fn set(&mut self, ray: usize, sure: f32, limit: f32) {
         (self.sure.0[ray], self.limit.0[ray]) = (sure, limit);

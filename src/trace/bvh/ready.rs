@@ -4,7 +4,7 @@
 
 use super::filter::{Filter, Filters};
 use super::place::Blur;
-use super::simd::{Array, Mask, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector, size};
 use super::slab::{SlabRay, Slabs, least_t};
 use super::woop::Margin;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -136,8 +136,7 @@ impl<'a> ReadyRays<'a> {
 pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([ReadyRay; 8], u32) {
     let splat = S::V8::splat;
     let [x, y, z, ..] = columns;
-    let farthest = x.abs().max(y.abs()).max(z.abs());
-    let off = farthest.mul_add(splat(blur.direction), splat(blur.origin));
+    let off = size([x, y, z]).mul_add(splat(blur.direction), splat(blur.origin));
     ready_blurred::<S>(columns, reach, off, blur.direction)
 }
 
@@ -148,7 +147,7 @@ pub(super) fn ready_blurred<S: Simd>(columns: [S::V8; 8], reach: Vec3, off: S::V
     let zero = splat(0.0);
     let [x, y, z, dx, dy, dz, tmin, tmax] = columns;
     let (origin, direction) = ([x, y, z], [dx, dy, dz]);
-    let largest = dx.abs().max(dy.abs()).max(dz.abs());
+    let largest = size(direction);
     let slabs = Slabs::of_rays(origin, direction, reach, off, turn);
     let mut finite = zero;
     let (mut reciprocals, mut near, mut far, mut sides) = ([zero; 3], [zero; 3], [zero; 3], [zero; 3]);

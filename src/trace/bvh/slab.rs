@@ -17,7 +17,7 @@
 
 use super::node::Node;
 use super::place::Blur;
-use super::simd::{Array, Mask, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
@@ -118,7 +118,7 @@ impl<V: Vector> Slabs<V> {
     pub fn of_rays(origin: [V; 3], direction: [V; 3], reach: Vec3, off: V, turn: f32) -> [Self; 3] {
         let splat = V::splat;
         let ([x, y, z], [dx, dy, dz]) = (origin, direction);
-        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let largest = size(direction);
         let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
         let [sx, sy, sz] = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
         let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * turn));

@@ -26,7 +26,7 @@ use super::alone::{SingleRay, TriangleFound};
 use super::isa::{self, Kernel};
 use super::query::{Closest, Occluded};
 use super::scratch::{Scratch, with_scratch};
-use super::simd::{Array, Mask, Simd, Vector};
+use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use apart::{ClosestApart, OccludedApart};
@@ -144,7 +144,7 @@ impl Packet {
         // Zero for finite numbers, else none.
         let finite = x.mul_add(zero, y.mul_add(zero, z.mul(zero)));
         let finite = dx.mul_add(zero, dy.mul_add(zero, dz.mul_add(zero, finite)));
-        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let largest = size([dx, dy, dz]);
         let directed = S::V8::splat(f32::MIN_POSITIVE).at_most(largest).and(finite.at_most(zero));
         directed.and(tmin.at_most(tmax)).bits()
     }

@@ -115,6 +115,12 @@ pub(super) trait Vector: Copy {
     fn smallest(self) -> f32;
 }
 
+/// The largest magnitude of a component.
+#[inline(always)]
+pub(super) fn size<V: Vector>([x, y, z]: [V; 3]) -> V {
+    x.abs().max(y.abs()).max(z.abs())
+}
+
 /// Loaded from and stored to an array.
 pub(super) trait Array<const N: usize>: Sized {
     fn load(values: &[f32; N]) -> Self;

@@ -9,7 +9,7 @@ use crate::trace::bvh::found::{Found as Doubted, NONE};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::range::Range;
 use crate::trace::bvh::ready::ReadyRay;
-use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::walk::Stack;
 
 /// So many are made ready together, up to eight; fewer each by itself.
@@ -34,15 +34,11 @@ impl Apart {
         bvh: &Bvh,
         place: u32,
         rays: &[Ray; RAYS],
-        mut seeing: u64,
+        seeing: u64,
         range: &mut Range,
         found: &mut Found,
     ) {
-        let Self { stack, doubted } = self;
-        for group in 0..RAYS / S::Wide::LANES {
-            let done = S::Wide::at(&range.limit, group).less(S::Wide::splat(0.0)).bits();
-            seeing &= !(u64::from(done) << (S::Wide::LANES * group));
-        }
+        let mut seeing = seeing & !range.done::<S>();
         let mut ready = [ReadyRay::NONE; 8];
         while seeing != 0 {
             let mut some = lowest_eight(seeing);
@@ -51,42 +47,54 @@ impl Apart {
             if some.count_ones() >= MANY {
                 (ready, known) = bvh.ready_at::<S>(place, eight(rays, some));
             }
-            for ready in &ready {
-                if some == 0 {
-                    break;
-                }
+            for k in 0..some.count_ones() as usize {
                 let i = some.trailing_zeros() as usize % RAYS;
                 some &= some - 1;
-                let is_ready = known & 1 != 0;
-                known >>= 1;
-                let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
-                let mut noted = Noted::nothing(&single);
-                if !Q::ANY {
-                    // Rounded up, as of a ray that has hit nothing yet.
-                    noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
-                    (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
-                    if noted.id == NONE && found.computed >> i & 1 != 0 {
-                        noted.is_doubted = true;
-                        doubted.take([noted.sure, noted.limit], found.nearest[i]);
-                    }
-                }
-                let before = (noted.sure, noted.id);
-                if is_ready {
-                    bvh.walk_place_ready::<S, Q>(place, &single, ready, stack, &mut noted, doubted);
-                } else {
-                    bvh.walk_place::<S, Q>(place, &single, ray, stack, &mut noted, doubted);
-                }
-                if Q::ANY {
-                    if noted.is_hit(doubted) {
-                        range.set(i, DONE, DONE);
-                    }
-                } else if noted.is_doubted || before != (noted.sure, noted.id) {
-                    range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
-                    (found.noted[i], found.place[i]) = (noted.id, noted.place);
-                    if noted.id == NONE {
-                        (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
-                    }
-                }
+                let ready = if known >> k & 1 != 0 { Some(&ready[k % 8]) } else { None };
+                self.trace_one::<S, Q>(bvh, place, rays, i, ready, range, found);
+            }
+        }
+    }
+
+    /// Ray `i` by itself, which may be ready for the object.
+    #[expect(clippy::too_many_arguments, reason = "a ray among others, a place, and what both have so far")]
+    #[inline(always)]
+    fn trace_one<S: Simd, Q: Query>(
+        &mut self,
+        bvh: &Bvh,
+        place: u32,
+        rays: &[Ray; RAYS],
+        i: usize,
+        ready: Option<&ReadyRay>,
+        range: &mut Range,
+        found: &mut Found,
+    ) {
+        let Self { stack, doubted } = self;
+        let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
+        let mut noted = Noted::nothing(&single);
+        if !Q::ANY {
+            // Rounded up, as of a ray that has hit nothing yet.
+            noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
+            (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
+            if noted.id == NONE && found.computed >> i & 1 != 0 {
+                noted.is_doubted = true;
+                doubted.take([noted.sure, noted.limit], found.nearest[i]);
+            }
+        }
+        let before = (noted.sure, noted.id);
+        match ready {
+            Some(ready) => bvh.walk_place_ready::<S, Q>(place, &single, ready, stack, &mut noted, doubted),
+            None => bvh.walk_place::<S, Q>(place, &single, ray, stack, &mut noted, doubted),
+        }
+        if Q::ANY {
+            if noted.is_hit(doubted) {
+                range.set(i, DONE, DONE);
+            }
+        } else if noted.is_doubted || before != (noted.sure, noted.id) {
+            range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
+            (found.noted[i], found.place[i]) = (noted.id, noted.place);
+            if noted.id == NONE {
+                (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
             }
         }
     }

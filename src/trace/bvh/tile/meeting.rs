@@ -3,8 +3,8 @@
 //! Which rows of rays may see which triangles is told for all of them at once, by [`Footprints`]. A loop over the triangles, in it one over each one's
 //! groups, in it a branch for a group that misses and another for one that hits, was ended or taken nobody could tell when: what such a branch has let
 //! begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need is computed of every pair, but for triangles
-//! of which a bundle sees both sides. A hit without doubt
-//! is noted in place; what is left in doubt is kept in a row, and decided when all pairs are through.
+//! of which a bundle sees both sides. A hit without doubt is noted in place; what is left in doubt is kept in a row, and decided when all pairs are
+//! through.
 
 use super::found::DONE;
 use super::walk::Walk;
@@ -118,6 +118,7 @@ struct Doubt {
     open: u16,
 }
 
+/// Of eight triangles and eight groups.
 const MOST_PAIRS: usize = 64;
 
 impl<Q: Query> Walk<'_, Q> {
