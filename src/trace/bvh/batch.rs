@@ -3,7 +3,7 @@
 
 use std::cell::Cell;
 
-use super::flight::{self, Flight};
+use super::flight::{self, Flight, Objects};
 use super::found::{Found, NONE};
 use super::noted::Rays;
 use super::placements::{FIXED, walk_over};
@@ -34,6 +34,9 @@ struct Apart {
 /// rays, most of which pass it by or are in shadow already. Of 2,500 placements a bundle enters two or three, and is faster by a
 /// quarter; it takes many more, far away, to get here. Bundles of closest hits are faster with any number.
 const MOST_PLACES: u32 = 10;
+
+/// As many times a placed object is left to some of a bundle's rays before these set out: enough for a flight.
+const VISITORS: usize = 64;
 
 thread_local! {
     /// Taken while a batch is traced: a batch within a batch gets one of its own.
@@ -171,24 +174,39 @@ impl Bvh {
         let Workspace { stacks, apart, tile } = workspace;
         let is_all = self.has_only_triangles();
         let mut in_bundles = coherent && self.has_triangles();
-        let (mut all, mut all_answers) = (rays, answers);
-        while !all.is_empty() {
-            let chunk = if in_bundles || !is_all { bundle::RAYS.min(all.len()) } else { all.len() };
-            let (rays, answers);
-            (rays, all) = all.split_at(chunk);
-            (answers, all_answers) = all_answers.split_at_mut(chunk);
-            let traced = if in_bundles { tile::trace::<S, Q>(tile, self, rays, answers) } else { 0 };
+        let mut objects = None;
+        let mut start = 0;
+        while start < rays.len() {
+            let left = rays.len() - start;
+            let chunk = start..start + if in_bundles || !is_all { bundle::RAYS.min(left) } else { left };
+            start = chunk.end;
+            let (first, count) = (chunk.start, chunk.len());
+            let traced = if in_bundles {
+                tile::trace::<S, Q>(tile, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
+            } else {
+                0
+            };
             // The others, in runs: all of them, where there are no bundles.
-            let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - rays.len()) } else { 1 };
+            let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - count) } else { 1 };
             while open != 0 {
-                let first = open.trailing_zeros() as usize;
-                let end = if in_bundles { first + (open >> first).trailing_ones() as usize } else { rays.len() };
-                let run = first..end;
-                self.trace_apart::<S, Q>(stacks, apart, first, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                let from = open.trailing_zeros() as usize;
+                let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
+                let run = first + from..first + end;
+                self.trace_apart::<S, Q>(stacks, apart, from, &rays[run.clone()], &mut answers[run], &mut tile.t);
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
+            let is_last = start == rays.len() || !is_all;
+            let visitors = &mut tile.visitors;
+            if Q::ANY && !visitors.is_empty() && (is_last || visitors.len() >= VISITORS) {
+                let objects = match &objects {
+                    Some(objects) => objects,
+                    None => objects.insert(Objects::new::<S>(self)),
+                };
+                flight::visit::<S, Q>(&mut apart.flight, self, objects, visitors, rays, answers);
+                visitors.clear();
+            }
             if !is_all {
-                self.trace_others::<S, Q>(stacks, rays, answers, &tile.t);
+                self.trace_others::<S, Q>(stacks, &rays[chunk.clone()], &mut answers[chunk], &tile.t);
             }
             in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
         }

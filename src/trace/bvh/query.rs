@@ -18,6 +18,11 @@ pub(super) trait Query {
     type Answer: Copy;
     const MISS: Self::Answer;
     fn answer(hit: Option<Hit>) -> Self::Answer;
+    /// Whether no more is wanted of a ray with this answer.
+    #[inline(always)]
+    fn is_enough(_: Self::Answer) -> bool {
+        false
+    }
     /// What is found so far, where a hit of another kind of primitive had the exact `t`; none where no more is wanted.
     fn resume(nearest: &mut Nearest, t: f64, answer: Self::Answer) -> bool;
     /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided by who asked for the flight.
@@ -80,6 +85,10 @@ impl Query for Occluded {
     #[inline(always)]
     fn answer(hit: Option<Hit>) -> bool {
         hit.is_some()
+    }
+    #[inline(always)]
+    fn is_enough(answer: bool) -> bool {
+        answer
     }
     #[inline(always)]
     fn resume(_: &mut Nearest, _: f64, answer: bool) -> bool {

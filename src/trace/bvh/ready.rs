@@ -50,7 +50,7 @@ impl ReadyRay {
         }
     }
 
-    /// As [`SlabRay::new`] and [`Filter::new`]; [`Self::end`] is not asked of it.
+    /// As [`SlabRay::new`] and [`Filter::new`].
     #[inline(always)]
     pub fn new<S: Simd>(ray: &Ray, reach: Vec3, blur: Blur) -> Self {
         let Slabs { reciprocal, near, far, is_negative } = Slabs::of_ray::<S>(ray, reach, blur);
@@ -65,7 +65,7 @@ impl ReadyRay {
         Self {
             rows: [
                 [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, 0.0],
-                [fx, fy, fz, sx, sy, sz, 0.0, 0.0],
+                [fx, fy, fz, sx, sy, sz, ray.tmax, ray.tmax * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE],
                 [x, y, z, p, q, ax, ay, az],
                 [width, of_depth, of_size, against, shorten, begin, blur.origin, blur.direction],
             ],
@@ -214,4 +214,26 @@ pub(super) fn row<S: Simd>(ray: &Ray) -> S::V8 {
     // The first eight numbers of a ray, in one load; field by field, it took four instructions.
     let [row @ .., _time] = bytemuck::cast_ref::<Ray, [f32; 9]>(ray);
     S::V8::load(row)
+}
+
+/// The lowest bits of some, as many as there are up to eight.
+#[inline(always)]
+pub(super) fn lowest_eight(rays: u64) -> u64 {
+    let mut rest = rays;
+    for _ in 0..8 {
+        rest &= rest.wrapping_sub(1);
+    }
+    rays & !rest
+}
+
+/// Up to eight rays; where they are fewer, the last again.
+#[inline(always)]
+pub(super) fn eight(rays: &[Ray], mut some: u64) -> [&Ray; 8] {
+    let mut eight = [&rays[0]; 8];
+    for ray in &mut eight {
+        *ray = &rays[some.trailing_zeros() as usize];
+        let rest = some & some.wrapping_sub(1);
+        some = if rest == 0 { some } else { rest };
+    }
+    eight
 }

@@ -160,7 +160,7 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn object_at(&self, number: u32) -> (&Place, &TriangleTree) {
+    pub(in crate::trace::bvh) fn object_at(&self, number: u32) -> (&Place, &TriangleTree) {
         let place = self.placements.at(number);
         (place, &self.objects[place.placement.object as usize].triangles)
     }

@@ -15,7 +15,10 @@ use crate::trace::bvh::woop::Sides;
 
 /// What rays travel through.
 pub(super) trait Ground {
+    /// Whether rays go on from the fixed triangles to placements, and into their objects.
     const HAS_PLACEMENTS: bool;
+    /// Whether they may be in placed objects.
+    const HAS_PLACES: bool = Self::HAS_PLACEMENTS;
     /// Whether blocks are put together when they are asked for, so that they had better be asked for once.
     const IS_PUT_TOGETHER: bool = false;
     /// Which triangles of a block a ray may pass within.
@@ -199,5 +202,40 @@ impl Ground for Placed<'_> {
     #[inline(always)]
     fn address(&self, space: Space, next: Child) -> *const u8 {
         self.0[space.0 as usize].addresses.of(next)
+    }
+}
+
+/// Placed objects alone, for rays that are in one of them from the beginning.
+pub(in crate::trace::bvh) struct Objects<'a>(Placed<'a>);
+
+impl<'a> Objects<'a> {
+    pub fn new<S: Simd>(bvh: &'a Bvh) -> Self {
+        Self(Placed::new::<S>(bvh))
+    }
+}
+
+impl Ground for Objects<'_> {
+    const HAS_PLACEMENTS: bool = false;
+    const HAS_PLACES: bool = true;
+
+    #[inline(always)]
+    fn look<S: Simd>(filter: &Filter, block: &Block) -> (Sides<S::V8>, u32) {
+        Placed::look::<S>(filter, block)
+    }
+    #[inline(always)]
+    fn meet<S: Simd>(filter: &Filter, block: &Block, sides: &Sides<S::V8>, passed: u32, limit: f32) -> Candidates {
+        Placed::meet::<S>(filter, block, sides, passed, limit)
+    }
+    #[inline(always)]
+    fn node(&self, space: Space, child: Child) -> &Node {
+        self.0.node(space, child)
+    }
+    #[inline(always)]
+    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0.block(space, index, scratch)
+    }
+    #[inline(always)]
+    fn address(&self, space: Space, next: Child) -> *const u8 {
+        self.0.address(space, next)
     }
 }

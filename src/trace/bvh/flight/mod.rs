@@ -13,25 +13,36 @@
 //! **Placed objects.** A ray that comes to a placement goes on in the object's tree, in the object's coordinates, on the same
 //! stack: t is the same there, so a hit shortens what waits above as well. Walking the object's tree alone, there and
 //! then, would be bound by latency again.
+//!
+//! **Visitors.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`visit`]). Those of several bundles set out
+//! together, in the objects' coordinates from the beginning.
 
 mod ground;
 mod set;
 mod traveller;
+mod visitors;
+
+use std::cell::Cell;
 
 use super::Bvh;
 use super::found::Found;
 use super::leaves::Leaves;
 use super::node::Child;
 use super::place::Blur;
-use super::query::Query;
-use super::ready::ReadyRays;
+use super::placements::FIXED;
+use super::query::{Query, SOMETHING};
+use super::ready::{ReadyRay, ReadyRays};
 use super::simd::{Simd, Vector};
 use super::woop::Sides;
+use crate::math::Aabb;
 use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;
+pub(super) use ground::Objects;
 use ground::{Ground, Placed, Plain, Rounded};
 use set::Set;
-use traveller::{Space, Traveller};
+use traveller::{Space, Start, Traveller};
+use visitors::Queue;
+pub(super) use visitors::Visitors;
 
 /// Rays in flight.
 const RAYS: usize = 32;
@@ -98,18 +109,56 @@ struct Steps {
     returning: Set,
 }
 
+/// Who is still to set out.
+trait Waiting {
+    /// The next one.
+    fn next<S: Simd>(&mut self) -> Option<Start>;
+    /// The one that came last.
+    fn ready(&self) -> &ReadyRay;
+}
+
+/// Rays that start in the world.
+struct Outside<'a> {
+    rays: ReadyRays<'a>,
+    space: Space,
+}
+
+impl<'a> Outside<'a> {
+    /// `bounds` are those of all that the rays may meet.
+    fn new(bvh: &Bvh, bounds: Aabb, rays: &'a [Ray], blur: Blur) -> Self {
+        let space = if bvh.fixed.triangles.tree().is_empty() { Space::UPPER } else { Space::FIXED };
+        Self { rays: ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur), space }
+    }
+}
+
+impl Waiting for Outside<'_> {
+    #[inline(always)]
+    fn next<S: Simd>(&mut self) -> Option<Start> {
+        let ray = self.rays.next::<S>()?;
+        Some(Start { ray, place: FIXED, space: self.space })
+    }
+
+    #[inline(always)]
+    fn ready(&self) -> &ReadyRay {
+        self.rays.ready()
+    }
+}
+
 /// Answers all rays among triangles, of which there are some: `done` is told of each valid one what it has found.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[Ray], done: impl FnMut(usize, &Found)) {
     let fixed = &bvh.fixed.triangles;
+    let bounds = fixed.tree().bounds();
     if bvh.placements.has_triangles() {
-        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, Blur::NONE, done);
+        let waiting = Outside::new(bvh, bounds.union(bvh.placements.tree().bounds()), rays, Blur::NONE);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, waiting, done);
     }
+    let waiting = Outside::new(bvh, bounds, rays, Blur::NONE);
     match fixed.leaves() {
         Leaves::Blocks(blocks) => {
-            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, Blur::NONE, done);
+            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, waiting, done);
         }
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, Blur::NONE, done),
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, waiting, done),
     }
 }
 
@@ -126,8 +175,35 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
     let triangles = &bvh.fixed.triangles;
     if !triangles.tree().is_empty() {
         let ground = Rounded::new::<S>(triangles, decide);
-        run::<S, Q, _>(flight, bvh, &ground, rays, blur, done);
+        let waiting = Outside::new(bvh, triangles.tree().bounds(), rays, blur);
+        run::<S, Q, _>(flight, bvh, &ground, rays, waiting, done);
     }
+}
+
+/// Rays that have answers already, and may get others by what they hit in the objects that they visit; any hit will do.
+#[inline(always)]
+pub(super) fn visit<S: Simd, Q: Query>(
+    flight: &mut Flight,
+    bvh: &Bvh,
+    objects: &Objects<'_>,
+    visitors: &[Visitors],
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) {
+    let answers = Cell::from_mut(answers).as_slice_of_cells();
+    run::<S, Q, _>(
+        flight,
+        bvh,
+        objects,
+        rays,
+        Queue::<Q>::new(bvh, visitors, rays, answers),
+        #[inline(always)]
+        |ray, found| {
+            if found.is_hit() {
+                answers[ray].set(Q::answer(Some(SOMETHING)));
+            }
+        },
+    );
 }
 
 #[inline(always)]
@@ -136,20 +212,13 @@ fn run<S: Simd, Q: Query, G: Ground>(
     bvh: &Bvh,
     ground: &G,
     rays: &[Ray],
-    blur: Blur,
+    mut waiting: impl Waiting,
     mut done: impl FnMut(usize, &Found),
 ) {
-    let fixed = bvh.fixed.triangles.tree();
-    let has_fixed = !fixed.is_empty();
-    let mut bounds = fixed.bounds();
-    if G::HAS_PLACEMENTS {
-        bounds = bounds.union(bvh.placements.tree().bounds());
-    }
-    let mut waiting = ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur);
     let mut flying = Set::NOBODY;
     for k in 0..RAYS {
-        let Some(ray) = waiting.next::<S>() else { break };
-        let next = flight.travellers[k].start::<G>(ray, waiting.ready(), has_fixed);
+        let Some(start) = waiting.next::<S>() else { break };
+        let next = flight.travellers[k].start::<G>(start, waiting.ready());
         flight.send::<S, G>(k, next, ground);
         flying.insert(k);
     }
@@ -160,8 +229,8 @@ fn run<S: Simd, Q: Query, G: Ground>(
         for k in arrived {
             let traveller = &mut flight.travellers[k];
             done(traveller.ray, &traveller.found);
-            if let Some(ray) = waiting.next::<S>() {
-                flight.next[k] = traveller.start::<G>(ray, waiting.ready(), has_fixed);
+            if let Some(start) = waiting.next::<S>() {
+                flight.next[k] = traveller.start::<G>(start, waiting.ready());
                 at_nodes.insert(k);
             } else {
                 flying.remove(k);

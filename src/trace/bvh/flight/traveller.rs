@@ -44,6 +44,16 @@ impl Space {
     }
 }
 
+/// A ray that sets out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Which of the rays it is.
+    pub ray: usize,
+    /// The placement that it is in, or [`FIXED`].
+    pub place: u32,
+    pub space: Space,
+}
+
 /// A ray on its way. What steps need is in as few cache lines as may be.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
@@ -76,21 +86,21 @@ impl Traveller {
         near: [0; STACK + WIDTH],
     };
 
-    /// Sets out with a ray of its own, for the root of the fixed triangles, if there are any, and where there are placements, then for
+    /// Sets out with a ray of its own, for the root of the tree in the space where it starts; from the fixed triangles, where there are placements, then for
     /// theirs. What it reaches next: that root.
     #[inline(always)]
-    pub fn start<G: Ground>(&mut self, ray: usize, ready: &ReadyRay, has_fixed: bool) -> Child {
+    pub fn start<G: Ground>(&mut self, Start { ray, place, space }: Start, ready: &ReadyRay) -> Child {
         self.ready[0] = *ready;
         self.found.start(ready.end());
         (self.ray, self.len) = (ray, 1);
-        if G::HAS_PLACEMENTS {
-            (self.place, self.space) = (FIXED, Space::UPPER);
-            if has_fixed {
-                // Near entries of 0: they stay whatever the ray hits.
-                (self.near[1], self.stack[1]) = (0, Child::ROOT);
-                (self.near[2], self.stack[2]) = (0, Child::NONE);
-                (self.len, self.space) = (3, Space::FIXED);
-            }
+        if G::HAS_PLACES {
+            (self.place, self.space) = (place, space);
+        }
+        if G::HAS_PLACEMENTS && space == Space::FIXED {
+            // Near entries of 0: they stay whatever the ray hits.
+            (self.near[1], self.stack[1]) = (0, Child::ROOT);
+            (self.near[2], self.stack[2]) = (0, Child::NONE);
+            self.len = 3;
         }
         Child::ROOT
     }
@@ -161,7 +171,7 @@ impl Traveller {
         if candidates.lanes == 0 {
             return None;
         }
-        let place = if G::HAS_PLACEMENTS { self.place } else { FIXED };
+        let place = if G::HAS_PLACES { self.place } else { FIXED };
         let number = self.ray;
         Q::take(
             &mut self.found,

@@ -1,14 +1,14 @@
 //! Rays of a bundle that go through a placed object each by itself: where they are no bundle in its coordinates, or where a bundle does not pay.
 
-use super::found::{DONE, Found};
+use super::found::Found;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Noted, SingleRay};
 use crate::trace::bvh::bundle::{RAYS, SLACK};
 use crate::trace::bvh::found::{Found as Doubted, NONE};
-use crate::trace::bvh::query::Query;
+use crate::trace::bvh::query::Closest;
 use crate::trace::bvh::range::Range;
-use crate::trace::bvh::ready::ReadyRay;
+use crate::trace::bvh::ready::{ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::walk::Stack;
 
@@ -27,22 +27,21 @@ impl Apart {
         Self { stack: Stack::new(), doubted: Doubted::NONE }
     }
 
-    /// Traces the rays of the bit mask `seeing` through one placed object.
+    /// The closest hits of the rays of a bit mask in one placed object.
     #[inline(always)]
-    pub fn trace<S: Simd, Q: Query>(
+    pub fn trace<S: Simd>(
         &mut self,
         bvh: &Bvh,
         place: u32,
         rays: &[Ray; RAYS],
-        seeing: u64,
+        mut open: u64,
         range: &mut Range,
         found: &mut Found,
     ) {
-        let mut seeing = seeing & !range.done::<S>();
         let mut ready = [ReadyRay::NONE; 8];
-        while seeing != 0 {
-            let mut some = lowest_eight(seeing);
-            seeing &= !some;
+        while open != 0 {
+            let mut some = lowest_eight(open);
+            open &= !some;
             let mut known = 0;
             if some.count_ones() >= MANY {
                 (ready, known) = bvh.ready_at::<S>(place, eight(rays, some));
@@ -51,7 +50,7 @@ impl Apart {
                 let i = some.trailing_zeros() as usize % RAYS;
                 some &= some - 1;
                 let ready = if known >> k & 1 != 0 { Some(&ready[k % 8]) } else { None };
-                self.trace_one::<S, Q>(bvh, place, rays, i, ready, range, found);
+                self.trace_one::<S>(bvh, place, rays, i, ready, range, found);
             }
         }
     }
@@ -59,7 +58,7 @@ impl Apart {
     /// Ray `i` by itself, which may be ready for the object.
     #[expect(clippy::too_many_arguments, reason = "a ray among others, a place, and what both have so far")]
     #[inline(always)]
-    fn trace_one<S: Simd, Q: Query>(
+    fn trace_one<S: Simd>(
         &mut self,
         bvh: &Bvh,
         place: u32,
@@ -72,25 +71,19 @@ impl Apart {
         let Self { stack, doubted } = self;
         let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
         let mut noted = Noted::nothing(&single);
-        if !Q::ANY {
-            // Rounded up, as of a ray that has hit nothing yet.
-            noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
-            (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
-            if noted.id == NONE && found.computed >> i & 1 != 0 {
-                noted.is_doubted = true;
-                doubted.take([noted.sure, noted.limit], found.nearest[i]);
-            }
+        // Rounded up, as of a ray that has hit nothing yet.
+        noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
+        (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
+        if noted.id == NONE && found.computed >> i & 1 != 0 {
+            noted.is_doubted = true;
+            doubted.take([noted.sure, noted.limit], found.nearest[i]);
         }
         let before = (noted.sure, noted.id);
         match ready {
-            Some(ready) => bvh.walk_place_ready::<S, Q>(place, &single, ready, stack, &mut noted, doubted),
-            None => bvh.walk_place::<S, Q>(place, &single, ray, stack, &mut noted, doubted),
+            Some(ready) => bvh.walk_place_ready::<S, Closest>(place, &single, ready, stack, &mut noted, doubted),
+            None => bvh.walk_place::<S, Closest>(place, &single, ray, stack, &mut noted, doubted),
         }
-        if Q::ANY {
-            if noted.is_hit(doubted) {
-                range.set(i, DONE, DONE);
-            }
-        } else if noted.is_doubted || before != (noted.sure, noted.id) {
+        if noted.is_doubted || before != (noted.sure, noted.id) {
             range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
             (found.noted[i], found.place[i]) = (noted.id, noted.place);
             if noted.id == NONE {
@@ -98,26 +91,4 @@ impl Apart {
             }
         }
     }
-}
-
-/// The lowest bits of some, as many as there are up to eight.
-#[inline(always)]
-fn lowest_eight(rays: u64) -> u64 {
-    let mut rest = rays;
-    for _ in 0..8 {
-        rest &= rest.wrapping_sub(1);
-    }
-    rays & !rest
-}
-
-/// Up to eight rays; where they are fewer, the last again.
-#[inline(always)]
-fn eight(rays: &[Ray; RAYS], mut some: u64) -> [&Ray; 8] {
-    let mut eight = [&rays[0]; 8];
-    for ray in &mut eight {
-        *ray = &rays[some.trailing_zeros() as usize % RAYS];
-        let rest = some & some.wrapping_sub(1);
-        some = if rest == 0 { some } else { rest };
-    }
-    eight
 }

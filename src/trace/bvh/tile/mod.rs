@@ -13,8 +13,9 @@
 //!   and v of what was noted are computed four rays at a time
 //!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
 //! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
-//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`apart`]); so do
-//!   shadow rays that are much farther apart than triangles are wide.
+//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`apart`]).
+//!   Shadow rays do so where they are much farther apart than triangles are wide, too; they wait for those of other bundles, and fly
+//!   ([`super::flight`]).
 
 mod apart;
 mod found;
@@ -30,6 +31,7 @@ use std::marker::PhantomData;
 use super::Bvh;
 use super::build::MAX_DEPTH;
 use super::bundle::{Bundle, Fill, Fit, RAYS};
+use super::flight::Visitors;
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::range::Range;
@@ -49,12 +51,13 @@ pub(super) struct Scratch {
     pub t: [f64; RAYS],
     /// How many placed objects the last bundles entered.
     pub entered: u32,
+    /// Rays that look for any hit, and are still to go through placed objects each by itself.
+    pub visitors: Vec<Visitors>,
     /// Rays of one octant.
     part: Part,
 }
 
-/// As many of a placed object's triangles fit between shadow rays that go through it each by itself. With 1 in their place a bundle is twice as fast,
-/// with a thousand half as fast again. Closest hits gain nothing by going alone, however many there are.
+/// As many of a placed object's triangles fit between shadow rays that go through it each by itself. With 1 to 20 shadow rays of 2,500 placements take as long. Closest hits gain nothing by going alone, however many there are.
 const GRAINS: f32 = 20.0;
 
 /// Places on a stack.
@@ -79,21 +82,22 @@ impl Scratch {
         let stack = [Entry::root(!0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
         let one = One { upper: stack, stack, bundle, local, range, found, apart: Apart::new() };
-        Self { one, t: [0.0; RAYS], entered: 0, part: Part::new() }
+        Self { one, t: [0.0; RAYS], entered: 0, visitors: Vec::new(), part: Part::new() }
     }
 }
 
 /// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through all triangles, into `answers` of
 /// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
-/// have too little in common.
+/// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.visitors`, among whom ray 0 is called `first`.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(
     scratch: &mut Scratch,
     bvh: &Bvh,
+    first: usize,
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
-    let Scratch { one, t, entered, part } = scratch;
+    let Scratch { one, t, entered, visitors, part } = scratch;
     *entered = 0;
     // Of a part; filled only where there is one.
     let mut parted = None;
@@ -120,7 +124,15 @@ pub(super) fn trace<S: Simd, Q: Query>(
         };
         let fit =
             S::apart(Fill::<Q> { bundle: &mut one.bundle, rays: group, range: &mut one.range, query: PhantomData });
-        let is_traced = fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered);
+        let before = visitors.len();
+        let is_traced =
+            fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered, visitors);
+        for visitors in &mut visitors[before..] {
+            visitors.first = first;
+            if octants.is_some() {
+                visitors.rays = part.members(visitors.rays);
+            }
+        }
         if is_traced {
             done |= members;
         }
@@ -140,6 +152,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
 impl One {
     /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
     /// too steep for a tree.
+    #[expect(clippy::too_many_arguments, reason = "rays, and all that is told of them")]
     #[inline(always)]
     fn trace<S: Simd, Q: Query>(
         &mut self,
@@ -149,6 +162,7 @@ impl One {
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
         entered: &mut u32,
+        visitors: &mut Vec<Visitors>,
     ) -> bool {
         let Self { upper, stack, bundle, local, range, found, apart } = self;
         let Some(mut tour) = Tour::new(bvh, bundle, count, upper) else { return false };
@@ -158,8 +172,9 @@ impl One {
             if tree.tree().is_empty() {
                 continue;
             }
-            if Q::ANY && place != FIXED && bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count) {
-                apart.trace::<S, Q>(bvh, place, rays, seeing, range, found);
+            let is_sparse = |bundle: &Bundle| bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count);
+            if Q::ANY && place != FIXED && is_sparse(bundle) {
+                visitors.push(Visitors { place, first: 0, rays: seeing & !range.done::<S>() });
                 continue;
             }
             *entered += u32::from(place != FIXED);
@@ -167,7 +182,12 @@ impl One {
             let bundle = if place == FIXED { &*bundle } else { &*local };
             let reach = tree.tree().reach();
             let Some(slab) = bundle.slab(reach).filter(|_| is_bundle) else {
-                apart.trace::<S, Q>(bvh, place, rays, seeing, range, found);
+                let rays_left = seeing & !range.done::<S>();
+                if Q::ANY {
+                    visitors.push(Visitors { place, first: 0, rays: rays_left });
+                } else {
+                    apart.trace::<S>(bvh, place, rays, rays_left, range, found);
+                }
                 continue;
             };
             let way = Way::new(bundle, slab, count);

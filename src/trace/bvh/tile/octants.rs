@@ -61,6 +61,16 @@ impl Part {
         self.rays[self.count..].fill(last);
     }
 
+    /// Which of all those are of the bit mask, whose bits are of the part.
+    pub fn members(&self, mut mask: u64) -> u64 {
+        let mut members = 0;
+        while mask != 0 {
+            members |= 1 << self.index[mask.trailing_zeros() as usize];
+            mask &= mask - 1;
+        }
+        members
+    }
+
     /// Brings what belongs to each of them to where it belongs among all.
     pub fn scatter<T: Copy>(&self, from: &[T; RAYS], to: &mut [T]) {
         for (&index, &value) in self.index[..self.count].iter().zip(from) {

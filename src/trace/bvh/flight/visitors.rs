@@ -1,0 +1,97 @@
+//! Rays that bundles leave to placed objects each by itself: a few of them of many a bundle make a flight, where each bundle's own would be too few.
+
+use std::cell::Cell;
+
+use super::Waiting;
+use super::traveller::{Space, Start};
+use crate::ray::Ray;
+use crate::trace::bvh::Bvh;
+use crate::trace::bvh::query::Query;
+use crate::trace::bvh::ready::{ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::simd::Simd;
+
+/// Rays that are to go through one placed object, which has triangles.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::trace::bvh) struct Visitors {
+    /// The number of the placement.
+    pub place: u32,
+    /// The ray whose bit is the lowest.
+    pub first: usize,
+    /// A bit for each of them.
+    pub rays: u64,
+}
+
+/// So many are made ready together, up to eight; fewer each by itself.
+const MANY: u32 = 3;
+
+/// Visitors who wait for their turn.
+pub(super) struct Queue<'a, Q: Query> {
+    bvh: &'a Bvh,
+    rays: &'a [Ray],
+    answers: &'a [Cell<Q::Answer>],
+    others: std::slice::Iter<'a, Visitors>,
+    /// Those of one object who are not ready yet.
+    next: Visitors,
+    /// Those who are, a bit each, and where the first of them is among `ready`.
+    group: u64,
+    slot: usize,
+    ready: [ReadyRay; 8],
+}
+
+impl<'a, Q: Query> Queue<'a, Q> {
+    pub fn new(bvh: &'a Bvh, visitors: &'a [Visitors], rays: &'a [Ray], answers: &'a [Cell<Q::Answer>]) -> Self {
+        let nobody = Visitors { place: 0, first: 0, rays: 0 };
+        let (others, ready) = (visitors.iter(), [ReadyRay::NONE; 8]);
+        Self { bvh, rays, answers, others, next: nobody, group: 0, slot: 0, ready }
+    }
+
+    /// Up to eight more.
+    #[inline(always)]
+    fn prepare<S: Simd>(&mut self) {
+        let Visitors { place, first, rays: open } = self.next;
+        (self.group, self.slot) = (lowest_eight(open), 0);
+        self.next.rays &= !self.group;
+        let rays = &self.rays[first..];
+        let mut known = 0;
+        if self.group.count_ones() >= MANY {
+            (self.ready, known) = self.bvh.ready_at::<S>(place, eight(rays, self.group));
+        }
+        let mut rest = self.group;
+        for (k, ready) in self.ready[..self.group.count_ones() as usize].iter_mut().enumerate() {
+            if known >> k & 1 == 0 {
+                let (object, triangles) = self.bvh.object_at(place);
+                let (local, blur) = object.local::<S>(&rays[rest.trailing_zeros() as usize]);
+                *ready = ReadyRay::new::<S>(&local, triangles.tree().reach(), blur);
+            }
+            rest &= rest.wrapping_sub(1);
+        }
+    }
+}
+
+impl<Q: Query> Waiting for Queue<'_, Q> {
+    #[inline(always)]
+    fn next<S: Simd>(&mut self) -> Option<Start> {
+        loop {
+            if self.group == 0 {
+                if self.next.rays == 0 {
+                    self.next = *self.others.next()?;
+                }
+                self.prepare::<S>();
+                continue;
+            }
+            let Visitors { place, first, .. } = self.next;
+            let ray = first + self.group.trailing_zeros() as usize;
+            self.group &= self.group - 1;
+            self.slot += 1;
+            if !Q::is_enough(self.answers[ray].get()) {
+                let object = self.bvh.placements.at(place).placement.object;
+                return Some(Start { ray, place, space: Space::object(object) });
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn ready(&self) -> &ReadyRay {
+        &self.ready[self.slot.wrapping_sub(1) % 8]
+    }
+}
