@@ -14,7 +14,7 @@ use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::ready::ReadyRay;
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::{Mask, Simd};
 use crate::trace::bvh::woop::Sides;
 
 /// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
@@ -116,16 +116,17 @@ impl Traveller {
     pub fn enter<S: Simd, Q: Query, G: Ground>(&mut self, node: &Node) -> Child {
         let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
         let len = self.len % STACK;
+        let top = self.stack[len.wrapping_sub(1) % STACK];
         let (nears, stack) = (self.near[len..].first_chunk_mut(), self.stack[len..].first_chunk_mut());
-        if let (Some(nears), Some(stack)) = (nears, stack) {
-            self.len = len
-                + if Q::IN_ORDER {
-                    S::far_to_near(near, mask, &node.child, nears, stack)
-                } else {
-                    S::named_first(mask, &node.child, stack)
-                };
+        let (Some(nears), Some(stack)) = (nears, stack) else { return Child::NONE };
+        if !Q::IN_ORDER {
+            self.len = len + S::named_first(mask, &node.child, stack);
+            return self.pop();
         }
-        self.pop()
+        let (nearest, others) = S::nearest_apart(near, mask, &node.child, nears, stack);
+        let is_none = mask.bits() == 0;
+        self.len = len + others - usize::from(is_none);
+        select_unpredictable(is_none, top, nearest)
     }
 
     /// What it sees of a block: what is to be told of that to [`Self::hit`], and which triangles it may pass within.
@@ -193,7 +194,7 @@ impl Traveller {
             || {
                 // What it has come to may be beyond the limit, too, if it is from the stack, above whose top it is still.
                 self.len += usize::from(leaf.count() == 1);
-                self.shorten();
+                self.shorten::<S>();
                 self.pass(leaf)
             },
         )
@@ -232,13 +233,16 @@ impl Traveller {
         self.stack[self.len % STACK]
     }
 
-    /// Leaves out what is beyond the limit.
+    /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to guess how many.
     #[inline(always)]
-    fn shorten(&mut self) {
-        let mut kept = 1;
-        for i in 1..self.len % STACK {
-            (self.near[kept], self.stack[kept]) = (self.near[i], self.stack[i]);
-            kept += usize::from(f32::from_bits(self.near[i] & !7) <= self.found.limit);
+    fn shorten<S: Simd>(&mut self) {
+        let (len, mut kept) = (self.len % STACK, 1);
+        for first in (1..len).step_by(WIDTH) {
+            let (nears, children) = (self.near[first..].first_chunk(), self.stack[first..].first_chunk());
+            let (Some(&nears), Some(&children)) = (nears, children) else { break };
+            let (near, stack) = (self.near[kept..].first_chunk_mut(), self.stack[kept..].first_chunk_mut());
+            let (Some(near), Some(stack)) = (near, stack) else { break };
+            kept += S::within(self.found.limit, (&nears, &children), len - first, near, stack);
         }
         self.len = kept;
     }

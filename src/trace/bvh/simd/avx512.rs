@@ -44,6 +44,28 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn nearest_apart(
+        near: V8,
+        mask: <V8 as Vector>::Mask,
+        child: &[Child; 8],
+        other_near: &mut [u32; 8],
+        other_child: &mut [Child; 8],
+    ) -> (Child, usize) {
+        Avx2::nearest_apart(near, mask, child, other_near, other_child)
+    }
+
+    #[inline(always)]
+    fn within(
+        limit: f32,
+        entries: (&[u32; 8], &[Child; 8]),
+        count: usize,
+        near: &mut [u32; 8],
+        child: &mut [Child; 8],
+    ) -> usize {
+        Avx2::within(limit, entries, count, near, child)
+    }
+
+    #[inline(always)]
     fn named_first(mask: <V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
         Avx2::named_first(mask, child, named)
     }

@@ -47,6 +47,24 @@ pub(super) trait Simd {
         sorted_near: &mut [u32; 8],
         sorted_child: &mut [Child; 8],
     ) -> usize;
+    /// Of the children that the mask names the nearest, told as [`Self::far_to_near`] does; and how many others there are. These are stored likewise, but in
+    /// order only where they are two. No branch depends on what the mask names. If it names none, the child is anyone's.
+    fn nearest_apart(
+        near: Self::V8,
+        mask: <Self::V8 as Vector>::Mask,
+        child: &[Child; 8],
+        other_near: &mut [u32; 8],
+        other_child: &mut [Child; 8],
+    ) -> (Child, usize);
+    /// Of the first `count` of eight entries, as [`Self::far_to_near`] stores them, those that are not farther than the limit, in their order; then others. How
+    /// many these are.
+    fn within(
+        limit: f32,
+        entries: (&[u32; 8], &[Child; 8]),
+        count: usize,
+        near: &mut [u32; 8],
+        child: &mut [Child; 8],
+    ) -> usize;
     /// Children that the mask names, in their order; then others. How many it names.
     fn named_first(mask: <Self::V8 as Vector>::Mask, child: &[Child; 8], named: &mut [Child; 8]) -> usize;
     /// A bit for each number whose highest bit is set.

@@ -44,6 +44,45 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn nearest_apart(
+        near: [f32; 8],
+        mask: Bits,
+        child: &[Child; 8],
+        other_near: &mut [u32; 8],
+        other_child: &mut [Child; 8],
+    ) -> (Child, usize) {
+        let key = |slot: usize| near[slot].to_bits() & !7 | slot as u32;
+        let named = || (0..8).filter(|slot| mask.bits() >> slot & 1 != 0);
+        let nearest = named().min_by_key(|&slot| key(slot)).unwrap_or(0);
+        let mut count = 0;
+        for slot in named().filter(|&slot| slot != nearest) {
+            (other_near[count], other_child[count]) = (key(slot), child[slot]);
+            count += 1;
+        }
+        if count >= 2 && other_near[0] < other_near[1] {
+            other_near.swap(0, 1);
+            other_child.swap(0, 1);
+        }
+        (child[nearest], count)
+    }
+
+    #[inline(always)]
+    fn within(
+        limit: f32,
+        (nears, children): (&[u32; 8], &[Child; 8]),
+        count: usize,
+        near: &mut [u32; 8],
+        child: &mut [Child; 8],
+    ) -> usize {
+        let mut kept = 0;
+        for i in (0..count.min(8)).filter(|&i| f32::from_bits(nears[i] & !7) <= limit) {
+            (near[kept], child[kept]) = (nears[i], children[i]);
+            kept += 1;
+        }
+        kept
+    }
+
+    #[inline(always)]
     fn named_first(mask: Bits, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
         for (place, slot) in (0..8).filter(|slot| mask.bits() >> slot & 1 != 0).enumerate() {
             named[place] = child[slot];

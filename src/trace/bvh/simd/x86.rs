@@ -89,6 +89,60 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn nearest_apart(
+        near: V8,
+        mask: M8,
+        child: &[Child; 8],
+        other_near: &mut [u32; 8],
+        other_child: &mut [Child; 8],
+    ) -> (Child, usize) {
+        unsafe {
+            let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let keys = _mm256_or_si256(_mm256_and_si256(_mm256_castps_si256(near.0), _mm256_set1_epi32(!7)), slots);
+            // Numbers not below 0 are ordered as their bits are.
+            let last = _mm256_castsi256_ps(_mm256_set1_epi32(i32::MAX));
+            let named = _mm256_castps_si256(_mm256_blendv_ps(last, _mm256_castsi256_ps(keys), mask.0));
+            let four = _mm_min_epi32(_mm256_castsi256_si128(named), _mm256_extracti128_si256::<1>(named));
+            let two = _mm_min_epi32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
+            let one = _mm_min_epi32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two));
+            let nearest = _mm_cvtsi128_si32(one) as usize % 8;
+            let others = mask.bits() as usize % 256 & !(1 << nearest);
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[others]));
+            let keys = _mm256_permutevar8x32_epi32(keys, order);
+            // The first two, the farther first; the others as they are.
+            let partners = _mm256_shuffle_epi32::<0b11_10_00_01>(keys);
+            let sorted = _mm256_blend_epi32::<0b01>(keys, _mm256_max_epi32(keys, partners));
+            let keys = _mm256_blend_epi32::<0b10>(sorted, _mm256_min_epi32(keys, partners));
+            _mm256_storeu_si256(other_near.as_mut_ptr().cast(), keys);
+            // The lowest three bits choose.
+            let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(child.as_ptr().cast()), keys);
+            _mm256_storeu_si256(other_child.as_mut_ptr().cast(), children);
+            (child[nearest], others.count_ones() as usize)
+        }
+    }
+
+    #[inline(always)]
+    fn within(
+        limit: f32,
+        (nears, children): (&[u32; 8], &[Child; 8]),
+        count: usize,
+        near: &mut [u32; 8],
+        child: &mut [Child; 8],
+    ) -> usize {
+        unsafe {
+            let (keys, children) =
+                (_mm256_loadu_si256(nears.as_ptr().cast()), _mm256_loadu_si256(children.as_ptr().cast()));
+            let nears = _mm256_castsi256_ps(_mm256_and_si256(keys, _mm256_set1_epi32(!7)));
+            let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(nears, _mm256_set1_ps(limit));
+            let named = _mm256_movemask_ps(is_within) as usize % 256 & ((1 << count.min(8)) - 1);
+            let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[named]));
+            _mm256_storeu_si256(near.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(keys, order));
+            _mm256_storeu_si256(child.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, order));
+            named.count_ones() as usize
+        }
+    }
+
+    #[inline(always)]
     fn named_first(mask: M8, child: &[Child; 8], named: &mut [Child; 8]) -> usize {
         unsafe {
             let bits = mask.bits() as usize % 256;
