@@ -2,6 +2,7 @@
 //! by one among everything else, of which there is little.
 
 use std::cell::Cell;
+use std::hint::select_unpredictable;
 
 use super::flight::{self, Flight, Objects};
 use super::found::{Found, NONE};
@@ -270,12 +271,12 @@ struct Pending {
 impl Pending {
     const NONE: Self = Self { rays: [0; 4], ids: [NONE; 4], places: [FIXED; 4], count: 0 };
 
-    /// Whether they are four now.
+    /// One more, if a hit of it is noted: told without a branch, for whether a ray hits anything is anyone's guess. Whether they are four now.
     #[inline(always)]
     fn push(&mut self, ray: usize, found: &Found) -> bool {
         let i = self.count % 4;
         (self.rays[i], self.ids[i], self.places[i]) = (ray, found.noted, found.place);
-        self.count += 1;
+        self.count += usize::from(found.is_noted());
         self.count == 4
     }
 
@@ -299,14 +300,16 @@ impl<Q: Query> Arrivals<'_, Q> {
     #[inline(always)]
     fn take<S: Simd>(&mut self, i: usize, found: &Found) {
         let Self { answers, fixed, placed } = self;
-        if found.is_noted() && Q::ANY {
-            answers.answers[i] = Q::answer(Some(SOMETHING));
-        } else if found.is_noted() {
+        if Q::ANY {
+            let answer = &mut answers.answers[i];
+            *answer = select_unpredictable(found.is_noted(), Q::answer(Some(SOMETHING)), *answer);
+        } else {
             let pending = if found.place == FIXED { fixed } else { placed };
             if pending.push(i, found) {
                 answers.compute::<S>(pending);
             }
-        } else if found.is_hit() {
+        }
+        if found.has_only_computed() {
             let nearest = found.nearest(answers.bvh, &answers.rays[i]);
             answers.take(i, nearest.t(), nearest.hit());
         }

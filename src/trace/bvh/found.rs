@@ -155,6 +155,12 @@ impl Found {
         self.noted != NONE || self.is_computed && self.nearest.hit().is_some()
     }
 
+    /// Whether there is a hit that was computed, which few are, and none that is noted.
+    #[inline(always)]
+    pub fn has_only_computed(&self) -> bool {
+        self.is_computed && self.noted == NONE && self.nearest.hit().is_some()
+    }
+
     /// Takes the candidates of block `index` of the triangles at `place`.
     #[inline(always)]
     pub fn offer<Q: Query>(

@@ -196,47 +196,140 @@ mod tests {
     use crate::trace::bvh::isa::{Isa, dispatch};
     use crate::trace::bvh::random::Random;
 
-    struct Sort {
+    #[derive(Clone, Copy)]
+    struct Entered {
         near: [f32; 8],
         named: u32,
         child: [Child; 8],
     }
+
+    impl Entered {
+        #[inline(always)]
+        fn mask<S: Simd>(&self) -> <S::V8 as Vector>::Mask {
+            let mut out = [1.0; 8];
+            for (slot, out) in out.iter_mut().enumerate() {
+                *out -= (self.named >> slot & 1) as f32;
+            }
+            S::V8::load(&out).at_most(S::V8::splat(0.0))
+        }
+
+        /// What is entered where it is named, in the order of a sort: bits of `near` before slots, and the slot in the lowest.
+        fn sorted(&self) -> Vec<(u32, Child)> {
+            let mut all: Vec<_> = (0..8)
+                .filter(|slot| self.named >> slot & 1 != 0)
+                .map(|slot| (self.near[slot].to_bits() / 8 * 8 + slot as u32, self.child[slot]))
+                .collect();
+            all.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
+            all
+        }
+    }
+
+    struct Sort(Entered);
 
     impl Kernel for Sort {
         type Output = Vec<(u32, Child)>;
 
         #[inline(always)]
         fn run<S: Simd>(self) -> Vec<(u32, Child)> {
-            let mut out = [1.0; 8];
-            for (slot, out) in out.iter_mut().enumerate() {
-                *out -= (self.named >> slot & 1) as f32;
-            }
-            let mask = S::V8::load(&out).at_most(S::V8::splat(0.0));
+            let Entered { near, child, .. } = self.0;
+            let (mut sorted, mut children) = ([0; 8], [Child::NONE; 8]);
+            let count = S::far_to_near(S::V8::load(&near), self.0.mask::<S>(), &child, &mut sorted, &mut children);
+            sorted.into_iter().zip(children).take(count).collect()
+        }
+    }
+
+    struct Nearest(Entered);
+
+    impl Kernel for Nearest {
+        type Output = (Child, Vec<(u32, Child)>);
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> (Child, Vec<(u32, Child)>) {
+            let Entered { near, child, .. } = self.0;
+            let (mut others, mut children) = ([0; 8], [Child::NONE; 8]);
+            let near = S::V8::load(&near);
+            let (nearest, count) = S::nearest_apart(near, self.0.mask::<S>(), &child, &mut others, &mut children);
+            (nearest, others.into_iter().zip(children).take(count).collect())
+        }
+    }
+
+    struct Within {
+        limit: f32,
+        entries: [(u32, Child); 8],
+        count: usize,
+    }
+
+    impl Kernel for Within {
+        type Output = Vec<(u32, Child)>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Vec<(u32, Child)> {
+            let entries = (&self.entries.map(|(near, _)| near), &self.entries.map(|(_, child)| child));
             let (mut near, mut child) = ([0; 8], [Child::NONE; 8]);
-            let count = S::far_to_near(S::V8::load(&self.near), mask, &self.child, &mut near, &mut child);
+            let count = S::within(self.limit, entries, self.count, &mut near, &mut child);
             near.into_iter().zip(child).take(count).collect()
         }
     }
 
-    /// Whichever children are named, each instruction set has them in the order of a sort: bits of `near` before slots, and the slot in the lowest.
-    #[test]
-    fn children_are_sorted_alike() {
+    /// Every choice of children, with numbers that are far apart, next to each other, and equal.
+    fn cases() -> impl Iterator<Item = Entered> {
         let child = [3, 1, 4, 1, 5, 9, 2, 6].map(Child::inner);
         let tiny = f32::from_bits(9);
         let ties = [1.0, 0.0, tiny, 1.0, f32::INFINITY, 0.0, 1.0f32.next_up(), 2.0];
         let mut random = Random::new(1);
-        let others = std::iter::repeat_with(|| [0; 8].map(|_| random.vec3().x.abs())).take(20);
-        for near in others.chain([ties, [0.0; 8]]) {
-            for named in 0..256u32 {
-                let mut expected: Vec<_> = (0..8)
-                    .filter(|slot| named >> slot & 1 != 0)
-                    .map(|slot| (near[slot].to_bits() / 8 * 8 + slot as u32, child[slot]))
-                    .collect();
-                expected.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
-                for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available()) {
-                    let sorted = dispatch(isa, Sort { near, named, child });
-                    assert_eq!(sorted, expected, "{isa:?}: {named:08b} of {near:?}");
+        let others = std::iter::repeat_with(move || [0; 8].map(|_| random.vec3().x.abs())).take(20);
+        let nears = others.chain([ties, [0.0; 8]]);
+        nears.flat_map(move |near| (0..256).map(move |named| Entered { near, named, child }))
+    }
+
+    fn sets() -> impl Iterator<Item = Isa> {
+        Isa::ALL.into_iter().filter(|isa| isa.is_available())
+    }
+
+    /// Whichever children are named, each instruction set has them in the order of a sort.
+    #[test]
+    fn children_are_sorted_alike() {
+        for case in cases() {
+            for isa in sets() {
+                assert_eq!(dispatch(isa, Sort(case)), case.sorted(), "{isa:?}: {:08b} of {:?}", case.named, case.near);
+            }
+        }
+    }
+
+    /// The nearest child is the last of a sort; the others are the same children, each once, and in order where they are two.
+    #[test]
+    fn the_nearest_child_is_told_apart() {
+        for case in cases() {
+            let mut expected = case.sorted();
+            let nearest = expected.pop();
+            for isa in sets() {
+                let context = format!("{isa:?}: {:08b} of {:?}", case.named, case.near);
+                let (child, mut others) = dispatch(isa, Nearest(case));
+                assert!(nearest.is_none_or(|(_, expected)| child == expected), "{context}");
+                if others.len() > 2 {
+                    others.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
                 }
+                assert_eq!(others, expected, "{context}");
+            }
+        }
+    }
+
+    /// Of entries those are kept, in their order, that a filter keeps; the lowest three bits say nothing of where a child is entered.
+    #[test]
+    fn entries_within_a_limit_are_kept() {
+        for case in cases() {
+            let entry = |slot: usize| ((case.near[slot].to_bits() & !7) | slot as u32, case.child[slot]);
+            let entries = [0, 1, 2, 3, 4, 5, 6, 7].map(entry);
+            // Any of them may be the limit, be there more entries or fewer.
+            let (limit, count) = (f32::from_bits(entries[case.named as usize % 8].0 & !7), case.named as usize % 13);
+            let is_near = |(near, _): &(u32, Child)| f32::from_bits(near & !7) <= limit;
+            let expected: Vec<_> = entries.into_iter().take(count).filter(is_near).collect();
+            for isa in sets() {
+                assert_eq!(
+                    dispatch(isa, Within { limit, entries, count }),
+                    expected,
+                    "{isa:?}: {count} of {entries:?}"
+                );
             }
         }
     }
