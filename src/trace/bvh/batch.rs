@@ -196,7 +196,7 @@ impl Bvh {
                 self.trace_apart::<S, Q>(stacks, apart, from, &rays[run.clone()], &mut answers[run], &mut tile.t);
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
-            let is_last = start == rays.len() || !is_all;
+            let is_last = start == rays.len();
             let visitors = &mut tile.visitors;
             if Q::ANY && !visitors.is_empty() && (is_last || visitors.len() >= VISITORS) {
                 let objects = match &objects {

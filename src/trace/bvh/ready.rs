@@ -216,6 +216,9 @@ pub(super) fn row<S: Simd>(ray: &Ray) -> S::V8 {
     S::V8::load(row)
 }
 
+/// So many of some rays are made ready together, up to eight; fewer each by itself.
+pub(super) const MANY: u32 = 3;
+
 /// The lowest bits of some, as many as there are up to eight.
 #[inline(always)]
 pub(super) fn lowest_eight(rays: u64) -> u64 {

@@ -8,7 +8,7 @@ use crate::trace::bvh::Bvh;
 use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::place::{Blur, EightRays, Place};
 use crate::trace::bvh::placements::FIXED;
-use crate::trace::bvh::query::Query;
+use crate::trace::bvh::query::{Closest, Query};
 use crate::trace::bvh::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::triangles::TriangleTree;
@@ -22,7 +22,7 @@ pub enum Travel {
     Auto,
     /// Several of them in turn, however few.
     InFlight,
-    /// One after the other, however many.
+    /// One after the other, however many; but shadow rays that bundles leave to placed objects fly.
     Alone,
 }
 
@@ -134,9 +134,9 @@ impl Bvh {
         self.walk_through::<S, Q, true>(number, triangles, &local, single, stack, noted, found);
     }
 
-    /// The same of a ray that is [ready](Self::ready_at), through an object that has triangles.
+    /// The closest hit of a ray that is [ready](Self::ready_at), through an object that has triangles.
     #[inline(always)]
-    pub(in crate::trace::bvh) fn walk_place_ready<S: Simd, Q: Query>(
+    pub(in crate::trace::bvh) fn walk_place_ready<S: Simd>(
         &self,
         number: u32,
         single: &SingleRay,
@@ -147,7 +147,7 @@ impl Bvh {
     ) {
         let (_, triangles) = self.object_at(number);
         let ready = (ready.slab(), ready.filter());
-        self.walk_through::<S, Q, true>(number, triangles, &ready, single, stack, noted, found);
+        self.walk_through::<S, Closest, true>(number, triangles, &ready, single, stack, noted, found);
     }
 
     /// Eight rays made ready for a placed object, and a bit for each for which that could be done.

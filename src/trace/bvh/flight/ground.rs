@@ -1,4 +1,4 @@
-//! What rays travel through: the triangles of the world alone, or these and placed objects.
+//! What rays travel through: the triangles of the world alone, these and placed objects, or placed objects alone.
 //!
 //! Rounds are compiled once for each, so that scenes without placements pay nothing for them.
 

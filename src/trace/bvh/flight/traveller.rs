@@ -30,7 +30,7 @@ pub(super) struct Space(pub u32);
 
 impl Space {
     pub const FIXED: Self = Self(0);
-    /// Among the placements; and whoever arrives does so from here.
+    /// Among the placements; and whoever comes through them arrives from here.
     pub const UPPER: Self = Self(1);
 
     #[inline(always)]
@@ -58,7 +58,7 @@ pub(super) struct Start {
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 pub(super) struct Traveller {
-    /// The ray in the world, and in the object where it is.
+    /// The ray where it set out, in the world mostly, and in the object where it is.
     ready: [ReadyRay; 2],
     /// Children on the stack.
     len: usize,
@@ -68,7 +68,7 @@ pub(super) struct Traveller {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
-    /// Children waiting to be visited, the nearest on top; above the top is room for what is stored beside.
+    /// Children waiting to be visited, those of a node that are nearer on top where they are two; above the top is room for what is stored beside.
     stack: [Child; STACK + WIDTH],
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
     near: [u32; STACK + WIDTH],
@@ -226,7 +226,7 @@ impl Traveller {
         self.pop()
     }
 
-    /// Goes on to the nearest; at last to [`Child::NONE`].
+    /// Goes on to what is on top; at last to [`Child::NONE`].
     #[inline(always)]
     fn pop(&mut self) -> Child {
         self.len -= 1;
@@ -245,5 +245,49 @@ impl Traveller {
             kept += S::within(self.found.limit, (&nears, &children), len - first, near, stack);
         }
         self.len = kept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::random::Random;
+
+    struct Shorten<'a>(&'a mut Traveller);
+
+    impl Kernel for Shorten<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Simd>(self) {
+            self.0.shorten::<S>();
+        }
+    }
+
+    /// What is beyond the limit goes, all else stays in its order, however much is on the stack.
+    #[test]
+    fn what_is_beyond_the_limit_goes() {
+        let mut random = Random::new(4);
+        for len in [1, 2, 8, 9, 10, 17, 26, 100, STACK - 1] {
+            for limit in [0.0, 0.3, 0.5, 1.0] {
+                let entries: Vec<_> = (1..len as u32)
+                    .map(|i| ((random.vec3().x.abs().to_bits() & !7) | (i % 8), Child::inner(i)))
+                    .collect();
+                let mut expected = entries.clone();
+                expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
+                for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                    let mut traveller = Traveller { len, ..Traveller::NONE };
+                    traveller.found.limit = limit;
+                    for (i, &(near, child)) in entries.iter().enumerate() {
+                        (traveller.near[i + 1], traveller.stack[i + 1]) = (near, child);
+                    }
+                    dispatch(isa, Shorten(&mut traveller));
+                    let kept = traveller.near.into_iter().zip(traveller.stack).take(traveller.len).skip(1);
+                    assert_eq!(kept.collect::<Vec<_>>(), expected, "{isa:?}: {len} entries, up to {limit}");
+                    assert_eq!(traveller.stack[0], Child::NONE);
+                }
+            }
+        }
     }
 }

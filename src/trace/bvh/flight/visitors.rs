@@ -7,7 +7,7 @@ use super::traveller::{Space, Start};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::{ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 
 /// Rays that are to go through one placed object, which has triangles.
@@ -21,17 +21,14 @@ pub(in crate::trace::bvh) struct Visitors {
     pub rays: u64,
 }
 
-/// So many are made ready together, up to eight; fewer each by itself.
-const MANY: u32 = 3;
-
 /// Visitors who wait for their turn.
 pub(super) struct Queue<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
     answers: &'a [Cell<Q::Answer>],
-    others: std::slice::Iter<'a, Visitors>,
+    waiting: std::slice::Iter<'a, Visitors>,
     /// Those of one object who are not ready yet.
-    next: Visitors,
+    current: Visitors,
     /// Those who are, a bit each, and where the first of them is among `ready`.
     group: u64,
     slot: usize,
@@ -39,18 +36,30 @@ pub(super) struct Queue<'a, Q: Query> {
 }
 
 impl<'a, Q: Query> Queue<'a, Q> {
-    pub fn new(bvh: &'a Bvh, visitors: &'a [Visitors], rays: &'a [Ray], answers: &'a [Cell<Q::Answer>]) -> Self {
+    pub fn new(bvh: &'a Bvh, all: &'a [Visitors], rays: &'a [Ray], answers: &'a [Cell<Q::Answer>]) -> Self {
         let nobody = Visitors { place: 0, first: 0, rays: 0 };
-        let (others, ready) = (visitors.iter(), [ReadyRay::NONE; 8]);
-        Self { bvh, rays, answers, others, next: nobody, group: 0, slot: 0, ready }
+        let (waiting, ready) = (all.iter(), [ReadyRay::NONE; 8]);
+        Self { bvh, rays, answers, waiting, current: nobody, group: 0, slot: 0, ready }
+    }
+
+    /// Those who have not got what they want from other objects meanwhile.
+    #[inline(always)]
+    fn open(&self, &Visitors { first, rays, .. }: &Visitors) -> u64 {
+        let (mut open, mut rest) = (rays, rays);
+        while rest != 0 {
+            let ray = rest.trailing_zeros();
+            rest &= rest - 1;
+            open &= !(u64::from(Q::is_enough(self.answers[first + ray as usize].get())) << ray);
+        }
+        open
     }
 
     /// Up to eight more.
     #[inline(always)]
     fn prepare<S: Simd>(&mut self) {
-        let Visitors { place, first, rays: open } = self.next;
+        let Visitors { place, first, rays: open } = self.current;
         (self.group, self.slot) = (lowest_eight(open), 0);
-        self.next.rays &= !self.group;
+        self.current.rays &= !self.group;
         let rays = &self.rays[first..];
         let mut known = 0;
         if self.group.count_ones() >= MANY {
@@ -73,13 +82,15 @@ impl<Q: Query> Waiting for Queue<'_, Q> {
     fn next<S: Simd>(&mut self) -> Option<Start> {
         loop {
             if self.group == 0 {
-                if self.next.rays == 0 {
-                    self.next = *self.others.next()?;
+                if self.current.rays == 0 {
+                    let next = *self.waiting.next()?;
+                    self.current = Visitors { rays: self.open(&next), ..next };
+                    continue;
                 }
                 self.prepare::<S>();
                 continue;
             }
-            let Visitors { place, first, .. } = self.next;
+            let Visitors { place, first, .. } = self.current;
             let ray = first + self.group.trailing_zeros() as usize;
             self.group &= self.group - 1;
             self.slot += 1;

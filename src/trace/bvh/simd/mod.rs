@@ -48,7 +48,7 @@ pub(super) trait Simd {
         sorted_child: &mut [Child; 8],
     ) -> usize;
     /// Of the children that the mask names the nearest, told as [`Self::far_to_near`] does; and how many others there are. These are stored likewise, but in
-    /// order only where they are two. No branch depends on what the mask names. If it names none, the child is anyone's.
+    /// order only where they are two. Vectors take no branch that depends on what the mask names. If it names none, the child is anyone's.
     fn nearest_apart(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,

@@ -106,7 +106,7 @@ impl Simd for Avx2 {
             let two = _mm_min_epi32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
             let one = _mm_min_epi32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two));
             let nearest = _mm_cvtsi128_si32(one) as usize % 8;
-            let others = mask.bits() as usize % 256 & !(1 << nearest);
+            let others = (mask.bits() as usize % 256) & !(1 << nearest);
             let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[others]));
             let keys = _mm256_permutevar8x32_epi32(keys, order);
             // The first two, the farther first; the others as they are.
@@ -134,7 +134,7 @@ impl Simd for Avx2 {
                 (_mm256_loadu_si256(nears.as_ptr().cast()), _mm256_loadu_si256(children.as_ptr().cast()));
             let nears = _mm256_castsi256_ps(_mm256_and_si256(keys, _mm256_set1_epi32(!7)));
             let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(nears, _mm256_set1_ps(limit));
-            let named = _mm256_movemask_ps(is_within) as usize % 256 & ((1 << count.min(8)) - 1);
+            let named = (_mm256_movemask_ps(is_within) as usize % 256) & ((1 << count.min(8)) - 1);
             let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(NAMED_FIRST[named]));
             _mm256_storeu_si256(near.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(keys, order));
             _mm256_storeu_si256(child.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, order));

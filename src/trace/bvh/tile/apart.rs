@@ -1,4 +1,4 @@
-//! Rays of a bundle that go through a placed object each by itself: where they are no bundle in its coordinates, or where a bundle does not pay.
+//! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are no bundle in its coordinates.
 
 use super::found::Found;
 use crate::ray::Ray;
@@ -8,12 +8,9 @@ use crate::trace::bvh::bundle::{RAYS, SLACK};
 use crate::trace::bvh::found::{Found as Doubted, NONE};
 use crate::trace::bvh::query::Closest;
 use crate::trace::bvh::range::Range;
-use crate::trace::bvh::ready::{ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::walk::Stack;
-
-/// So many are made ready together, up to eight; fewer each by itself.
-const MANY: u32 = 3;
 
 /// What they need.
 pub(super) struct Apart {
@@ -80,7 +77,7 @@ impl Apart {
         }
         let before = (noted.sure, noted.id);
         match ready {
-            Some(ready) => bvh.walk_place_ready::<S, Closest>(place, &single, ready, stack, &mut noted, doubted),
+            Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, stack, &mut noted, doubted),
             None => bvh.walk_place::<S, Closest>(place, &single, ray, stack, &mut noted, doubted),
         }
         if noted.is_doubted || before != (noted.sure, noted.id) {

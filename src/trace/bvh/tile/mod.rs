@@ -14,7 +14,7 @@
 //!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
 //! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
 //!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`apart`]).
-//!   Shadow rays do so where they are much farther apart than triangles are wide, too; they wait for those of other bundles, and fly
+//!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
 //!   ([`super::flight`]).
 
 mod apart;
@@ -127,10 +127,11 @@ pub(super) fn trace<S: Simd, Q: Query>(
         let before = visitors.len();
         let is_traced =
             fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered, visitors);
-        for visitors in &mut visitors[before..] {
-            visitors.first = first;
+        // Until here their bits are of the part, if there is one.
+        for some in &mut visitors[before..] {
+            some.first = first;
             if octants.is_some() {
-                visitors.rays = part.members(visitors.rays);
+                some.rays = part.members(some.rays);
             }
         }
         if is_traced {
@@ -172,9 +173,12 @@ impl One {
             if tree.tree().is_empty() {
                 continue;
             }
-            let is_sparse = |bundle: &Bundle| bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count);
-            if Q::ANY && place != FIXED && is_sparse(bundle) {
-                visitors.push(Visitors { place, first: 0, rays: seeing & !range.done::<S>() });
+            let seeing = if Q::ANY { seeing & !range.done::<S>() } else { seeing };
+            if Q::ANY && seeing == 0 {
+                continue;
+            }
+            if Q::ANY && place != FIXED && bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count) {
+                visitors.push(Visitors { place, first: 0, rays: seeing });
                 continue;
             }
             *entered += u32::from(place != FIXED);
@@ -182,11 +186,10 @@ impl One {
             let bundle = if place == FIXED { &*bundle } else { &*local };
             let reach = tree.tree().reach();
             let Some(slab) = bundle.slab(reach).filter(|_| is_bundle) else {
-                let rays_left = seeing & !range.done::<S>();
                 if Q::ANY {
-                    visitors.push(Visitors { place, first: 0, rays: rays_left });
+                    visitors.push(Visitors { place, first: 0, rays: seeing });
                 } else {
-                    apart.trace::<S>(bvh, place, rays, rays_left, range, found);
+                    apart.trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
                 }
                 continue;
             };

@@ -78,3 +78,20 @@ impl Part {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_are_those_that_were_gathered() {
+        let rays: Vec<Ray> = (0..12_u8).map(|i| Ray::new(Vec3::splat(i.into()), Vec3::X)).collect();
+        let mut part = Part::new();
+        part.gather(&rays, 0b1011_0100_0010);
+        assert_eq!((part.count, part.members(0b1_1111)), (5, 0b1011_0100_0010));
+        for (place, &index) in [1, 6, 8, 9, 11].iter().enumerate() {
+            assert_eq!(part.members(1 << place), 1 << index);
+            assert_eq!(part.rays[place], rays[index]);
+        }
+    }
+}
