@@ -3,7 +3,8 @@
 //! A single ray's walk ([`super::walk`]) is bound by latency, not by work: each step needs the node that the one before
 //! has chosen, and how many children are entered is anyone's guess, so every other node is mispredicted. Here a round
 //! gives every ray of the flight one step. Steps of different rays do not depend on each other, and what can be is told without
-//! branches: who is at a node, at a leaf, or has arrived, by masks of what all of them reach next; which child of a node comes first, by minima; and at a leaf all rays look on which sides of edges they pass ([`Sight`]) before
+//! branches: who is at a node, at a leaf, or has arrived, by masks of what all of them reach next; which child of a node comes first, by
+//! minima; and at a leaf all rays look on which sides of edges they pass ([`Sight`]) before
 //! those that may pass within a triangle are gone through again. A branch there, taken for every other leaf, cost an eighth of the time, for
 //! when it turns out to be wrong all that follows has been done in vain. What a ray reaches next is fetched while the others take their turn.
 //!

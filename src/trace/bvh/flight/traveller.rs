@@ -68,7 +68,8 @@ pub(super) struct Traveller {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
-    /// Children waiting to be visited, those of a node that are nearer on top where they are two; above the top is room for what is stored beside.
+    /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is
+    /// stored beside.
     stack: [Child; STACK + WIDTH],
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
     near: [u32; STACK + WIDTH],
