@@ -171,6 +171,58 @@ fn meshes_are_closed_where_an_even_number_of_triangles_meet_at_every_edge() {
     assert!(!is_closed(&[lost]), "a triangle that cannot be hit leaves a hole");
 }
 
+/// The squared distance of a triangle: the least of those of its edges, and of its plane where the point is above it.
+fn square(point: DVec3, corners: [DVec3; 3]) -> f64 {
+    let [a, b, c] = corners.map(|corner| corner - point);
+    let edge = |a: DVec3, b: DVec3| {
+        let along = b - a;
+        (a + along * (-a.dot(along) / along.length_squared()).clamp(0.0, 1.0)).length_squared()
+    };
+    let normal = (b - a).cross(c - a).normalize();
+    let is_above = [(a, b), (b, c), (c, a)].iter().all(|(a, b)| a.cross(*b).dot(normal) >= 0.0);
+    let edges = edge(a, b).min(edge(b, c)).min(edge(c, a));
+    if is_above { edges.min(a.dot(normal).powi(2)) } else { edges }
+}
+
+/// Points of a batch travel together; each has the answer that it gets by itself, and no triangle is nearer, or as near with a lower number.
+#[test]
+fn points_that_travel_together_have_each_their_nearest() {
+    let mut random = Random::new(9);
+    let mut anywhere = |size: f64| {
+        let [x, y, z] = [0; 3].map(|_| f64::from(random.unit()) - 0.5);
+        DVec3::new(x, y, z) * size
+    };
+    let corners: Vec<[DVec3; 3]> = (0..500)
+        .map(|_| {
+            let a = anywhere(2.0);
+            [a, a + anywhere(0.2), a + anywhere(0.2)]
+        })
+        .collect();
+    let triangles = (0..500).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let precise = Precise::new(vec![PreciseMesh { positions: corners.concat(), triangles }]).expect("a mesh");
+    let mut points: Vec<DVec3> = (0..333).map(|_| anywhere(4.0)).collect();
+    // At corners, which are nearest at a distance of 0; and what cannot travel.
+    points.extend(corners.iter().take(20).map(|triangle| triangle[0]));
+    points[10] = DVec3::NAN;
+    points[11] = DVec3::splat(f64::INFINITY);
+    points[50] = DVec3::splat(1e40);
+    points[352] = DVec3::NAN;
+    for count in [0, 1, 7, 32, 33, 353] {
+        let points = &points[..count];
+        let mut together = vec![None; count];
+        precise.nearest_point_batch(points, &mut together);
+        for (&point, together) in points.iter().zip(&together) {
+            assert_eq!(*together, precise.nearest_point(point), "{point}");
+            assert_eq!(together.is_some(), point.is_finite(), "{point}");
+            if let Some(found) = together {
+                let nearest = corners.iter().map(|&corners| square(point, corners)).fold(f64::INFINITY, f64::min);
+                let off = (found.distance_squared - nearest).abs();
+                assert!(off <= 1e-9 * nearest + 1e-15, "{point}: {} and {nearest}", found.distance_squared);
+            }
+        }
+    }
+}
+
 #[test]
 fn nothing_is_within_a_clearance() {
     let mesh = tetrahedron();

@@ -65,6 +65,12 @@ impl Discs {
         Disc::around(node.bounds(), &all)
     }
 
+    /// Where in memory those of a node are; of another child, anywhere.
+    #[inline(always)]
+    pub(super) fn address<S: Simd>(&self, child: Child) -> *const u8 {
+        S::address(&self.0, if child.is_leaf() { 0 } else { child.node() })
+    }
+
     /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off by at most `pad` in each component.
     #[inline(always)]
     pub(super) fn near<S: Simd>(&self, node: Child, point: Vec3, pad: f32) -> S::V8 {

@@ -39,6 +39,7 @@
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
+mod addresses;
 mod all_hits;
 mod alone;
 mod batch;
@@ -80,6 +81,7 @@ mod refit;
 mod room;
 mod rows;
 mod scratch;
+mod set;
 mod shapes;
 mod simd;
 mod slab;
@@ -93,7 +95,7 @@ pub use alone::{Search, SingleRay, Travel, TriangleFound};
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use discs::Discs;
-pub(super) use near::Waiting;
+pub(super) use near::{Sought, Surveyor};
 pub(super) use place::Blur;
 pub(super) use query::Verdict;
 

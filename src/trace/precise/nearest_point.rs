@@ -5,7 +5,7 @@
 use super::{Precise, is_traceable};
 use crate::math::{DVec3, Vec3};
 use crate::shape::closest::{TrianglePoint, closest_point};
-use crate::trace::bvh::Waiting;
+use crate::trace::bvh::{Bvh, Sought, Surveyor};
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +51,9 @@ impl Precise {
     /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry, primitive). Triangles
     /// without an area count too. None for a point that is not finite, and where there are no triangles. Squares of distances above 1e154 are infinite.
     pub fn nearest_point(&self, point: DVec3) -> Option<NearestPoint> {
-        self.nearest(point, None, &mut Waiting::new())
+        let mut nearest = [None];
+        self.nearest_point_batch(&[point], &mut nearest);
+        nearest[0]
     }
 
     /// The same for many points, into `nearest` of the same length. Sooner where one point is near the next: the triangle that was
@@ -61,12 +63,13 @@ impl Precise {
     /// Unless there is one answer a point.
     pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
         assert_eq!(points.len(), nearest.len(), "one answer a point");
-        let mut waiting = Waiting::new();
-        let mut last = None;
-        for (&point, nearest) in points.iter().zip(nearest) {
-            *nearest = self.nearest(point, last, &mut waiting);
-            last = nearest.or(last);
+        let run = points.len().div_ceil(Bvh::POINTS).max(1);
+        let mut survey = Survey { precise: self, is_exact: self.frame.is_identity(), runs: Vec::new() };
+        for (points, nearest) in points.chunks(run).zip(nearest.chunks_mut(run)) {
+            survey.runs.push(Run { points, nearest, point: DVec3::ZERO, asked: 0, best: None });
         }
+        let discs = self.discs.get_or_init(|| self.bvh.discs());
+        self.bvh.near_triangles(discs, survey.runs.len(), &mut survey);
     }
 
     /// By a look at every triangle, which are all about as far away.
@@ -85,33 +88,70 @@ impl Precise {
         }
         best
     }
+}
 
-    fn nearest(&self, point: DVec3, last: Option<NearestPoint>, waiting: &mut Waiting) -> Option<NearestPoint> {
-        if !point.is_finite() {
-            return None;
+/// Points of which one traveller takes one after the other.
+struct Run<'a> {
+    points: &'a [DVec3],
+    nearest: &'a mut [Option<NearestPoint>],
+    /// So many were asked for; the last of them,
+    asked: usize,
+    point: DVec3,
+    /// and what is nearest to it.
+    best: Option<NearestPoint>,
+}
+
+/// Batches of points on their way through the tree.
+struct Survey<'a> {
+    precise: &'a Precise,
+    /// Whether the corners in the tree are those that were given.
+    is_exact: bool,
+    runs: Vec<Run<'a>>,
+}
+
+impl Survey<'_> {
+    /// The distance in the tree.
+    fn distance(&self, best: &NearestPoint) -> f64 {
+        best.distance_squared.sqrt() * self.precise.frame.scale()
+    }
+}
+
+impl Surveyor for Survey<'_> {
+    fn next(&mut self, traveller: usize) -> Option<Sought> {
+        let run = &mut self.runs[traveller];
+        if run.asked > 0 {
+            run.nearest[run.asked - 1] = run.best;
         }
-        let (local, error) = self.frame.blurred_point(point);
-        let is_near = local.abs().max_element() <= FARTHEST;
-        if !is_near {
-            return self.nearest_of_all(point);
-        }
-        let is_exact = self.frame.is_identity();
-        let distance = |best: &NearestPoint| best.distance_squared.sqrt() * self.frame.scale();
-        let mut best = last.map(|last| {
-            let (geometry, primitive) = last.id();
-            NearestPoint::on(point, self.corners(geometry, primitive), geometry, primitive)
-        });
-        let wanted = best.as_ref().map_or(f64::INFINITY, distance);
-        let mut measure = |geometry: u32, primitive: u32, rounded: &[Vec3; 3]| {
-            let corners = if is_exact { rounded.map(|p| p.as_dvec3()) } else { self.corners(geometry, primitive) };
-            let answer = NearestPoint::on(point, corners, geometry, primitive);
-            if best.as_ref().is_none_or(|best| answer.is_before(best)) {
-                best = Some(answer);
+        loop {
+            let point = *run.points.get(run.asked)?;
+            run.asked += 1;
+            run.nearest[run.asked - 1] = None;
+            if !point.is_finite() {
+                continue;
             }
-            best.as_ref().map_or(f64::INFINITY, distance)
-        };
-        let discs = self.discs.get_or_init(|| self.bvh.discs());
-        self.bvh.near_triangles(discs, local, error as f32 * 1.01, wanted, waiting, &mut measure);
-        best
+            let (local, error) = self.precise.frame.blurred_point(point);
+            if local.abs().max_element() > FARTHEST {
+                run.nearest[run.asked - 1] = self.precise.nearest_of_all(point);
+                continue;
+            }
+            run.point = point;
+            run.best = run.best.map(|last| {
+                let (geometry, primitive) = last.id();
+                NearestPoint::on(point, self.precise.corners(geometry, primitive), geometry, primitive)
+            });
+            let wanted = self.runs[traveller].best.as_ref().map_or(f64::INFINITY, |best| self.distance(best));
+            return Some(Sought { point: local, error: error as f32 * 1.01, wanted });
+        }
+    }
+
+    fn measure(&mut self, traveller: usize, geometry: u32, primitive: u32, rounded: &[Vec3; 3]) -> f64 {
+        let corners =
+            if self.is_exact { rounded.map(|p| p.as_dvec3()) } else { self.precise.corners(geometry, primitive) };
+        let run = &mut self.runs[traveller];
+        let answer = NearestPoint::on(run.point, corners, geometry, primitive);
+        if run.best.as_ref().is_none_or(|best| answer.is_before(best)) {
+            run.best = Some(answer);
+        }
+        self.runs[traveller].best.as_ref().map_or(f64::INFINITY, |best| self.distance(best))
     }
 }

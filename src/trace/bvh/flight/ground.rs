@@ -4,6 +4,7 @@
 
 use super::traveller::Space;
 use crate::trace::bvh::Bvh;
+use crate::trace::bvh::addresses::Addresses;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::filter::{Candidates, Filter};
 use crate::trace::bvh::leaves::Blocks;
@@ -34,31 +35,6 @@ pub(super) trait Ground {
     fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory a node is, or a leaf's first block, or a placement.
     fn address(&self, space: Space, next: Child) -> *const u8;
-}
-
-/// Where in memory children are, by their [kind](Child::kind), and how far apart.
-struct Addresses {
-    first: [*const u8; 3],
-    stride: [usize; 3],
-}
-
-impl Addresses {
-    fn new<S: Simd>(tree: &Tree, leaves: *const u8, stride: usize) -> Self {
-        let nodes = S::address(tree.nodes(), 0);
-        // A ray that has arrived has no next. An address outside of what is there would be looked up in vain, which holds up all that follows.
-        Self { first: [nodes, leaves, nodes], stride: [size_of::<Node>(), stride, 0] }
-    }
-
-    fn of_triangles<S: Simd>(triangles: &TriangleTree) -> Self {
-        let leaves = triangles.leaves();
-        Self::new::<S>(triangles.tree(), leaves.address::<S>(0), leaves.bytes() / leaves.len().max(1))
-    }
-
-    #[inline(always)]
-    fn of(&self, child: Child) -> *const u8 {
-        let kind = child.kind() % 3;
-        self.first[kind].wrapping_add(self.stride[kind] * child.first() as usize)
-    }
 }
 
 /// The triangles of the world, and nothing else.

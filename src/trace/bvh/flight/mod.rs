@@ -18,7 +18,6 @@
 //! together, in the objects' coordinates from the beginning.
 
 mod ground;
-mod set;
 mod traveller;
 mod visitors;
 
@@ -32,6 +31,7 @@ use super::place::Blur;
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::ready::{ReadyRay, ReadyRays};
+use super::set::{Set, TRAVELLERS};
 use super::simd::{Simd, Vector};
 use super::woop::Sides;
 use crate::math::Aabb;
@@ -39,13 +39,12 @@ use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;
 pub(super) use ground::Objects;
 use ground::{Ground, Placed, Plain, Rounded};
-use set::Set;
 use traveller::{Space, Start, Traveller};
 use visitors::Queue;
 pub(super) use visitors::Visitors;
 
 /// Rays in flight.
-const RAYS: usize = 32;
+const RAYS: usize = TRAVELLERS;
 
 /// Room for a flight.
 pub(super) struct Flight {
@@ -110,7 +109,7 @@ struct Steps {
 }
 
 /// Who is still to set out.
-trait Waiting {
+trait Departures {
     /// The next one.
     fn next<S: Simd>(&mut self) -> Option<Start>;
     /// The one that came last.
@@ -131,7 +130,7 @@ impl<'a> Outside<'a> {
     }
 }
 
-impl Waiting for Outside<'_> {
+impl Departures for Outside<'_> {
     #[inline(always)]
     fn next<S: Simd>(&mut self) -> Option<Start> {
         let ray = self.rays.next::<S>()?;
@@ -150,15 +149,15 @@ pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[R
     let fixed = &bvh.fixed.triangles;
     let bounds = fixed.tree().bounds();
     if bvh.placements.has_triangles() {
-        let waiting = Outside::new(bvh, bounds.union(bvh.placements.tree().bounds()), rays, Blur::NONE);
-        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, waiting, done);
+        let departures = Outside::new(bvh, bounds.union(bvh.placements.tree().bounds()), rays, Blur::NONE);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, departures, done);
     }
-    let waiting = Outside::new(bvh, bounds, rays, Blur::NONE);
+    let departures = Outside::new(bvh, bounds, rays, Blur::NONE);
     match fixed.leaves() {
         Leaves::Blocks(blocks) => {
-            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, waiting, done);
+            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, departures, done);
         }
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, waiting, done),
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, departures, done),
     }
 }
 
@@ -175,8 +174,8 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
     let triangles = &bvh.fixed.triangles;
     if !triangles.tree().is_empty() {
         let ground = Rounded::new::<S>(triangles, decide);
-        let waiting = Outside::new(bvh, triangles.tree().bounds(), rays, blur);
-        run::<S, Q, _>(flight, bvh, &ground, rays, waiting, done);
+        let departures = Outside::new(bvh, triangles.tree().bounds(), rays, blur);
+        run::<S, Q, _>(flight, bvh, &ground, rays, departures, done);
     }
 }
 
@@ -212,13 +211,13 @@ fn run<S: Simd, Q: Query, G: Ground>(
     bvh: &Bvh,
     ground: &G,
     rays: &[Ray],
-    mut waiting: impl Waiting,
+    mut departures: impl Departures,
     mut done: impl FnMut(usize, &Found),
 ) {
     let mut flying = Set::NOBODY;
     for k in 0..RAYS {
-        let Some(start) = waiting.next::<S>() else { break };
-        let next = flight.travellers[k].start::<G>(start, waiting.ready());
+        let Some(start) = departures.next::<S>() else { break };
+        let next = flight.travellers[k].start::<G>(start, departures.ready());
         flight.send::<S, G>(k, next, ground);
         flying.insert(k);
     }
@@ -229,8 +228,8 @@ fn run<S: Simd, Q: Query, G: Ground>(
         for k in arrived {
             let traveller = &mut flight.travellers[k];
             done(traveller.ray, &traveller.found);
-            if let Some(start) = waiting.next::<S>() {
-                flight.next[k] = traveller.start::<G>(start, waiting.ready());
+            if let Some(start) = departures.next::<S>() {
+                flight.next[k] = traveller.start::<G>(start, departures.ready());
                 at_nodes.insert(k);
             } else {
                 flying.remove(k);

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::Waiting;
+use super::Departures;
 use super::traveller::{Space, Start};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
@@ -77,7 +77,7 @@ impl<'a, Q: Query> Queue<'a, Q> {
     }
 }
 
-impl<Q: Query> Waiting for Queue<'_, Q> {
+impl<Q: Query> Departures for Queue<'_, Q> {
     #[inline(always)]
     fn next<S: Simd>(&mut self) -> Option<Start> {
         loop {

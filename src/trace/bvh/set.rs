@@ -1,8 +1,7 @@
-//! Some of the travellers of a flight.
+//! Some of the travellers of a flight, be they rays or points.
 
-use super::RAYS;
-
-const _: () = assert!(RAYS == u32::BITS as usize);
+/// How many travel together, at most.
+pub(super) const TRAVELLERS: usize = u32::BITS as usize;
 
 /// A bit for each traveller that belongs to it. Gone through, it gives their numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +40,7 @@ impl Iterator for Set {
         if self.0 == 0 {
             return None;
         }
-        let first = self.0.trailing_zeros() as usize % RAYS;
+        let first = self.0.trailing_zeros() as usize % TRAVELLERS;
         self.0 &= self.0 - 1;
         Some(first)
     }
