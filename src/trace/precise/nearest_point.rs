@@ -63,10 +63,11 @@ impl Precise {
     /// Unless there is one answer a point.
     pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
         assert_eq!(points.len(), nearest.len(), "one answer a point");
+        nearest.fill(None);
         let run = points.len().div_ceil(Bvh::POINTS).max(1);
         let mut survey = Survey { precise: self, is_exact: self.frame.is_identity(), runs: Vec::new() };
         for (points, nearest) in points.chunks(run).zip(nearest.chunks_mut(run)) {
-            survey.runs.push(Run { points, nearest, point: DVec3::ZERO, asked: 0, best: None });
+            survey.runs.push(Run { points, nearest, asked: 0, best: None });
         }
         let discs = self.discs.get_or_init(|| self.bvh.discs());
         self.bvh.near_triangles(discs, survey.runs.len(), &mut survey);
@@ -94,10 +95,9 @@ impl Precise {
 struct Run<'a> {
     points: &'a [DVec3],
     nearest: &'a mut [Option<NearestPoint>],
-    /// So many were asked for; the last of them,
+    /// So many were asked for.
     asked: usize,
-    point: DVec3,
-    /// and what is nearest to it.
+    /// What is nearest to the last of them that is on its way, or was.
     best: Option<NearestPoint>,
 }
 
@@ -125,7 +125,6 @@ impl Surveyor for Survey<'_> {
         loop {
             let point = *run.points.get(run.asked)?;
             run.asked += 1;
-            run.nearest[run.asked - 1] = None;
             if !point.is_finite() {
                 continue;
             }
@@ -134,7 +133,6 @@ impl Surveyor for Survey<'_> {
                 run.nearest[run.asked - 1] = self.precise.nearest_of_all(point);
                 continue;
             }
-            run.point = point;
             run.best = run.best.map(|last| {
                 let (geometry, primitive) = last.id();
                 NearestPoint::on(point, self.precise.corners(geometry, primitive), geometry, primitive)
@@ -148,7 +146,7 @@ impl Surveyor for Survey<'_> {
         let corners =
             if self.is_exact { rounded.map(|p| p.as_dvec3()) } else { self.precise.corners(geometry, primitive) };
         let run = &mut self.runs[traveller];
-        let answer = NearestPoint::on(run.point, corners, geometry, primitive);
+        let answer = NearestPoint::on(run.points[run.asked - 1], corners, geometry, primitive);
         if run.best.as_ref().is_none_or(|best| answer.is_before(best)) {
             run.best = Some(answer);
         }

@@ -51,17 +51,13 @@ impl Bvh {
     }
 
     /// Offers the surveyor of each point every fixed triangle that may be the nearest, or as near, and no farther than wanted. Up to `most` points are
-    /// in flight. `discs` are this tree's.
+    /// in flight; where there are no triangles nobody is asked. `discs` are this tree's.
     pub(in crate::trace) fn near_triangles(&self, discs: &Discs, most: usize, surveyor: &mut dyn Surveyor) {
         let triangles = &self.fixed.triangles;
-        if triangles.tree().is_empty() {
-            for traveller in 0..most.min(Self::POINTS) {
-                while surveyor.next(traveller).is_some() {}
-            }
-            return;
+        if !triangles.tree().is_empty() {
+            let mut seekers = vec![Seeker::NOBODY; most.min(Self::POINTS)];
+            isa::dispatch(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
         }
-        let mut seekers = vec![Seeker::NOBODY; most.min(Self::POINTS)];
-        isa::dispatch(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
     }
 }
 
