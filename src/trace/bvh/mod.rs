@@ -95,7 +95,7 @@ pub use alone::{Search, SingleRay, Travel, TriangleFound};
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use discs::Discs;
-pub(super) use near::{Sought, Surveyor};
+pub(super) use near::{NearestTriangle, Sought, Surveyor};
 pub(super) use place::Blur;
 pub(super) use query::Verdict;
 

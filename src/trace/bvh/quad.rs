@@ -2,7 +2,8 @@
 //!
 //! The same operations in the same order as [`triangle::intersect`], so the same bits; none is fused.
 
-use super::simd::{Array, Doubles};
+use super::simd::Array;
+use super::simd::doubles::{Doubles, cross, dot, minus, size};
 use crate::shape::triangle;
 
 /// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers of a hit with.
@@ -96,25 +97,4 @@ impl<D: Doubles> Quad<D> {
         let (u, v) = (self.volumes[0].mul(inverse), self.volumes[1].mul(inverse));
         Numbers { t: t.to_array(), t32: t.narrow().to_array(), u: u.narrow().to_array(), v: v.narrow().to_array() }
     }
-}
-
-/// The largest magnitude of a component.
-#[inline(always)]
-fn size<D: Doubles>(p: [D; 3]) -> D {
-    p[0].abs().max(p[1].abs()).max(p[2].abs())
-}
-
-#[inline(always)]
-fn minus<D: Doubles>(p: [D; 3], q: [D; 3]) -> [D; 3] {
-    [p[0].sub(q[0]), p[1].sub(q[1]), p[2].sub(q[2])]
-}
-
-#[inline(always)]
-fn cross<D: Doubles>(p: [D; 3], q: [D; 3]) -> [D; 3] {
-    [p[1].mul(q[2]).sub(q[1].mul(p[2])), p[2].mul(q[0]).sub(q[2].mul(p[0])), p[0].mul(q[1]).sub(q[0].mul(p[1]))]
-}
-
-#[inline(always)]
-fn dot<D: Doubles>(p: [D; 3], q: [D; 3]) -> D {
-    p[0].mul(q[0]).add(p[1].mul(q[1])).add(p[2].mul(q[2]))
 }

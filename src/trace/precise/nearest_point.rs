@@ -3,9 +3,9 @@
 //! The tree offers what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
 use super::{Precise, is_traceable};
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::shape::closest::{TrianglePoint, closest_point};
-use crate::trace::bvh::{Bvh, Sought, Surveyor};
+use crate::trace::bvh::{Bvh, NearestTriangle, Sought, Surveyor};
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +36,8 @@ impl NearestPoint {
             || self.distance_squared == other.distance_squared && self.id() < other.id()
     }
 
-    /// The point of one triangle.
-    #[inline]
-    fn on(point: DVec3, corners: [DVec3; 3], geometry: u32, primitive: u32) -> Self {
-        let TrianglePoint { offset, distance_squared, u, v } = closest_point(point, corners);
+    fn new(point: DVec3, on: TrianglePoint, geometry: u32, primitive: u32) -> Self {
+        let TrianglePoint { offset, distance_squared, u, v } = on;
         Self { point: point + offset, distance_squared, u, v, primitive, geometry }
     }
 }
@@ -65,9 +63,9 @@ impl Precise {
         assert_eq!(points.len(), nearest.len(), "one answer a point");
         nearest.fill(None);
         let run = points.len().div_ceil(Bvh::POINTS).max(1);
-        let mut survey = Survey { precise: self, is_exact: self.frame.is_identity(), runs: Vec::new() };
+        let mut survey = Survey { precise: self, runs: Vec::new() };
         for (points, nearest) in points.chunks(run).zip(nearest.chunks_mut(run)) {
-            survey.runs.push(Run { points, nearest, asked: 0, best: None });
+            survey.runs.push(Run { points, nearest, asked: 0 });
         }
         let discs = self.discs.get_or_init(|| self.bvh.discs());
         self.bvh.near_triangles(discs, survey.runs.len(), &mut survey);
@@ -80,7 +78,7 @@ impl Precise {
             for primitive in 0..mesh.triangles.len() as u32 {
                 let corners = self.corners(geometry, primitive);
                 if corners.iter().all(|&corner| is_traceable(corner)) {
-                    let answer = NearestPoint::on(point, corners, geometry, primitive);
+                    let answer = NearestPoint::new(point, closest_point(point, corners), geometry, primitive);
                     if best.as_ref().is_none_or(|best| answer.is_before(best)) {
                         best = Some(answer);
                     }
@@ -97,30 +95,20 @@ struct Run<'a> {
     nearest: &'a mut [Option<NearestPoint>],
     /// So many were asked for.
     asked: usize,
-    /// What is nearest to the last of them that is on its way, or was.
-    best: Option<NearestPoint>,
 }
 
 /// Batches of points on their way through the tree.
 struct Survey<'a> {
     precise: &'a Precise,
-    /// Whether the corners in the tree are those that were given.
-    is_exact: bool,
     runs: Vec<Run<'a>>,
 }
 
-impl Survey<'_> {
-    /// The distance in the tree.
-    fn distance(&self, best: &NearestPoint) -> f64 {
-        best.distance_squared.sqrt() * self.precise.frame.scale()
-    }
-}
-
 impl Surveyor for Survey<'_> {
-    fn next(&mut self, traveller: usize) -> Option<Sought> {
+    fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought> {
         let run = &mut self.runs[traveller];
-        if run.asked > 0 {
-            run.nearest[run.asked - 1] = run.best;
+        if let Some(NearestTriangle { on, geometry, primitive }) = last {
+            let asked = run.asked - 1;
+            run.nearest[asked] = Some(NearestPoint::new(run.points[asked], on, geometry, primitive));
         }
         loop {
             let point = *run.points.get(run.asked)?;
@@ -129,27 +117,25 @@ impl Surveyor for Survey<'_> {
                 continue;
             }
             let (local, error) = self.precise.frame.blurred_point(point);
-            if local.abs().max_element() > FARTHEST {
-                run.nearest[run.asked - 1] = self.precise.nearest_of_all(point);
-                continue;
+            if local.abs().max_element() <= FARTHEST {
+                return Some(Sought { point, local, error: error as f32 * 1.01 });
             }
-            run.best = run.best.map(|last| {
-                let (geometry, primitive) = last.id();
-                NearestPoint::on(point, self.precise.corners(geometry, primitive), geometry, primitive)
-            });
-            let wanted = self.runs[traveller].best.as_ref().map_or(f64::INFINITY, |best| self.distance(best));
-            return Some(Sought { point: local, error: error as f32 * 1.01, wanted });
+            run.nearest[run.asked - 1] = self.precise.nearest_of_all(point);
         }
     }
 
-    fn measure(&mut self, traveller: usize, geometry: u32, primitive: u32, rounded: &[Vec3; 3]) -> f64 {
-        let corners =
-            if self.is_exact { rounded.map(|p| p.as_dvec3()) } else { self.precise.corners(geometry, primitive) };
-        let run = &mut self.runs[traveller];
-        let answer = NearestPoint::on(run.points[run.asked - 1], corners, geometry, primitive);
-        if run.best.as_ref().is_none_or(|best| answer.is_before(best)) {
-            run.best = Some(answer);
-        }
-        self.runs[traveller].best.as_ref().map_or(f64::INFINITY, |best| self.distance(best))
+    #[inline]
+    fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
+        self.precise.corners(geometry, primitive)
+    }
+
+    #[inline]
+    fn is_exact(&self) -> bool {
+        self.precise.frame.is_identity()
+    }
+
+    #[inline]
+    fn scale(&self) -> f64 {
+        self.precise.frame.scale()
     }
 }

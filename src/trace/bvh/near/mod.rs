@@ -8,37 +8,52 @@
 //! Points are in flight together, as rays are ([`super::flight`]): alone, one waits for each node until it knows the next.
 
 mod bounds;
+mod measure;
 mod waiting;
 
 use super::Bvh;
 use super::addresses::Addresses;
+use super::block::{Block, LANES};
 use super::discs::Discs;
 use super::isa::{self, Kernel};
 use super::node::{Child, Node};
 use super::set::{Set, TRAVELLERS};
-use super::simd::Simd;
+use super::simd::{Array, Doubles, Simd};
 use super::triangles::TriangleTree;
-use crate::math::{UNIT_ROUNDOFF, Vec3};
+use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
+use crate::shape::closest::TrianglePoint;
 use bounds::{Lower, enter, lower_bounds};
+use measure::{Corners, Measured, by_axis};
 use waiting::Waiting;
 
-/// A point in the coordinates of a tree, finite.
+/// A point that is asked for, finite.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) struct Sought {
-    pub point: Vec3,
-    /// The point and the corners may be off by so much in each component, both together.
+    pub point: DVec3,
+    /// In the coordinates of the tree.
+    pub local: Vec3,
+    /// The local point and the corners may be off by so much in each component, both together.
     pub error: f32,
-    /// No triangle is wanted beyond this distance.
-    pub wanted: f64,
 }
 
-/// Who asks for points, and measures. Of each traveller, below [`Bvh::POINTS`], one point after the other is asked for.
+/// The triangle that is nearest to a point; of those as near that with the lowest ids.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::trace) struct NearestTriangle {
+    pub on: TrianglePoint,
+    pub geometry: u32,
+    pub primitive: u32,
+}
+
+/// Who asks for points, and has the corners as they were given.
 pub(in crate::trace) trait Surveyor {
-    /// The traveller's next point; everything that may be nearest to the one before was offered.
-    fn next(&mut self, traveller: usize) -> Option<Sought>;
-    /// Measures the distance of the traveller's point from a triangle, by its geometry, its primitive, and its corners in the tree. Says beyond which distance none is wanted
-    /// any more.
-    fn measure(&mut self, traveller: usize, geometry: u32, primitive: u32, corners: &[Vec3; 3]) -> f64;
+    /// The traveller's next point, and what is nearest to the one before.
+    fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought>;
+    /// The corners of a triangle as they were given, by its geometry and its primitive.
+    fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3];
+    /// Whether those in the tree are just these.
+    fn is_exact(&self) -> bool;
+    /// Lengths in the tree are so many times those that were given.
+    fn scale(&self) -> f64;
 }
 
 impl Bvh {
@@ -50,9 +65,9 @@ impl Bvh {
         Discs::new(&self.fixed.triangles)
     }
 
-    /// Offers the surveyor of each point every fixed triangle that may be the nearest, or as near, and no farther than wanted. Up to `most` points are
-    /// in flight; where there are no triangles nobody is asked. `discs` are this tree's.
-    pub(in crate::trace) fn near_triangles(&self, discs: &Discs, most: usize, surveyor: &mut dyn Surveyor) {
+    /// Finds the nearest fixed triangle of each point that is asked for. Up to `most` points are in flight; where there are no triangles nobody is asked.
+    /// `discs` are this tree's.
+    pub(in crate::trace) fn near_triangles(&self, discs: &Discs, most: usize, surveyor: &mut impl Surveyor) {
         let triangles = &self.fixed.triangles;
         if !triangles.tree().is_empty() {
             let mut seekers = vec![Seeker::NOBODY; most.min(Self::POINTS)];
@@ -61,43 +76,93 @@ impl Bvh {
     }
 }
 
-/// A point on its way.
+/// A point on its way. What steps need is in one cache line.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct Seeker {
-    point: Vec3,
+    /// In the coordinates of the tree.
+    local: Vec3,
     /// As [`Sought::error`].
     error: f32,
     /// By how much a box is nearer than it seems, along each axis.
     pad: f32,
     /// No triangle is wanted beyond this distance; rounded up.
     limit: f32,
+    point: DVec3,
+    /// The squared distance of the nearest triangle so far, infinite before there is one;
+    square: f64,
+    /// its geometry and primitive,
+    id: (u32, u32),
+    /// and its corners.
+    corners: Corners,
     waiting: Waiting,
 }
 
 impl Seeker {
-    const NOBODY: Self = Self { point: Vec3::ZERO, error: 0.0, pad: 0.0, limit: 0.0, waiting: Waiting::NOBODY };
+    const NOBODY: Self = Self {
+        local: Vec3::ZERO,
+        error: 0.0,
+        pad: 0.0,
+        limit: 0.0,
+        point: DVec3::ZERO,
+        square: f64::INFINITY,
+        id: (u32::MAX, u32::MAX),
+        corners: [[0.0; 4]; 3],
+        waiting: Waiting::NOBODY,
+    };
 
-    /// Sets out in a tree with this reach.
+    /// Sets out in a tree with this reach, and this scale; with the triangle that was nearest to the point before, for it may be near this one too.
     #[inline(always)]
-    fn start(&mut self, Sought { point, error, wanted }: Sought, reach: Vec3) {
-        let span = (point.abs() + reach).max_element();
-        (self.point, self.error, self.pad) = (point, error, error + 4.0 * UNIT_ROUNDOFF * span);
-        self.limit = self.rounded_up(wanted);
+    fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, reach: Vec3, scale: f64) {
+        let span = (local.abs() + reach).max_element();
+        (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * span);
+        self.point = point;
+        if self.square < f64::INFINITY {
+            self.square = self.measured::<S>().square();
+        }
+        self.limit = self.reach(scale);
         self.waiting.clear();
     }
 
-    /// For the rounding of what was measured.
+    /// The nearest triangle so far.
     #[inline(always)]
-    fn rounded_up(&self, wanted: f64) -> f32 {
-        (wanted as f32) * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * self.error + f32::MIN_POSITIVE
+    fn measured<S: Simd>(&self) -> Measured<S::D4> {
+        let [x, y, z] = &self.corners;
+        Measured::new(self.point, [S::D4::load(x), S::D4::load(y), S::D4::load(z)])
+    }
+
+    #[inline(always)]
+    fn nearest<S: Simd>(&self) -> Option<NearestTriangle> {
+        let (geometry, primitive) = self.id;
+        (self.square < f64::INFINITY).then(
+            #[inline(always)]
+            || NearestTriangle { on: self.measured::<S>().point(), geometry, primitive },
+        )
+    }
+
+    /// Takes a triangle if it is nearer. Whether it is.
+    #[inline(always)]
+    fn take<D: Doubles>(&mut self, corners: [D; 3], id: (u32, u32)) -> bool {
+        let square = Measured::new(self.point, corners).square();
+        let is_nearer = square < self.square || square == self.square && id < self.id;
+        if is_nearer {
+            (self.square, self.id) = (square, id);
+            self.corners = [corners[0].to_array(), corners[1].to_array(), corners[2].to_array()];
+        }
+        is_nearer
+    }
+
+    /// How far the nearest triangle is in the tree, and more for the rounding.
+    #[inline(always)]
+    fn reach(&self, scale: f64) -> f32 {
+        (self.square.sqrt() * scale) as f32 * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * self.error + f32::MIN_POSITIVE
     }
 
     /// One node. What it reaches next.
     #[inline(always)]
     fn enter<S: Simd>(&mut self, discs: &Discs, parent: Child, node: &Node) -> Child {
         let limit = self.limit * self.limit;
-        let (mask, near) = enter::<S>(discs, parent, node, self.point, self.pad, limit);
+        let (mask, near) = enter::<S>(discs, parent, node, self.local, self.pad, limit);
         self.waiting.enter::<S>(near, mask, &node.child)
     }
 }
@@ -119,15 +184,15 @@ fn fetch<S: Simd>(addresses: &Addresses, discs: &Discs, next: Child) {
     S::prefetch(discs.address::<S>(next));
 }
 
-struct Near<'a> {
+struct Near<'a, Y> {
     triangles: &'a TriangleTree,
     discs: &'a Discs,
     /// One for each traveller.
     seekers: &'a mut [Seeker],
-    surveyor: &'a mut dyn Surveyor,
+    surveyor: &'a mut Y,
 }
 
-impl Near<'_> {
+impl<Y: Surveyor> Near<'_, Y> {
     /// Goes through what a seeker has seen. What it reaches next, if that is another child now.
     #[inline(always)]
     fn measure<S: Simd>(&mut self, sight: &Sight<S::V8>) -> Option<Child> {
@@ -138,12 +203,16 @@ impl Near<'_> {
         while open != 0 {
             let lane = lower.nearest(open);
             open &= !(1 << lane);
-            let geometry = self.triangles.part(block.part[lane]).geometry;
-            let wanted = self.surveyor.measure(*k, geometry, block.primitive[lane], &block.triangle(lane));
-            let limit = seeker.rounded_up(wanted);
-            if limit < seeker.limit {
-                seeker.limit = limit;
-                open &= lower.within(limit);
+            let (geometry, primitive) = (self.triangles.part(block.part[lane]).geometry, block.primitive[lane]);
+            let corners = if self.surveyor.is_exact() {
+                wide_corners::<S>(block, lane)
+            } else {
+                let [x, y, z] = by_axis(self.surveyor.corners(geometry, primitive));
+                [S::D4::load(&x), S::D4::load(&y), S::D4::load(&z)]
+            };
+            if seeker.take(corners, (geometry, primitive)) {
+                seeker.limit = seeker.reach(self.surveyor.scale());
+                open &= lower.within(seeker.limit);
             }
         }
         let limit = seeker.limit;
@@ -154,7 +223,19 @@ impl Near<'_> {
     }
 }
 
-impl Kernel for Near<'_> {
+/// The corners of one triangle of a block, axis by axis.
+#[inline(always)]
+fn wide_corners<S: Simd>(block: &Block, lane: usize) -> [S::D4; 3] {
+    let [x, y, z] = &block.corners;
+    [wide::<S>(x, lane), wide::<S>(y, lane), wide::<S>(z, lane)]
+}
+
+#[inline(always)]
+fn wide<S: Simd>([a, b, c]: &[[f32; LANES]; 3], lane: usize) -> S::D4 {
+    S::D4::widen(S::V4::load(&[a[lane], b[lane], c[lane], 0.0]))
+}
+
+impl<Y: Surveyor> Kernel for Near<'_, Y> {
     type Output = ();
 
     #[inline(always)]
@@ -171,8 +252,9 @@ impl Kernel for Near<'_> {
                 (S::highest_bits(bytemuck::cast_ref(&next)), S::equal(bytemuck::cast_ref(&next), Child::NONE.0));
             let mut at_nodes = flying.of(!leaf);
             for k in flying.of(none) {
-                if let Some(sought) = self.surveyor.next(k) {
-                    self.seekers[k].start(sought, reach);
+                let seeker = &mut self.seekers[k];
+                if let Some(sought) = self.surveyor.next(k, seeker.nearest::<S>()) {
+                    seeker.start::<S>(sought, reach, self.surveyor.scale());
                     next[k] = Child::ROOT;
                     at_nodes.insert(k);
                 } else {
@@ -187,7 +269,7 @@ impl Kernel for Near<'_> {
             for k in flying.of(leaf & !none) {
                 let (seeker, leaf, mut scratch) = (&mut self.seekers[k], next[k], None);
                 let block = triangles.block(leaf.first(), &mut scratch);
-                let lower = lower_bounds::<S>(block, seeker.point, seeker.error);
+                let lower = lower_bounds::<S>(block, seeker.local, seeker.error);
                 let open = lower.within(seeker.limit) & block.lanes;
                 sights[count % TRAVELLERS] = Sight { seeker: k, leaf, lower, open };
                 count += usize::from(open != 0);

@@ -7,12 +7,14 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+pub(super) mod doubles;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx512::Avx512;
+pub(super) use doubles::Doubles;
 pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::{Avx2, V8};
@@ -162,32 +164,6 @@ pub(super) trait Group: Vector {
     fn put(self, values: &mut PerRay, group: usize);
     /// Sets the group's values where the mask holds. All of them are stored: see [`Array::overwrite`].
     fn put_where(self, mask: Self::Mask, values: &mut [f32; RAYS], group: usize);
-}
-
-/// Four values of f64.
-pub(super) trait Doubles: Three + Copy {
-    /// As many f32.
-    type F: Array<4>;
-    fn splat(value: f64) -> Self;
-    fn load(values: &[f64; 4]) -> Self;
-    /// Exact.
-    fn widen(values: Self::F) -> Self;
-    /// Rounded to nearest.
-    fn narrow(self) -> Self::F;
-    fn to_array(self) -> [f64; 4];
-    fn add(self, other: Self) -> Self;
-    fn sub(self, other: Self) -> Self;
-    fn mul(self, other: Self) -> Self;
-    fn div(self, other: Self) -> Self;
-    /// The second where one is NaN.
-    fn max(self, other: Self) -> Self;
-    /// The second where one is NaN.
-    fn min(self, other: Self) -> Self;
-    fn abs(self) -> Self;
-    /// Bit i is set where self is less than other in lane i; not for NaN.
-    fn less(self, other: Self) -> u32;
-    /// Of each of them the sum of its first three lanes, in their order.
-    fn sums(of: [Self; 4]) -> Self;
 }
 
 #[cfg(test)]

@@ -326,6 +326,17 @@ impl Doubles for [f64; 4] {
         bits
     }
     #[inline(always)]
+    fn less_select(self, other: Self, yes: Self, no: Self) -> Self {
+        std::array::from_fn(
+            #[inline(always)]
+            |i| if self[i] < other[i] { yes[i] } else { no[i] },
+        )
+    }
+    #[inline(always)]
+    fn first(self) -> Self {
+        [self[0]; 4]
+    }
+    #[inline(always)]
     fn widen(values: [f32; 4]) -> Self {
         values.map(f64::from)
     }

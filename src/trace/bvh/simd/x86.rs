@@ -557,6 +557,14 @@ impl Doubles for D4 {
         unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
     #[inline(always)]
+    fn less_select(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm256_blendv_pd(no.0, yes.0, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) })
+    }
+    #[inline(always)]
+    fn first(self) -> Self {
+        Self(unsafe { _mm256_permute4x64_pd::<0>(self.0) })
+    }
+    #[inline(always)]
     fn widen(values: V4) -> Self {
         Self(unsafe { _mm256_cvtps_pd(values.0) })
     }
