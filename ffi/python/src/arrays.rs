@@ -10,7 +10,7 @@ use twincast::Ray;
 use twincast::math::{DVec3, Vec3};
 use twincast::trace::precise::PreciseRay;
 
-/// Rays that a thread takes at a time.
+/// Rays, or points, that a thread takes at a time.
 pub const CHUNK: usize = 1024;
 
 /// An array of three columns.

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::NearestPoint;
 
-use crate::arrays::{Points, Rows};
+use crate::arrays::{CHUNK, Points, Rows};
 use crate::order::{self, Order};
 use crate::pool;
 use crate::scene::{INVALID, Scene, table};
@@ -19,9 +19,6 @@ type Nearest<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray1<f64>>,
 );
-
-/// Points that a thread takes at a time.
-const CHUNK: usize = 256;
 
 /// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`.
 fn along<T: Copy + Send + Sync>(rows: &Rows<'_>, none: T, ask: impl Fn(&[DVec3], &mut [T]) + Sync) -> Vec<T> {
