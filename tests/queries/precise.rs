@@ -184,7 +184,7 @@ fn square(point: DVec3, corners: [DVec3; 3]) -> f64 {
     if is_above { edges.min(a.dot(normal).powi(2)) } else { edges }
 }
 
-/// Points of a batch travel together; each has the answer that it gets by itself, and no triangle is nearer, or as near with a lower number.
+/// Points of a batch travel together; each has the answer that it gets by itself, and no triangle is nearer.
 #[test]
 fn points_that_travel_together_have_each_their_nearest() {
     let mut random = Random::new(9);
@@ -220,6 +220,19 @@ fn points_that_travel_together_have_each_their_nearest() {
                 assert!(off <= 1e-9 * nearest + 1e-15, "{point}: {} and {nearest}", found.distance_squared);
             }
         }
+    }
+}
+
+/// However small a triangle is, its inside is nearer than its edges to a point above it.
+#[test]
+fn small_triangles_have_an_inside() {
+    for exponent in [-1, -80, -200, -400] {
+        let size = 2f64.powi(exponent);
+        let positions = vec![DVec3::ZERO, DVec3::X * size, DVec3::Y * size];
+        let precise = Precise::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a mesh");
+        let found = precise.nearest_point(DVec3::new(0.25, 0.25, 1.0) * size).expect("a point");
+        assert_eq!((found.u, found.v, found.distance_squared), (0.25, 0.25, size * size), "2^{exponent}");
+        assert_eq!(found.point, DVec3::new(0.25, 0.25, 0.0) * size);
     }
 }
 

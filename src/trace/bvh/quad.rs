@@ -2,8 +2,8 @@
 //!
 //! The same operations in the same order as [`triangle::intersect`], so the same bits; none is fused.
 
-use super::simd::Array;
-use super::simd::doubles::{Doubles, cross, dot, minus, size};
+use super::simd::doubles::{cross, dot, minus, size};
+use super::simd::{Array, Doubles};
 use crate::shape::triangle;
 
 /// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers of a hit with.

@@ -106,7 +106,7 @@ pub struct Precise {
     meshes: Vec<PreciseMesh>,
     bvh: Bvh,
     bounds: DAabb,
-    /// Made for the first point that is asked for.
+    /// Made for the first point that is asked for and finite.
     discs: OnceLock<Discs>,
     /// Found out when it is first asked.
     closed: OnceLock<bool>,

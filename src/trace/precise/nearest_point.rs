@@ -1,6 +1,6 @@
 //! The point of the meshes that is nearest to a given one.
 //!
-//! The tree offers what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
+//! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
 use super::{Precise, is_traceable};
 use crate::math::DVec3;
@@ -54,21 +54,24 @@ impl Precise {
         nearest[0]
     }
 
-    /// The same for many points, into `nearest` of the same length. Sooner where one point is near the next: the triangle that was
-    /// nearest to the last one is looked at first.
+    /// The same for many points, into `nearest` of the same length. Up to 32 stretches of them go side by side; sooner where in each of these one point is near
+    /// the next: the triangle that was nearest to the last one is looked at first.
     ///
     /// # Panics
     /// Unless there is one answer a point.
     pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
         assert_eq!(points.len(), nearest.len(), "one answer a point");
         nearest.fill(None);
+        if !points.iter().any(|point| point.is_finite()) {
+            return;
+        }
         let run = points.len().div_ceil(Bvh::POINTS).max(1);
         let mut survey = Survey { precise: self, runs: Vec::new() };
         for (points, nearest) in points.chunks(run).zip(nearest.chunks_mut(run)) {
             survey.runs.push(Run { points, nearest, asked: 0 });
         }
         let discs = self.discs.get_or_init(|| self.bvh.discs());
-        self.bvh.near_triangles(discs, survey.runs.len(), &mut survey);
+        self.bvh.nearest_triangles(discs, survey.runs.len(), &mut survey);
     }
 
     /// By a look at every triangle, which are all about as far away.

@@ -11,7 +11,7 @@ use crate::trace::bvh::discs::Discs;
 use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, size};
 
-/// The children of `parent`, whose node is given, that are no farther than the square root of `limit`, and no more than the squared distance of each. Each component of
+/// The children of `parent`, whose node is given, that are no farther than the square root of `limit_squared`, and no more than the squared distance of each. Each component of
 /// the difference between a corner and the point may be less by `pad` than it seems.
 #[inline(always)]
 pub(super) fn enter<S: Simd>(
@@ -20,7 +20,7 @@ pub(super) fn enter<S: Simd>(
     node: &Node,
     point: Vec3,
     pad: f32,
-    limit: f32,
+    limit_squared: f32,
 ) -> (<S::V8 as Vector>::Mask, S::V8) {
     let (zero, padding) = (S::V8::splat(0.0), S::V8::splat(pad));
     let mut square = zero;
@@ -33,7 +33,7 @@ pub(super) fn enter<S: Simd>(
     }
     // Empty slots are infinitely far away.
     let near = square.mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF)).max(discs.near::<S>(parent, point, pad));
-    (near.at_most(S::V8::splat(limit.min(f32::MAX))), near)
+    (near.at_most(S::V8::splat(limit_squared.min(f32::MAX))), near)
 }
 
 /// Of each triangle of a block what its distance is no less than.

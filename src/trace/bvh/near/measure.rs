@@ -1,13 +1,15 @@
 //! The point of a triangle that is nearest to a given one, in f64, of all three edges at a time.
 //!
 //! The same operations in the same order as [`closest_point`](crate::shape::closest::closest_point), so the same bits; but which end of an edge comes
-//! first, and on which part of the triangle the point is, is decided without a branch, for which is anyone's guess.
+//! first, and on which part of the triangle the point is, is decided without a branch, for which is anyone's guess. Everything is scaled by a power of
+//! two, by which a triangle comes to be neither so small that products of four lengths vanish, nor so large that they overflow.
 
 use std::hint::select_unpredictable;
 
 use crate::math::DVec3;
 use crate::shape::closest::TrianglePoint;
-use crate::trace::bvh::simd::doubles::{Doubles, cross, dot, minus, plus, times};
+use crate::trace::bvh::simd::Doubles;
+use crate::trace::bvh::simd::doubles::{cross, dot, minus, plus, times};
 
 /// The corners of a triangle: of each axis those of all three, and a number that means nothing.
 pub(super) type Corners = [[f64; 4]; 3];
@@ -17,12 +19,13 @@ pub(super) fn by_axis([a, b, c]: [DVec3; 3]) -> Corners {
     [[a.x, b.x, c.x, 0.0], [a.y, b.y, c.y, 0.0], [a.z, b.z, c.z, 0.0]]
 }
 
-/// A triangle as seen from a point. Edge i is the one from corner i to the next, in lane i.
+/// A triangle as seen from a point, in scaled coordinates. Edge i is the one from corner i to the next, in lane i.
 pub(super) struct Measured<D> {
     /// The nearest points of the edges.
     offset: [D; 3],
     /// Where they are, from each edge's first corner to its second.
     share: D,
+    /// Their squared distances.
     square: [f64; 4],
     /// The foot of the perpendicular: where it is, and the weights of the corners.
     foot: DVec3,
@@ -52,11 +55,11 @@ fn less_select<D: Doubles>(a: D, b: D, yes: [D; 3], no: [D; 3]) -> [D; 3] {
 }
 
 impl<D: Doubles> Measured<D> {
-    /// `corners` one for each axis.
+    /// `corners` one for each axis, `scale` a power of two.
     #[inline(always)]
-    pub fn new(point: DVec3, corners: [D; 3]) -> Self {
+    pub fn new(point: DVec3, corners: [D; 3], scale: f64) -> Self {
         let (zero, one) = (D::splat(0.0), D::splat(1.0));
-        let p = minus(corners, [D::splat(point.x), D::splat(point.y), D::splat(point.z)]);
+        let p = times(minus(corners, [D::splat(point.x), D::splat(point.y), D::splat(point.z)]), D::splat(scale));
         let q = next(p);
         let along = minus(q, p);
 
@@ -88,7 +91,7 @@ impl<D: Doubles> Measured<D> {
         Self { offset, share, square: dot(offset, offset).to_array(), foot, weight, foot_square }
     }
 
-    /// The squared distance.
+    /// The squared distance, scaled.
     #[inline(always)]
     pub fn square(&self) -> f64 {
         let least = |a: f64, b: f64| if b < a { b } else { a };
@@ -96,6 +99,7 @@ impl<D: Doubles> Measured<D> {
         least(least(least(self.foot_square, a), b), c)
     }
 
+    /// The nearest point; offset and distance are scaled.
     #[inline(always)]
     pub fn point(&self) -> TrianglePoint {
         let distance_squared = self.square();
@@ -121,7 +125,7 @@ mod tests {
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Simd;
 
-    struct Measure(DVec3, [DVec3; 3]);
+    struct Measure(DVec3, [DVec3; 3], f64);
 
     impl Kernel for Measure {
         type Output = (f64, TrianglePoint);
@@ -129,7 +133,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self) -> Self::Output {
             let [x, y, z] = by_axis(self.1);
-            let measured = Measured::new(self.0, [S::D4::load(&x), S::D4::load(&y), S::D4::load(&z)]);
+            let measured = Measured::new(self.0, [S::D4::load(&x), S::D4::load(&y), S::D4::load(&z)], self.2);
             (measured.square(), measured.point())
         }
     }
@@ -159,8 +163,15 @@ mod tests {
             let expected = closest_point(point, corners);
             foots += usize::from(expected.u > 0.0 && expected.v > 0.0 && expected.u + expected.v < 1.0);
             for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-                let found = dispatch(isa, Measure(point, corners));
-                assert_eq!(found, (expected.distance_squared, expected), "{isa:?}: {point} from {corners:?}");
+                // Also where products of four lengths would vanish, or overflow.
+                for size in [1.0, 2f64.powi(-400), 2f64.powi(300)] {
+                    let found = dispatch(isa, Measure(point * size, corners.map(|corner| corner * size), size.recip()));
+                    assert_eq!(
+                        found,
+                        (expected.distance_squared, expected),
+                        "{isa:?}: {point} from {corners:?}, {size}"
+                    );
+                }
             }
         }
         assert!((2000..18_000).contains(&foots), "{foots} above the middle");

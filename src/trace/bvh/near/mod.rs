@@ -1,4 +1,4 @@
-//! The triangles that may be nearest to points, offered to whoever measures.
+//! The triangle that is nearest to each of many points: the others are left out in f32, those that remain are measured in f64.
 //!
 //! The nearest child is gone down to first, the others wait with the distance of their boxes and discs (Roussopoulos, Kelley, Vincent 1995,
 //! *Nearest neighbor queries*), eight at a time. [`closest_point`](super::closest_point) opens boxes strictly by distance: it
@@ -29,8 +29,9 @@ use waiting::Waiting;
 /// A point that is asked for, finite.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) struct Sought {
+    /// In the coordinates of the corners as they were given.
     pub point: DVec3,
-    /// In the coordinates of the tree.
+    /// In the coordinates of the tree; no component above 1e18, so that squares of distances hold in f32.
     pub local: Vec3,
     /// The local point and the corners may be off by so much in each component, both together.
     pub error: f32,
@@ -39,6 +40,7 @@ pub(in crate::trace) struct Sought {
 /// The triangle that is nearest to a point; of those as near that with the lowest ids.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) struct NearestTriangle {
+    /// The nearest of its points, in the coordinates of the corners as they were given.
     pub on: TrianglePoint,
     pub geometry: u32,
     pub primitive: u32,
@@ -46,13 +48,13 @@ pub(in crate::trace) struct NearestTriangle {
 
 /// Who asks for points, and has the corners as they were given.
 pub(in crate::trace) trait Surveyor {
-    /// The traveller's next point, and what is nearest to the one before.
+    /// Is told what is nearest to the traveller's last point, if it had one, and says its next one. After None it is not asked for that traveller again.
     fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought>;
     /// The corners of a triangle as they were given, by its geometry and its primitive.
     fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3];
     /// Whether those in the tree are just these.
     fn is_exact(&self) -> bool;
-    /// Lengths in the tree are so many times those that were given.
+    /// Lengths in the tree are so many times those that were given: a power of two.
     fn scale(&self) -> f64;
 }
 
@@ -60,23 +62,24 @@ impl Bvh {
     /// Points in flight.
     pub(in crate::trace) const POINTS: usize = TRAVELLERS;
 
-    /// What [`near_triangles`](Self::near_triangles) looks at besides boxes.
+    /// What [`nearest_triangles`](Self::nearest_triangles) looks at besides boxes.
     pub(in crate::trace) fn discs(&self) -> Discs {
         Discs::new(&self.fixed.triangles)
     }
 
-    /// Finds the nearest fixed triangle of each point that is asked for. Up to `most` points are in flight; where there are no triangles nobody is asked.
-    /// `discs` are this tree's.
-    pub(in crate::trace) fn near_triangles(&self, discs: &Discs, most: usize, surveyor: &mut impl Surveyor) {
+    /// Finds the nearest fixed triangle of each point that is asked for, by so many travellers, no more than [`Self::POINTS`]; where there are no triangles nobody
+    /// is asked. `discs` are this tree's.
+    pub(in crate::trace) fn nearest_triangles(&self, discs: &Discs, travellers: usize, surveyor: &mut impl Surveyor) {
+        debug_assert!(travellers <= Self::POINTS, "{travellers} travellers");
         let triangles = &self.fixed.triangles;
         if !triangles.tree().is_empty() {
-            let mut seekers = vec![Seeker::NOBODY; most.min(Self::POINTS)];
+            let mut seekers = vec![Seeker::NOBODY; travellers.min(Self::POINTS)];
             isa::dispatch(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
         }
     }
 }
 
-/// A point on its way. What steps need is in one cache line.
+/// A point on its way. What steps need is in one cache line, but for what waits.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct Seeker {
@@ -88,8 +91,9 @@ struct Seeker {
     pad: f32,
     /// No triangle is wanted beyond this distance; rounded up.
     limit: f32,
+    /// As [`Sought::point`].
     point: DVec3,
-    /// The squared distance of the nearest triangle so far, infinite before there is one;
+    /// The squared distance of the nearest triangle so far, in the tree; infinite before there is one;
     square: f64,
     /// its geometry and primitive,
     id: (u32, u32),
@@ -118,32 +122,38 @@ impl Seeker {
         (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * span);
         self.point = point;
         if self.square < f64::INFINITY {
-            self.square = self.measured::<S>().square();
+            self.square = self.measured::<S>(scale).square();
         }
-        self.limit = self.reach(scale);
+        self.limit = self.rounded_limit();
         self.waiting.clear();
     }
 
     /// The nearest triangle so far.
     #[inline(always)]
-    fn measured<S: Simd>(&self) -> Measured<S::D4> {
+    fn measured<S: Simd>(&self, scale: f64) -> Measured<S::D4> {
         let [x, y, z] = &self.corners;
-        Measured::new(self.point, [S::D4::load(x), S::D4::load(y), S::D4::load(z)])
+        Measured::new(self.point, [S::D4::load(x), S::D4::load(y), S::D4::load(z)], scale)
     }
 
+    /// The same as it is told.
     #[inline(always)]
-    fn nearest<S: Simd>(&self) -> Option<NearestTriangle> {
+    fn nearest<S: Simd>(&self, scale: f64) -> Option<NearestTriangle> {
         let (geometry, primitive) = self.id;
         (self.square < f64::INFINITY).then(
             #[inline(always)]
-            || NearestTriangle { on: self.measured::<S>().point(), geometry, primitive },
+            || {
+                let TrianglePoint { offset, distance_squared, u, v } = self.measured::<S>(scale).point();
+                let inverse = scale.recip();
+                let (offset, distance_squared) = (offset * inverse, distance_squared * inverse * inverse);
+                NearestTriangle { on: TrianglePoint { offset, distance_squared, u, v }, geometry, primitive }
+            },
         )
     }
 
     /// Takes a triangle if it is nearer. Whether it is.
     #[inline(always)]
-    fn take<D: Doubles>(&mut self, corners: [D; 3], id: (u32, u32)) -> bool {
-        let square = Measured::new(self.point, corners).square();
+    fn take<D: Doubles>(&mut self, corners: [D; 3], id: (u32, u32), scale: f64) -> bool {
+        let square = Measured::new(self.point, corners, scale).square();
         let is_nearer = square < self.square || square == self.square && id < self.id;
         if is_nearer {
             (self.square, self.id) = (square, id);
@@ -154,15 +164,14 @@ impl Seeker {
 
     /// How far the nearest triangle is in the tree, and more for the rounding.
     #[inline(always)]
-    fn reach(&self, scale: f64) -> f32 {
-        (self.square.sqrt() * scale) as f32 * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * self.error + f32::MIN_POSITIVE
+    fn rounded_limit(&self) -> f32 {
+        self.square.sqrt() as f32 * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * self.error + f32::MIN_POSITIVE
     }
 
     /// One node. What it reaches next.
     #[inline(always)]
     fn enter<S: Simd>(&mut self, discs: &Discs, parent: Child, node: &Node) -> Child {
-        let limit = self.limit * self.limit;
-        let (mask, near) = enter::<S>(discs, parent, node, self.local, self.pad, limit);
+        let (mask, near) = enter::<S>(discs, parent, node, self.local, self.pad, self.limit * self.limit);
         self.waiting.enter::<S>(near, mask, &node.child)
     }
 }
@@ -199,7 +208,7 @@ impl<Y: Surveyor> Near<'_, Y> {
         let Sight { seeker: k, leaf, lower, open } = sight;
         let (seeker, mut open, mut scratch) = (&mut self.seekers[*k], *open, None);
         let block = self.triangles.block(leaf.first(), &mut scratch);
-        let before = seeker.limit;
+        let (before, scale) = (seeker.limit, self.surveyor.scale());
         while open != 0 {
             let lane = lower.nearest(open);
             open &= !(1 << lane);
@@ -210,8 +219,8 @@ impl<Y: Surveyor> Near<'_, Y> {
                 let [x, y, z] = by_axis(self.surveyor.corners(geometry, primitive));
                 [S::D4::load(&x), S::D4::load(&y), S::D4::load(&z)]
             };
-            if seeker.take(corners, (geometry, primitive)) {
-                seeker.limit = seeker.reach(self.surveyor.scale());
+            if seeker.take(corners, (geometry, primitive), scale) {
+                seeker.limit = seeker.rounded_limit();
                 open &= lower.within(seeker.limit);
             }
         }
@@ -252,9 +261,9 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
                 (S::highest_bits(bytemuck::cast_ref(&next)), S::equal(bytemuck::cast_ref(&next), Child::NONE.0));
             let mut at_nodes = flying.of(!leaf);
             for k in flying.of(none) {
-                let seeker = &mut self.seekers[k];
-                if let Some(sought) = self.surveyor.next(k, seeker.nearest::<S>()) {
-                    seeker.start::<S>(sought, reach, self.surveyor.scale());
+                let (seeker, scale) = (&mut self.seekers[k], self.surveyor.scale());
+                if let Some(sought) = self.surveyor.next(k, seeker.nearest::<S>(scale)) {
+                    seeker.start::<S>(sought, reach, scale);
                     next[k] = Child::ROOT;
                     at_nodes.insert(k);
                 } else {
@@ -280,6 +289,129 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
                 if let Some(child) = self.measure::<S>(sight) {
                     next[sight.seeker] = child;
                     fetch::<S>(&addresses, discs, child);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Geometry, Material, Mesh, Scene};
+    use crate::shape::closest::closest_point;
+    use crate::trace::World;
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::{Isa, Options, Preset};
+
+    /// Traveller k asks for points k, k + [`Bvh::POINTS`] and so on.
+    struct Survey<'a> {
+        points: &'a [Vec3],
+        geometries: &'a [Vec<[Vec3; 3]>],
+        /// The corners as they were given are so many times those in the tree.
+        size: f64,
+        is_exact: bool,
+        asked: [usize; Bvh::POINTS],
+        found: Vec<Option<NearestTriangle>>,
+    }
+
+    impl Surveyor for Survey<'_> {
+        fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought> {
+            let asked = &mut self.asked[traveller];
+            if *asked > 0 {
+                self.found[traveller + (*asked - 1) * Bvh::POINTS] = last;
+            }
+            let &local = self.points.get(traveller + *asked * Bvh::POINTS)?;
+            *asked += 1;
+            Some(Sought { point: local.as_dvec3() * self.size, local, error: 0.0 })
+        }
+
+        fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
+            self.geometries[geometry as usize][primitive as usize].map(|corner| corner.as_dvec3() * self.size)
+        }
+
+        fn is_exact(&self) -> bool {
+            self.is_exact
+        }
+
+        fn scale(&self) -> f64 {
+            self.size.recip()
+        }
+    }
+
+    /// Of a hilly grid, all of it in the second geometry, some of it again in the first, in another order.
+    fn geometries(random: &mut Random) -> [Vec<[Vec3; 3]>; 2] {
+        const SIDE: usize = 9;
+        let heights: Vec<f32> = (0..SIDE * SIDE).map(|_| (random.unit() * 2.0).round()).collect();
+        let at = |x: usize, y: usize| Vec3::new(x as f32, y as f32, heights[y * SIDE + x]);
+        let mut whole: Vec<_> = (0..SIDE - 1)
+            .flat_map(|y| (0..SIDE - 1).map(move |x| (x, y)))
+            .flat_map(|(x, y)| {
+                let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+                [[a, b, d], [d, c, a]]
+            })
+            .collect();
+        for i in (1..whole.len()).rev() {
+            whole.swap(i, ((random.unit() + 1.0) * 0.5 * (i + 1) as f32) as usize);
+        }
+        let again = whole.iter().rev().step_by(3).map(|&[a, b, c]| [b, c, a]).collect();
+        [again, whole]
+    }
+
+    /// Of the triangles that are as near as any the one with the lowest ids, whatever finds it; corners and edges belong to many.
+    #[test]
+    fn the_nearest_triangle_has_the_lowest_ids() {
+        let mut random = Random::new(21);
+        let geometries = geometries(&mut random);
+        let mesh = |triangles: &Vec<[Vec3; 3]>| {
+            let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
+            Geometry::Mesh(Mesh::new(triangles.concat(), indices.collect()))
+        };
+        let scene = Scene::from_geometries(geometries.iter().map(mesh).collect(), vec![Material::default()]);
+        let world = World::new(&scene).expect("meshes");
+        let mut points: Vec<Vec3> =
+            (0..300).map(|_| (random.vec3() * 12.0).round() * 0.5 + Vec3::new(4.0, 4.0, 0.0)).collect();
+        points.extend((0..30).map(|_| random.vec3() * 5.0));
+        let mut ties = 0;
+        let expected: Vec<_> = points
+            .iter()
+            .map(|point| {
+                let of = |(geometry, triangles): (u32, &Vec<[Vec3; 3]>)| {
+                    let on =
+                        |corners: &[Vec3; 3]| closest_point(point.as_dvec3(), corners.map(|corner| corner.as_dvec3()));
+                    triangles
+                        .iter()
+                        .map(on)
+                        .zip(0..)
+                        .map(|(on, primitive)| (on, geometry, primitive))
+                        .collect::<Vec<_>>()
+                };
+                let all: Vec<(TrianglePoint, u32, u32)> = (0..).zip(&geometries).flat_map(of).collect();
+                let least = all.iter().map(|(on, ..)| on.distance_squared).fold(f64::INFINITY, f64::min);
+                let mut nearest = all.into_iter().filter(|(on, ..)| on.distance_squared == least);
+                let first = nearest.next().expect("some triangle");
+                ties += usize::from(nearest.next().is_some());
+                first
+            })
+            .collect();
+        assert!(ties > 250, "{ties} ties of {}", points.len());
+
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for preset in Preset::ALL {
+                let bvh = Bvh::build_with(&world, Options { preset, isa, progress: None });
+                // Also corners so small that products of four lengths vanish.
+                for (size, is_exact) in [(1.0, true), (1.0, false), (2f64.powi(-300), false)] {
+                    let (asked, found) = ([0; Bvh::POINTS], vec![None; points.len()]);
+                    let mut survey = Survey { points: &points, geometries: &geometries, size, is_exact, asked, found };
+                    bvh.nearest_triangles(&bvh.discs(), Bvh::POINTS, &mut survey);
+                    for ((found, (on, geometry, primitive)), point) in survey.found.iter().zip(&expected).zip(&points) {
+                        let found = found.expect("there are triangles");
+                        let context = format!("{isa:?}, {preset:?}, {size}: {point}");
+                        assert_eq!((found.geometry, found.primitive), (*geometry, *primitive), "{context}");
+                        assert_eq!(found.on.offset, on.offset * size, "{context}");
+                        assert_eq!(found.on.distance_squared, on.distance_squared * size * size, "{context}");
+                        assert_eq!((found.on.u, found.on.v), (on.u, on.v), "{context}");
+                    }
                 }
             }
         }

@@ -55,25 +55,25 @@ impl Waiting {
         select_unpredictable(is_more, leaf.rest(), self.children[self.len % MOST])
     }
 
-    /// What is beyond the limit waits no more. Past a block of a leaf, again: where [`Self::pass`] has led may be beyond it, too.
+    /// What is beyond the limit, a squared distance, waits no more. Past a block of a leaf, again: where [`Self::pass`] has led may be beyond it, too.
     #[inline(always)]
-    pub fn pass_within<S: Simd>(&mut self, leaf: Child, limit: f32) -> Child {
+    pub fn pass_within<S: Simd>(&mut self, leaf: Child, limit_squared: f32) -> Child {
         // What it came to from the stack is above the top still.
         self.len += usize::from(leaf.count() == 1);
-        self.shorten::<S>(limit);
+        self.shorten::<S>(limit_squared);
         self.pass(leaf)
     }
 
     /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to guess how many.
     #[inline(always)]
-    fn shorten<S: Simd>(&mut self, limit: f32) {
+    fn shorten<S: Simd>(&mut self, limit_squared: f32) {
         let (len, mut kept) = (self.len % MOST, 1);
         for first in (1..len).step_by(WIDTH) {
             let (nears, children) = (self.near[first..].first_chunk(), self.children[first..].first_chunk());
             let (Some(&nears), Some(&children)) = (nears, children) else { break };
             let (near, stack) = (self.near[kept..].first_chunk_mut(), self.children[kept..].first_chunk_mut());
             let (Some(near), Some(stack)) = (near, stack) else { break };
-            kept += S::within(limit, (&nears, &children), len - first, near, stack);
+            kept += S::within(limit_squared, (&nears, &children), len - first, near, stack);
         }
         self.len = kept;
     }
