@@ -8,8 +8,9 @@ use std::hint::select_unpredictable;
 
 use crate::math::DVec3;
 use crate::shape::closest::TrianglePoint;
-use crate::trace::bvh::simd::Doubles;
+use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::simd::doubles::{cross, dot, minus, plus, times};
+use crate::trace::bvh::simd::{Array, Doubles, Simd};
 
 /// The corners of a triangle: of each axis those of all three, and a number that means nothing.
 pub(super) type Corners = [[f64; 4]; 3];
@@ -17,6 +18,18 @@ pub(super) type Corners = [[f64; 4]; 3];
 /// The corners, axis by axis.
 pub(super) fn by_axis([a, b, c]: [DVec3; 3]) -> Corners {
     [[a.x, b.x, c.x, 0.0], [a.y, b.y, c.y, 0.0], [a.z, b.z, c.z, 0.0]]
+}
+
+/// The corners of one triangle of a block, axis by axis.
+#[inline(always)]
+pub(super) fn of_block<S: Simd>(block: &Block, lane: usize) -> [S::D4; 3] {
+    let [x, y, z] = &block.corners;
+    [wide::<S>(x, lane), wide::<S>(y, lane), wide::<S>(z, lane)]
+}
+
+#[inline(always)]
+fn wide<S: Simd>([a, b, c]: &[[f32; LANES]; 3], lane: usize) -> S::D4 {
+    S::D4::widen(S::V4::load(&[a[lane], b[lane], c[lane], 0.0]))
 }
 
 /// A triangle as seen from a point, in scaled coordinates. Edge i is the one from corner i to the next, in lane i.
@@ -123,7 +136,6 @@ mod tests {
     use crate::shape::closest::closest_point;
     use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
     use crate::trace::bvh::random::Random;
-    use crate::trace::bvh::simd::Simd;
 
     struct Measure(DVec3, [DVec3; 3], f64);
 

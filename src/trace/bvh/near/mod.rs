@@ -9,22 +9,22 @@
 
 mod bounds;
 mod measure;
+mod seeker;
 mod waiting;
 
 use super::Bvh;
 use super::addresses::Addresses;
-use super::block::{Block, LANES};
 use super::discs::Discs;
 use super::isa::{self, Kernel};
-use super::node::{Child, Node};
+use super::node::Child;
 use super::set::{Set, TRAVELLERS};
-use super::simd::{Array, Doubles, Simd};
+use super::simd::{Doubles, Simd};
 use super::triangles::TriangleTree;
-use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::shape::closest::TrianglePoint;
-use bounds::{Lower, enter, lower_bounds};
-use measure::{Corners, Measured, by_axis};
-use waiting::Waiting;
+use bounds::{Lower, lower_bounds};
+use measure::{by_axis, of_block};
+use seeker::Seeker;
 
 /// A point that is asked for, finite.
 #[derive(Clone, Copy, Debug)]
@@ -79,103 +79,6 @@ impl Bvh {
     }
 }
 
-/// A point on its way. What steps need is in one cache line, but for what waits.
-#[repr(C, align(64))]
-#[derive(Clone, Copy)]
-struct Seeker {
-    /// In the coordinates of the tree.
-    local: Vec3,
-    /// As [`Sought::error`].
-    error: f32,
-    /// By how much a box is nearer than it seems, along each axis.
-    pad: f32,
-    /// No triangle is wanted beyond this distance; rounded up.
-    limit: f32,
-    /// As [`Sought::point`].
-    point: DVec3,
-    /// The squared distance of the nearest triangle so far, in the tree; infinite before there is one;
-    square: f64,
-    /// its geometry and primitive,
-    id: (u32, u32),
-    /// and its corners.
-    corners: Corners,
-    waiting: Waiting,
-}
-
-impl Seeker {
-    const NOBODY: Self = Self {
-        local: Vec3::ZERO,
-        error: 0.0,
-        pad: 0.0,
-        limit: 0.0,
-        point: DVec3::ZERO,
-        square: f64::INFINITY,
-        id: (u32::MAX, u32::MAX),
-        corners: [[0.0; 4]; 3],
-        waiting: Waiting::NOBODY,
-    };
-
-    /// Sets out in a tree with this reach, and this scale; with the triangle that was nearest to the point before, for it may be near this one too.
-    #[inline(always)]
-    fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, reach: Vec3, scale: f64) {
-        let span = (local.abs() + reach).max_element();
-        (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * span);
-        self.point = point;
-        if self.square < f64::INFINITY {
-            self.square = self.measured::<S>(scale).square();
-        }
-        self.limit = self.rounded_limit();
-        self.waiting.clear();
-    }
-
-    /// The nearest triangle so far.
-    #[inline(always)]
-    fn measured<S: Simd>(&self, scale: f64) -> Measured<S::D4> {
-        let [x, y, z] = &self.corners;
-        Measured::new(self.point, [S::D4::load(x), S::D4::load(y), S::D4::load(z)], scale)
-    }
-
-    /// The same as it is told.
-    #[inline(always)]
-    fn nearest<S: Simd>(&self, scale: f64) -> Option<NearestTriangle> {
-        let (geometry, primitive) = self.id;
-        (self.square < f64::INFINITY).then(
-            #[inline(always)]
-            || {
-                let TrianglePoint { offset, distance_squared, u, v } = self.measured::<S>(scale).point();
-                let inverse = scale.recip();
-                let (offset, distance_squared) = (offset * inverse, distance_squared * inverse * inverse);
-                NearestTriangle { on: TrianglePoint { offset, distance_squared, u, v }, geometry, primitive }
-            },
-        )
-    }
-
-    /// Takes a triangle if it is nearer. Whether it is.
-    #[inline(always)]
-    fn take<D: Doubles>(&mut self, corners: [D; 3], id: (u32, u32), scale: f64) -> bool {
-        let square = Measured::new(self.point, corners, scale).square();
-        let is_nearer = square < self.square || square == self.square && id < self.id;
-        if is_nearer {
-            (self.square, self.id) = (square, id);
-            self.corners = [corners[0].to_array(), corners[1].to_array(), corners[2].to_array()];
-        }
-        is_nearer
-    }
-
-    /// How far the nearest triangle is in the tree, and more for the rounding.
-    #[inline(always)]
-    fn rounded_limit(&self) -> f32 {
-        self.square.sqrt() as f32 * (1.0 + 4.0 * UNIT_ROUNDOFF) + 2.0 * self.error + f32::MIN_POSITIVE
-    }
-
-    /// One node. What it reaches next.
-    #[inline(always)]
-    fn enter<S: Simd>(&mut self, discs: &Discs, parent: Child, node: &Node) -> Child {
-        let (mask, near) = enter::<S>(discs, parent, node, self.local, self.pad, self.limit * self.limit);
-        self.waiting.enter::<S>(near, mask, &node.child)
-    }
-}
-
 /// What a seeker has seen at a leaf.
 #[derive(Clone, Copy)]
 struct Sight<V> {
@@ -214,7 +117,7 @@ impl<Y: Surveyor> Near<'_, Y> {
             open &= !(1 << lane);
             let (geometry, primitive) = (self.triangles.part(block.part[lane]).geometry, block.primitive[lane]);
             let corners = if self.surveyor.is_exact() {
-                wide_corners::<S>(block, lane)
+                of_block::<S>(block, lane)
             } else {
                 let [x, y, z] = by_axis(self.surveyor.corners(geometry, primitive));
                 [S::D4::load(&x), S::D4::load(&y), S::D4::load(&z)]
@@ -230,18 +133,6 @@ impl<Y: Surveyor> Near<'_, Y> {
             || seeker.waiting.pass_within::<S>(*leaf, limit * limit),
         )
     }
-}
-
-/// The corners of one triangle of a block, axis by axis.
-#[inline(always)]
-fn wide_corners<S: Simd>(block: &Block, lane: usize) -> [S::D4; 3] {
-    let [x, y, z] = &block.corners;
-    [wide::<S>(x, lane), wide::<S>(y, lane), wide::<S>(z, lane)]
-}
-
-#[inline(always)]
-fn wide<S: Simd>([a, b, c]: &[[f32; LANES]; 3], lane: usize) -> S::D4 {
-    S::D4::widen(S::V4::load(&[a[lane], b[lane], c[lane], 0.0]))
 }
 
 impl<Y: Surveyor> Kernel for Near<'_, Y> {
