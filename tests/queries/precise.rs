@@ -74,6 +74,9 @@ fn every_hit_is_that_of_exact_arithmetic() {
         let Case { corners, rays, precise, traced } = case(&mut random, away, scale);
         let mut first = vec![None; rays.len()];
         precise.closest_batch(&traced, &mut first);
+        let mut names = vec![None; rays.len()];
+        precise.first_batch(&traced, &mut names);
+        assert_eq!(names, first.iter().map(|hit| hit.map(|hit| (hit.geometry, hit.primitive))).collect::<Vec<_>>());
         let mut any = vec![false; rays.len()];
         precise.occluded_batch(&traced, &mut any);
         let (mut ends, mut all) = (Vec::new(), Vec::new());
@@ -107,6 +110,30 @@ fn every_hit_is_that_of_exact_arithmetic() {
             }
         }
         assert!(hits > 100, "{hits}");
+    }
+}
+
+/// A range that ends just before, at or behind the first hit, or begins there: what is named is what is hit within it.
+#[test]
+fn names_are_those_of_hits_within_the_range() {
+    let mut random = Random::new(7);
+    for (away, scale) in [(0, 1.0), (1 << 40, 1.0)] {
+        let Case { precise, traced, .. } = case(&mut random, away, scale);
+        let mut first = vec![None; traced.len()];
+        precise.closest_batch(&traced, &mut first);
+        let hit = traced.iter().zip(&first).filter_map(|(ray, hit)| hit.map(|hit| (*ray, hit.t)));
+        let ranged = |(ray, t): (PreciseRay, f64)| {
+            [(0.0, t.next_down()), (0.0, t), (0.0, t.next_up()), (t, f64::INFINITY), (t.next_up(), f64::INFINITY)]
+                .map(|(tmin, tmax)| PreciseRay { tmin, tmax, ..ray })
+        };
+        let rays: Vec<PreciseRay> =
+            hit.flat_map(ranged).filter(|ray| ray.tmin <= ray.tmax && ray.tmax >= 0.0).collect();
+        let (mut hits, mut names) = (vec![None; rays.len()], vec![None; rays.len()]);
+        precise.closest_batch(&rays, &mut hits);
+        precise.first_batch(&rays, &mut names);
+        assert_eq!(names, hits.iter().map(|hit| hit.map(|hit| (hit.geometry, hit.primitive))).collect::<Vec<_>>());
+        let misses = names.iter().filter(|name| name.is_none()).count();
+        assert!(misses > 100 && names.len() - misses > 300, "{misses} of {} miss", names.len());
     }
 }
 

@@ -77,10 +77,24 @@ impl Rows<'_> {
     #[inline]
     pub fn at(&self, row: usize) -> DVec3 {
         match self {
-            Self::F32(rows) => Vec3::new(rows[[row, 0]], rows[[row, 1]], rows[[row, 2]]).as_dvec3(),
+            Self::F32(rows) => vector(rows, row).as_dvec3(),
             Self::F64(rows) => DVec3::new(rows[[row, 0]], rows[[row, 1]], rows[[row, 2]]),
         }
     }
+
+    /// The same in f32.
+    #[inline]
+    fn rounded(&self, row: usize) -> Vec3 {
+        match self {
+            Self::F32(rows) => vector(rows, row),
+            Self::F64(_) => self.at(row).as_vec3(),
+        }
+    }
+}
+
+#[inline]
+fn vector(rows: &ArrayView2<'_, f32>, row: usize) -> Vec3 {
+    Vec3::new(rows[[row, 0]], rows[[row, 1]], rows[[row, 2]])
 }
 
 /// Rays of a query.
@@ -128,13 +142,23 @@ impl<'a> Rays<'a> {
 
     #[inline]
     pub fn at(&self, i: usize) -> PreciseRay {
-        let tmax = match self.tmax {
+        let (origin, direction) = (self.origins.at(i), self.directions.at(self.direction(i)));
+        PreciseRay { origin, direction, tmin: self.tmin, tmax: self.tmax(i) }
+    }
+
+    /// Which row is the direction of ray `i`.
+    #[inline]
+    fn direction(&self, i: usize) -> usize {
+        i.min(self.directions.len() - 1)
+    }
+
+    #[inline]
+    fn tmax(&self, i: usize) -> f64 {
+        match self.tmax {
             Reach::F32(tmax) => tmax[i].into(),
             Reach::F64(tmax) => tmax[i],
             Reach::All(tmax) => tmax,
-        };
-        let direction = self.directions.at(i.min(self.directions.len() - 1));
-        PreciseRay { origin: self.origins.at(i), direction, tmin: self.tmin, tmax }
+        }
     }
 
     /// The numbers of the rays of a chunk.
@@ -149,13 +173,11 @@ impl<'a> Rays<'a> {
 
     /// The same in f32; for those that [are](Self::are_f32).
     pub fn rounded(&self, which: Range<usize>) -> Vec<Ray> {
-        let rounded = |PreciseRay { origin, direction, tmin, tmax }| Ray {
-            origin: origin.as_vec3(),
-            direction: direction.as_vec3(),
-            tmin: tmin as f32,
-            tmax: tmax as f32,
-            time: 0.0,
+        let tmin = self.tmin as f32;
+        let rounded = |i| {
+            let (origin, direction) = (self.origins.rounded(i), self.directions.rounded(self.direction(i)));
+            Ray { origin, direction, tmin, tmax: self.tmax(i) as f32, time: 0.0 }
         };
-        which.map(|i| rounded(self.at(i))).collect()
+        which.map(rounded).collect()
     }
 }

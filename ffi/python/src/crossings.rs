@@ -1,6 +1,7 @@
 //! All hits of many rays, and how many they are.
 
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::trace::precise::{PreciseHit, PreciseRay};
@@ -9,23 +10,18 @@ use crate::arrays::{CHUNK, Ends, Points, Rays};
 use crate::pool;
 use crate::scene::{Scene, table};
 
-/// All hits, by ray, then by t: ray, primitive, geometry, t, (u, v), location.
-type Crossings<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
+/// All hits, by ray, then by t: ray, primitive, location.
+type Crossings<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>);
 
-/// What one task has found: its rays, where the hits of each end, and these.
-#[derive(Default)]
-struct Found {
-    rays: Vec<PreciseRay>,
-    ends: Vec<usize>,
-    hits: Vec<PreciseHit>,
-}
+/// All hits, by ray, then by t: where those of each ray begin and the last ones end; ray, primitive, geometry; t, (u, v).
+type List<'py> = (
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+);
 
 #[pymethods]
 impl Scene {
@@ -70,65 +66,132 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Crossings<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let (ray, primitive, geometry, t, uv, location) = pool::run(py, threads, || {
-            let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
-            let found: Vec<Found> = chunks.map(|chunk| self.found(&rays, chunk, most)).collect();
-            let count: usize = found.iter().map(|found| found.hits.len()).sum();
-            let (mut ray, mut primitive, mut geometry) = (vec![0i64; count], vec![0i64; count], vec![0u32; count]);
-            let (mut t, mut uv) = (vec![0f64; count], vec![0f64; 2 * count]);
-            let mut location = vec![0f64; if locations { 3 * count } else { 0 }];
-            let mut rest = (&mut ray[..], &mut primitive[..], &mut geometry[..], &mut t[..], &mut uv[..]);
-            let mut rest_location = &mut location[..];
-            let mut tasks = Vec::with_capacity(found.len());
-            for found in &found {
-                let len = found.hits.len();
-                let (a, b, c, d, e) = rest;
-                let ((a, ra), (b, rb), (c, rc)) = (a.split_at_mut(len), b.split_at_mut(len), c.split_at_mut(len));
-                let ((d, rd), (e, re)) = (d.split_at_mut(len), e.split_at_mut(2 * len));
-                let (f, rf) = rest_location.split_at_mut(if locations { 3 * len } else { 0 });
-                (rest, rest_location) = ((ra, rb, rc, rd, re), rf);
-                tasks.push((found, (a, b, c, d, e, f)));
-            }
-            tasks.into_par_iter().enumerate().for_each(
-                |(chunk, (found, (ray, primitive, geometry, t, uv, location)))| {
-                    let mut from = 0;
-                    for (i, &end) in found.ends.iter().enumerate() {
-                        for k in from..end {
-                            let hit = &found.hits[k];
-                            ray[k] = (chunk * CHUNK + i) as i64;
-                            (primitive[k], geometry[k], t[k]) = (hit.primitive.into(), hit.geometry, hit.t);
-                            uv[2 * k..2 * k + 2].copy_from_slice(&[hit.u, hit.v]);
-                            if locations {
-                                let PreciseRay { origin, direction, .. } = found.rays[i];
-                                location[3 * k..3 * k + 3].copy_from_slice(&(origin + direction * hit.t).to_array());
-                            }
+        let (ray, primitive, location) = pool::run(py, threads, || {
+            let found = self.found(&rays, |task| {
+                let (mut ray, mut primitive, mut location) = (Vec::new(), Vec::new(), Vec::new());
+                for (i, hits) in task.by_ray() {
+                    for hit in &hits[..hits.len().min(most)] {
+                        ray.push((task.first + i) as i64);
+                        primitive.push(i64::from(hit.primitive));
+                        if locations {
+                            let PreciseRay { origin, direction, .. } = task.rays[i];
+                            location.extend((origin + direction * hit.t).to_array());
                         }
-                        from = end;
                     }
-                },
-            );
-            (ray, primitive, geometry, t, uv, location)
+                }
+                (ray, primitive, location)
+            });
+            (joined(&found, |found| &found.0), joined(&found, |found| &found.1), joined(&found, |found| &found.2))
         })?;
-        let ids = (ray.into_pyarray(py), primitive.into_pyarray(py), geometry.into_pyarray(py));
-        Ok((ids.0, ids.1, ids.2, t.into_pyarray(py), table(py, uv, 2)?, table(py, location, 3)?))
+        Ok((ray.into_pyarray(py), primitive.into_pyarray(py), table(py, location, 3)?))
+    }
+
+    /// All hits, in numbers of 32 bits, but in f64 where rays are.
+    #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), threads = 0))]
+    fn list<'py>(
+        &self,
+        py: Python<'py>,
+        origins: Points<'py>,
+        directions: Points<'py>,
+        tmin: f64,
+        tmax: Ends<'py>,
+        threads: usize,
+    ) -> PyResult<List<'py>> {
+        let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        if rays.are_f32() {
+            self.list_in(py, &rays, threads, |x| x as f32)
+        } else {
+            self.list_in(py, &rays, threads, |x| x)
+        }
+    }
+}
+
+/// What one task has found.
+struct Task<'a> {
+    /// The number of its first ray.
+    first: usize,
+    rays: &'a [PreciseRay],
+    /// Of each ray where its hits end.
+    ends: &'a [usize],
+    hits: &'a [PreciseHit],
+}
+
+impl Task<'_> {
+    /// The number of each of its rays, the first being 0, and its hits.
+    fn by_ray(&self) -> impl Iterator<Item = (usize, &[PreciseHit])> {
+        let begins = std::iter::once(&0).chain(self.ends);
+        begins.zip(self.ends).map(|(&begin, &end)| &self.hits[begin..end]).enumerate()
     }
 }
 
 impl Scene {
-    /// The hits of the rays of one task.
-    fn found(&self, rays: &Rays<'_>, chunk: usize, most: usize) -> Found {
-        let rays = rays.some(rays.chunk(chunk));
-        let mut found = Found { rays, ..Found::default() };
-        self.precise.all_hits_batch(&found.rays, &mut found.ends, &mut found.hits);
-        if most < usize::MAX {
-            let (mut kept, mut from) = (Vec::with_capacity(found.hits.len()), 0);
-            for end in &mut found.ends {
-                let until = (*end).min(from + most);
-                kept.extend_from_slice(&found.hits[from..until]);
-                (from, *end) = (*end, kept.len());
-            }
-            found.hits = kept;
-        }
-        found
+    /// What `keep` keeps of all hits, task by task.
+    fn found<T: Send>(&self, rays: &Rays<'_>, keep: impl Fn(&Task<'_>) -> T + Sync) -> Vec<T> {
+        let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
+        let found = chunks.map_init(Default::default, |(ends, hits), chunk| {
+            let rays = rays.some(rays.chunk(chunk));
+            self.precise.all_hits_batch(&rays, ends, hits);
+            keep(&Task { first: chunk * CHUNK, rays: &rays, ends, hits })
+        });
+        found.collect()
     }
+
+    /// [`Self::list`], with t, u and v as `real` has them.
+    fn list_in<'py, F: Element + Copy + Default + Sync>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays<'_>,
+        threads: usize,
+        real: impl Fn(f64) -> F + Sync,
+    ) -> PyResult<List<'py>> {
+        let (splits, [ray, primitive, geometry], t, uv) = pool::run(py, threads, || {
+            let found = self.found(rays, |task| {
+                let (mut ids, mut t, mut uv) = ([const { Vec::new() }; 3], Vec::new(), Vec::new());
+                for (i, hits) in task.by_ray() {
+                    for hit in hits {
+                        let [ray, primitive, geometry] = &mut ids;
+                        ray.push((task.first + i) as u32);
+                        primitive.push(hit.primitive);
+                        geometry.push(hit.geometry);
+                        t.push(real(hit.t));
+                        uv.extend([real(hit.u), real(hit.v)]);
+                    }
+                }
+                (task.ends.to_vec(), ids, t, uv)
+            });
+            let mut splits = Vec::with_capacity(rays.len() + 1);
+            splits.push(0);
+            let mut base = 0;
+            for (ends, _, t, _) in &found {
+                splits.extend(ends.iter().map(|end| (base + end) as u32));
+                base += t.len();
+            }
+            // What is counted in 32 bits is no more than that.
+            let is_countable = u32::try_from(base).is_ok();
+            let ids = [0, 1, 2].map(|k| joined(&found, |found| &found.1[k]));
+            let lists = (splits, ids, joined(&found, |found| &found.2), joined(&found, |found| &found.3));
+            is_countable
+                .then_some(lists)
+                .ok_or_else(|| format!("{base} hits: Open3D's interface counts up to {}", u32::MAX))
+        })?
+        .map_err(PyOverflowError::new_err)?;
+        let (ray, primitive, geometry) = (ray.into_pyarray(py), primitive.into_pyarray(py), geometry.into_pyarray(py));
+        let (t, uv) = (t.into_pyarray(py).into_any(), table(py, uv, 2)?.into_any());
+        Ok((splits.into_pyarray(py), ray, primitive, geometry, t, uv))
+    }
+}
+
+/// One column of all parts, one after the other.
+fn joined<P: Sync, T: Copy + Default + Send + Sync>(parts: &[P], column: impl Fn(&P) -> &Vec<T> + Sync) -> Vec<T> {
+    // Zeros that nobody has to write: the threads that copy are the first to touch the pages.
+    let mut whole = vec![T::default(); parts.iter().map(|part| column(part).len()).sum()];
+    let mut rest = &mut whole[..];
+    let mut tasks = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (here, after) = rest.split_at_mut(column(part).len());
+        tasks.push((here, part));
+        rest = after;
+    }
+    tasks.into_par_iter().for_each(|(here, part)| here.copy_from_slice(column(part)));
+    whole
 }

@@ -80,12 +80,19 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let first = pool::run(py, threads, || {
-            let mut first = vec![-1; rays.len()];
+            // Zeros that nobody has to write, here and below: the threads that answer are the first to touch the pages.
+            let mut first = vec![0; rays.len()];
             first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
                 let mut hits = [None; CHUNK];
-                let hits = self.hits(&rays, chunk, &mut hits);
-                for (first, hit) in first.iter_mut().zip(hits) {
-                    *first = hit.map_or(-1, |hit| hit.primitive.into());
+                if let Some(hits) = self.exact_hits(&rays, chunk, &mut hits) {
+                    first
+                        .iter_mut()
+                        .zip(hits)
+                        .for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
+                } else {
+                    let mut names = [None; CHUNK];
+                    self.precise.first_batch(&rays.some(rays.chunk(chunk)), &mut names[..first.len()]);
+                    first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
                 }
             });
             first
@@ -140,8 +147,8 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
-            let (mut t, mut uv) = (vec![f32::INFINITY; count], vec![0f32; 2 * count]);
-            let (mut primitive, mut geometry) = (vec![INVALID; count], vec![INVALID; count]);
+            let (mut t, mut uv) = (vec![0f32; count], vec![0f32; 2 * count]);
+            let (mut primitive, mut geometry) = (vec![0; count], vec![0; count]);
             let mut normal = vec![0f32; 3 * count];
             let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
@@ -149,6 +156,7 @@ impl Scene {
             tasks.for_each(|(chunk, ((t, uv, normal), (primitive, geometry)))| {
                 let mut hits = [None; CHUNK];
                 for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
+                    (t[i], primitive[i], geometry[i]) = (f32::INFINITY, INVALID, INVALID);
                     if let Some(hit) = hit {
                         t[i] = hit.t;
                         uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
@@ -177,13 +185,14 @@ impl Scene {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
         let (t, uv, primitive, geometry) = pool::run(py, threads, || {
-            let (mut t, mut uv) = (vec![f64::INFINITY; count], vec![0f64; 2 * count]);
-            let (mut primitive, mut geometry) = (vec![-1; count], vec![-1; count]);
+            let (mut t, mut uv) = (vec![0f64; count], vec![0f64; 2 * count]);
+            let (mut primitive, mut geometry) = (vec![0; count], vec![0; count]);
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
                 let mut hits = [None; CHUNK];
                 for (i, hit) in self.precise_hits(&rays, chunk, &mut hits).iter().enumerate() {
+                    (t[i], primitive[i], geometry[i]) = (f64::INFINITY, -1, -1);
                     if let Some(hit) = hit {
                         t[i] = hit.t;
                         uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
@@ -247,15 +256,26 @@ impl Scene {
         }
     }
 
-    /// The hits of a chunk of the rays. Rays and meshes in f32 need no more.
+    /// The hits of a chunk of the rays, if rays and meshes are in f32, and so need no more.
+    fn exact_hits<'a>(
+        &self,
+        rays: &Rays<'_>,
+        chunk: usize,
+        hits: &'a mut [Option<Hit>; CHUNK],
+    ) -> Option<&'a [Option<Hit>]> {
+        let bvh = self.precise.exact().filter(|_| rays.are_f32())?;
+        let rays = rays.rounded(rays.chunk(chunk));
+        let hits = &mut hits[..rays.len()];
+        bvh.closest_batch(&rays, hits, Batch::of(&rays));
+        Some(hits)
+    }
+
+    /// The hits of a chunk of the rays.
     fn hits<'a>(&self, rays: &Rays<'_>, chunk: usize, hits: &'a mut [Option<Hit>; CHUNK]) -> &'a [Option<Hit>] {
-        let which = rays.chunk(chunk);
-        let hits = &mut hits[..which.len()];
-        if let Some(bvh) = self.precise.exact().filter(|_| rays.are_f32()) {
-            let rays = rays.rounded(which);
-            bvh.closest_batch(&rays, hits, Batch::of(&rays));
-            return hits;
+        if self.exact_hits(rays, chunk, hits).is_some() {
+            return &hits[..rays.chunk(chunk).len()];
         }
+        let hits = &mut hits[..rays.chunk(chunk).len()];
         let mut precise = [None; CHUNK];
         let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
             t: t as f32,

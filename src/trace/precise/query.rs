@@ -48,6 +48,32 @@ impl Precise {
         }
     }
 
+    /// The geometry and the primitive of each ray's nearest hit, into `names` of the same length: those of [`Self::closest_batch`], whose numbers
+    /// nobody has to compute.
+    ///
+    /// # Panics
+    /// Unless there is one answer a ray.
+    pub fn first_batch(&self, rays: &[PreciseRay], names: &mut [Option<(u32, u32)>]) {
+        assert_eq!(rays.len(), names.len(), "one name a ray");
+        for (rays, names) in rays.chunks(CHUNK).zip(names.chunks_mut(CHUNK)) {
+            names.fill(None);
+            let (mut found, mut open) = (Vec::new(), Vec::new());
+            self.certain(Wanted::First, rays, |i, certain| match certain {
+                Certain::Hits { sure: [], .. } => {}
+                // The range was widened: within it for sure is not within the range.
+                Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
+                    found.push((i, *id));
+                }
+                Certain::Hits { .. } | Certain::Doubt => open.push(i),
+            });
+            // All of them together, so that the processor waits for many at once.
+            found.iter().for_each(|&(i, id)| names[i] = Some(self.bvh.triangle(id)));
+            for i in open {
+                names[i] = self.closest(&rays[i]).map(|hit| (hit.geometry, hit.primitive));
+            }
+        }
+    }
+
     /// Whether each ray has any hit, into `occluded` of the same length.
     ///
     /// # Panics

@@ -45,14 +45,10 @@ class Scene:
         most: int = ...,
         locations: bool = False,
         threads: int = 0,
-    ) -> tuple[
-        NDArray[np.int64],
-        NDArray[np.int64],
-        _Ids,
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-    ]: ...
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]: ...
+    def list(
+        self, origins: _Floats, directions: _Floats, tmin: float = 0.0, tmax: float | _Floats = ..., threads: int = 0
+    ) -> tuple[_Ids, _Ids, _Ids, _Ids, _Floats, _Floats]: ...
     def nearest(
         self, points: _Floats, threads: int = 0
     ) -> tuple[

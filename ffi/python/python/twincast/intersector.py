@@ -106,7 +106,7 @@ class RayMeshIntersector:
             raise ValueError(f"max_hits must be at least 0, not {max_hits}")
         if not multiple_hits:
             return self._first(origins, directions, return_locations)
-        ray, tri, _, _, _, locations = self._scene.crossings(
+        ray, tri, locations = self._scene.crossings(
             origins,
             directions,
             most=2**63 - 1 if max_hits is None else max_hits,

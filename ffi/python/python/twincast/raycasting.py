@@ -149,16 +149,14 @@ class RaycastingScene:
             t_hit (m,), geometry_ids, primitive_ids (m,) uint32 and primitive_uvs (m, 2) as in :meth:`cast_rays`.
         """
         origins, directions, _ = _rays(rays)
-        ray, primitive, geometry, t, uv, _ = self._scene.crossings(origins, directions, threads=_threads(nthreads))
-        splits = np.zeros(len(origins) + 1, dtype=np.uint32)
-        np.cumsum(np.bincount(ray, minlength=len(origins)), out=splits[1:])
+        splits, ray, primitive, geometry, t, uv = self._scene.list(origins, directions, threads=_threads(nthreads))
         return {
             "ray_splits": splits.view(Result),
-            "ray_ids": ray.astype(np.uint32).view(Result),
-            "t_hit": t.astype(origins.dtype, copy=False).view(Result),
+            "ray_ids": ray.view(Result),
+            "t_hit": t.view(Result),
             "geometry_ids": geometry.view(Result),
-            "primitive_ids": primitive.astype(np.uint32).view(Result),
-            "primitive_uvs": uv.astype(origins.dtype, copy=False).view(Result),
+            "primitive_ids": primitive.view(Result),
+            "primitive_uvs": uv.view(Result),
         }
 
     def compute_closest_points(self, query_points: Any, nthreads: int = 0) -> dict[str, Result]:
