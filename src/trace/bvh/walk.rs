@@ -71,6 +71,45 @@ impl Stack {
         }
         self.0[at] = entry;
     }
+
+    /// Puts the children that are entered, of which there are some, on top of `len` others, but the nearest, which is the next one. Mostly one or two are entered: each
+    /// number has its own branch, which is predicted better than the length of a loop.
+    #[inline(always)]
+    fn open<Q: Query>(
+        &mut self,
+        len: &mut usize,
+        node: &Node,
+        &Entered { children, near: Near(ref near) }: &Entered,
+    ) -> Entry {
+        let (first, rest) = lowest(children);
+        let mut next = Entry::child(node, near, first);
+        if rest == 0 {
+            return next;
+        }
+        let (second, mut rest) = lowest(rest);
+        let mut other = Entry::child(node, near, second);
+        if other.near < next.near {
+            std::mem::swap(&mut next, &mut other);
+        }
+        let base = *len;
+        self.0[*len] = other;
+        *len += 1;
+        while rest != 0 {
+            let (slot, others) = lowest(rest);
+            rest = others;
+            let mut other = Entry::child(node, near, slot);
+            if other.near < next.near {
+                std::mem::swap(&mut next, &mut other);
+            }
+            if Q::ANY {
+                self.0[*len] = other
+            } else {
+                self.insert(base, *len, other)
+            }
+            *len += 1;
+        }
+        next
+    }
 }
 
 /// One stack for the placements, one for what is below them.
@@ -114,7 +153,28 @@ pub(super) trait Enter {
 impl Enter for SlabRay {
     #[inline(always)]
     fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
-        SlabRay::enter::<S>(self, node, limit)
+        // Asked that seldom, numbers are better loaded again at each node than spread over vectors beforehand: the black box keeps them from being.
+        SlabRay::enter::<S>(std::hint::black_box(self), node, limit)
+    }
+}
+
+/// What a ray enters of a node: a bit for each child, and where.
+pub(super) struct Entered {
+    children: u32,
+    near: Near,
+}
+
+impl Entered {
+    #[inline(always)]
+    fn new<S: Simd>(ray: &impl Enter, node: &Node, limit: f32) -> Self {
+        let (mask, near) = ray.enter::<S>(node, limit);
+        Self { children: ray.select::<S>(node, mask.bits()), near: Near(near.to_array()) }
+    }
+
+    /// Of a tree's root, of which there is one.
+    #[inline(always)]
+    pub fn root<S: Simd>(tree: &Tree, ray: &impl Enter, limit: f32) -> Self {
+        Self::new::<S>(ray, tree.node(Child::ROOT), limit)
     }
 }
 
@@ -124,50 +184,38 @@ pub(super) fn single<S: Simd, Q: Query>(
     stack: &mut Stack,
     tree: &Tree,
     ray: &impl Enter,
+    limit: f32,
+    leaf: impl FnMut(Child) -> Visit,
+) {
+    let root = Entered::root::<S>(tree, ray, limit);
+    from_root::<S, Q>(stack, tree, ray, limit, &root, leaf);
+}
+
+/// The same of a ray of which it is known what it enters of the root.
+#[inline(always)]
+pub(super) fn from_root<S: Simd, Q: Query>(
+    stack: &mut Stack,
+    tree: &Tree,
+    ray: &impl Enter,
     mut limit: f32,
+    root: &Entered,
     mut leaf: impl FnMut(Child) -> Visit,
 ) {
+    if root.children == 0 {
+        return;
+    }
     // Children on the stack, the nearest on top.
     let mut len = 0;
-    let mut next = Entry::ROOT;
+    let mut next = stack.open::<Q>(&mut len, tree.node(Child::ROOT), root);
     loop {
-        // Down to a leaf. Mostly one or two children are entered: each number has its own branch, which is predicted
-        // better than the length of a loop.
+        // Down to a leaf.
         while !next.child.is_leaf() {
             let node = tree.node(next.child);
-            let (mask, near) = ray.enter::<S>(node, limit);
-            let (mask, Near(near)) = (ray.select::<S>(node, mask.bits()), &Near(near.to_array()));
-            if mask == 0 {
+            let entered = Entered::new::<S>(ray, node, limit);
+            if entered.children == 0 {
                 break;
             }
-            let (first, rest) = lowest(mask);
-            next = Entry::child(node, near, first);
-            if rest == 0 {
-                continue;
-            }
-            let (second, rest) = lowest(rest);
-            let mut other = Entry::child(node, near, second);
-            if other.near < next.near {
-                std::mem::swap(&mut next, &mut other);
-            }
-            let base = len;
-            stack.0[len] = other;
-            len += 1;
-            let mut rest = rest;
-            while rest != 0 {
-                let (slot, others) = lowest(rest);
-                rest = others;
-                let mut other = Entry::child(node, near, slot);
-                if other.near < next.near {
-                    std::mem::swap(&mut next, &mut other);
-                }
-                if Q::ANY {
-                    stack.0[len] = other
-                } else {
-                    stack.insert(base, len, other)
-                }
-                len += 1;
-            }
+            next = stack.open::<Q>(&mut len, node, &entered);
         }
         if next.child.is_leaf() {
             match leaf(next.child) {

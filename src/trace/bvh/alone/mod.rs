@@ -32,7 +32,7 @@ use super::scratch::{Scratch, with_scratch};
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::{self, Stack, Visit, with_stack};
+use super::walk::{self, Entered, Stack, Visit, with_stack};
 use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
@@ -105,45 +105,61 @@ impl Bvh {
         found: &mut Found,
     ) -> Noted {
         let mut noted = Noted::nothing(ray);
-        let ready = (ready.slab(), ready.filter());
-        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &ready, ray, stack, &mut noted, found);
+        let filter = || ready.filter();
+        self.walk_through::<S, Q, false>(
+            FIXED,
+            &self.fixed.triangles,
+            &ready.slab(),
+            filter,
+            ray,
+            stack,
+            &mut noted,
+            found,
+        );
         noted
     }
 
     /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
     #[inline(always)]
     fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, stack: &mut Stack, found: &mut Found) -> Option<Noted> {
-        let ready = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;
+        let (slab, rest) = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;
         let mut noted = Noted::nothing(ray);
-        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &ready, ray, stack, &mut noted, found);
+        let filter = || rest.filter();
+        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &slab, filter, ray, stack, &mut noted, found);
         Some(noted)
     }
 
-    /// The same through the triangles at `place`, with the ray that is ready for them, and `ray` in the world. It is the ray that is meant if
-    /// it is not `BLURRED`.
+    /// The same through the triangles at `place`, with the ray that is ready for their nodes, and made ready for themselves by `filter`, and `ray` in the world. It is the ray
+    /// that is meant if it is not `BLURRED`.
     #[expect(clippy::too_many_arguments, reason = "a place, a ray, and what it has found")]
     #[inline(always)]
     fn walk_through<S: Simd, Q: Query, const BLURRED: bool>(
         &self,
         place: u32,
         triangles: &TriangleTree,
-        (slab, filter): &(SlabRay, Filter),
+        slab: &SlabRay,
+        filter: impl FnOnce() -> Filter,
         ray: &SingleRay,
         stack: &mut Stack,
         noted: &mut Noted,
         found: &mut Found,
     ) {
-        walk::single::<S, Q>(
+        let tree = triangles.tree();
+        let root = Entered::root::<S>(tree, slab, noted.limit);
+        let filter = filter();
+        walk::from_root::<S, Q>(
             stack,
-            triangles.tree(),
+            tree,
             slab,
             noted.limit,
+            &root,
             #[inline(always)]
             |leaf| {
                 for index in leaf.blocks() {
                     let mut scratch = None;
                     let block = triangles.block(index, &mut scratch);
-                    let candidates = filter.candidates::<S, BLURRED>(block, noted.limit);
+                    // Asked that seldom, numbers are better loaded again than spread over vectors beforehand: the black box keeps them from being.
+                    let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);
                     if candidates.lanes != 0 && noted.offer::<Q>(self, found, place, index, block, &candidates, ray) {
                         return Visit::Stop;
                     }

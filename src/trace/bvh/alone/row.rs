@@ -52,13 +52,14 @@ impl SingleRay {
         if self.tmin > 0.0 { self.tmin } else { 0.0 }
     }
 
-    /// None where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not `BLURRED`, it is the ray that is meant.
+    /// Made ready for nodes, and what is left to be made ready for triangles; none where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not
+    /// `BLURRED`, it is the ray that is meant.
     #[inline(always)]
     pub(super) fn ready<S: Simd, const BLURRED: bool>(
         &self,
         reach: &[f32; 4],
         blur: Blur,
-    ) -> Option<(SlabRay, Filter)> {
+    ) -> Option<(SlabRay, Rest<S>)> {
         let splat = S::V4::splat;
         let Self { origin: o, direction: d, time, .. } = self;
         let tmin = self.begin();
@@ -98,8 +99,30 @@ impl SingleRay {
             first: SlabRay::first_rows(negative),
             tmin: least_t(tmin),
         };
-        // The last of those that are largest.
         let largest_lanes = largest.at_most(magnitude).bits();
+        Some((slab, Rest { origin, direction, slope, shorten, largest_lanes, tmin, blur }))
+    }
+}
+
+/// What is left of a ray to be made ready for triangles, when it is for nodes. The root can be entered before: its numbers take some time to come, in
+/// which this is done.
+pub(super) struct Rest<S: Simd> {
+    origin: S::V4,
+    direction: S::V4,
+    /// The direction over its largest magnitude, and 1 over that.
+    slope: S::V4,
+    shorten: S::V4,
+    /// A bit for each component of that magnitude.
+    largest_lanes: u32,
+    tmin: f32,
+    blur: Blur,
+}
+
+impl<S: Simd> Rest<S> {
+    #[inline(always)]
+    pub fn filter(self) -> Filter {
+        let Self { origin, direction, slope, shorten, largest_lanes, tmin, blur } = self;
+        // The last of those that are largest.
         let axis = if largest_lanes & 0b100 != 0 { 2 } else { (largest_lanes >> 1 & 1) as usize };
         let [x, y, z] = axes(axis);
         // Which spares the question later on.
@@ -112,18 +135,16 @@ impl SingleRay {
         // No number is NaN: a maximum of any kind will do.
         let (p, q) = (shear[0].abs(), shear[1].abs());
         let width = 1.0 + if p > q { p } else { q };
-        let begin = tmin * along.abs() * (1.0 - SLACK);
-        let filter = Filter {
+        Filter {
             axes: [filter::at(x), filter::at(y), filter::at(z)],
             origin: [origin[x], origin[y], origin[z]],
             shear,
             margin: Margin::of_one(width, blur.direction),
             against: -along,
             shorten,
-            begin,
+            begin: tmin * along.abs() * (1.0 - SLACK),
             blur,
-        };
-        Some((slab, filter))
+        }
     }
 }
 

@@ -87,10 +87,11 @@ impl Bvh {
     ) -> Noted {
         let Stacks { upper, level: lower } = stacks;
         let mut noted = Noted::nothing(single);
-        let ready = (ready.slab(), ready.filter());
+        let slab = ready.slab();
         let fixed = &self.fixed.triangles;
         if !fixed.tree().is_empty() {
-            self.walk_through::<S, Q, false>(FIXED, fixed, &ready, single, lower, &mut noted, found);
+            let filter = || ready.filter();
+            self.walk_through::<S, Q, false>(FIXED, fixed, &slab, filter, single, lower, &mut noted, found);
             if Q::ANY && noted.is_hit(found) {
                 return noted;
             }
@@ -98,7 +99,7 @@ impl Bvh {
         walk::single::<S, Q>(
             upper,
             self.placements.tree(),
-            &ready.0,
+            &slab,
             noted.limit,
             #[inline(always)]
             |leaf| {
@@ -130,8 +131,9 @@ impl Bvh {
             return;
         }
         let (local, blur) = place.local::<S>(ray);
-        let Some(local) = SingleRay::from(&local).ready::<S, true>(triangles.tree().reach_row(), blur) else { return };
-        self.walk_through::<S, Q, true>(number, triangles, &local, single, stack, noted, found);
+        let local = SingleRay::from(&local);
+        let Some((slab, rest)) = local.ready::<S, true>(triangles.tree().reach_row(), blur) else { return };
+        self.walk_through::<S, Q, true>(number, triangles, &slab, || rest.filter(), single, stack, noted, found);
     }
 
     /// The closest hit of a ray that is [ready](Self::ready_at), through an object that has triangles.
@@ -146,8 +148,8 @@ impl Bvh {
         found: &mut Found,
     ) {
         let (_, triangles) = self.object_at(number);
-        let ready = (ready.slab(), ready.filter());
-        self.walk_through::<S, Closest, true>(number, triangles, &ready, single, stack, noted, found);
+        let filter = || ready.filter();
+        self.walk_through::<S, Closest, true>(number, triangles, &ready.slab(), filter, single, stack, noted, found);
     }
 
     /// Eight rays made ready for a placed object, and a bit for each for which that could be done.
