@@ -86,7 +86,7 @@ impl Scene {
         Ok((ray.into_pyarray(py), primitive.into_pyarray(py), table(py, location, 3)?))
     }
 
-    /// All hits, in numbers of 32 bits, but in f64 where rays are.
+    /// All hits, as Open3D has them: numbers of 32 bits, but t, u and v in f64 where rays or their range are.
     #[pyo3(signature = (origins, directions, tmin = 0.0, tmax = Ends::All(f64::INFINITY), threads = 0))]
     fn list<'py>(
         &self,
@@ -166,13 +166,14 @@ impl Scene {
                 splits.extend(ends.iter().map(|end| (base + end) as u32));
                 base += t.len();
             }
-            // What is counted in 32 bits is no more than that.
-            let is_countable = u32::try_from(base).is_ok();
+            if u32::try_from(base.max(rays.len())).is_err() {
+                return Err(format!(
+                    "{base} hits of {} rays are more than 32 bits count: ask fewer rays at a time",
+                    rays.len()
+                ));
+            }
             let ids = [0, 1, 2].map(|k| joined(&found, |found| &found.1[k]));
-            let lists = (splits, ids, joined(&found, |found| &found.2), joined(&found, |found| &found.3));
-            is_countable
-                .then_some(lists)
-                .ok_or_else(|| format!("{base} hits: Open3D's interface counts up to {}", u32::MAX))
+            Ok((splits, ids, joined(&found, |found| &found.2), joined(&found, |found| &found.3)))
         })?
         .map_err(PyOverflowError::new_err)?;
         let (ray, primitive, geometry) = (ray.into_pyarray(py), primitive.into_pyarray(py), geometry.into_pyarray(py));

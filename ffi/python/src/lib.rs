@@ -7,7 +7,7 @@
 //! | `pool` | the threads that queries run on, without the interpreter's lock |
 //! | `scene` | meshes, and what can be asked of them |
 //! | `crossings` | all hits of many rays, as flat arrays |
-//! | `points`, `curve` | what can be asked of points, and in which order it is done |
+//! | `points`, `order`, `inside` | what can be asked of points, in which order it is done, and which of them are inside |
 //! | `render` | pictures |
 //!
 //! There is no unsafe code here: a panic becomes a Python exception in PyO3's wrappers, so it never crosses the boundary. An array

@@ -49,6 +49,50 @@ def test_rays_in_any_order(rng, dtype):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lists_of_many_rays(rng, dtype):
+    """Whatever many threads have listed stands where the counts say, begins with the first hit, and is what other questions answer."""
+    shift = 0.0 if dtype == np.float32 else 1e6 / 3
+    scene = sphere_scene(dtype, shift)
+    origins = rng.normal(size=(MANY, 3)) * 3
+    rays = np.hstack([origins + shift, rng.normal(size=(MANY, 3)) - 0.4 * origins]).astype(dtype)
+    hits, counts = scene.list_intersections(rays), scene.count_intersections(rays)
+    splits = hits["ray_splits"]
+    assert np.array_equal(splits, np.concatenate([[0], np.cumsum(counts)])) and splits.dtype == np.uint32
+    assert np.array_equal(hits["ray_ids"], np.repeat(np.arange(MANY), counts))
+    assert set(counts.tolist()) == {0, 1, 2}
+    assert (np.diff(hits["t_hit"])[np.diff(hits["ray_ids"].astype(int)) == 0] > 0).all()
+    cast, hit = scene.cast_rays(rays), counts > 0
+    assert np.array_equal(hit, np.isfinite(cast["t_hit"]))
+    for name in ("t_hit", "geometry_ids", "primitive_ids", "primitive_uvs"):
+        assert hits[name].dtype == cast[name].dtype, name
+        assert np.array_equal(hits[name][splits[:-1][hit]], cast[name][hit]), name
+    intersector = twincast.RayMeshIntersector(
+        trimesh.Trimesh(SPHERE.vertices.astype(dtype) + dtype(shift), SPHERE.faces, process=False)
+    )
+    o, d = rays[:, :3], rays[:, 3:]
+    tri, ray, locations = intersector.intersects_id(o, d, return_locations=True)
+    assert np.array_equal(tri, hits["primitive_ids"]) and np.array_equal(ray, hits["ray_ids"])
+    assert tri.dtype == ray.dtype == np.int64
+    # On the sphere, but for what the facets cut off.
+    assert np.abs(np.linalg.norm(locations - shift, axis=1) - 1).max() < 2e-3
+    first = np.unique(ray, return_index=True)[1]
+    some = intersector.intersects_id(o, d, max_hits=1, return_locations=True)
+    assert all(np.array_equal(few, whole[first]) for few, whole in zip(some, (tri, ray, locations)))
+    assert np.array_equal(intersector.intersects_first(o, d)[hit], tri[first])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lists_of_nothing(dtype):
+    empty = twincast.RaycastingScene()
+    for scene, count in [(sphere_scene(dtype), 0), (empty, 3)]:
+        hits = scene.list_intersections(np.ones((count, 6), dtype))
+        assert hits["ray_splits"].tolist() == [0] * (count + 1)
+        shapes = {key: (value.shape, value.dtype) for key, value in hits.items() if key != "ray_splits"}
+        ids = {key: ((0,), np.uint32) for key in ("ray_ids", "geometry_ids", "primitive_ids")}
+        assert shapes == {**ids, "t_hit": ((0,), dtype), "primitive_uvs": ((0, 2), dtype)}
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_signs_of_many_points(rng, dtype):
     """Balls without a triangle lend their sign to what is in them."""
     shift = 0.0 if dtype == np.float32 else 1e6 / 3

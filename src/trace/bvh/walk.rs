@@ -72,8 +72,8 @@ impl Stack {
         self.0[at] = entry;
     }
 
-    /// Puts the children that are entered, of which there are some, on top of `len` others, but the nearest, which is the next one. Mostly one or two are entered: each
-    /// number has its own branch, which is predicted better than the length of a loop.
+    /// Pushes all children that are entered but the nearest, which it returns; at least one is. Mostly one or two are: each number has its own branch, which
+    /// is predicted better than the length of a loop.
     #[inline(always)]
     fn open<Q: Query>(
         &mut self,
@@ -153,7 +153,8 @@ pub(super) trait Enter {
 impl Enter for SlabRay {
     #[inline(always)]
     fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
-        // Asked that seldom, numbers are better loaded again at each node than spread over vectors beforehand: the black box keeps them from being.
+        // One ray comes to so few nodes that its numbers are better loaded at each than spread over vectors before the first, of which no registers
+        // could hold so many: the black box keeps the compiler from that.
         SlabRay::enter::<S>(std::hint::black_box(self), node, limit)
     }
 }

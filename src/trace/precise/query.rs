@@ -48,8 +48,8 @@ impl Precise {
         }
     }
 
-    /// The geometry and the primitive of each ray's nearest hit, into `names` of the same length: those of [`Self::closest_batch`], whose numbers
-    /// nobody has to compute.
+    /// The geometry and the primitive of each ray's nearest hit, into `names` of the same length: those of [`Self::closest_batch`], without computing t, u and v
+    /// where there is no doubt. (Where sizes squared times a direction vanish in f64, the latter may miss what is named here.)
     ///
     /// # Panics
     /// Unless there is one answer a ray.
@@ -57,15 +57,8 @@ impl Precise {
         assert_eq!(rays.len(), names.len(), "one name a ray");
         for (rays, names) in rays.chunks(CHUNK).zip(names.chunks_mut(CHUNK)) {
             names.fill(None);
-            let (mut found, mut open) = (Vec::new(), Vec::new());
-            self.certain(Wanted::First, rays, |i, certain| match certain {
-                Certain::Hits { sure: [], .. } => {}
-                // The range was widened: within it for sure is not within the range.
-                Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
-                    found.push((i, *id));
-                }
-                Certain::Hits { .. } | Certain::Doubt => open.push(i),
-            });
+            let mut found = Vec::new();
+            let open = self.surely_hit(Wanted::First, rays, |i, id| found.push((i, id)));
             // All of them together, so that the processor waits for many at once.
             found.iter().for_each(|&(i, id)| names[i] = Some(self.bvh.triangle(id)));
             for i in open {
@@ -82,19 +75,24 @@ impl Precise {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
         for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
             occluded.fill(false);
-            let mut open = Vec::new();
-            self.certain(Wanted::Any, rays, |i, certain| match certain {
-                Certain::Hits { sure: [], .. } => {}
-                // As above.
-                Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
-                    occluded[i] = true;
-                }
-                Certain::Hits { .. } | Certain::Doubt => open.push(i),
-            });
-            for i in open {
+            for i in self.surely_hit(Wanted::Any, rays, |i, _| occluded[i] = true) {
                 occluded[i] = self.occluded(&rays[i]);
             }
         }
+    }
+
+    /// Tells `take` the triangle that each ray of a chunk hits for sure, the first or any; the rays about which that leaves a doubt.
+    fn surely_hit(&self, wanted: Wanted, rays: &[PreciseRay], mut take: impl FnMut(usize, u32)) -> Vec<usize> {
+        let mut open = Vec::new();
+        self.certain(wanted, rays, |i, certain| match certain {
+            Certain::Hits { sure: [], .. } => {}
+            // The range was widened: within it for sure is not within the range.
+            Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
+                take(i, *id)
+            }
+            Certain::Hits { .. } | Certain::Doubt => open.push(i),
+        });
+        open
     }
 
     /// How often each ray crosses a triangle, into `counts` of the same length; what counts is said at

@@ -147,6 +147,11 @@ class RaycastingScene:
         dict
             ray_splits (rays + 1,) uint32: those of ray i are from ``ray_splits[i]`` to ``ray_splits[i + 1]``. ray_ids (m,) uint32.
             t_hit (m,), geometry_ids, primitive_ids (m,) uint32 and primitive_uvs (m, 2) as in :meth:`cast_rays`.
+
+        Raises
+        ------
+        OverflowError
+            Where there are more rays or hits than 32 bits count.
         """
         origins, directions, _ = _rays(rays)
         splits, ray, primitive, geometry, t, uv = self._scene.list(origins, directions, threads=_threads(nthreads))

@@ -105,12 +105,12 @@ impl Bvh {
         found: &mut Found,
     ) -> Noted {
         let mut noted = Noted::nothing(ray);
-        let filter = || ready.filter();
         self.walk_through::<S, Q, false>(
             FIXED,
             &self.fixed.triangles,
             &ready.slab(),
-            filter,
+            #[inline(always)]
+            || ready.filter(),
             ray,
             stack,
             &mut noted,
@@ -124,12 +124,21 @@ impl Bvh {
     fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, stack: &mut Stack, found: &mut Found) -> Option<Noted> {
         let (slab, rest) = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;
         let mut noted = Noted::nothing(ray);
-        let filter = || rest.filter();
-        self.walk_through::<S, Q, false>(FIXED, &self.fixed.triangles, &slab, filter, ray, stack, &mut noted, found);
+        self.walk_through::<S, Q, false>(
+            FIXED,
+            &self.fixed.triangles,
+            &slab,
+            #[inline(always)]
+            || rest.filter(),
+            ray,
+            stack,
+            &mut noted,
+            found,
+        );
         Some(noted)
     }
 
-    /// The same through the triangles at `place`, with the ray that is ready for their nodes, and made ready for themselves by `filter`, and `ray` in the world. It is the ray
+    /// The same through the triangles at `place`: `slab` is the ray ready for the tree's nodes, `filter` makes it ready for triangles, `ray` is in the world. It is the ray
     /// that is meant if it is not `BLURRED`.
     #[expect(clippy::too_many_arguments, reason = "a place, a ray, and what it has found")]
     #[inline(always)]
@@ -158,7 +167,7 @@ impl Bvh {
                 for index in leaf.blocks() {
                     let mut scratch = None;
                     let block = triangles.block(index, &mut scratch);
-                    // Asked that seldom, numbers are better loaded again than spread over vectors beforehand: the black box keeps them from being.
+                    // The black box is for the same as at nodes: `Enter` of a single ray.
                     let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);
                     if candidates.lanes != 0 && noted.offer::<Q>(self, found, place, index, block, &candidates, ray) {
                         return Visit::Stop;

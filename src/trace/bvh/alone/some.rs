@@ -90,8 +90,17 @@ impl Bvh {
         let slab = ready.slab();
         let fixed = &self.fixed.triangles;
         if !fixed.tree().is_empty() {
-            let filter = || ready.filter();
-            self.walk_through::<S, Q, false>(FIXED, fixed, &slab, filter, single, lower, &mut noted, found);
+            self.walk_through::<S, Q, false>(
+                FIXED,
+                fixed,
+                &slab,
+                #[inline(always)]
+                || ready.filter(),
+                single,
+                lower,
+                &mut noted,
+                found,
+            );
             if Q::ANY && noted.is_hit(found) {
                 return noted;
             }
@@ -133,7 +142,17 @@ impl Bvh {
         let (local, blur) = place.local::<S>(ray);
         let local = SingleRay::from(&local);
         let Some((slab, rest)) = local.ready::<S, true>(triangles.tree().reach_row(), blur) else { return };
-        self.walk_through::<S, Q, true>(number, triangles, &slab, || rest.filter(), single, stack, noted, found);
+        self.walk_through::<S, Q, true>(
+            number,
+            triangles,
+            &slab,
+            #[inline(always)]
+            || rest.filter(),
+            single,
+            stack,
+            noted,
+            found,
+        );
     }
 
     /// The closest hit of a ray that is [ready](Self::ready_at), through an object that has triangles.
@@ -148,8 +167,17 @@ impl Bvh {
         found: &mut Found,
     ) {
         let (_, triangles) = self.object_at(number);
-        let filter = || ready.filter();
-        self.walk_through::<S, Closest, true>(number, triangles, &ready.slab(), filter, single, stack, noted, found);
+        self.walk_through::<S, Closest, true>(
+            number,
+            triangles,
+            &ready.slab(),
+            #[inline(always)]
+            || ready.filter(),
+            single,
+            stack,
+            noted,
+            found,
+        );
     }
 
     /// Eight rays made ready for a placed object, and a bit for each for which that could be done.
