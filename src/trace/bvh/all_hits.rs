@@ -15,7 +15,7 @@ use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::{self, Stack, Visit, with_stack};
+use super::walk::{self, Visit};
 use crate::ray::{Hit, Ray};
 use crate::shape::crossing;
 use crate::shape::triangle::Placed;
@@ -38,11 +38,7 @@ impl Bvh {
         hits.clear();
         if ray.is_valid() {
             let mut gathered = Gathered::default();
-            with_stack(|upper| {
-                with_stack(|level| {
-                    isa::dispatch(self.isa, Gather { bvh: self, ray, upper, level, gathered: &mut gathered });
-                });
-            });
+            isa::dispatch(self.isa, Gather { bvh: self, ray, gathered: &mut gathered });
             gathered.finish(hits);
         }
     }
@@ -71,8 +67,6 @@ impl Gathered {
 struct Gather<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
-    upper: &'a mut Stack,
-    level: &'a mut Stack,
     gathered: &'a mut Gathered,
 }
 
@@ -81,23 +75,23 @@ impl Kernel for Gather<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, ray, upper, level, gathered } = self;
-        bvh.fixed.gather::<S>(ray, None, level, gathered);
+        let Self { bvh, ray, gathered } = self;
+        bvh.fixed.gather::<S>(ray, None, gathered);
         bvh.unbounded.gather(ray, &mut gathered.shapes);
         let limit = limit(ray);
         if !bvh.moving.is_empty() {
-            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, upper, |object, place| {
-                object.gather::<S>(ray, Some(place), level, gathered);
+            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, |object, place| {
+                object.gather::<S>(ray, Some(place), gathered);
                 Visit::Until(limit)
             });
         }
         if bvh.placements.is_empty() {
             return;
         }
-        walk_over::<S, Closest>(bvh.placements.tree(), ray, bvh.placements.spread(), limit, upper, |number| {
+        walk_over::<S, Closest>(bvh.placements.tree(), ray, bvh.placements.spread(), limit, |number| {
             let place = bvh.placements.at(number);
             let object = &bvh.objects[place.placement.object as usize];
-            object.gather::<S>(ray, Some(place), level, gathered);
+            object.gather::<S>(ray, Some(place), gathered);
             Visit::Until(limit)
         });
     }
@@ -111,14 +105,14 @@ fn limit(ray: &Ray) -> f32 {
 impl Level {
     /// What `ray`, in the world, hits in this level, which may be placed.
     #[inline(always)]
-    fn gather<S: Simd>(&self, ray: &Ray, place: Option<&Place>, stack: &mut Stack, gathered: &mut Gathered) {
+    fn gather<S: Simd>(&self, ray: &Ray, place: Option<&Place>, gathered: &mut Gathered) {
         let through = place.map(Place::through);
         let limit = limit(ray);
         if !self.triangles.tree().is_empty() {
             let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
             let slab = SlabRay::new::<S>(&local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(&local, blur);
-            walk::single::<S, Closest>(stack, self.triangles.tree(), &slab, limit, |leaf| {
+            walk::single::<S, Closest>(self.triangles.tree(), &slab, limit, |leaf| {
                 self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
                 Visit::Until(limit)
             });
@@ -127,7 +121,7 @@ impl Level {
         let local = place.map_or(*ray, |place| place.placement.object_ray(ray));
         if !self.shapes.tree().is_empty() && local.is_valid() {
             let slab = SlabRay::new::<S>(&local, self.shapes.tree().reach(), Blur::NONE);
-            walk::single::<S, Closest>(stack, self.shapes.tree(), &slab, limit, |leaf| {
+            walk::single::<S, Closest>(self.shapes.tree(), &slab, limit, |leaf| {
                 self.shapes.gather_leaf(leaf, &local, through, &mut gathered.shapes);
                 Visit::Until(limit)
             });

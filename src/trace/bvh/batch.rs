@@ -4,13 +4,14 @@
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 
+use super::alone::Doubted;
 use super::flight::{self, Flight, Objects};
 use super::found::{Found, NONE};
 use super::noted::Rays;
 use super::placements::{FIXED, walk_over};
 use super::query::{Closest, Query, SOMETHING};
 use super::simd::Simd;
-use super::walk::{Stacks, Visit};
+use super::walk::Visit;
 use super::{Bvh, bundle, isa, tile};
 use crate::ray::{Hit, Ray};
 use crate::trace::Batch;
@@ -20,7 +21,6 @@ use crate::trace::spread::Spread;
 /// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some dozens of
 /// rays.
 struct Workspace {
-    stacks: Stacks,
     apart: Apart,
     tile: tile::Scratch,
 }
@@ -28,7 +28,7 @@ struct Workspace {
 /// For rays that make no bundle: those in flight, or what one that walks alone has hit of which there was doubt.
 struct Apart {
     flight: Flight,
-    doubted: Found,
+    doubted: Doubted,
 }
 
 /// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle as much as dozens of
@@ -46,8 +46,8 @@ thread_local! {
 
 impl Workspace {
     fn new() -> Box<Self> {
-        let apart = Apart { flight: Flight::new(), doubted: Found::NONE };
-        Box::new(Self { stacks: Stacks::new(), apart, tile: tile::Scratch::new() })
+        let apart = Apart { flight: Flight::new(), doubted: None };
+        Box::new(Self { apart, tile: tile::Scratch::new() })
     }
 }
 
@@ -72,22 +72,20 @@ impl Bvh {
 
     /// Shapes of placed objects, for one ray.
     #[inline(always)]
-    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+    fn enter_placements<S: Simd, Q: Query>(&self, ray: &Ray, nearest: &mut Nearest) {
         if !self.placements.has_shapes() || Q::ANY && nearest.hit().is_some() {
             return;
         }
-        let Stacks { upper, level: lower } = stacks;
         walk_over::<S, Q>(
             self.placements.tree(),
             ray,
             self.placements.spread(),
             nearest.limit(),
-            upper,
             #[inline(always)]
             |number| {
                 let place = self.placements.at(number);
                 let level = &self.objects[place.placement.object as usize];
-                level.trace_placed_shapes::<S, Q>(ray, place, lower, nearest);
+                level.trace_placed_shapes::<S, Q>(ray, place, nearest);
                 Visit::after::<Q>(nearest)
             },
         );
@@ -95,20 +93,18 @@ impl Bvh {
 
     /// Everything that moves, for one ray.
     #[inline(always)]
-    fn enter_moving<S: Simd, Q: Query>(&self, ray: &Ray, stacks: &mut Stacks, nearest: &mut Nearest) {
+    fn enter_moving<S: Simd, Q: Query>(&self, ray: &Ray, nearest: &mut Nearest) {
         if self.moving.is_empty() || Q::ANY && nearest.hit().is_some() {
             return;
         }
-        let Stacks { upper, level: lower } = stacks;
         self.moving.walk::<S, Q>(
             &self.objects,
             ray,
             nearest.limit(),
-            upper,
             #[inline(always)]
             |level, place| {
-                level.trace_triangles::<S, Q>(ray, Some(place), lower, nearest);
-                level.trace_placed_shapes::<S, Q>(ray, place, lower, nearest);
+                level.trace_triangles::<S, Q>(ray, Some(place), nearest);
+                level.trace_placed_shapes::<S, Q>(ray, place, nearest);
                 Visit::after::<Q>(nearest)
             },
         );
@@ -119,7 +115,6 @@ impl Bvh {
     #[inline(always)]
     fn trace_apart<S: Simd, Q: Query>(
         &self,
-        stacks: &mut Stacks,
         apart: &mut Apart,
         first: usize,
         rays: &[Ray],
@@ -135,7 +130,6 @@ impl Bvh {
         let Apart { flight, doubted } = apart;
         if self.travel_alone(rays.len()) {
             self.walk_one_by_one::<S, Q>(
-                stacks,
                 doubted,
                 rays,
                 #[inline(always)]
@@ -172,7 +166,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
         coherent: bool,
     ) {
-        let Workspace { stacks, apart, tile } = workspace;
+        let Workspace { apart, tile } = workspace;
         let is_all = self.has_only_triangles();
         let mut in_bundles = coherent && self.has_triangles();
         let mut objects = None;
@@ -193,7 +187,7 @@ impl Bvh {
                 let from = open.trailing_zeros() as usize;
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
-                self.trace_apart::<S, Q>(stacks, apart, from, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                self.trace_apart::<S, Q>(apart, from, &rays[run.clone()], &mut answers[run], &mut tile.t);
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -207,7 +201,7 @@ impl Bvh {
                 visitors.clear();
             }
             if !is_all {
-                self.trace_others::<S, Q>(stacks, &rays[chunk.clone()], &mut answers[chunk], &tile.t);
+                self.trace_others::<S, Q>(&rays[chunk.clone()], &mut answers[chunk], &tile.t);
             }
             in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
         }
@@ -215,13 +209,7 @@ impl Bvh {
 
     /// What there is besides triangles that stand still, for rays that have `answers`, with t in f64, among these.
     #[inline(always)]
-    fn trace_others<S: Simd, Q: Query>(
-        &self,
-        stacks: &mut Stacks,
-        rays: &[Ray],
-        answers: &mut [Q::Answer],
-        t: &[f64; bundle::RAYS],
-    ) {
+    fn trace_others<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer], t: &[f64; bundle::RAYS]) {
         for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
             let mut nearest = Nearest::new(ray);
             if !Q::resume(&mut nearest, t, *answer) {
@@ -229,13 +217,13 @@ impl Bvh {
             }
             loop {
                 self.unbounded.offer(ray, &mut nearest);
-                self.fixed.trace_shapes::<S, Q>(ray, ray, None, &mut stacks.level, &mut nearest);
-                self.enter_placements::<S, Q>(ray, stacks, &mut nearest);
-                self.enter_moving::<S, Q>(ray, stacks, &mut nearest);
+                self.fixed.trace_shapes::<S, Q>(ray, ray, None, &mut nearest);
+                self.enter_placements::<S, Q>(ray, &mut nearest);
+                self.enter_moving::<S, Q>(ray, &mut nearest);
                 if !nearest.is_open() {
                     break;
                 }
-                nearest = self.triangles_again::<S>(ray, stacks);
+                nearest = self.triangles_again::<S>(ray);
             }
             *answer = Q::answer(nearest.hit());
         }
@@ -244,15 +232,14 @@ impl Bvh {
     /// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.
     #[cold]
     #[inline(never)]
-    fn triangles_again<S: Simd>(&self, ray: &Ray, stacks: &mut Stacks) -> Nearest {
+    fn triangles_again<S: Simd>(&self, ray: &Ray) -> Nearest {
         let mut nearest = Nearest::new(ray);
-        let Stacks { upper, level: lower } = stacks;
-        self.fixed.trace_triangles::<S, Closest>(ray, None, lower, &mut nearest);
+        self.fixed.trace_triangles::<S, Closest>(ray, None, &mut nearest);
         if self.placements.has_triangles() {
-            walk_over::<S, Closest>(self.placements.tree(), ray, &Spread::NONE, nearest.limit(), upper, |number| {
+            walk_over::<S, Closest>(self.placements.tree(), ray, &Spread::NONE, nearest.limit(), |number| {
                 let place = self.placements.at(number);
                 let level = &self.objects[place.placement.object as usize];
-                level.trace_triangles::<S, Closest>(ray, Some(place), lower, &mut nearest);
+                level.trace_triangles::<S, Closest>(ray, Some(place), &mut nearest);
                 Visit::after::<Closest>(&nearest)
             });
         }

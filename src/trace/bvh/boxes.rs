@@ -13,7 +13,7 @@ use super::preset::Options;
 use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit, with_stack};
+use super::walk::{self, Visit};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::Ray;
 
@@ -62,7 +62,7 @@ impl BoxTree {
     /// mostly first, until it has seen enough. The search takes each box that the ray enters; it may take others.
     pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
         if !self.tree.is_empty() && ray.is_valid() {
-            with_stack(|stack| isa::dispatch(self.isa, VisitBoxes { boxes: self, ray, stack, visitor }));
+            isa::dispatch(self.isa, VisitBoxes { boxes: self, ray, visitor });
         }
     }
 
@@ -111,7 +111,6 @@ fn distance(bounds: &Aabb, point: Vec3) -> f64 {
 struct VisitBoxes<'a, 'v> {
     boxes: &'a BoxTree,
     ray: &'a Ray,
-    stack: &'a mut Stack,
     visitor: &'a mut (dyn FnMut(u32) -> Search + 'v),
 }
 
@@ -120,11 +119,10 @@ impl Kernel for VisitBoxes<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { boxes, ray, stack, visitor } = self;
+        let Self { boxes, ray, visitor } = self;
         let slab = SlabRay::new::<S>(ray, boxes.tree.reach(), Blur::NONE);
         let mut limit = ray.tmax.next_up();
         walk::single::<S, Closest>(
-            stack,
             &boxes.tree,
             &slab,
             limit,

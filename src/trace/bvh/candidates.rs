@@ -11,7 +11,7 @@ use super::query::Closest;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::{self, Stack, Visit, with_stack};
+use super::walk::{self, Visit};
 use crate::ray::Ray;
 
 /// What is done with a candidate: its geometry and its primitive; says up to which t more are wanted, none where no more are.
@@ -22,7 +22,7 @@ impl Bvh {
     /// The ray, and the triangles, may be off from those that are meant by the blur.
     pub(in crate::trace) fn candidates(&self, ray: &Ray, blur: Blur, offer: Offer<'_>) {
         if ray.is_valid() && !self.fixed.triangles.tree().is_empty() {
-            with_stack(|stack| isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, stack, offer }));
+            isa::dispatch(self.isa, Candidates { bvh: self, ray, blur, offer });
         }
     }
 }
@@ -31,7 +31,6 @@ struct Candidates<'a> {
     bvh: &'a Bvh,
     ray: &'a Ray,
     blur: Blur,
-    stack: &'a mut Stack,
     offer: Offer<'a>,
 }
 
@@ -40,13 +39,12 @@ impl Kernel for Candidates<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, ray, blur, stack, offer } = self;
+        let Self { bvh, ray, blur, offer } = self;
         let triangles = &bvh.fixed.triangles;
         walk::<S>(
             triangles,
             ray,
             blur,
-            stack,
             #[inline(always)]
             |filter, block, limit| filter.rounded_candidates::<S>(block, limit),
             #[inline(always)]
@@ -62,7 +60,6 @@ pub(super) fn walk<S: Simd>(
     triangles: &TriangleTree,
     ray: &Ray,
     blur: Blur,
-    stack: &mut Stack,
     test: impl Fn(&Filter, &Block, f32) -> filter::Candidates,
     mut each: impl FnMut(&Block, usize, f32) -> Option<f32>,
 ) {
@@ -70,7 +67,6 @@ pub(super) fn walk<S: Simd>(
     let (slab, filter) = (SlabRay::new::<S>(ray, tree.reach(), blur), Filter::new(ray, blur));
     let mut limit = ray.tmax.next_up();
     walk::single::<S, Closest>(
-        stack,
         tree,
         &slab,
         limit,

@@ -8,7 +8,7 @@ use super::shapes::ShapeTree;
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::{self, Stack, Visit};
+use super::walk::{self, Visit};
 use crate::math::{Aabb, Affine3};
 use crate::ray::Ray;
 use crate::trace::nearest::Nearest;
@@ -53,13 +53,7 @@ impl Level {
 
     /// Offers the triangles that `ray`, in the world, hits in this level, which may be placed; all by itself.
     #[inline(always)]
-    pub fn trace_triangles<S: Simd, Q: Query>(
-        &self,
-        ray: &Ray,
-        place: Option<&Place>,
-        stack: &mut Stack,
-        nearest: &mut Nearest,
-    ) {
+    pub fn trace_triangles<S: Simd, Q: Query>(&self, ray: &Ray, place: Option<&Place>, nearest: &mut Nearest) {
         let tree = self.triangles.tree();
         let is_done = Q::ANY && nearest.hit().is_some();
         if is_done || tree.is_empty() {
@@ -69,7 +63,6 @@ impl Level {
         let through = place.map(Place::through);
         let (slab, filter) = (SlabRay::new::<S>(&local, tree.reach(), blur), Filter::new(&local, blur));
         walk::single::<S, Q>(
-            stack,
             tree,
             &slab,
             nearest.limit(),
@@ -83,16 +76,10 @@ impl Level {
 
     /// Shapes of an object in its place, for a ray of the world.
     #[inline(always)]
-    pub fn trace_placed_shapes<S: Simd, Q: Query>(
-        &self,
-        ray: &Ray,
-        place: &Place,
-        stack: &mut Stack,
-        nearest: &mut Nearest,
-    ) {
+    pub fn trace_placed_shapes<S: Simd, Q: Query>(&self, ray: &Ray, place: &Place, nearest: &mut Nearest) {
         let local = place.placement.object_ray(ray);
         if local.is_valid() {
-            self.trace_shapes::<S, Q>(ray, &local, Some(place.through()), stack, nearest);
+            self.trace_shapes::<S, Q>(ray, &local, Some(place.through()), nearest);
         }
     }
 
@@ -104,14 +91,12 @@ impl Level {
         ray: &Ray,
         local: &Ray,
         through: Option<Through<'_>>,
-        stack: &mut Stack,
         nearest: &mut Nearest,
     ) {
         let is_done = Q::ANY && nearest.hit().is_some();
         if !is_done && !self.shapes.tree().is_empty() {
             let slab = SlabRay::new::<S>(local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Q>(
-                stack,
                 self.shapes.tree(),
                 &slab,
                 nearest.limit(),

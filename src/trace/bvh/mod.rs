@@ -21,8 +21,7 @@
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `alone` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
-//! | `scratch` | what both need of a thread |
-//! | `boxes` | a tree over boxes of the caller's |
+//! //! | `boxes` | a tree over boxes of the caller's |
 //! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
@@ -80,11 +79,11 @@ mod ready;
 mod refit;
 mod room;
 mod rows;
-mod scratch;
 mod set;
 mod shapes;
 mod simd;
 mod slab;
+mod stack;
 mod steps;
 mod tile;
 mod triangles;

@@ -12,7 +12,7 @@ use super::placements::{spread_over, tree_over, walk_over};
 use super::preset::Options;
 use super::query::Query;
 use super::simd::Simd;
-use super::walk::{Stack, Visit};
+use super::walk::Visit;
 use crate::ray::Ray;
 use crate::trace::Placement;
 use crate::trace::spread::Spread;
@@ -58,7 +58,6 @@ impl MovingTree {
         objects: &[Level],
         ray: &Ray,
         limit: f32,
-        stack: &mut Stack,
         mut enter: impl FnMut(&Level, &Place) -> Visit,
     ) {
         walk_over::<S, Q>(
@@ -66,7 +65,6 @@ impl MovingTree {
             ray,
             &self.spread,
             limit,
-            stack,
             #[inline(always)]
             |number| {
                 let placement = self.at(number);

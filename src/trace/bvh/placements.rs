@@ -10,7 +10,7 @@ use super::preset::Options;
 use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
-use super::walk::{self, Stack, Visit};
+use super::walk::{self, Visit};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::Placement;
@@ -72,12 +72,10 @@ pub(super) fn walk_over<S: Simd, Q: Query>(
     ray: &Ray,
     spread: &Spread,
     limit: f32,
-    stack: &mut Stack,
     mut enter: impl FnMut(u32) -> Visit,
 ) {
     let slab = among_boxes::<S>(tree, ray, spread);
     walk::single::<S, Q>(
-        stack,
         tree,
         &slab,
         limit,

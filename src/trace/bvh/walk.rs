@@ -3,13 +3,11 @@
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 
-use std::cell::RefCell;
-
-use super::build::MAX_DEPTH;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::query::Query;
 use super::simd::{Array, Mask, Simd, Vector};
 use super::slab::SlabRay;
+use super::stack::{Entry, Room, Stack};
 use crate::trace::nearest::Nearest;
 
 /// What a leaf says to the walk.
@@ -29,115 +27,9 @@ impl Visit {
     }
 }
 
-/// A child to be visited.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    /// Where the ray enters it.
-    near: f32,
-    child: Child,
-}
-
-impl Entry {
-    #[inline(always)]
-    fn child(node: &Node, near: &[f32; WIDTH], slot: usize) -> Self {
-        Self { near: near[slot], child: node.child[slot] }
-    }
-
-    const ROOT: Self = Self { near: 0.0, child: Child::ROOT };
-}
-
-/// Every level of the tree leaves at most seven siblings waiting.
-const STACK: usize = MAX_DEPTH * (WIDTH - 1) + 1;
-
 /// Where children are entered: within one cache line, for it is stored whole and loaded one by one.
 #[repr(align(32))]
 struct Near([f32; WIDTH]);
-
-/// Room for children waiting to be visited. Made once a batch, since filling it costs as much as a few nodes.
-pub(super) struct Stack([Entry; STACK]);
-
-impl Stack {
-    pub const fn new() -> Self {
-        Self([Entry::ROOT; STACK])
-    }
-
-    /// Puts an entry on top of `len` others, but below those since `base` that are nearer.
-    #[inline(always)]
-    fn insert(&mut self, base: usize, len: usize, entry: Entry) {
-        let mut at = len;
-        while at > base && self.0[at - 1].near < entry.near {
-            self.0[at] = self.0[at - 1];
-            at -= 1;
-        }
-        self.0[at] = entry;
-    }
-
-    /// Pushes all children that are entered but the nearest, which it returns; at least one is. Mostly one or two are: each number has its own branch, which
-    /// is predicted better than the length of a loop.
-    #[inline(always)]
-    fn open<Q: Query>(
-        &mut self,
-        len: &mut usize,
-        node: &Node,
-        &Entered { children, near: Near(ref near) }: &Entered,
-    ) -> Entry {
-        let (first, rest) = lowest(children);
-        let mut next = Entry::child(node, near, first);
-        if rest == 0 {
-            return next;
-        }
-        let (second, mut rest) = lowest(rest);
-        let mut other = Entry::child(node, near, second);
-        if other.near < next.near {
-            std::mem::swap(&mut next, &mut other);
-        }
-        let base = *len;
-        self.0[*len] = other;
-        *len += 1;
-        while rest != 0 {
-            let (slot, others) = lowest(rest);
-            rest = others;
-            let mut other = Entry::child(node, near, slot);
-            if other.near < next.near {
-                std::mem::swap(&mut next, &mut other);
-            }
-            if Q::ANY {
-                self.0[*len] = other
-            } else {
-                self.insert(base, *len, other)
-            }
-            *len += 1;
-        }
-        next
-    }
-}
-
-/// One stack for the placements, one for what is below them.
-pub(super) struct Stacks {
-    pub upper: Stack,
-    pub level: Stack,
-}
-
-impl Stacks {
-    pub const fn new() -> Self {
-        Self { upper: Stack::new(), level: Stack::new() }
-    }
-}
-
-thread_local! {
-    /// Stacks that are not in use: who visits a leaf may cast rays of its own.
-    #[expect(clippy::vec_box, reason = "boxes are moved in and out, stacks of some kilobytes are not")]
-    static STACKS: RefCell<Vec<Box<Stack>>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Lends a stack to `work`, for callers with a single ray.
-#[inline]
-pub(super) fn with_stack<R>(work: impl FnOnce(&mut Stack) -> R) -> R {
-    let mut stack = STACKS.with_borrow_mut(Vec::pop).unwrap_or_else(|| Box::new(Stack::new()));
-    let result = work(&mut stack);
-    STACKS.with_borrow_mut(|stacks| stacks.push(stack));
-    result
-}
 
 /// What walks: a ray, or several that go the same way.
 pub(super) trait Enter {
@@ -172,6 +64,35 @@ impl Entered {
         Self { children: ray.select::<S>(node, mask.bits()), near: Near(near.to_array()) }
     }
 
+    /// The nearest of the children, of which there is at least one; all others go on the stack. Mostly one or two are entered: each number has its own branch,
+    /// which is predicted better than the length of a loop.
+    #[inline(always)]
+    fn open<Q: Query>(&self, stack: &mut Stack<'_>, node: &Node) -> Entry {
+        let Near(near) = &self.near;
+        let (first, rest) = lowest(self.children);
+        let mut next = Entry { near: near[first], child: node.child[first] };
+        if rest == 0 {
+            return next;
+        }
+        let (second, mut rest) = lowest(rest);
+        let mut other = Entry { near: near[second], child: node.child[second] };
+        if other.near < next.near {
+            std::mem::swap(&mut next, &mut other);
+        }
+        let base = stack.len();
+        stack.push(other);
+        while rest != 0 {
+            let (slot, others) = lowest(rest);
+            rest = others;
+            let mut other = Entry { near: near[slot], child: node.child[slot] };
+            if other.near < next.near {
+                std::mem::swap(&mut next, &mut other);
+            }
+            if Q::ANY { stack.push(other) } else { stack.insert(base, other) }
+        }
+        next
+    }
+
     /// Of a tree's root, of which there is one.
     #[inline(always)]
     pub fn root<S: Simd>(tree: &Tree, ray: &impl Enter, limit: f32) -> Self {
@@ -181,21 +102,14 @@ impl Entered {
 
 /// Visits the leaves that `ray` enters before `limit`; near ones first, if that matters to the query.
 #[inline(always)]
-pub(super) fn single<S: Simd, Q: Query>(
-    stack: &mut Stack,
-    tree: &Tree,
-    ray: &impl Enter,
-    limit: f32,
-    leaf: impl FnMut(Child) -> Visit,
-) {
+pub(super) fn single<S: Simd, Q: Query>(tree: &Tree, ray: &impl Enter, limit: f32, leaf: impl FnMut(Child) -> Visit) {
     let root = Entered::root::<S>(tree, ray, limit);
-    from_root::<S, Q>(stack, tree, ray, limit, &root, leaf);
+    from_root::<S, Q>(tree, ray, limit, &root, leaf);
 }
 
 /// The same of a ray of which it is known what it enters of the root.
 #[inline(always)]
 pub(super) fn from_root<S: Simd, Q: Query>(
-    stack: &mut Stack,
     tree: &Tree,
     ray: &impl Enter,
     mut limit: f32,
@@ -205,9 +119,9 @@ pub(super) fn from_root<S: Simd, Q: Query>(
     if root.children == 0 {
         return;
     }
-    // Children on the stack, the nearest on top.
-    let mut len = 0;
-    let mut next = stack.open::<Q>(&mut len, tree.node(Child::ROOT), root);
+    let mut room = Room::new();
+    let mut stack = Stack::new(&mut room);
+    let mut next = root.open::<Q>(&mut stack, tree.node(Child::ROOT));
     loop {
         // Down to a leaf.
         while !next.child.is_leaf() {
@@ -216,7 +130,7 @@ pub(super) fn from_root<S: Simd, Q: Query>(
             if entered.children == 0 {
                 break;
             }
-            next = stack.open::<Q>(&mut len, node, &entered);
+            next = entered.open::<Q>(&mut stack, node);
         }
         if next.child.is_leaf() {
             match leaf(next.child) {
@@ -225,11 +139,7 @@ pub(super) fn from_root<S: Simd, Q: Query>(
             }
         }
         next = loop {
-            if len == 0 {
-                return;
-            }
-            len -= 1;
-            let entry = stack.0[len];
+            let Some(entry) = stack.pop() else { return };
             if entry.near <= limit {
                 break entry;
             }

@@ -56,12 +56,12 @@ pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &
         }
         Sight::Some => {
             if let Some(solid) = &committed.solid {
-                show_solid(committed, solid, query, target, &target.ray());
+                show_solid(committed, solid, *query, *target);
             }
         }
     }
     if committed.others.is_some() && !(ANY && target.tfar() < 0.0) {
-        cast_others::<ANY>(committed, query, target);
+        cast_others::<ANY>(committed, *query, *target);
     }
 }
 
@@ -102,9 +102,11 @@ pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: 
     Some(surface.name(primitive, u, v, ng))
 }
 
-/// Among the triangles, each of which has to pass.
-fn show_solid(committed: &Committed, solid: &Bvh, query: &Query, target: &Target, ray: &RTCRay) {
-    solid.visit_triangles(&native(ray), &mut |found| {
+/// Among the triangles, each of which has to pass. By value, here and below, so that neither need lie in memory where there is nothing of that.
+#[inline(never)]
+fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target) {
+    let ray = target.ray();
+    solid.visit_triangles(&native(&ray), &mut |found| {
         let hit = &found.hit;
         if let Some(record) = committed.record(hit.geometry)
             && record.mask & ray.mask != 0
@@ -112,9 +114,9 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: &Query, target: &Target
             && let Body::Surface(surface) = &record.body
         {
             let named = surface.name(hit.primitive, hit.u, hit.v, found.normal);
-            target.offer(query, record, hit.geometry, hit.t, &named);
+            target.offer(&query, record, hit.geometry, hit.t, &named);
         }
-        onwards(target)
+        onwards(&target)
     });
 }
 
@@ -127,7 +129,7 @@ fn onwards(target: &Target) -> Search {
 
 /// Among everything that is not a triangle that stands still.
 #[inline(never)]
-fn cast_others<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
+fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target) {
     let Some(others) = &committed.others else { return };
     let ray = target.ray();
     others.visit(&native(&ray), &mut |i| {
@@ -135,9 +137,9 @@ fn cast_others<const ANY: bool>(committed: &Committed, query: &Query, target: &T
         if let Some(record) = committed.record(geometry)
             && record.mask & ray.mask != 0
         {
-            cast_item::<ANY>(query, target, record, Item { geometry, primitive }, &ray);
+            cast_item::<ANY>(&query, &target, record, Item { geometry, primitive }, &ray);
         }
-        onwards(target)
+        onwards(&target)
     });
 }
 

@@ -28,11 +28,10 @@ use super::place::Blur;
 use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
 use super::ready::ReadyRay;
-use super::scratch::{Scratch, with_scratch};
 use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
-use super::walk::{self, Entered, Stack, Visit, with_stack};
+use super::walk::{self, Entered, Visit};
 use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
@@ -40,18 +39,21 @@ pub use found::TriangleFound;
 pub use row::SingleRay;
 pub use some::Travel;
 
+/// What was decided at once of a ray of which there was doubt, if [`Noted`] says that anything was; room for it is made where it is first needed, for few rays need it.
+pub(super) type Doubted = Option<Found>;
+
 /// Whether a search goes on, up to some t.
 pub type Search = ControlFlow<(), f32>;
 
 impl Bvh {
     /// The nearest fixed triangle that `ray` hits, into `found`. Whether there is one.
     pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
-        with_scratch(|scratch| self.has_fixed() && isa::dispatch(self.isa, Alone { bvh: self, ray, scratch, found }))
+        self.has_fixed() && isa::dispatch(self.isa, Alone { bvh: self, ray, found })
     }
 
     /// Whether `ray` hits any fixed triangle.
     pub fn occludes(&self, ray: &SingleRay) -> bool {
-        with_scratch(|scratch| self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray, scratch }))
+        self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray })
     }
 
     /// Whether there are fixed triangles. Asked by who has borrowed [`Scratch`], not before: what the borrower was given is then read piece by piece, as it
@@ -65,7 +67,7 @@ impl Bvh {
     /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
     pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> Search) {
         if self.has_fixed() && ray.is_valid() {
-            with_stack(|stack| isa::dispatch(self.isa, VisitAll { bvh: self, ray, stack, visitor }));
+            isa::dispatch(self.isa, VisitAll { bvh: self, ray, visitor });
         }
     }
 
@@ -75,35 +77,22 @@ impl Bvh {
         &self,
         ray: &SingleRay,
         ready: &ReadyRay,
-        stack: &mut Stack,
-        doubted: &mut Found,
+        doubted: &mut Doubted,
         found: &mut TriangleFound,
     ) -> bool {
-        let noted = self.walk_ready::<S, Closest>(ray, ready, stack, doubted);
+        let noted = self.walk_ready::<S, Closest>(ray, ready, doubted);
         noted.compute::<S>(self, ray, doubted, found)
     }
 
     /// [`Self::occludes`], likewise.
     #[inline(always)]
-    pub(super) fn occluded_ready<S: Simd>(
-        &self,
-        ray: &SingleRay,
-        ready: &ReadyRay,
-        stack: &mut Stack,
-        doubted: &mut Found,
-    ) -> bool {
-        self.walk_ready::<S, Occluded>(ray, ready, stack, doubted).is_hit(doubted)
+    pub(super) fn occluded_ready<S: Simd>(&self, ray: &SingleRay, ready: &ReadyRay, doubted: &mut Doubted) -> bool {
+        self.walk_ready::<S, Occluded>(ray, ready, doubted).is_hit(doubted)
     }
 
     /// As [`Self::walk_alone`], of a ray that is ready.
     #[inline(always)]
-    fn walk_ready<S: Simd, Q: Query>(
-        &self,
-        ray: &SingleRay,
-        ready: &ReadyRay,
-        stack: &mut Stack,
-        found: &mut Found,
-    ) -> Noted {
+    fn walk_ready<S: Simd, Q: Query>(&self, ray: &SingleRay, ready: &ReadyRay, doubted: &mut Doubted) -> Noted {
         let mut noted = Noted::nothing(ray);
         self.walk_through::<S, Q, false>(
             FIXED,
@@ -112,16 +101,15 @@ impl Bvh {
             #[inline(always)]
             || ready.filter(),
             ray,
-            stack,
             &mut noted,
-            found,
+            doubted,
         );
         noted
     }
 
     /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
     #[inline(always)]
-    fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, stack: &mut Stack, found: &mut Found) -> Option<Noted> {
+    fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, doubted: &mut Doubted) -> Option<Noted> {
         let (slab, rest) = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;
         let mut noted = Noted::nothing(ray);
         self.walk_through::<S, Q, false>(
@@ -131,9 +119,8 @@ impl Bvh {
             #[inline(always)]
             || rest.filter(),
             ray,
-            stack,
             &mut noted,
-            found,
+            doubted,
         );
         Some(noted)
     }
@@ -149,15 +136,13 @@ impl Bvh {
         slab: &SlabRay,
         filter: impl FnOnce() -> Filter,
         ray: &SingleRay,
-        stack: &mut Stack,
         noted: &mut Noted,
-        found: &mut Found,
+        doubted: &mut Doubted,
     ) {
         let tree = triangles.tree();
         let root = Entered::root::<S>(tree, slab, noted.limit);
         let filter = filter();
         walk::from_root::<S, Q>(
-            stack,
             tree,
             slab,
             noted.limit,
@@ -169,7 +154,7 @@ impl Bvh {
                     let block = triangles.block(index, &mut scratch);
                     // The black box is for the same as at nodes: `Enter` of a single ray.
                     let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);
-                    if candidates.lanes != 0 && noted.offer::<Q>(self, found, place, index, block, &candidates, ray) {
+                    if candidates.lanes != 0 && noted.offer::<Q>(self, doubted, place, index, block, &candidates, ray) {
                         return Visit::Stop;
                     }
                 }
@@ -204,20 +189,21 @@ impl Noted {
         Self { sure: ray.tmax.min(f32::MAX), limit, id: NONE, place: FIXED, is_doubted: false }
     }
 
-    /// Whether there is any hit; `found` is what was decided.
+    /// Whether there is any hit.
     #[inline(always)]
-    pub fn is_hit(&self, found: &Found) -> bool {
-        self.id != NONE || self.is_doubted && found.is_hit()
+    pub fn is_hit(&self, doubted: &Doubted) -> bool {
+        self.id != NONE || self.is_doubted && doubted.as_ref().is_some_and(Found::is_hit)
     }
 
-    /// The hit, of a fixed triangle, into `found`; `doubted` is what was decided. Whether there is any.
+    /// The hit, of a fixed triangle, into `found`. Whether there is any.
     #[inline(always)]
-    fn compute<S: Simd>(&self, bvh: &Bvh, ray: &SingleRay, doubted: &Found, found: &mut TriangleFound) -> bool {
+    fn compute<S: Simd>(&self, bvh: &Bvh, ray: &SingleRay, doubted: &Doubted, found: &mut TriangleFound) -> bool {
         if self.id != NONE {
             *found = bvh.sure_triangle::<S>(ray, self.id);
             return true;
         }
-        let computed = if self.is_doubted { bvh.computed_triangle(doubted) } else { None };
+        let doubted = if self.is_doubted { doubted.as_ref() } else { None };
+        let computed = doubted.and_then(|doubted| bvh.computed_triangle(doubted));
         computed.is_some_and(|computed| {
             *found = computed;
             true
@@ -230,7 +216,7 @@ impl Noted {
     fn offer<Q: Query>(
         &mut self,
         bvh: &Bvh,
-        found: &mut Found,
+        doubted: &mut Doubted,
         place: u32,
         index: u32,
         block: &Block,
@@ -255,8 +241,8 @@ impl Noted {
                     continue;
                 }
             }
-            *self = self.decide(bvh, found, place, index, block, lane, ray);
-            if Q::ANY && found.is_hit() {
+            *self = self.decide(bvh, doubted, place, index, block, lane, ray);
+            if Q::ANY && self.is_hit(doubted) {
                 return true;
             }
         }
@@ -270,13 +256,14 @@ impl Noted {
     fn decide(
         self,
         bvh: &Bvh,
-        found: &mut Found,
+        doubted: &mut Doubted,
         place: u32,
         index: u32,
         block: &Block,
         lane: usize,
         ray: &SingleRay,
     ) -> Self {
+        let found = doubted.get_or_insert(Found::NONE);
         if !self.is_doubted {
             found.start([self.sure, self.limit]);
         }
@@ -290,7 +277,6 @@ impl Noted {
 struct Alone<'a> {
     bvh: &'a Bvh,
     ray: &'a SingleRay,
-    scratch: &'a mut Scratch,
     found: &'a mut TriangleFound,
 }
 
@@ -299,17 +285,16 @@ impl Kernel for Alone<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { bvh, ray, scratch, found } = self;
-        let Scratch { stack, found: [doubted, ..], .. } = scratch;
-        let Some(noted) = bvh.walk_alone::<S, Closest>(ray, stack, doubted) else { return false };
-        noted.compute::<S>(bvh, ray, doubted, found)
+        let Self { bvh, ray, found } = self;
+        let mut doubted = None;
+        let Some(noted) = bvh.walk_alone::<S, Closest>(ray, &mut doubted) else { return false };
+        noted.compute::<S>(bvh, ray, &doubted, found)
     }
 }
 
 struct AnyAlone<'a> {
     bvh: &'a Bvh,
     ray: &'a SingleRay,
-    scratch: &'a mut Scratch,
 }
 
 impl Kernel for AnyAlone<'_> {
@@ -317,17 +302,16 @@ impl Kernel for AnyAlone<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { bvh, ray, scratch } = self;
-        let Scratch { stack, found: [doubted, ..], .. } = scratch;
-        let noted = bvh.walk_alone::<S, Occluded>(ray, stack, doubted);
-        noted.is_some_and(|noted| noted.is_hit(doubted))
+        let Self { bvh, ray } = self;
+        let mut doubted = None;
+        let noted = bvh.walk_alone::<S, Occluded>(ray, &mut doubted);
+        noted.is_some_and(|noted| noted.is_hit(&doubted))
     }
 }
 
 struct VisitAll<'a, 'v> {
     bvh: &'a Bvh,
     ray: &'a Ray,
-    stack: &'a mut Stack,
     visitor: &'a mut (dyn FnMut(&TriangleFound) -> Search + 'v),
 }
 
@@ -336,13 +320,12 @@ impl Kernel for VisitAll<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, ray, stack, visitor } = self;
+        let Self { bvh, ray, visitor } = self;
         let triangles = &bvh.fixed.triangles;
         candidates::walk::<S>(
             triangles,
             ray,
             Blur::NONE,
-            stack,
             #[inline(always)]
             |filter, block, limit| filter.candidates::<S, false>(block, limit),
             #[inline(always)]

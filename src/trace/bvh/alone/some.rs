@@ -2,7 +2,7 @@
 //!
 //! A few rays make no flight ([`super::super::flight`]) worth its name: while one waits, none of the others has a step to take.
 
-use super::{Noted, SingleRay};
+use super::{Doubted, Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::found::{Found, NONE};
@@ -12,7 +12,7 @@ use crate::trace::bvh::query::{Closest, Query};
 use crate::trace::bvh::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::triangles::TriangleTree;
-use crate::trace::bvh::walk::{self, Stack, Stacks, Visit};
+use crate::trace::bvh::walk::{self, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,8 +49,7 @@ impl Bvh {
     #[inline(always)]
     pub(in crate::trace::bvh) fn walk_one_by_one<S: Simd, Q: Query>(
         &self,
-        stacks: &mut Stacks,
-        found: &mut Found,
+        doubted: &mut Doubted,
         rays: &[Ray],
         mut done: impl FnMut(usize, &Found),
     ) {
@@ -61,14 +60,15 @@ impl Bvh {
             let (ray, ready) = (&rays[i], waiting.ready());
             let single = SingleRay::from(ray);
             let Noted { sure, limit, id, place, is_doubted } = if has_placements {
-                self.walk_from_place_to_place::<S, Q>(&single, ray, ready, stacks, found)
+                self.walk_from_place_to_place::<S, Q>(&single, ray, ready, doubted)
             } else {
-                self.walk_ready::<S, Q>(&single, ready, &mut stacks.level, found)
+                self.walk_ready::<S, Q>(&single, ready, doubted)
             };
-            if id != NONE {
-                found.resume([sure, limit], id, place);
-            }
             if id != NONE || is_doubted {
+                let found = doubted.get_or_insert(Found::NONE);
+                if id != NONE {
+                    found.resume([sure, limit], id, place);
+                }
                 done(i, found);
             }
         }
@@ -82,10 +82,8 @@ impl Bvh {
         single: &SingleRay,
         ray: &Ray,
         ready: &ReadyRay,
-        stacks: &mut Stacks,
-        found: &mut Found,
+        doubted: &mut Doubted,
     ) -> Noted {
-        let Stacks { upper, level: lower } = stacks;
         let mut noted = Noted::nothing(single);
         let slab = ready.slab();
         let fixed = &self.fixed.triangles;
@@ -97,24 +95,22 @@ impl Bvh {
                 #[inline(always)]
                 || ready.filter(),
                 single,
-                lower,
                 &mut noted,
-                found,
+                doubted,
             );
-            if Q::ANY && noted.is_hit(found) {
+            if Q::ANY && noted.is_hit(doubted) {
                 return noted;
             }
         }
         walk::single::<S, Q>(
-            upper,
             self.placements.tree(),
             &slab,
             noted.limit,
             #[inline(always)]
             |leaf| {
                 for number in leaf.blocks() {
-                    self.walk_place::<S, Q>(number, single, ray, lower, &mut noted, found);
-                    if Q::ANY && noted.is_hit(found) {
+                    self.walk_place::<S, Q>(number, single, ray, &mut noted, doubted);
+                    if Q::ANY && noted.is_hit(doubted) {
                         return Visit::Stop;
                     }
                 }
@@ -131,9 +127,8 @@ impl Bvh {
         number: u32,
         single: &SingleRay,
         ray: &Ray,
-        stack: &mut Stack,
         noted: &mut Noted,
-        found: &mut Found,
+        doubted: &mut Doubted,
     ) {
         let (place, triangles) = self.object_at(number);
         if triangles.tree().is_empty() {
@@ -149,9 +144,8 @@ impl Bvh {
             #[inline(always)]
             || rest.filter(),
             single,
-            stack,
             noted,
-            found,
+            doubted,
         );
     }
 
@@ -162,9 +156,8 @@ impl Bvh {
         number: u32,
         single: &SingleRay,
         ready: &ReadyRay,
-        stack: &mut Stack,
         noted: &mut Noted,
-        found: &mut Found,
+        doubted: &mut Doubted,
     ) {
         let (_, triangles) = self.object_at(number);
         self.walk_through::<S, Closest, true>(
@@ -174,9 +167,8 @@ impl Bvh {
             #[inline(always)]
             || ready.filter(),
             single,
-            stack,
             noted,
-            found,
+            doubted,
         );
     }
 

@@ -1,21 +1,19 @@
 //! Rays of a packet that go their own ways: made ready together, they walk one after the other.
 
-use super::{Packet, RAYS, each};
+use super::{Packet, PacketHits, RAYS, each};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{SingleRay, TriangleFound};
 use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::ready::{ReadyRay, ready};
-use crate::trace::bvh::scratch::Scratch;
 use crate::trace::bvh::simd::Simd;
 
-/// The nearest hits of those rays of packet `number` that `lanes` has a bit for.
+/// The nearest hits of those rays that `lanes` has a bit for.
 pub(super) struct ClosestApart<'a> {
     pub bvh: &'a Bvh,
-    pub number: usize,
     pub packet: &'a Packet,
     pub lanes: u32,
-    pub scratch: &'a mut Scratch,
+    pub hits: &'a mut PacketHits,
 }
 
 impl Kernel for ClosestApart<'_> {
@@ -23,13 +21,13 @@ impl Kernel for ClosestApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, number, packet, lanes, scratch: Scratch { stack, found: [doubted, ..], hits } } = self;
+        let Self { bvh, packet, lanes, hits } = self;
         let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
-        let mut found = TriangleFound::NONE;
-        hits[number].lanes = 0;
+        let (mut found, mut doubted) = (TriangleFound::NONE, None);
+        hits.lanes = 0;
         for lane in each(lanes & valid) {
-            if bvh.closest_ready::<S>(&rays[lane], &ready[lane], stack, doubted, &mut found) {
-                hits[number].put(lane, &found);
+            if bvh.closest_ready::<S>(&rays[lane], &ready[lane], &mut doubted, &mut found) {
+                hits.put(lane, &found);
             }
         }
     }
@@ -40,7 +38,6 @@ pub(super) struct OccludedApart<'a> {
     pub bvh: &'a Bvh,
     pub packet: &'a Packet,
     pub lanes: u32,
-    pub scratch: &'a mut Scratch,
 }
 
 impl Kernel for OccludedApart<'_> {
@@ -48,11 +45,11 @@ impl Kernel for OccludedApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
-        let Self { bvh, packet, lanes, scratch: Scratch { stack, found: [doubted, ..], .. } } = self;
+        let Self { bvh, packet, lanes } = self;
         let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
-        let mut occluded = 0;
+        let (mut occluded, mut doubted) = (0, None);
         for lane in each(lanes & valid) {
-            occluded |= u32::from(bvh.occluded_ready::<S>(&rays[lane], &ready[lane], stack, doubted)) << lane;
+            occluded |= u32::from(bvh.occluded_ready::<S>(&rays[lane], &ready[lane], &mut doubted)) << lane;
         }
         occluded
     }

@@ -19,13 +19,13 @@ mod doubts;
 mod finish;
 mod octet;
 mod party;
+mod scratch;
 mod way;
 
 use super::Bvh;
 use super::alone::{SingleRay, TriangleFound};
 use super::isa::{self, Kernel};
 use super::query::{Closest, Occluded};
-use super::scratch::{Scratch, with_scratch};
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::Vec3;
 use crate::ray::Ray;
@@ -33,12 +33,13 @@ use apart::{ClosestApart, OccludedApart};
 use beam::Beam;
 use doubts::Doubts;
 use octet::Octet;
+use scratch::{Scratch, with_scratch};
 
 /// Rays of a packet.
-pub(super) const RAYS: usize = Packet::RAYS;
+const RAYS: usize = Packet::RAYS;
 
 /// Packets that travel together at most.
-pub(super) const MOST: usize = 2;
+const MOST: usize = 2;
 
 /// Eight rays, component by component, in the order in which Embree's `RTCRay8` begins: a caller's can be read where it is.
 #[repr(C, align(32))]
@@ -233,10 +234,10 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
         let Self { bvh, asked, scratch } = self;
         let mut own = None;
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
-            let Scratch { stack, found, hits } = scratch;
+            let Scratch { found, hits } = scratch;
             let mut doubts = Doubts::new(found);
             let mut octets = [Octet::nothing(); N];
-            way::trace::<S, Closest, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);
+            way::trace::<S, Closest, N>(bvh, &asked, &beam, &mut doubts, &mut octets);
             for (number, octet) in octets.iter().enumerate() {
                 let (packet, lanes) = (asked.packets[number], asked.lanes[number]);
                 finish::finish::<S>(bvh, number, packet, lanes, octet, &doubts, &mut hits[number]);
@@ -244,7 +245,7 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
             return;
         }
         for (number, (packet, lanes)) in asked.packets.into_iter().zip(asked.lanes).enumerate() {
-            isa::dispatch(bvh.isa, ClosestApart { bvh, number, packet, lanes, scratch });
+            isa::dispatch(bvh.isa, ClosestApart { bvh, packet, lanes, hits: &mut scratch.hits[number] });
         }
     }
 }
@@ -264,17 +265,16 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
         let Self { bvh, asked, scratch, occluded } = self;
         let mut own = None;
         if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
-            let Scratch { stack, found, .. } = scratch;
-            let mut doubts = Doubts::new(found);
+            let mut doubts = Doubts::new(&mut scratch.found);
             let mut octets = [Octet::nothing(); N];
-            way::trace::<S, Occluded, N>(bvh, &asked, &beam, stack, &mut doubts, &mut octets);
+            way::trace::<S, Occluded, N>(bvh, &asked, &beam, &mut doubts, &mut octets);
             for (occluded, octet) in occluded.iter_mut().zip(&octets) {
                 *occluded = octet.hit;
             }
             return;
         }
         for (occluded, (packet, lanes)) in occluded.iter_mut().zip(asked.packets.into_iter().zip(asked.lanes)) {
-            *occluded = isa::dispatch(bvh.isa, OccludedApart { bvh, packet, lanes, scratch });
+            *occluded = isa::dispatch(bvh.isa, OccludedApart { bvh, packet, lanes });
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Simd, Vector};
-use crate::trace::bvh::walk::{self, Stack, Visit};
+use crate::trace::bvh::walk::{self, Visit};
 
 /// Walks, and notes in `octets` what is hit; what is decided at once is in `doubts`.
 #[inline(always)]
@@ -16,7 +16,6 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
     bvh: &Bvh,
     asked: &Asked<'_, N>,
     beam: &Beam,
-    stack: &mut Stack,
     doubts: &mut Doubts<'_>,
     octets: &mut [Octet<S::V8>; N],
 ) {
@@ -28,7 +27,6 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
     let party = Party::<Q, S::V8, N>::new(beam, asked, triangles.tree().reach());
     party.shorten(octets);
     walk::single::<S, Q>(
-        stack,
         triangles.tree(),
         &party,
         most,

@@ -3,25 +3,23 @@
 use super::found::Found;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::alone::{Noted, SingleRay};
+use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
 use crate::trace::bvh::bundle::{RAYS, SLACK};
-use crate::trace::bvh::found::{Found as Doubted, NONE};
+use crate::trace::bvh::found::{Found as Walked, NONE};
 use crate::trace::bvh::query::Closest;
 use crate::trace::bvh::range::Range;
 use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::walk::Stack;
 
 /// What they need.
 pub(super) struct Apart {
-    stack: Stack,
     /// Of the ray that walks, what was in doubt.
     doubted: Doubted,
 }
 
 impl Apart {
     pub fn new() -> Self {
-        Self { stack: Stack::new(), doubted: Doubted::NONE }
+        Self { doubted: None }
     }
 
     /// The closest hits of the rays of a bit mask in one placed object.
@@ -65,7 +63,7 @@ impl Apart {
         range: &mut Range,
         found: &mut Found,
     ) {
-        let Self { stack, doubted } = self;
+        let Self { doubted } = self;
         let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
         let mut noted = Noted::nothing(&single);
         // Rounded up, as of a ray that has hit nothing yet.
@@ -73,17 +71,19 @@ impl Apart {
         (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
         if noted.id == NONE && found.computed >> i & 1 != 0 {
             noted.is_doubted = true;
-            doubted.take([noted.sure, noted.limit], found.nearest[i]);
+            doubted.get_or_insert(Walked::NONE).take([noted.sure, noted.limit], found.nearest[i]);
         }
         let before = (noted.sure, noted.id);
         match ready {
-            Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, stack, &mut noted, doubted),
-            None => bvh.walk_place::<S, Closest>(place, &single, ray, stack, &mut noted, doubted),
+            Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, &mut noted, doubted),
+            None => bvh.walk_place::<S, Closest>(place, &single, ray, &mut noted, doubted),
         }
         if noted.is_doubted || before != (noted.sure, noted.id) {
             range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
             (found.noted[i], found.place[i]) = (noted.id, noted.place);
-            if noted.id == NONE {
+            if noted.id == NONE
+                && let Some(doubted) = doubted
+            {
                 (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
             }
         }

@@ -1,0 +1,29 @@
+//! What a thread needs while it traces packets.
+//!
+//! It lies in the thread's own memory, always ready: such a call takes as long as some hundred instructions, of which lending a box and
+//! taking it back are some thirty.
+
+use std::cell::RefCell;
+
+use super::{MOST, PacketHits, RAYS};
+use crate::trace::bvh::found::Found;
+
+/// Room for what rays have hit of which there was doubt, and for the hits of packets.
+pub(super) struct Scratch {
+    pub found: [Found; MOST * RAYS],
+    pub hits: [PacketHits; MOST],
+}
+
+impl Scratch {
+    const NEW: Self = Self { found: [Found::NONE; MOST * RAYS], hits: [PacketHits::NONE; MOST] };
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = const { RefCell::new(Scratch::NEW) };
+}
+
+/// Lends it to `work`, which calls nobody who might ask for it again.
+#[inline(always)]
+pub(super) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
+    SCRATCH.with_borrow_mut(work)
+}
