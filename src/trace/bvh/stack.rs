@@ -108,7 +108,7 @@ mod tests {
     fn what_was_pushed_last_comes_first() {
         let mut room = Room::new();
         let mut stack = Stack::new(&mut room);
-        [3.0, 1.0, 2.0].map(|near| stack.push(at(near)));
+        [3.0, 1.0, 2.0].into_iter().for_each(|near| stack.push(at(near)));
         assert_eq!(drain(&mut stack), [2.0, 1.0, 3.0]);
         assert!(stack.pop().is_none());
     }
@@ -122,7 +122,7 @@ mod tests {
             let mut stack = Stack::new(&mut room);
             stack.push(at(-1.0));
             let base = stack.len();
-            values.map(|near| stack.insert(base, at(near)));
+            values.iter().for_each(|&near| stack.insert(base, at(near)));
             let mut sorted = values.to_vec();
             sorted.sort_by(f32::total_cmp);
             sorted.push(-1.0);

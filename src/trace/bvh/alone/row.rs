@@ -9,7 +9,7 @@ use crate::ray::Ray;
 use crate::trace::bvh::bundle::axes;
 use crate::trace::bvh::filter::{self, Filter};
 use crate::trace::bvh::place::Blur;
-use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Turned, Vector};
 use crate::trace::bvh::slab::{HUGE, SlabRay, least_t};
 use crate::trace::bvh::woop::{Margin, SLACK};
 
@@ -33,6 +33,14 @@ impl From<&Ray> for SingleRay {
     fn from(&Ray { origin, direction, tmin, tmax, time }: &Ray) -> Self {
         Self { origin, tmin, direction, time, tmax }
     }
+}
+
+/// [`Filter::axes`] of a ray along each axis.
+const AXES: [[u32; 3]; 3] = [of_axis(0), of_axis(1), of_axis(2)];
+
+const fn of_axis(axis: usize) -> [u32; 3] {
+    let [x, y, z] = axes(axis);
+    [filter::at(x), filter::at(y), filter::at(z)]
 }
 
 /// The share of the largest component that all must have, for the short way.
@@ -124,20 +132,18 @@ impl<S: Simd> Rest<S> {
         let Self { origin, direction, slope, shorten, largest_lanes, tmin, blur } = self;
         // The last of those that are largest.
         let axis = if largest_lanes & 0b100 != 0 { 2 } else { (largest_lanes >> 1 & 1) as usize };
-        let [x, y, z] = axes(axis);
-        // Which spares the question later on.
-        let (x, y) = (x.min(2), y.min(2));
-        let (origin, slope, direction) = (origin.to_array(), slope.to_array(), direction.to_array());
-        let along = direction[z];
-        let turned = if along < 0.0 { 1.0 } else { -1.0 };
-        let shear = [slope[x] * turned, slope[y] * turned];
+        let [x, y, z, _] = origin.turned(axis).to_array();
+        let [_, _, along, _] = direction.turned(axis).to_array();
+        let [p, q, ..] = slope.turned(axis).to_array();
+        let sign = if along < 0.0 { 1.0 } else { -1.0 };
+        let shear = [p * sign, q * sign];
         let [shorten, ..] = shorten.to_array();
         // No number is NaN: a maximum of any kind will do.
         let (p, q) = (shear[0].abs(), shear[1].abs());
         let width = 1.0 + if p > q { p } else { q };
         Filter {
-            axes: [filter::at(x), filter::at(y), filter::at(z)],
-            origin: [origin[x], origin[y], origin[z]],
+            axes: AXES[axis],
+            origin: [x, y, z],
             shear,
             margin: Margin::of_one(width, blur.direction),
             against: -along,

@@ -21,14 +21,14 @@ pub(super) use x86::{Avx2, V8};
 
 use super::block::Block;
 use super::build::lanes::Boxes;
-use super::bundle::{PerRay, RAYS};
+use super::bundle::{PerRay, RAYS, axes};
 use super::isa::Kernel;
 use super::node::{Child, Node};
 
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {
     /// Four f32.
-    type V4: Vector + Array<4> + Three;
+    type V4: Vector + Array<4> + Three + Turned;
     /// Eight f32.
     type V8: Vector + Array<8> + Boxes;
     /// As many f32 as one instruction takes.
@@ -154,6 +154,20 @@ pub(super) trait Array<const N: usize>: Sized {
 pub(super) trait Three {
     /// The second lane, the third, the first; then one that means nothing.
     fn yzx(self) -> Self;
+}
+
+/// The same, in another order.
+pub(super) trait Turned {
+    /// The component along an axis third, those of the two axes that follow it before it; then one that means nothing.
+    fn turned(self, axis: usize) -> Self;
+}
+
+/// Which lanes these are, axis by axis.
+const TURNED: [[u32; 4]; 3] = [turned(0), turned(1), turned(2)];
+
+const fn turned(axis: usize) -> [u32; 4] {
+    let [x, y, z] = axes(axis);
+    [x as u32, y as u32, z as u32, 3]
 }
 
 /// The rays of a bundle, group by group.

@@ -1,6 +1,6 @@
 //! Plain arrays, for any processor.
 
-use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, TURNED, Three, Turned, Vector};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
@@ -273,6 +273,14 @@ impl<T> Three for [T; 4] {
     fn yzx(self) -> Self {
         let [x, y, z, w] = self;
         [y, z, x, w]
+    }
+}
+
+impl<T: Copy> Turned for [T; 4] {
+    #[inline(always)]
+    fn turned(self, axis: usize) -> Self {
+        let [x, y, z, w] = TURNED[axis.min(2)];
+        [self[x as usize], self[y as usize], self[z as usize], self[w as usize]]
     }
 }
 

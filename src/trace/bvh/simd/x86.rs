@@ -8,7 +8,7 @@
 use std::arch::{asm, x86_64::*};
 use std::mem::offset_of;
 
-use super::{Array, Doubles, Group, Mask, Simd, Three, Vector};
+use super::{Array, Doubles, Group, Mask, Simd, TURNED, Three, Turned, Vector};
 use crate::memory;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
@@ -416,6 +416,14 @@ impl Three for V4 {
     #[inline(always)]
     fn yzx(self) -> Self {
         Self(unsafe { _mm_permute_ps::<0b11_00_10_01>(self.0) })
+    }
+}
+
+impl Turned for V4 {
+    #[inline(always)]
+    fn turned(self, axis: usize) -> Self {
+        let lanes = &TURNED[axis.min(2)];
+        Self(unsafe { _mm_permutevar_ps(self.0, _mm_loadu_si128(lanes.as_ptr().cast())) })
     }
 }
 
