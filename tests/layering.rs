@@ -28,6 +28,7 @@ const UNSAFE: &[&str] = &[
     "trace/bvh/simd/",
     "trace/bvh/build/lanes.rs",
     "trace/bvh/room.rs",
+    "trace/bvh/stack.rs",
     "cli/leave.rs",
     "image/loading.rs",
     "image/oiio/bridge.rs",

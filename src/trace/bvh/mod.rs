@@ -13,7 +13,7 @@
 //! | `batch`, `query` | many rays, as bundles, in flight or alone; the two questions |
 //! | `flight` | single rays, several of them in turn |
 //! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
-//! | `walk` | one ray by itself, from the root to the leaves |
+//! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
 //! | `moving` | placed objects that move |
@@ -21,7 +21,7 @@
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
 //! | `alone` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
-//! //! | `boxes` | a tree over boxes of the caller's |
+//! | `boxes` | a tree over boxes of the caller's |
 //! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |

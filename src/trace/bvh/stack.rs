@@ -1,7 +1,7 @@
 //! Children that wait to be visited while a ray walks through a tree.
 //!
-//! The room for them lies on the thread's own stack: a walk that starts within another's leaf has room of its own, nobody clears it, and nobody
-//! lends it.
+//! The room for them lies in the frame of who walks: a walk that starts within another's leaf has room of its own, nobody clears it, and nobody
+//! lends it. Room that is cleared, the safe alternative, costs as much as a few nodes, and has to be lent for that.
 #![allow(unsafe_code)] // Room that is not cleared is read where it was written.
 
 use std::mem::MaybeUninit;
@@ -93,50 +93,61 @@ impl<'a> Stack<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
     use super::{ENTRIES, Entry, Room, Stack};
     use crate::trace::bvh::node::Child;
 
-    fn at(near: f32) -> Entry {
-        Entry { near, child: Child::ROOT }
+    fn at(near: f32, number: u32) -> Entry {
+        Entry { near, child: Child::leaf(number, 1) }
     }
 
-    fn drain(stack: &mut Stack<'_>) -> Vec<f32> {
-        std::iter::from_fn(|| stack.pop()).map(|entry| entry.near).collect()
+    /// Where the entries are entered, and their numbers, from the top.
+    fn drain(stack: &mut Stack<'_>) -> Vec<(f32, u32)> {
+        std::iter::from_fn(|| stack.pop()).map(|Entry { near, child }| (near, child.first())).collect()
     }
 
     #[test]
     fn what_was_pushed_last_comes_first() {
         let mut room = Room::new();
         let mut stack = Stack::new(&mut room);
-        [3.0, 1.0, 2.0].into_iter().for_each(|near| stack.push(at(near)));
-        assert_eq!(drain(&mut stack), [2.0, 1.0, 3.0]);
+        (0..3).for_each(|number| stack.push(at([3.0, 1.0, 2.0][number as usize], number)));
+        assert_eq!(drain(&mut stack), [(2.0, 2), (1.0, 1), (3.0, 0)]);
         assert!(stack.pop().is_none());
     }
 
-    /// As a sort does it that keeps equal ones as they came: of these the last is on top.
+    /// Nearer ones above those that are farther; of equal ones the last is on top.
     #[test]
     fn what_is_inserted_lies_in_order_above_what_was_there() {
         for order in 0..256_u32 {
             let values = [0, 1, 2, 3].map(|k| (order >> (2 * k) & 3) as f32);
             let mut room = Room::new();
             let mut stack = Stack::new(&mut room);
-            stack.push(at(-1.0));
+            stack.push(at(-1.0, 9));
             let base = stack.len();
-            values.iter().for_each(|&near| stack.insert(base, at(near)));
-            let mut sorted = values.to_vec();
-            sorted.sort_by(f32::total_cmp);
-            sorted.push(-1.0);
+            let pairs = [(values[0], 0), (values[1], 1), (values[2], 2), (values[3], 3)];
+            pairs.iter().for_each(|&(near, number)| stack.insert(base, at(near, number)));
+            let mut sorted: Vec<(f32, u32)> = pairs.into_iter().rev().collect();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+            sorted.push((-1.0, 9));
             assert_eq!(drain(&mut stack), sorted, "{values:?}");
         }
     }
 
+    /// What [`Stack::pop`] relies on, for each way to put an entry there: on top, and below all or none of those that are.
     #[test]
-    #[should_panic(expected = "out of bounds")]
     fn there_is_no_more_room_than_a_tree_needs() {
-        let mut room = Room::new();
-        let mut stack = Stack::new(&mut room);
-        for _ in 0..=ENTRIES {
-            stack.push(at(0.0));
+        let ways: [fn(&mut Stack<'_>); 3] = [
+            |stack| stack.push(at(0.0, 0)),
+            |stack| stack.insert(0, at(stack.len() as f32, 0)),
+            |stack| stack.insert(stack.len(), at(0.0, 0)),
+        ];
+        for way in ways {
+            let mut room = Room::new();
+            let mut stack = Stack::new(&mut room);
+            (0..ENTRIES).for_each(|_| way(&mut stack));
+            assert!(catch_unwind(AssertUnwindSafe(|| way(&mut stack))).is_err());
+            assert_eq!(drain(&mut stack).len(), ENTRIES);
         }
     }
 }

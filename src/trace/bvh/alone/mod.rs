@@ -56,8 +56,7 @@ impl Bvh {
         self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray })
     }
 
-    /// Whether there are fixed triangles. Asked by who has borrowed [`Scratch`], not before: what the borrower was given is then read piece by piece, as it
-    /// was written, and not in one go, which would have to wait for the pieces.
+    /// Whether there are fixed triangles.
     #[inline(always)]
     pub(super) fn has_fixed(&self) -> bool {
         !self.fixed.triangles.tree().is_empty()
@@ -107,7 +106,7 @@ impl Bvh {
         noted
     }
 
-    /// Walks, and notes what is hit; what is in doubt is in `found`. None for a ray that is not valid.
+    /// Walks, and notes what is hit; what was in doubt is in `doubted`. None for a ray that is not valid.
     #[inline(always)]
     fn walk_alone<S: Simd, Q: Query>(&self, ray: &SingleRay, doubted: &mut Doubted) -> Option<Noted> {
         let (slab, rest) = ray.ready::<S, false>(self.fixed.triangles.tree().reach_row(), Blur::NONE)?;

@@ -170,6 +170,7 @@ impl PacketHits {
     };
 
     /// The hit of one ray.
+    #[inline(always)]
     fn put(&mut self, lane: usize, found: &TriangleFound) {
         let hit = &found.hit;
         (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
@@ -189,6 +190,7 @@ impl Bvh {
     pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, tell: impl FnOnce(&[PacketHits; N])) {
         const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
         with_scratch(|scratch| {
+            // Not asked before: what was given here is then read piece by piece, as it was written, and not in one go, which would have to wait for the pieces.
             if self.has_fixed() {
                 isa::dispatch(self.isa, ClosestPackets { bvh: self, asked, scratch });
             } else {

@@ -1,7 +1,6 @@
 //! What a thread needs while it traces packets.
 //!
-//! It lies in the thread's own memory, always ready: such a call takes as long as some hundred instructions, of which lending a box and
-//! taking it back are some thirty.
+//! It lies in the thread's own memory, always ready: to lend a box and take it back would be some thirty instructions more, to clear as much some hundred.
 
 use std::cell::RefCell;
 
