@@ -1,6 +1,6 @@
 //! What the builder asks of a vector beyond arithmetic. Both implementations give the same bits, so the tree is
 //! the same for every instruction set: nothing is fused.
-#![allow(unsafe_code)] // Intrinsics; see `x86`.
+#![allow(unsafe_code)] // Intrinsics; see `simd::x86`.
 
 use super::record;
 use crate::trace::bvh::simd::Vector;

@@ -5,7 +5,8 @@
 
 use std::arch::x86_64::*;
 
-use super::x86::{Avx2, D4, V4, V8, lanewise, opaque};
+use super::avx2::Avx2;
+use super::x86::{D4, V4, V8, lanewise, opaque};
 use super::{Group, Mask, Simd, Vector};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};

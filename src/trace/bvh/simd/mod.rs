@@ -6,6 +6,8 @@
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 pub(super) mod doubles;
 mod portable;
@@ -13,11 +15,13 @@ mod portable;
 mod x86;
 
 #[cfg(target_arch = "x86_64")]
+pub(super) use avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
 pub(super) use avx512::Avx512;
 pub(super) use doubles::Doubles;
 pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
-pub(super) use x86::{Avx2, V8};
+pub(super) use x86::V8;
 
 use super::block::Block;
 use super::build::lanes::Boxes;
