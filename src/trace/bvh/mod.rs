@@ -10,7 +10,7 @@
 //! | `refit` | the same tree for moved vertices |
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `ready` | rays made ready eight at a time |
-//! | `batch`, `query` | many rays, as bundles, in flight or alone; the two questions |
+//! | `batch`, `arrivals`, `query` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle; the two questions |
 //! | `flight` | single rays, several of them in turn |
 //! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
 //! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
@@ -41,6 +41,7 @@
 mod addresses;
 mod all_hits;
 mod alone;
+mod arrivals;
 mod batch;
 mod block;
 mod boxes;
