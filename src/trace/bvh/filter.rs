@@ -47,12 +47,13 @@ impl Candidates {
 impl Filter {
     #[inline(always)]
     pub fn new(ray: &Ray, blur: Blur) -> Self {
-        let [x, y, z] = axes(largest_axis(ray.direction.abs()));
+        let axis = largest_axis(ray.direction.abs());
+        let [x, y, z] = axes(axis);
         let (direction, origin) = (ray.direction.to_array(), ray.origin.to_array());
         let reciprocal = 1.0 / direction[z];
         let shear = [direction[x] * -reciprocal, direction[y] * -reciprocal];
         Self {
-            axes: [at(x), at(y), at(z)],
+            axes: rows(axis),
             origin: [origin[x], origin[y], origin[z]],
             shear,
             margin: Margin::of_one(1.0 + shear[0].abs().max(shear[1].abs()), blur.direction),
@@ -153,8 +154,15 @@ impl Filter {
 
 /// Where in a block the corners' components on an axis are.
 #[inline(always)]
-pub(super) const fn at(axis: usize) -> u32 {
+const fn at(axis: usize) -> u32 {
     axis as u32 * Block::AXIS
+}
+
+/// [`Filter::axes`] of a ray along an axis.
+#[inline(always)]
+pub(super) const fn rows(axis: usize) -> [u32; 3] {
+    let [x, y, z] = axes(axis);
+    [at(x), at(y), at(z)]
 }
 
 /// The axis of the largest component.

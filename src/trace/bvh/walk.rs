@@ -64,18 +64,22 @@ impl Entered {
         Self { children: ray.select::<S>(node, mask.bits()), near: Near(near.to_array()) }
     }
 
+    #[inline(always)]
+    fn entry(&self, node: &Node, slot: usize) -> Entry {
+        Entry { near: self.near.0[slot], child: node.child[slot] }
+    }
+
     /// The nearest of the children, of which there is at least one; all others go on the stack. Mostly one or two are entered: each number has its own branch,
     /// which is predicted better than the length of a loop.
     #[inline(always)]
     fn open<Q: Query>(&self, stack: &mut Stack<'_>, node: &Node) -> Entry {
-        let Near(near) = &self.near;
         let (first, rest) = lowest(self.children);
-        let mut next = Entry { near: near[first], child: node.child[first] };
+        let mut next = self.entry(node, first);
         if rest == 0 {
             return next;
         }
         let (second, mut rest) = lowest(rest);
-        let mut other = Entry { near: near[second], child: node.child[second] };
+        let mut other = self.entry(node, second);
         if other.near < next.near {
             std::mem::swap(&mut next, &mut other);
         }
@@ -84,7 +88,7 @@ impl Entered {
         while rest != 0 {
             let (slot, others) = lowest(rest);
             rest = others;
-            let mut other = Entry { near: near[slot], child: node.child[slot] };
+            let mut other = self.entry(node, slot);
             if other.near < next.near {
                 std::mem::swap(&mut next, &mut other);
             }

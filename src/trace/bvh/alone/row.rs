@@ -6,7 +6,6 @@
 
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::bundle::axes;
 use crate::trace::bvh::filter::{self, Filter};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Turned, Vector};
@@ -36,12 +35,7 @@ impl From<&Ray> for SingleRay {
 }
 
 /// [`Filter::axes`] of a ray along each axis.
-const AXES: [[u32; 3]; 3] = [of_axis(0), of_axis(1), of_axis(2)];
-
-const fn of_axis(axis: usize) -> [u32; 3] {
-    let [x, y, z] = axes(axis);
-    [filter::at(x), filter::at(y), filter::at(z)]
-}
+const AXES: [[u32; 3]; 3] = [filter::rows(0), filter::rows(1), filter::rows(2)];
 
 /// The share of the largest component that all must have, for the short way.
 const STEEPEST: f32 = 1e-16;

@@ -11,81 +11,65 @@ use crate::trace::bvh::range::Range;
 use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 
-/// What they need.
-pub(super) struct Apart {
-    /// Of the ray that walks, what was in doubt.
-    doubted: Doubted,
+/// The closest hits of the rays of a bit mask in one placed object.
+#[inline(always)]
+pub(super) fn trace<S: Simd>(
+    bvh: &Bvh,
+    place: u32,
+    rays: &[Ray; RAYS],
+    mut open: u64,
+    range: &mut Range,
+    found: &mut Found,
+) {
+    let mut ready = [ReadyRay::NONE; 8];
+    while open != 0 {
+        let mut some = lowest_eight(open);
+        open &= !some;
+        let mut known = 0;
+        if some.count_ones() >= MANY {
+            (ready, known) = bvh.ready_at::<S>(place, eight(rays, some));
+        }
+        for k in 0..some.count_ones() as usize {
+            let i = some.trailing_zeros() as usize % RAYS;
+            some &= some - 1;
+            let ready = if known >> k & 1 != 0 { Some(&ready[k % 8]) } else { None };
+            trace_one::<S>(bvh, place, rays, i, ready, range, found);
+        }
+    }
 }
 
-impl Apart {
-    pub fn new() -> Self {
-        Self { doubted: None }
+/// Ray `i` by itself, which may be ready for the object.
+#[inline(always)]
+fn trace_one<S: Simd>(
+    bvh: &Bvh,
+    place: u32,
+    rays: &[Ray; RAYS],
+    i: usize,
+    ready: Option<&ReadyRay>,
+    range: &mut Range,
+    found: &mut Found,
+) {
+    let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
+    let (mut noted, mut doubted): (Noted, Doubted) = (Noted::nothing(&single), None);
+    // Rounded up, as of a ray that has hit nothing yet.
+    noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
+    (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
+    if noted.id == NONE && found.computed >> i & 1 != 0 {
+        noted.is_doubted = true;
+        doubted.insert(Walked::NONE).take([noted.sure, noted.limit], found.nearest[i]);
     }
-
-    /// The closest hits of the rays of a bit mask in one placed object.
-    #[inline(always)]
-    pub fn trace<S: Simd>(
-        &mut self,
-        bvh: &Bvh,
-        place: u32,
-        rays: &[Ray; RAYS],
-        mut open: u64,
-        range: &mut Range,
-        found: &mut Found,
-    ) {
-        let mut ready = [ReadyRay::NONE; 8];
-        while open != 0 {
-            let mut some = lowest_eight(open);
-            open &= !some;
-            let mut known = 0;
-            if some.count_ones() >= MANY {
-                (ready, known) = bvh.ready_at::<S>(place, eight(rays, some));
-            }
-            for k in 0..some.count_ones() as usize {
-                let i = some.trailing_zeros() as usize % RAYS;
-                some &= some - 1;
-                let ready = if known >> k & 1 != 0 { Some(&ready[k % 8]) } else { None };
-                self.trace_one::<S>(bvh, place, rays, i, ready, range, found);
-            }
-        }
+    let before = (noted.sure, noted.id);
+    match ready {
+        Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, &mut noted, &mut doubted),
+        None => bvh.walk_place::<S, Closest>(place, &single, ray, &mut noted, &mut doubted),
     }
-
-    /// Ray `i` by itself, which may be ready for the object.
-    #[expect(clippy::too_many_arguments, reason = "a ray among others, a place, and what both have so far")]
-    #[inline(always)]
-    fn trace_one<S: Simd>(
-        &mut self,
-        bvh: &Bvh,
-        place: u32,
-        rays: &[Ray; RAYS],
-        i: usize,
-        ready: Option<&ReadyRay>,
-        range: &mut Range,
-        found: &mut Found,
-    ) {
-        let Self { doubted } = self;
-        let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
-        let mut noted = Noted::nothing(&single);
-        // Rounded up, as of a ray that has hit nothing yet.
-        noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
-        (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
-        if noted.id == NONE && found.computed >> i & 1 != 0 {
-            noted.is_doubted = true;
-            doubted.get_or_insert(Walked::NONE).take([noted.sure, noted.limit], found.nearest[i]);
-        }
-        let before = (noted.sure, noted.id);
-        match ready {
-            Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, &mut noted, doubted),
-            None => bvh.walk_place::<S, Closest>(place, &single, ray, &mut noted, doubted),
-        }
-        if noted.is_doubted || before != (noted.sure, noted.id) {
-            range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
-            (found.noted[i], found.place[i]) = (noted.id, noted.place);
-            if noted.id == NONE
-                && let Some(doubted) = doubted
-            {
-                (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
-            }
+    if noted.is_doubted || before != (noted.sure, noted.id) {
+        range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
+        (found.noted[i], found.place[i]) = (noted.id, noted.place);
+        if noted.id == NONE
+            && let Some(doubted) = doubted
+        {
+            (found.nearest[i], found.computed) = (doubted.nearest(bvh, ray), found.computed | 1 << i);
         }
     }
 }

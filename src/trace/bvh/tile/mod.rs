@@ -37,7 +37,6 @@ use super::query::{Query, SOMETHING};
 use super::range::Range;
 use super::simd::Simd;
 use crate::ray::Ray;
-use apart::Apart;
 use found::{Finish, Found};
 use octants::{Octants, Part};
 use placed::Tour;
@@ -73,7 +72,6 @@ struct One {
     local: Bundle,
     range: Range,
     found: Found,
-    apart: Apart,
 }
 
 impl Scratch {
@@ -81,7 +79,7 @@ impl Scratch {
         let found = Found::new();
         let stack = [Entry::root(!0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
-        let one = One { upper: stack, stack, bundle, local, range, found, apart: Apart::new() };
+        let one = One { upper: stack, stack, bundle, local, range, found };
         Self { one, t: [0.0; RAYS], entered: 0, visitors: Vec::new(), part: Part::new() }
     }
 }
@@ -165,7 +163,7 @@ impl One {
         entered: &mut u32,
         visitors: &mut Vec<Visitors>,
     ) -> bool {
-        let Self { upper, stack, bundle, local, range, found, apart } = self;
+        let Self { upper, stack, bundle, local, range, found } = self;
         let Some(mut tour) = Tour::new(bvh, bundle, count, upper) else { return false };
         found.start();
         while let Some((place, seeing, near)) = tour.next::<S>(range) {
@@ -189,7 +187,7 @@ impl One {
                 if Q::ANY {
                     visitors.push(Visitors { place, first: 0, rays: seeing });
                 } else {
-                    apart.trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
+                    apart::trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
                 }
                 continue;
             };
