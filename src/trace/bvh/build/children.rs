@@ -1,19 +1,10 @@
 //! One range divided into the children of a node: the child with the largest surface is split in two, until there are
 //! eight or none is worth it.
 
-use super::split::{Range, Rule, Split};
-use crate::trace::bvh::node::WIDTH;
-
-/// Cost of visiting a node, in tests of a block. Measured: from 1 to 4 rates hardly differ, bytes do.
-pub(in crate::trace::bvh) const NODE_COST: f32 = 1.0;
-
-/// How ranges are divided: by one thread or by several.
-pub(super) trait Splitter {
-    /// The best way to divide `range`.
-    fn find(&mut self, range: &Range) -> Split;
-    /// Does it.
-    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2];
-}
+use super::NODE_COST;
+use super::record::aabb;
+use super::split::{Range, Rule, Split, Splitter};
+use crate::trace::bvh::node::{self, Node, WIDTH};
 
 /// A child of the node that is made.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +69,22 @@ impl Children {
 
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = (usize, &Child)> {
         self.list[..self.len].iter().enumerate()
+    }
+
+    /// Their node, without the indices of its inner ones.
+    pub fn node(&self, rule: &Rule) -> Node {
+        let mut node = Node::empty();
+        for (slot, child) in self.iter() {
+            let Range { first, len, .. } = child.range;
+            // An inner child's node is not known yet.
+            let mut below = node::Child::ROOT;
+            if child.is_leaf {
+                below = node::Child::leaf(first, len.div_ceil(rule.block));
+                node.items[slot] = len as u8;
+            }
+            node.set(slot, &aabb(&child.range.bounds), below);
+        }
+        node
     }
 
     /// The open child with the largest surface; among equals the one with most items, so that coincident items are

@@ -12,16 +12,18 @@
 //! | `presplit` | large triangles in several places: the high preset |
 //! | `morton` | neighbours along a curve: the fast preset |
 //!
-//! A node starts as one range of items; the child with the largest surface is split in two until there are eight or none is
-//! worth it. Leaves are charged by blocks, ceil(n / block), so that they fill. A binary tree collapsed afterwards, the
-//! simpler alternative, writes every box twice and chooses worse.
+//! Ranges of items are divided in two until they fill a block, and of the branches of that binary tree those become nodes that make the
+//! wide one cheapest. Leaves are charged by blocks, ceil(n / block), so that they fill.
 //!
-//! The upper nodes are made one after the other, each by all threads; below them whole subtrees are tasks of one thread. The
+//! That is done for subtrees, each by one thread. The nodes above are made one after the other, each by all threads: the child with
+//! the largest surface is divided until there are eight or none is worth it. There are few of these, and nothing has to be kept of their binary tree. The
 //! tree is the same for any number of threads and any instruction set: every decision depends on its range alone,
 //! chunks have a fixed size, and no arithmetic is fused.
 
+mod binary;
 mod bins;
 mod children;
+mod collapse;
 pub(super) mod lanes;
 pub(super) mod morton;
 pub(super) mod presplit;
@@ -38,20 +40,38 @@ use super::node::{Child, Node, Tree};
 use super::preset::Options;
 use super::room;
 use children::Children;
-pub(super) use children::NODE_COST;
 pub(super) use record::{Record, triangle_items};
-use split::Rule;
-use subtree::{Parent, SubtreeKernel, Task};
+use split::{Range, Rule, Split};
+use subtree::SubtreeKernel;
 use top::Shared;
 
 /// Levels a tree can have: the stack of a walk is made for it.
 pub(super) const MAX_DEPTH: usize = 36;
 
-/// From this level on ranges are cut into halves, a node into eighths: 12 more levels hold 2^36 items.
-const CUT_DEPTH: u32 = MAX_DEPTH as u32 - 12;
-
 /// Ranges of at most this many items are tasks of one thread.
 const TASK: u32 = 1 << 14;
+
+/// Levels of nodes above tasks: whatever is below these is a task. One more is left for what others put below a tree's leaves (`clusters`).
+const TOP_LEVELS: usize = MAX_DEPTH - subtree::LEVELS - 1;
+
+/// Cost of visiting a node, in tests of a block. Measured: from 1 to 4 rates hardly differ, bytes do.
+pub(super) const NODE_COST: f32 = 1.0;
+
+/// A range that becomes a node.
+struct Task {
+    range: Range,
+    /// Levels above it.
+    depth: usize,
+    /// The best split of the range, where it is known.
+    split: Option<Split>,
+}
+
+/// A slot of a node.
+#[derive(Clone, Copy)]
+struct Slot {
+    node: u32,
+    slot: u32,
+}
 
 /// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
 /// `block`, a power of two, is how many items are tested together, `most` how many such blocks a leaf may hold, up to
@@ -77,12 +97,12 @@ pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Optio
         (rest, first) = (others, task.range.first + task.range.len);
         jobs.push((parent, task, own));
     }
-    let built: Vec<(Option<Parent>, Vec<Node>)> = jobs
+    let built: Vec<(Option<Slot>, Vec<Node>)> = jobs
         .into_par_iter()
         .with_max_len(1)
         .map(|(parent, task, items)| {
             let count = items.len();
-            let nodes = isa::dispatch(isa, SubtreeKernel { rule: &rule, items, task });
+            let nodes = isa::dispatch(isa, SubtreeKernel { rule: &rule, items, range: task.range });
             options.report(count);
             (parent, nodes)
         })
@@ -91,23 +111,22 @@ pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Optio
     Tree::new(join(top, built))
 }
 
-/// The nodes over everything of more than [`TASK`] items, and what is below them, in the order of the items.
-fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(Option<Parent>, Task)>) {
-    let mut shared = Shared { rule, items, isa, halve: false };
+/// The nodes over everything of more than [`TASK`] items, and the tasks below them, in the order of the items.
+fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(Option<Slot>, Task)>) {
+    let mut shared = Shared { rule, items, isa };
     let (mut nodes, mut tasks) = (Vec::new(), Vec::new());
     let mut open = vec![(None, Task { range: shared.whole(), depth: 0, split: None })];
     while let Some((parent, task)) = open.pop() {
-        if task.range.len <= TASK {
+        if task.range.len <= TASK || task.depth == TOP_LEVELS {
             tasks.push((parent, task));
             continue;
         }
         let index = nodes.len() as u32;
         point(&mut nodes, parent, index);
-        shared.halve = task.depth >= CUT_DEPTH;
         let children = Children::new(task.range, task.split, rule, &mut shared);
-        subtree::emit(&children, rule, &mut nodes);
+        nodes.push(children.node(rule));
         for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
-            let parent = Parent { node: index, slot: slot as u32 };
+            let parent = Slot { node: index, slot: slot as u32 };
             open.push((Some(parent), Task { range: child.range, depth: task.depth + 1, split: child.split }));
         }
     }
@@ -116,7 +135,7 @@ fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(
 }
 
 /// Puts the subtrees' nodes behind those above them.
-fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<Node> {
+fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Slot>, Vec<Node>)>) -> Vec<Node> {
     let mut base = top.len();
     for (parent, subtree) in &subtrees {
         point(&mut top, *parent, base as u32);
@@ -136,8 +155,8 @@ fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Parent>, Vec<Node>)>) -> Vec<N
 }
 
 /// Lets a child's slot name its node.
-fn point(nodes: &mut [Node], parent: Option<Parent>, index: u32) {
-    if let Some(Parent { node, slot }) = parent {
+fn point(nodes: &mut [Node], slot: Option<Slot>, index: u32) {
+    if let Some(Slot { node, slot }) = slot {
         nodes[node as usize].child[slot as usize] = Child::inner(index);
     }
 }
@@ -148,6 +167,7 @@ mod tests {
 
     use super::*;
     use crate::math::{Aabb, Vec3};
+    use crate::trace::bvh::random::Random;
 
     /// Boxes of a size, scattered by a linear congruence; numbered in order.
     fn items(count: u32, size: f32) -> Vec<Record> {
@@ -199,6 +219,30 @@ mod tests {
             let mut seen = vec![false; items.len()];
             check(&tree, &items, Child::ROOT, block, &mut seen);
             assert!(seen.iter().all(|&seen| seen), "{count} items");
+        }
+    }
+
+    fn levels(tree: &Tree, node: Child) -> usize {
+        let inner = tree.node(node).children().filter(|(_, child)| !child.is_leaf());
+        1 + inner.map(|(_, child)| levels(tree, child)).max().unwrap_or(0)
+    }
+
+    /// Clusters, each half as large as the one before and beside it: whatever divides them best peels one after the other off.
+    #[test]
+    fn no_tree_is_deeper_than_a_walk_allows() {
+        for (clusters, each) in [(120, 40), (100, 500), (120, 4000)] {
+            let mut state = Random::new(3);
+            let item = |i: u32| {
+                let size = 0.5f32.powi((i / each) as i32);
+                let corner = Vec3::splat(size) + state.vec3().abs() * size / 4.0;
+                Record::new(&Aabb { min: corner, max: corner + Vec3::splat(size / 64.0) }, 7, i)
+            };
+            let mut items: Vec<Record> = (0..clusters * each).map(item).collect();
+            let tree = build(&mut items, 1, 1, &Options::default());
+            let mut seen = vec![false; items.len()];
+            check(&tree, &items, Child::ROOT, 1, &mut seen);
+            assert!(seen.iter().all(|&seen| seen));
+            assert!(levels(&tree, Child::ROOT) < MAX_DEPTH, "{} levels", levels(&tree, Child::ROOT));
         }
     }
 

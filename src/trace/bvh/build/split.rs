@@ -80,6 +80,14 @@ impl Range {
     }
 }
 
+/// How ranges are divided: by one thread or by several.
+pub(super) trait Splitter {
+    /// The best way to divide `range`.
+    fn find(&mut self, range: &Range) -> Split;
+    /// Does it.
+    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2];
+}
+
 /// A way to divide a range.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Split {

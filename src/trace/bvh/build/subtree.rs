@@ -1,37 +1,25 @@
 //! A subtree by one thread, all of it compiled for one instruction set.
 
-use super::CUT_DEPTH;
+use super::binary::Binary;
 use super::bins::{self, Bins, Grid};
-use super::children::{Children, Splitter};
-use super::record::{Record, aabb};
-use super::split::{Range, Rule, Split};
+use super::record::Record;
+use super::split::{Range, Rule, Split, Splitter};
 use super::sweep;
 use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::node::{self, Node};
+use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
 
-/// A subtree to be built.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Task {
-    pub range: Range,
-    /// Levels above it.
-    pub depth: u32,
-    /// The best split of the range, where it is known.
-    pub split: Option<Split>,
-}
+/// Levels that nodes of a subtree have at most.
+pub(super) const LEVELS: usize = 17;
 
-/// The node and slot that a task's root belongs to.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Parent {
-    pub node: u32,
-    pub slot: u32,
-}
+/// A node takes three levels of a binary tree, or more.
+const BINARY_LEVELS: u32 = 3 * LEVELS as u32;
 
-/// Builds the nodes over a task's items, the root first. Leaves name ranges of items by their index in the whole.
+/// Builds the nodes over a range's items, the root first. Leaves name ranges of items by their index in the whole.
 pub(super) struct SubtreeKernel<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
-    pub task: Task,
+    pub range: Range,
 }
 
 impl Kernel for SubtreeKernel<'_> {
@@ -39,44 +27,14 @@ impl Kernel for SubtreeKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Vec<Node> {
-        let Self { rule, items, task } = self;
-        let base = task.range.first;
-        let mut nodes: Vec<Node> = Vec::with_capacity(items.len() / 16 + 1);
-        let mut open = vec![(Parent { node: 0, slot: 0 }, task)];
-        while let Some((parent, Task { range, depth, split })) = open.pop() {
-            let index = nodes.len() as u32;
-            if index > 0 {
-                nodes[parent.node as usize].child[parent.slot as usize] = node::Child::inner(index);
-            }
-            let mut splitter =
-                Local::<S> { rule, items, base, halve: depth >= CUT_DEPTH, isa: std::marker::PhantomData };
-            let children = Children::new(range, split, rule, &mut splitter);
-            emit(&children, rule, &mut nodes);
-            // The first child last, so that it comes next and follows its parent in memory.
-            for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
-                let parent = Parent { node: index, slot: slot as u32 };
-                open.push((parent, Task { range: child.range, depth: depth + 1, split: child.split }));
-            }
-        }
-        nodes
+        let Self { rule, items, range } = self;
+        let mut splitter = Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData };
+        // Below them halves lead to single items.
+        let cut = BINARY_LEVELS - range.len.next_power_of_two().trailing_zeros();
+        let mut binary = Binary::new(range, cut, rule, &mut splitter);
+        binary.weigh::<S>(rule);
+        binary.nodes(rule, LEVELS)
     }
-}
-
-/// Appends the node of these children, without the indices of its inner ones.
-#[inline(always)]
-pub(super) fn emit(children: &Children, rule: &Rule, nodes: &mut Vec<Node>) {
-    let mut node = Node::empty();
-    for (slot, child) in children.iter() {
-        let Range { first, len, .. } = child.range;
-        // An inner child's node is not known yet.
-        let mut below = node::Child::ROOT;
-        if child.is_leaf {
-            below = node::Child::leaf(first, len.div_ceil(rule.block));
-            node.items[slot] = len as u8;
-        }
-        node.set(slot, &aabb(&child.range.bounds), below);
-    }
-    nodes.push(node);
 }
 
 /// Divides ranges of `items`, the first of which has the index `base`.
@@ -84,17 +42,12 @@ struct Local<'a, S> {
     rule: &'a Rule,
     items: &'a mut [Record],
     base: u32,
-    /// Too deep for anything but halves.
-    halve: bool,
     isa: std::marker::PhantomData<S>,
 }
 
 impl<S: Simd> Splitter for Local<'_, S> {
     #[inline(always)]
     fn find(&mut self, range: &Range) -> Split {
-        if self.halve {
-            return Split::HALF;
-        }
         let items = &self.items[range.within(self.base)];
         let best = if items.len() <= sweep::MOST {
             sweep::best::<S>(items, self.rule)

@@ -5,9 +5,8 @@
 use rayon::prelude::*;
 
 use super::bins::MANY;
-use super::children::Splitter;
 use super::record::Record;
-use super::split::{Range, Rule, Split};
+use super::split::{Range, Rule, Split, Splitter};
 use super::subtree::binned;
 use crate::trace::bvh::isa::{self, Isa, Kernel};
 use crate::trace::bvh::simd::{Simd, Vector};
@@ -20,8 +19,6 @@ pub(super) struct Shared<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
     pub isa: Isa,
-    /// Too deep for anything but halves.
-    pub halve: bool,
 }
 
 impl Shared<'_> {
@@ -36,9 +33,6 @@ impl Shared<'_> {
 
 impl Splitter for Shared<'_> {
     fn find(&mut self, range: &Range) -> Split {
-        if self.halve {
-            return Split::HALF;
-        }
         let items = &self.items[range.within(0)];
         isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
     }

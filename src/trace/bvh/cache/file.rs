@@ -27,8 +27,8 @@ use crate::trace::bvh::node::Node;
 /// Not text, not cut at its seventh bit, line ends as they were: damage that is done in transfers shows here.
 const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
 
-/// To be raised whenever what is stored changes, or what it means.
-const VERSION: u32 = 2;
+/// To be raised whenever what is stored changes, or what it means, or how trees are built.
+const VERSION: u32 = 3;
 
 const BYTE_ORDER: u32 = 0x0102_0304;
 

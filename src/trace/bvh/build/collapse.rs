@@ -1,0 +1,292 @@
+//! From a binary tree to the wide one that costs least: which branches become nodes, and which are taken apart into slots of a node
+//! above them (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*).
+//!
+//! What a branch costs at least in one slot, in two, in up to eight, follows from what its sides cost: from the ends up, a few additions of
+//! vectors for each. To open the widest child until there are eight, the usual way, makes half as many nodes again, which are less full, and costs 5 % more
+//! (see docs/PERFORMANCE.md).
+
+use super::binary::{Binary, Branch};
+use super::lanes::Boxes;
+use super::record::{aabb, half_area};
+use super::split::Rule;
+use super::{NODE_COST, Slot, point};
+use crate::trace::bvh::node::{Child, Node, WIDTH};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+
+/// Of 1, 2 .. 8 slots half of them.
+const HALVES: [f32; WIDTH] = [0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0];
+
+impl Binary {
+    /// Finds what each branch costs, and how slots are best shared out.
+    #[inline(always)]
+    pub fn weigh<S: Simd>(&mut self, rule: &Rule) {
+        for number in (0..self.branches.len()).rev() {
+            let Branch { second, bounds, len, .. } = self.branches[number];
+            if second == 0 {
+                continue;
+            }
+            let (first, second) = (&self.branches[number + 1].costs, &self.branches[second as usize].costs);
+            // Lane i is for i + 1 slots. Where costs are no numbers, slots go to both sides alike.
+            let (mut least, mut share) = (S::V8::splat(f32::INFINITY), S::V8::load(&HALVES));
+            for k in 1..WIDTH {
+                let mut others = [0.0; WIDTH];
+                others.copy_from_slice(&second[WIDTH - k..][..WIDTH]);
+                let cost = S::V8::splat(first[WIDTH + k - 1]).add(S::V8::load(&others));
+                let cheaper = cost.less(least);
+                least = S::V8::select(cheaper, cost, least);
+                share = S::V8::select(cheaper, S::V8::splat(k as f32), share);
+            }
+            let area = half_area(&bounds);
+            let leaf = rule.blocks(len as usize) * area;
+            let node = NODE_COST * area + least.to_array()[WIDTH - 1];
+            let is_leaf = len <= rule.leaf && leaf <= node;
+            let alone = S::V8::splat(if is_leaf { leaf } else { node });
+            let together = alone.less(least);
+            let costs = S::V8::select(together, alone, least).to_array();
+            let (together, share) = (together.bits(), share.truncate());
+            let branch = &mut self.branches[number];
+            branch.is_leaf = is_leaf;
+            branch.costs[WIDTH..].copy_from_slice(&costs);
+            branch.costs[WIDTH] = alone.to_array()[0];
+            for slot in 1..WIDTH {
+                branch.shares[slot] = if together >> slot & 1 != 0 { 0 } else { share[slot] as u8 };
+            }
+            branch.shares[0] = share[WIDTH - 1] as u8;
+        }
+    }
+
+    /// The nodes of the wide tree, each before what is below it; of at most `levels`, which are a third of the binary tree's or more.
+    pub fn nodes(&self, rule: &Rule, levels: usize) -> Vec<Node> {
+        let best = |branch: &Branch, slots: usize| usize::from(branch.shares[slots - 1]);
+        self.collapsed(rule, levels, best).unwrap_or_else(|| {
+            // Eight slots for three levels, whatever it costs.
+            let halves = |_: &Branch, slots: usize| if slots == 1 { WIDTH / 2 } else { slots / 2 };
+            self.collapsed(rule, usize::MAX, halves).expect("as deep as it is")
+        })
+    }
+
+    /// The nodes, where `share` tells what [`Branch::shares`] does; none where these take more levels.
+    #[inline(always)]
+    fn collapsed(&self, rule: &Rule, levels: usize, share: impl Fn(&Branch, usize) -> usize) -> Option<Vec<Node>> {
+        let sides = |number: usize, slots: usize, of_first: usize| {
+            [(self.branches[number].second as usize, slots - of_first), (number + 1, of_first)]
+        };
+        let mut nodes = Vec::with_capacity(self.branches.len() / WIDTH + 1);
+        let mut open = vec![(None, 0, 1)];
+        // Branches, and how many slots these may fill.
+        let mut waiting = Vec::with_capacity(WIDTH);
+        while let Some((above, number, level)) = open.pop() {
+            if level > levels {
+                return None;
+            }
+            let index = nodes.len() as u32;
+            point(&mut nodes, above, index);
+            let whole = &self.branches[number];
+            if whole.is_leaf {
+                // All there is.
+                waiting.push((number, 1));
+            } else {
+                waiting.extend(sides(number, WIDTH, share(whole, 1)));
+            }
+            let (mut node, mut slot, below) = (Node::empty(), 0, open.len());
+            while let Some((number, slots)) = waiting.pop() {
+                let branch = &self.branches[number];
+                let of_first = if slots > 1 && branch.second != 0 { share(branch, slots) } else { 0 };
+                if of_first > 0 {
+                    waiting.extend(sides(number, slots, of_first));
+                    continue;
+                }
+                // The number of a node is not known yet.
+                let mut child = Child::ROOT;
+                if branch.is_leaf {
+                    child = Child::leaf(branch.first, branch.len.div_ceil(rule.block));
+                    node.items[slot] = branch.len as u8;
+                } else {
+                    open.push((Some(Slot { node: index, slot: slot as u32 }), number, level + 1));
+                }
+                node.set(slot, &aabb(&branch.bounds), child);
+                slot += 1;
+            }
+            nodes.push(node);
+            // The first comes next, and so follows in memory.
+            open[below..].reverse();
+        }
+        Some(nodes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
+
+    const RULE: Rule = Rule { block: 2, leaf: 6 };
+
+    /// A binary tree, told by what is at its ends.
+    enum Shape {
+        /// So many items in a cube.
+        End(u32, f32),
+        Fork(Box<[Shape; 2]>),
+    }
+
+    impl Shape {
+        fn fork(first: Self, second: Self) -> Self {
+            Self::Fork(Box::new([first, second]))
+        }
+
+        /// So many ends, divided anywhere.
+        fn random(random: &mut Random, ends: usize) -> Self {
+            let mut below = |n: usize| ((random.vec3().x.abs() * 1e4) as usize) % n;
+            if ends == 1 {
+                return Self::End(1 + below(4) as u32, [0.01, 0.1, 1.0][below(3)]);
+            }
+            let first = 1 + below(ends - 1);
+            Self::fork(Self::random(random, first), Self::random(random, ends - first))
+        }
+
+        /// Puts it into a tree, its items from `first` on, each end beside the one before.
+        fn push(&self, first: u32, binary: &mut Binary) -> (u32, [f32; 8]) {
+            let number = binary.branches.len();
+            let blank = [f32::NEG_INFINITY; 8];
+            let (costs, shares) = ([f32::INFINITY; 2 * WIDTH], [0; WIDTH]);
+            binary.branches.push(Branch { first, len: 0, bounds: blank, second: 0, is_leaf: true, costs, shares });
+            let (len, bounds) = match self {
+                &Self::End(len, size) => {
+                    let low = [first as f32, 0.0, 0.0];
+                    let [x, y, z] = low.map(|x| 0.0 - x);
+                    (len, [x, y, z, 0.0, low[0] + size, size, size, 0.0])
+                }
+                Self::Fork(sides) => {
+                    let (len, a) = sides[0].push(first, binary);
+                    binary.branches[number].second = binary.branches.len() as u32;
+                    let (more, b) = sides[1].push(first + len, binary);
+                    let mut both = a;
+                    both.iter_mut().zip(b).for_each(|(a, b)| *a = a.max(b));
+                    (len + more, both)
+                }
+            };
+            let branch = &mut binary.branches[number];
+            (branch.len, branch.bounds) = (len, bounds);
+            branch.costs[WIDTH..].fill(RULE.blocks(len as usize) * half_area(&bounds));
+            (len, bounds)
+        }
+
+        fn binary(&self) -> Binary {
+            let mut binary = Binary { branches: Vec::new() };
+            self.push(0, &mut binary);
+            binary
+        }
+    }
+
+    /// All ways to choose at most eight branches that make up a branch.
+    fn ways(binary: &Binary, number: usize) -> Vec<Vec<usize>> {
+        let mut all = vec![vec![number]];
+        let second = binary.branches[number].second as usize;
+        if second != 0 {
+            for a in ways(binary, number + 1) {
+                all.extend(ways(binary, second).into_iter().map(|b| [a.clone(), b].concat()));
+            }
+        }
+        all.retain(|way| way.len() <= WIDTH);
+        all
+    }
+
+    /// What a branch costs at least, as a node (of which it is told whether there must be one) or as a leaf.
+    fn least(binary: &Binary, number: usize, is_node: bool) -> f64 {
+        let branch = &binary.branches[number];
+        let area = f64::from(half_area(&branch.bounds));
+        let leaf = f64::from(RULE.blocks(branch.len as usize)) * area;
+        if branch.second == 0 {
+            return leaf;
+        }
+        let cost = |way: Vec<usize>| way.into_iter().map(|child| least(binary, child, false)).sum::<f64>();
+        let below = ways(binary, number).into_iter().skip(1).map(cost).fold(f64::INFINITY, f64::min);
+        let node = f64::from(NODE_COST) * area + below;
+        if branch.len <= RULE.leaf && !is_node { node.min(leaf) } else { node }
+    }
+
+    /// What nodes cost, the root with them; also tells how many levels they have.
+    fn cost(nodes: &[Node], node: u32) -> (f64, usize) {
+        let node = &nodes[node as usize];
+        let (mut sum, mut levels) = (f64::from(NODE_COST) * f64::from(node.bounds().half_area()), 0);
+        for (slot, child) in node.children() {
+            let (more, below) = if child.is_leaf() {
+                (f64::from(child.count()) * f64::from(node.child_bounds(slot).half_area()), 0)
+            } else {
+                cost(nodes, child.node())
+            };
+            (sum, levels) = (sum + more, levels.max(below));
+        }
+        (sum, levels + 1)
+    }
+
+    /// The items of a tree's leaves, in the order of its slots.
+    fn items(nodes: &[Node], node: u32, into: &mut Vec<u32>) {
+        let node = &nodes[node as usize];
+        for (slot, child) in node.children() {
+            if child.is_leaf() {
+                into.extend(child.first()..child.first() + u32::from(node.items[slot]));
+            } else {
+                items(nodes, child.node(), into);
+            }
+        }
+    }
+
+    struct Weigh<'a>(&'a mut Binary);
+
+    impl Kernel for Weigh<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Simd>(self) {
+            self.0.weigh::<S>(&RULE);
+        }
+    }
+
+    /// No choice of branches for nodes costs less, whichever instruction set makes it.
+    #[test]
+    fn no_way_costs_less() {
+        let mut random = Random::new(7);
+        for ends in (2..15).flat_map(|ends| [ends; 12]) {
+            let mut expected = None;
+            let shape = Shape::random(&mut random, ends);
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let mut binary = shape.binary();
+                dispatch(isa, Weigh(&mut binary));
+                let nodes = binary.nodes(&RULE, 9);
+                let mut all = Vec::new();
+                items(&nodes, 0, &mut all);
+                assert_eq!(all, (0..binary.branches[0].len).collect::<Vec<_>>(), "each item once, and in order");
+                let (found, least) = (cost(&nodes, 0).0, least(&binary, 0, !binary.branches[0].is_leaf));
+                let least = if binary.branches[0].is_leaf { 2.0 * least } else { least };
+                assert!((found / least - 1.0).abs() < 1e-5, "{isa:?}, {ends} ends: {found}, best {least}");
+                let nodes = format!("{nodes:?}");
+                assert_eq!(*expected.get_or_insert_with(|| nodes.clone()), nodes, "{isa:?}");
+            }
+        }
+    }
+
+    /// Where what is cheapest is too deep, three levels become one. Next to what takes all slots the rest of a chain gets one, again and again.
+    #[test]
+    fn levels_are_bounded() {
+        let cluster = |size: f32| {
+            let end = || Shape::End(2, size);
+            let two = || Shape::fork(end(), end());
+            let four = || Shape::fork(two(), two());
+            Shape::fork(four(), four())
+        };
+        let mut shape = cluster(1e3);
+        for level in 0..24 {
+            shape = Shape::fork(cluster(1e3 * 2f32.powi(level + 1)), shape);
+        }
+        let mut binary = shape.binary();
+        binary.weigh::<Portable>(&RULE);
+        let (deep, flat) = (binary.nodes(&RULE, usize::MAX), binary.nodes(&RULE, 9));
+        assert!(cost(&deep, 0).1 > 9 && cost(&flat, 0).1 <= 9, "{} and {}", cost(&deep, 0).1, cost(&flat, 0).1);
+        let mut all = Vec::new();
+        items(&flat, 0, &mut all);
+        assert_eq!(all, (0..binary.branches[0].len).collect::<Vec<_>>());
+    }
+}
