@@ -235,20 +235,27 @@ impl Scene {
         if normalize { normal.normalize_or_zero() } else { normal }
     }
 
-    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, so that the
-    /// processor fetches the indices of many triangles together, and then their corners.
+    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, in each of which the
+    /// processor waits for many cache lines together: the indices of some triangles, then their corners, and only then is anything computed.
     fn normals_of(&self, primitive: &[u32], geometry: &[u32], normalize: bool, normals: &mut [f32]) {
+        const TOGETHER: usize = 64;
         let meshes = self.precise.meshes();
-        let mut corners = [[0; 3]; CHUNK];
-        for (corners, (&primitive, &geometry)) in corners.iter_mut().zip(primitive.iter().zip(geometry)) {
-            if primitive != INVALID {
-                *corners = meshes[geometry as usize].triangles[primitive as usize];
+        let ids = primitive.chunks(TOGETHER).zip(geometry.chunks(TOGETHER));
+        for ((primitive, geometry), normals) in ids.zip(normals.chunks_mut(3 * TOGETHER)) {
+            let (mut indices, mut corners) = ([[0; 3]; TOGETHER], [[DVec3::ZERO; 3]; TOGETHER]);
+            for (indices, (&primitive, &geometry)) in indices.iter_mut().zip(primitive.iter().zip(geometry)) {
+                if geometry != INVALID {
+                    *indices = meshes[geometry as usize].triangles[primitive as usize];
+                }
             }
-        }
-        for ((normal, corners), &geometry) in normals.chunks_exact_mut(3).zip(corners).zip(geometry) {
-            if geometry != INVALID {
-                let positions = &meshes[geometry as usize].positions;
-                let [a, b, c] = corners.map(|i| positions[i as usize]);
+            for (corners, (indices, &geometry)) in corners.iter_mut().zip(indices.iter().zip(geometry)) {
+                if geometry != INVALID {
+                    let positions = &meshes[geometry as usize].positions;
+                    *corners = indices.map(|i| positions[i as usize]);
+                }
+            }
+            for (normal, [a, b, c]) in normals.chunks_exact_mut(3).zip(corners) {
+                // Zero where there is no triangle.
                 let n = (b - a).cross(c - a);
                 let n = if normalize { n.normalize_or_zero() } else { n };
                 normal.copy_from_slice(&n.as_vec3().to_array());
