@@ -247,8 +247,12 @@ fn points_that_travel_together_have_each_their_nearest() {
         let points = &points[..count];
         let mut together = vec![None; count];
         precise.nearest_point_batch(points, &mut together);
-        for (&point, together) in points.iter().zip(&together) {
+        let mut distances = vec![0.0; count];
+        precise.distance_squared_batch(points, &mut distances);
+        for ((&point, together), distance) in points.iter().zip(&together).zip(distances) {
             assert_eq!(*together, precise.nearest_point(point), "{point}");
+            let expected = together.map_or(f64::NAN, |found| found.distance_squared);
+            assert_eq!(distance.to_bits(), expected.to_bits(), "{point}");
             assert_eq!(together.is_some(), point.is_finite(), "{point}");
             if let Some(found) = together {
                 let nearest = corners.iter().map(|&corners| square(point, corners)).fold(f64::INFINITY, f64::min);
@@ -283,7 +287,7 @@ fn nothing_is_within_a_clearance() {
         let [x, y, z] = [0; 3].map(|_| f64::from(random.unit()) * 3.0 - 1.0);
         let point = DVec3::new(x, y, z);
         let nearest = precise.nearest_point(point).expect("there are triangles");
-        let clearance = precise.clearance(point, &nearest);
+        let clearance = precise.clearance(point, nearest.distance_squared);
         // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's own points is in it.
         let distance = (nearest.point - point).length();
         assert!(clearance <= distance && clearance >= distance * (1.0 - 1e-9) - 1e-11, "{clearance}, {distance}");

@@ -71,18 +71,15 @@ impl Scene {
         let distances = pool::run(py, threads, || {
             let is_closed = samples > 0 && self.precise.is_closed();
             along(&rows, f64::NAN, |points, distances| {
-                let (mut found, mut inside) = (vec![None; points.len()], vec![false; points.len()]);
-                self.precise.nearest_point_batch(points, &mut found);
+                let mut inside = vec![false; points.len()];
+                self.precise.distance_squared_batch(points, distances);
                 if is_closed {
-                    self.are_inside_closed(points, &found, &mut inside);
+                    self.are_inside_closed(points, distances, &mut inside);
                 } else if samples > 0 {
                     self.are_inside(points, samples, false, &mut inside);
                 }
-                for (distance, (found, inside)) in distances.iter_mut().zip(found.iter().zip(inside)) {
-                    if let Some(found) = found {
-                        let magnitude = found.distance_squared.sqrt();
-                        *distance = if inside { -magnitude } else { magnitude };
-                    }
+                for (distance, inside) in distances.iter_mut().zip(inside) {
+                    *distance = if inside { -distance.sqrt() } else { distance.sqrt() };
                 }
             })
         })?;

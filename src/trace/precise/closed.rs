@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{NearestPoint, Precise, is_traceable};
+use super::{Precise, is_traceable};
 use crate::math::DVec3;
 
 /// More than distances in f64 are off by, relative to the largest coordinate of what they were computed from.
@@ -54,9 +54,9 @@ impl Precise {
         edges.chunk_by(|a, b| a == b).all(|run| run.len() % 2 == 0)
     }
 
-    /// How far around a point there is surely no triangle; `nearest` is its own nearest point. 0 where nothing is sure.
-    pub fn clearance(&self, point: DVec3, nearest: &NearestPoint) -> f64 {
+    /// How far around a point there is surely no triangle, which is as far away, squared, as [`Self::distance_squared_batch`] says. 0 where nothing is sure.
+    pub fn clearance(&self, point: DVec3, distance_squared: f64) -> f64 {
         let rounding = ROUNDING * (point.abs().max_element() + self.frame.farthest());
-        (nearest.distance_squared.sqrt() * (1.0 - ROUNDING) - rounding).max(0.0)
+        (distance_squared.sqrt() * (1.0 - ROUNDING) - rounding).max(0.0)
     }
 }

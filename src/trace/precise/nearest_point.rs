@@ -60,15 +60,29 @@ impl Precise {
     /// # Panics
     /// Unless there is one answer a point.
     pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
-        assert_eq!(points.len(), nearest.len(), "one answer a point");
         nearest.fill(None);
+        self.survey(points, nearest);
+    }
+
+    /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where [`Self::nearest_point_batch`] finds none.
+    /// That is a little faster than to find the points as well.
+    ///
+    /// # Panics
+    /// Unless there is one answer a point.
+    pub fn distance_squared_batch(&self, points: &[DVec3], distances: &mut [f64]) {
+        distances.fill(f64::NAN);
+        self.survey(points, distances);
+    }
+
+    fn survey<A: Answer>(&self, points: &[DVec3], answers: &mut [A]) {
+        assert_eq!(points.len(), answers.len(), "one answer a point");
         if !points.iter().any(|point| point.is_finite()) {
             return;
         }
         let run = points.len().div_ceil(Bvh::POINTS).max(1);
         let mut survey = Survey { precise: self, runs: Vec::new() };
-        for (points, nearest) in points.chunks(run).zip(nearest.chunks_mut(run)) {
-            survey.runs.push(Run { points, nearest, asked: 0 });
+        for (points, answers) in points.chunks(run).zip(answers.chunks_mut(run)) {
+            survey.runs.push(Run { points, answers, asked: 0 });
         }
         let discs = self.discs.get_or_init(|| self.bvh.discs());
         self.bvh.nearest_triangles(discs, survey.runs.len(), &mut survey);
@@ -92,26 +106,58 @@ impl Precise {
     }
 }
 
+/// What is wanted of the triangle that is nearest to a point.
+trait Answer {
+    const HAS_POINT: bool;
+    fn of(point: DVec3, nearest: &NearestTriangle) -> Self;
+    fn of_point(nearest: Option<NearestPoint>) -> Self;
+}
+
+impl Answer for Option<NearestPoint> {
+    const HAS_POINT: bool = true;
+
+    fn of(point: DVec3, nearest: &NearestTriangle) -> Self {
+        nearest.on.map(|on| NearestPoint::new(point, on, nearest.geometry, nearest.primitive))
+    }
+
+    fn of_point(nearest: Option<NearestPoint>) -> Self {
+        nearest
+    }
+}
+
+/// The squared distance.
+impl Answer for f64 {
+    const HAS_POINT: bool = false;
+
+    fn of(_: DVec3, nearest: &NearestTriangle) -> Self {
+        nearest.distance_squared
+    }
+
+    fn of_point(nearest: Option<NearestPoint>) -> Self {
+        nearest.map_or(f64::NAN, |nearest| nearest.distance_squared)
+    }
+}
+
 /// Points of which one traveller takes one after the other.
-struct Run<'a> {
+struct Run<'a, A> {
     points: &'a [DVec3],
-    nearest: &'a mut [Option<NearestPoint>],
+    answers: &'a mut [A],
     /// So many were asked for.
     asked: usize,
 }
 
 /// Batches of points on their way through the tree.
-struct Survey<'a> {
+struct Survey<'a, A> {
     precise: &'a Precise,
-    runs: Vec<Run<'a>>,
+    runs: Vec<Run<'a, A>>,
 }
 
-impl Surveyor for Survey<'_> {
+impl<A: Answer> Surveyor for Survey<'_, A> {
     fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought> {
         let run = &mut self.runs[traveller];
-        if let Some(NearestTriangle { on, geometry, primitive }) = last {
+        if let Some(nearest) = last {
             let asked = run.asked - 1;
-            run.nearest[asked] = Some(NearestPoint::new(run.points[asked], on, geometry, primitive));
+            run.answers[asked] = A::of(run.points[asked], &nearest);
         }
         loop {
             let point = *run.points.get(run.asked)?;
@@ -123,7 +169,7 @@ impl Surveyor for Survey<'_> {
             if local.abs().max_element() <= FARTHEST {
                 return Some(Sought { point, local, error: error as f32 * 1.01 });
             }
-            run.nearest[run.asked - 1] = self.precise.nearest_of_all(point);
+            run.answers[run.asked - 1] = A::of_point(self.precise.nearest_of_all(point));
         }
     }
 
@@ -135,6 +181,11 @@ impl Surveyor for Survey<'_> {
     #[inline]
     fn is_exact(&self) -> bool {
         self.precise.frame.is_identity()
+    }
+
+    #[inline]
+    fn wants_points(&self) -> bool {
+        A::HAS_POINT
     }
 
     #[inline]

@@ -48,8 +48,8 @@ impl Binary {
             branch.is_leaf = is_leaf;
             branch.costs[WIDTH..].copy_from_slice(&costs);
             branch.costs[WIDTH] = alone.to_array()[0];
-            for slot in 1..WIDTH {
-                branch.shares[slot] = if together >> slot & 1 != 0 { 0 } else { share[slot] as u8 };
+            for (slot, (of_first, share)) in branch.shares.iter_mut().zip(share).enumerate() {
+                *of_first = if together >> slot & 1 != 0 { 0 } else { share as u8 };
             }
             branch.shares[0] = share[WIDTH - 1] as u8;
         }

@@ -40,8 +40,10 @@ pub(in crate::trace) struct Sought {
 /// The triangle that is nearest to a point; of those as near that with the lowest ids.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) struct NearestTriangle {
-    /// The nearest of its points, in the coordinates of the corners as they were given.
-    pub on: TrianglePoint,
+    /// How far it is, squared, in the coordinates of the corners as they were given.
+    pub distance_squared: f64,
+    /// The nearest of its points, in the same coordinates; if [it is wanted](Surveyor::wants_points).
+    pub on: Option<TrianglePoint>,
     pub geometry: u32,
     pub primitive: u32,
 }
@@ -54,6 +56,8 @@ pub(in crate::trace) trait Surveyor {
     fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3];
     /// Whether those in the tree are just these.
     fn is_exact(&self) -> bool;
+    /// Whether the nearest points are wanted, besides their distances.
+    fn wants_points(&self) -> bool;
     /// Lengths in the tree are so many times those that were given: a power of two.
     fn scale(&self) -> f64;
 }
@@ -153,7 +157,8 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
             let mut at_nodes = flying.of(!leaf);
             for k in flying.of(none) {
                 let (seeker, scale) = (&mut self.seekers[k], self.surveyor.scale());
-                if let Some(sought) = self.surveyor.next(k, seeker.nearest::<S>(scale)) {
+                let nearest = seeker.nearest::<S>(scale, self.surveyor.wants_points());
+                if let Some(sought) = self.surveyor.next(k, nearest) {
                     seeker.start::<S>(sought, reach, scale);
                     next[k] = Child::ROOT;
                     at_nodes.insert(k);
@@ -202,6 +207,7 @@ mod tests {
         /// The corners as they were given are so many times those in the tree.
         size: f64,
         is_exact: bool,
+        wants_points: bool,
         asked: [usize; Bvh::POINTS],
         found: Vec<Option<NearestTriangle>>,
     }
@@ -223,6 +229,10 @@ mod tests {
 
         fn is_exact(&self) -> bool {
             self.is_exact
+        }
+
+        fn wants_points(&self) -> bool {
+            self.wants_points
         }
 
         fn scale(&self) -> f64 {
@@ -291,17 +301,24 @@ mod tests {
             for preset in Preset::ALL {
                 let bvh = Bvh::build_with(&world, Options { preset, isa, progress: None });
                 // Also corners so small that products of four lengths vanish.
-                for (size, is_exact) in [(1.0, true), (1.0, false), (2f64.powi(-300), false)] {
+                for (size, is_exact, wants_points) in [
+                    (1.0, true, true),
+                    (1.0, false, true),
+                    (2f64.powi(-300), false, true),
+                    (2f64.powi(-300), false, false),
+                ] {
                     let (asked, found) = ([0; Bvh::POINTS], vec![None; points.len()]);
-                    let mut survey = Survey { points: &points, geometries: &geometries, size, is_exact, asked, found };
+                    let (points, geometries) = (&points, &geometries);
+                    let mut survey = Survey { points, geometries, size, is_exact, wants_points, asked, found };
                     bvh.nearest_triangles(&bvh.discs(), Bvh::POINTS, &mut survey);
-                    for ((found, (on, geometry, primitive)), point) in survey.found.iter().zip(&expected).zip(&points) {
+                    for ((found, (on, geometry, primitive)), point) in survey.found.iter().zip(&expected).zip(points) {
                         let found = found.expect("there are triangles");
                         let context = format!("{isa:?}, {preset:?}, {size}: {point}");
                         assert_eq!((found.geometry, found.primitive), (*geometry, *primitive), "{context}");
-                        assert_eq!(found.on.offset, on.offset * size, "{context}");
-                        assert_eq!(found.on.distance_squared, on.distance_squared * size * size, "{context}");
-                        assert_eq!((found.on.u, found.on.v), (on.u, on.v), "{context}");
+                        assert_eq!(found.distance_squared, on.distance_squared * size * size, "{context}");
+                        let (offset, distance_squared) = (on.offset * size, found.distance_squared);
+                        let on = TrianglePoint { offset, distance_squared, ..*on };
+                        assert_eq!(found.on, wants_points.then_some(on), "{context}");
                     }
                 }
             }

@@ -66,19 +66,22 @@ impl Seeker {
         Measured::new(self.point, [S::D4::load(x), S::D4::load(y), S::D4::load(z)], scale)
     }
 
-    /// The same as it is told.
+    /// The same as it is told, with its point if `wants_point`.
     #[inline(always)]
-    pub fn nearest<S: Simd>(&self, scale: f64) -> Option<NearestTriangle> {
-        let (geometry, primitive) = self.id;
-        (self.square < f64::INFINITY).then(
+    pub fn nearest<S: Simd>(&self, scale: f64, wants_point: bool) -> Option<NearestTriangle> {
+        if self.square == f64::INFINITY {
+            return None;
+        }
+        let ((geometry, primitive), inverse) = (self.id, scale.recip());
+        let distance_squared = self.square * inverse * inverse;
+        let on = wants_point.then(
             #[inline(always)]
             || {
-                let TrianglePoint { offset, distance_squared, u, v } = self.measured::<S>(scale).point();
-                let inverse = scale.recip();
-                let (offset, distance_squared) = (offset * inverse, distance_squared * inverse * inverse);
-                NearestTriangle { on: TrianglePoint { offset, distance_squared, u, v }, geometry, primitive }
+                let TrianglePoint { offset, u, v, .. } = self.measured::<S>(scale).point();
+                TrianglePoint { offset: offset * inverse, distance_squared, u, v }
             },
-        )
+        );
+        Some(NearestTriangle { distance_squared, on, geometry, primitive })
     }
 
     /// Takes a triangle if it is nearer. Whether it is.
