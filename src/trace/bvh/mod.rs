@@ -3,7 +3,7 @@
 //! | file | idea |
 //! | --- | --- |
 //! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
-//! | `build` | binned surface area heuristic, the wide nodes emitted directly (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*) |
+//! | `build` | binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*), and which branches become nodes |
 //! | `preset` | what a tree is built for: speed of building, of tracing, or memory |
 //! | `clusters` | the fast preset: triangles along a curve |
 //! | `cache` | a tree in a file, for the next time |

@@ -1,7 +1,9 @@
 //! A range of items divided in two again and again: the binary tree from which [`collapse`](super::collapse) makes the wide one.
 
-use super::split::{Range, Rule, Split, Splitter};
+use super::split::{Range, Rule, Split};
+use super::subtree::Local;
 use crate::trace::bvh::node::WIDTH;
+use crate::trace::bvh::simd::Simd;
 
 /// A binary tree, each branch before its first side, and all of that before its second.
 pub(super) struct Binary {
@@ -37,9 +39,9 @@ impl Branch {
 }
 
 impl Binary {
-    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves; below `cut` levels down the middle.
+    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not suffice for anything else, down the middle.
     #[inline(always)]
-    pub fn new(whole: Range, cut: u32, rule: &Rule, splitter: &mut impl Splitter) -> Self {
+    pub fn new<S: Simd>(whole: Range, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
         let mut branches: Vec<Branch> = Vec::with_capacity((3 * whole.len / rule.block) as usize + 1);
         let mut open = vec![(whole, 0, None::<usize>)];
         while let Some((range, depth, above)) = open.pop() {
@@ -47,18 +49,16 @@ impl Binary {
             if let Some(above) = above {
                 branches[above].second = number as u32;
             }
-            let branch = Branch::new(&range, rule);
-            let cost = branch.costs[WIDTH];
-            branches.push(branch);
+            branches.push(Branch::new(&range, rule));
             if range.len <= rule.block {
                 continue;
             }
-            let split = if depth < cut { splitter.find(&range) } else { Split::HALF };
-            // Written so that what is no number, for boxes too large to be measured, is divided.
-            if range.len <= rule.leaf && cost <= split.cost {
+            let in_halves = range.len.next_power_of_two().trailing_zeros();
+            let split = if depth + in_halves < levels { local.find(&range) } else { Split::HALF };
+            if rule.prefers_leaf(&range, range.half_area(), split.cost) {
                 continue;
             }
-            let [first, second] = splitter.apply(&range, &split);
+            let [first, second] = local.apply(&range, &split);
             // The first comes next.
             open.push((second, depth + 1, Some(number)));
             open.push((first, depth + 1, None));

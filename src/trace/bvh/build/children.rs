@@ -1,9 +1,9 @@
-//! One range divided into the children of a node: the child with the largest surface is split in two, until there are
-//! eight or none is worth it.
+//! A node above the subtrees: the child with the largest surface is divided, until there are eight or none is worth it.
 
 use super::NODE_COST;
 use super::record::aabb;
-use super::split::{Range, Rule, Split, Splitter};
+use super::split::{Range, Rule};
+use super::top::Shared;
 use crate::trace::bvh::node::{self, Node, WIDTH};
 
 /// A child of the node that is made.
@@ -11,17 +11,14 @@ use crate::trace::bvh::node::{self, Node, WIDTH};
 pub(super) struct Child {
     pub range: Range,
     area: f32,
-    /// The best way to divide it, once known.
-    pub split: Option<Split>,
     pub is_leaf: bool,
 }
 
 impl Child {
-    const NONE: Self = Self { range: Range::EMPTY, area: 0.0, split: None, is_leaf: true };
+    const NONE: Self = Self { range: Range::EMPTY, area: 0.0, is_leaf: true };
 
-    #[inline(always)]
     fn new(range: Range, rule: &Rule) -> Self {
-        Self { range, area: range.half_area(), split: None, is_leaf: range.len <= rule.block }
+        Self { range, area: range.half_area(), is_leaf: range.len <= rule.block }
     }
 }
 
@@ -32,23 +29,19 @@ pub(super) struct Children {
 }
 
 impl Children {
-    /// Of `range`, for which `split` may be known already.
-    #[inline(always)]
-    pub fn new(range: Range, split: Option<Split>, rule: &Rule, splitter: &mut impl Splitter) -> Self {
+    /// Of `range`.
+    pub fn new(range: Range, rule: &Rule, shared: &mut Shared<'_>) -> Self {
         let mut children = Self { list: [Child::NONE; WIDTH], len: 1 };
-        children.list[0] = Child { split, ..Child::new(range, rule) };
+        children.list[0] = Child::new(range, rule);
         while children.len < WIDTH {
             let Some(widest) = children.widest() else { break };
             let child = &mut children.list[widest];
-            let split = child.split.unwrap_or_else(
-                #[inline(always)]
-                || splitter.find(&child.range),
-            );
-            if is_leaf_better(child, &split, rule, 0.0) {
+            let split = shared.find(&child.range);
+            if rule.prefers_leaf(&child.range, child.area, split.cost) {
                 child.is_leaf = true;
                 continue;
             }
-            let [left, right] = splitter.apply(&child.range, &split);
+            let [left, right] = shared.apply(&child.range, &split);
             *child = Child::new(left, rule);
             children.list[children.len] = Child::new(right, rule);
             children.len += 1;
@@ -56,12 +49,8 @@ impl Children {
         // What is left open becomes a node of its own, unless that costs more than a leaf.
         for child in &mut children.list[..children.len] {
             if !child.is_leaf && child.range.len <= rule.leaf {
-                let split = child.split.unwrap_or_else(
-                    #[inline(always)]
-                    || splitter.find(&child.range),
-                );
-                child.is_leaf = is_leaf_better(child, &split, rule, NODE_COST);
-                child.split = Some(split);
+                let node = shared.find(&child.range).cost + NODE_COST * child.area;
+                child.is_leaf = rule.prefers_leaf(&child.range, child.area, node);
             }
         }
         children
@@ -89,7 +78,6 @@ impl Children {
 
     /// The open child with the largest surface; among equals the one with most items, so that coincident items are
     /// divided evenly.
-    #[inline(always)]
     fn widest(&self) -> Option<usize> {
         let mut best: Option<usize> = None;
         for (i, child) in self.list[..self.len].iter().enumerate().filter(|(_, child)| !child.is_leaf) {
@@ -102,12 +90,4 @@ impl Children {
         }
         best
     }
-}
-
-/// Whether a leaf costs less than the two sides and `extra`, in tests of a block.
-#[inline(always)]
-fn is_leaf_better(child: &Child, split: &Split, rule: &Rule, extra: f32) -> bool {
-    let len = child.range.len;
-    // Written so that what is no number, for boxes too large to be measured, is divided.
-    len <= rule.leaf && rule.blocks(len as usize) * child.area <= split.cost + extra * child.area
 }

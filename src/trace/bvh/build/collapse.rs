@@ -38,7 +38,13 @@ impl Binary {
             }
             let area = half_area(&bounds);
             let leaf = rule.blocks(len as usize) * area;
-            let node = NODE_COST * area + least.to_array()[WIDTH - 1];
+            // A little more, so that nodes are few where none has an area.
+            let mut node = NODE_COST * area + f32::MIN_POSITIVE;
+            if number == 0 {
+                // The root is a node in any case.
+                node = 0.0;
+            }
+            let node = node + least.to_array()[WIDTH - 1];
             let is_leaf = len <= rule.leaf && leaf <= node;
             let alone = S::V8::splat(if is_leaf { leaf } else { node });
             let together = alone.less(least);
@@ -55,7 +61,7 @@ impl Binary {
         }
     }
 
-    /// The nodes of the wide tree, each before what is below it; of at most `levels`, which are a third of the binary tree's or more.
+    /// The nodes of the wide tree, each before what is below it, of at most `levels`: at least a third of the binary tree's, rounded up.
     pub fn nodes(&self, rule: &Rule, levels: usize) -> Vec<Node> {
         let best = |branch: &Branch, slots: usize| usize::from(branch.shares[slots - 1]);
         self.collapsed(rule, levels, best).unwrap_or_else(|| {
@@ -193,18 +199,16 @@ mod tests {
         all
     }
 
-    /// What a branch costs at least, as a node (of which it is told whether there must be one) or as a leaf.
-    fn least(binary: &Binary, number: usize, is_node: bool) -> f64 {
+    /// What a branch costs at least as a child, and as the root.
+    fn least(binary: &Binary, number: usize) -> [f64; 2] {
         let branch = &binary.branches[number];
         let area = f64::from(half_area(&branch.bounds));
-        let leaf = f64::from(RULE.blocks(branch.len as usize)) * area;
-        if branch.second == 0 {
-            return leaf;
-        }
-        let cost = |way: Vec<usize>| way.into_iter().map(|child| least(binary, child, false)).sum::<f64>();
+        let may_be_leaf = branch.second == 0 || branch.len <= RULE.leaf;
+        let leaf = if may_be_leaf { f64::from(RULE.blocks(branch.len as usize)) * area } else { f64::INFINITY };
+        let cost = |way: Vec<usize>| way.into_iter().map(|child| least(binary, child)[0]).sum::<f64>();
         let below = ways(binary, number).into_iter().skip(1).map(cost).fold(f64::INFINITY, f64::min);
-        let node = f64::from(NODE_COST) * area + below;
-        if branch.len <= RULE.leaf && !is_node { node.min(leaf) } else { node }
+        let node = f64::from(NODE_COST) * area;
+        [leaf.min(node + below), node + leaf.min(below)]
     }
 
     /// What nodes cost, the root with them; also tells how many levels they have.
@@ -249,7 +253,8 @@ mod tests {
     #[test]
     fn no_way_costs_less() {
         let mut random = Random::new(7);
-        for ends in (2..15).flat_map(|ends| [ends; 12]) {
+        let mut leaves = 0;
+        for ends in (2..15).flat_map(|ends| [ends; 24]).chain([2; 500]) {
             let mut expected = None;
             let shape = Shape::random(&mut random, ends);
             for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
@@ -259,13 +264,29 @@ mod tests {
                 let mut all = Vec::new();
                 items(&nodes, 0, &mut all);
                 assert_eq!(all, (0..binary.branches[0].len).collect::<Vec<_>>(), "each item once, and in order");
-                let (found, least) = (cost(&nodes, 0).0, least(&binary, 0, !binary.branches[0].is_leaf));
-                let least = if binary.branches[0].is_leaf { 2.0 * least } else { least };
+                let (found, [_, least]) = (cost(&nodes, 0).0, least(&binary, 0));
+                leaves += usize::from(binary.branches[0].is_leaf);
                 assert!((found / least - 1.0).abs() < 1e-5, "{isa:?}, {ends} ends: {found}, best {least}");
                 let nodes = format!("{nodes:?}");
                 assert_eq!(*expected.get_or_insert_with(|| nodes.clone()), nodes, "{isa:?}");
             }
         }
+        assert!(leaves > 0, "some are all one leaf");
+    }
+
+    /// Where nothing has an area there are no more nodes than there must be: 256 leaves of four items, in 32 nodes, in four, in one.
+    #[test]
+    fn nodes_of_no_area_are_full() {
+        fn even(ends: usize) -> Shape {
+            if ends == 1 { Shape::End(2, 0.0) } else { Shape::fork(even(ends / 2), even(ends / 2)) }
+        }
+        let mut binary = even(512).binary();
+        binary.branches.iter_mut().for_each(|branch| {
+            branch.bounds = [0.0; 8];
+            branch.costs[WIDTH..].fill(0.0);
+        });
+        binary.weigh::<Portable>(&RULE);
+        assert_eq!(binary.nodes(&RULE, 9).len(), 1 + 4 + 32);
     }
 
     /// Where what is cheapest is too deep, three levels become one. Next to what takes all slots the rest of a chain gets one, again and again.

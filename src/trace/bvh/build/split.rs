@@ -14,6 +14,13 @@ pub(super) struct Rule {
 }
 
 impl Rule {
+    /// Whether a leaf costs less than what the sides of a split, or a node of them, come to.
+    #[inline(always)]
+    pub fn prefers_leaf(&self, range: &Range, area: f32, others: f32) -> bool {
+        // Written so that what is no number, for boxes too large to be measured, is divided.
+        range.len <= self.leaf && self.blocks(range.len as usize) * area <= others
+    }
+
     /// Blocks that hold `count` items.
     #[inline(always)]
     pub fn blocks(&self, count: usize) -> f32 {
@@ -78,14 +85,6 @@ impl Range {
     pub fn within(&self, base: u32) -> std::ops::Range<usize> {
         (self.first - base) as usize..(self.first - base + self.len) as usize
     }
-}
-
-/// How ranges are divided: by one thread or by several.
-pub(super) trait Splitter {
-    /// The best way to divide `range`.
-    fn find(&mut self, range: &Range) -> Split;
-    /// Does it.
-    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2];
 }
 
 /// A way to divide a range.

@@ -3,23 +3,19 @@
 use super::binary::Binary;
 use super::bins::{self, Bins, Grid};
 use super::record::Record;
-use super::split::{Range, Rule, Split, Splitter};
+use super::split::{Range, Rule, Split};
 use super::sweep;
 use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
-
-/// Levels that nodes of a subtree have at most.
-pub(super) const LEVELS: usize = 17;
-
-/// A node takes three levels of a binary tree, or more.
-const BINARY_LEVELS: u32 = 3 * LEVELS as u32;
 
 /// Builds the nodes over a range's items, the root first. Leaves name ranges of items by their index in the whole.
 pub(super) struct SubtreeKernel<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
     pub range: Range,
+    /// Levels that its nodes may have.
+    pub levels: usize,
 }
 
 impl Kernel for SubtreeKernel<'_> {
@@ -27,27 +23,27 @@ impl Kernel for SubtreeKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Vec<Node> {
-        let Self { rule, items, range } = self;
-        let mut splitter = Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData };
-        // Below them halves lead to single items.
-        let cut = BINARY_LEVELS - range.len.next_power_of_two().trailing_zeros();
-        let mut binary = Binary::new(range, cut, rule, &mut splitter);
+        let Self { rule, items, range, levels } = self;
+        let mut local = Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData };
+        // Where it comes to that, a node takes three levels of the binary tree.
+        let mut binary = Binary::new(range, 3 * levels as u32, rule, &mut local);
         binary.weigh::<S>(rule);
-        binary.nodes(rule, LEVELS)
+        binary.nodes(rule, levels)
     }
 }
 
 /// Divides ranges of `items`, the first of which has the index `base`.
-struct Local<'a, S> {
+pub(super) struct Local<'a, S> {
     rule: &'a Rule,
     items: &'a mut [Record],
     base: u32,
     isa: std::marker::PhantomData<S>,
 }
 
-impl<S: Simd> Splitter for Local<'_, S> {
+impl<S: Simd> Local<'_, S> {
+    /// The best way to divide `range`.
     #[inline(always)]
-    fn find(&mut self, range: &Range) -> Split {
+    pub fn find(&mut self, range: &Range) -> Split {
         let items = &self.items[range.within(self.base)];
         let best = if items.len() <= sweep::MOST {
             sweep::best::<S>(items, self.rule)
@@ -59,8 +55,9 @@ impl<S: Simd> Splitter for Local<'_, S> {
         best.unwrap_or(Split::HALF)
     }
 
+    /// Does it.
     #[inline(always)]
-    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+    pub fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
         let items = &mut self.items[range.within(self.base)];
         let sides = split.partition::<S>(items, range);
         if sides[0].len > 0 && sides[1].len > 0 { sides } else { Split::HALF.partition::<S>(items, range) }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bins::MANY;
 use super::record::Record;
-use super::split::{Range, Rule, Split, Splitter};
+use super::split::{Range, Rule, Split};
 use super::subtree::binned;
 use crate::trace::bvh::isa::{self, Isa, Kernel};
 use crate::trace::bvh::simd::{Simd, Vector};
@@ -29,15 +29,15 @@ impl Shared<'_> {
         let whole = self.items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
         Range { len: self.items.len() as u32, ..whole }
     }
-}
 
-impl Splitter for Shared<'_> {
-    fn find(&mut self, range: &Range) -> Split {
+    /// The best way to divide `range`.
+    pub fn find(&mut self, range: &Range) -> Split {
         let items = &self.items[range.within(0)];
         isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
     }
 
-    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+    /// Does it.
+    pub fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
         let isa = self.isa;
         let items = &mut self.items[range.within(0)];
         if matches!(split.cut, super::split::Cut::Half) {
