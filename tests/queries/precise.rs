@@ -288,6 +288,7 @@ fn nothing_is_within_a_clearance() {
         let point = DVec3::new(x, y, z);
         let nearest = precise.nearest_point(point).expect("there are triangles");
         let clearance = precise.clearance(point, nearest.distance_squared);
+        assert_eq!(precise.clearance(point, f64::NAN), 0.0);
         // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's own points is in it.
         let distance = (nearest.point - point).length();
         assert!(clearance <= distance && clearance >= distance * (1.0 - 1e-9) - 1e-11, "{clearance}, {distance}");

@@ -17,13 +17,13 @@ fn direction(sample: usize) -> DVec3 {
 }
 
 impl Scene {
-    /// Whether each point is inside of meshes that are closed; the points are so far from these, squared, or NaN. A ball around a point that holds no triangle is all inside or all outside,
+    /// Whether each point is inside of meshes that are closed; `squares` are the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or all outside,
     /// so of points along a curve few need be asked.
-    pub fn are_inside_closed(&self, points: &[DVec3], distances: &[f64], inside: &mut [bool]) {
+    pub fn are_inside_closed(&self, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
         // Points that are asked, and of each point which of them tells.
         let (mut asked, mut tells) = (Vec::new(), Vec::with_capacity(points.len()));
         let mut last = (DVec3::NAN, 0.0);
-        for (&point, &distance_squared) in points.iter().zip(distances) {
+        for (&point, &distance_squared) in points.iter().zip(squares) {
             let clearance = self.precise.clearance(point, distance_squared);
             let (other, other_clearance): (DVec3, f64) = last;
             let is_same = (point - other).length() * (1.0 + 1e-9) < clearance.max(other_clearance);

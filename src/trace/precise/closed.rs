@@ -54,9 +54,11 @@ impl Precise {
         edges.chunk_by(|a, b| a == b).all(|run| run.len() % 2 == 0)
     }
 
-    /// How far around a point there is surely no triangle, which is as far away, squared, as [`Self::distance_squared_batch`] says. 0 where nothing is sure.
+    /// How far around a point there is surely no triangle, by the squared distance that [`Self::distance_squared_batch`] tells of it. 0 where nothing is sure, as
+    /// if that is NaN.
     pub fn clearance(&self, point: DVec3, distance_squared: f64) -> f64 {
         let rounding = ROUNDING * (point.abs().max_element() + self.frame.farthest());
+        // The larger number: NaN is none.
         (distance_squared.sqrt() * (1.0 - ROUNDING) - rounding).max(0.0)
     }
 }

@@ -60,8 +60,7 @@ impl Precise {
     /// # Panics
     /// Unless there is one answer a point.
     pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
-        nearest.fill(None);
-        self.survey(points, nearest);
+        self.survey(points, nearest, None);
     }
 
     /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where [`Self::nearest_point_batch`] finds none.
@@ -70,12 +69,12 @@ impl Precise {
     /// # Panics
     /// Unless there is one answer a point.
     pub fn distance_squared_batch(&self, points: &[DVec3], distances: &mut [f64]) {
-        distances.fill(f64::NAN);
-        self.survey(points, distances);
+        self.survey(points, distances, f64::NAN);
     }
 
-    fn survey<A: Answer>(&self, points: &[DVec3], answers: &mut [A]) {
+    fn survey<A: Answer>(&self, points: &[DVec3], answers: &mut [A], none: A) {
         assert_eq!(points.len(), answers.len(), "one answer a point");
+        answers.fill(none);
         if !points.iter().any(|point| point.is_finite()) {
             return;
         }
@@ -107,10 +106,13 @@ impl Precise {
 }
 
 /// What is wanted of the triangle that is nearest to a point.
-trait Answer {
+trait Answer: Clone {
+    /// Whether the nearest point is part of it.
     const HAS_POINT: bool;
+    /// Of a triangle that the tree has found.
     fn of(point: DVec3, nearest: &NearestTriangle) -> Self;
-    fn of_point(nearest: Option<NearestPoint>) -> Self;
+    /// Of a look at every triangle.
+    fn of_all(nearest: Option<NearestPoint>) -> Self;
 }
 
 impl Answer for Option<NearestPoint> {
@@ -120,7 +122,7 @@ impl Answer for Option<NearestPoint> {
         nearest.on.map(|on| NearestPoint::new(point, on, nearest.geometry, nearest.primitive))
     }
 
-    fn of_point(nearest: Option<NearestPoint>) -> Self {
+    fn of_all(nearest: Option<NearestPoint>) -> Self {
         nearest
     }
 }
@@ -133,7 +135,7 @@ impl Answer for f64 {
         nearest.distance_squared
     }
 
-    fn of_point(nearest: Option<NearestPoint>) -> Self {
+    fn of_all(nearest: Option<NearestPoint>) -> Self {
         nearest.map_or(f64::NAN, |nearest| nearest.distance_squared)
     }
 }
@@ -169,7 +171,7 @@ impl<A: Answer> Surveyor for Survey<'_, A> {
             if local.abs().max_element() <= FARTHEST {
                 return Some(Sought { point, local, error: error as f32 * 1.01 });
             }
-            run.answers[run.asked - 1] = A::of_point(self.precise.nearest_of_all(point));
+            run.answers[run.asked - 1] = A::of_all(self.precise.nearest_of_all(point));
         }
     }
 

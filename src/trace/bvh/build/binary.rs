@@ -39,10 +39,14 @@ impl Branch {
 }
 
 impl Binary {
-    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not suffice for anything else, down the middle.
+    /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not suffice for anything else, down the middle; for
+    /// halves of the whole they do.
     #[inline(always)]
     pub fn new<S: Simd>(whole: Range, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
-        let mut branches: Vec<Branch> = Vec::with_capacity((3 * whole.len / rule.block) as usize + 1);
+        let in_halves = |len: u32| len.next_power_of_two().trailing_zeros();
+        debug_assert!(in_halves(whole.len) <= levels, "{} items in {levels} levels", whole.len);
+        let most = (3 * whole.len / rule.block + 1).min(2 * whole.len);
+        let mut branches: Vec<Branch> = Vec::with_capacity(most as usize);
         let mut open = vec![(whole, 0, None::<usize>)];
         while let Some((range, depth, above)) = open.pop() {
             let number = branches.len();
@@ -53,9 +57,8 @@ impl Binary {
             if range.len <= rule.block {
                 continue;
             }
-            let in_halves = range.len.next_power_of_two().trailing_zeros();
-            let split = if depth + in_halves < levels { local.find(&range) } else { Split::HALF };
-            if rule.prefers_leaf(&range, range.half_area(), split.cost) {
+            let split = if depth + in_halves(range.len) < levels { local.find(&range) } else { Split::HALF };
+            if rule.prefers_leaf(range.len, range.half_area(), split.cost) {
                 continue;
             }
             let [first, second] = local.apply(&range, &split);

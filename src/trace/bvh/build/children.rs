@@ -37,7 +37,7 @@ impl Children {
             let Some(widest) = children.widest() else { break };
             let child = &mut children.list[widest];
             let split = shared.find(&child.range);
-            if rule.prefers_leaf(&child.range, child.area, split.cost) {
+            if rule.prefers_leaf(child.range.len, child.area, split.cost) {
                 child.is_leaf = true;
                 continue;
             }
@@ -50,7 +50,7 @@ impl Children {
         for child in &mut children.list[..children.len] {
             if !child.is_leaf && child.range.len <= rule.leaf {
                 let node = shared.find(&child.range).cost + NODE_COST * child.area;
-                child.is_leaf = rule.prefers_leaf(&child.range, child.area, node);
+                child.is_leaf = rule.prefers_leaf(child.range.len, child.area, node);
             }
         }
         children

@@ -2,8 +2,8 @@
 //! above them (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*).
 //!
 //! What a branch costs at least in one slot, in two, in up to eight, follows from what its sides cost: from the ends up, a few additions of
-//! vectors for each. To open the widest child until there are eight, the usual way, makes half as many nodes again, which are less full, and costs 5 % more
-//! (see docs/PERFORMANCE.md).
+//! vectors for each. To open the widest child until there are eight, the usual way, makes up to twice as many nodes, which are less full, and costs 2 to 6 %
+//! more (see docs/PERFORMANCE.md).
 
 use super::binary::{Binary, Branch};
 use super::lanes::Boxes;
@@ -37,7 +37,6 @@ impl Binary {
                 share = S::V8::select(cheaper, S::V8::splat(k as f32), share);
             }
             let area = half_area(&bounds);
-            let leaf = rule.blocks(len as usize) * area;
             // A little more, so that nodes are few where none has an area.
             let mut node = NODE_COST * area + f32::MIN_POSITIVE;
             if number == 0 {
@@ -45,8 +44,8 @@ impl Binary {
                 node = 0.0;
             }
             let node = node + least.to_array()[WIDTH - 1];
-            let is_leaf = len <= rule.leaf && leaf <= node;
-            let alone = S::V8::splat(if is_leaf { leaf } else { node });
+            let is_leaf = rule.prefers_leaf(len, area, node);
+            let alone = S::V8::splat(if is_leaf { rule.blocks(len as usize) * area } else { node });
             let together = alone.less(least);
             let costs = S::V8::select(together, alone, least).to_array();
             let (together, share) = (together.bits(), share.truncate());

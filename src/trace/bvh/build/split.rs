@@ -14,11 +14,11 @@ pub(super) struct Rule {
 }
 
 impl Rule {
-    /// Whether a leaf costs less than what the sides of a split, or a node of them, come to.
+    /// Whether so many items cost no more as a leaf than what the sides of a split, or a node of them, come to.
     #[inline(always)]
-    pub fn prefers_leaf(&self, range: &Range, area: f32, others: f32) -> bool {
+    pub fn prefers_leaf(&self, len: u32, area: f32, others: f32) -> bool {
         // Written so that what is no number, for boxes too large to be measured, is divided.
-        range.len <= self.leaf && self.blocks(range.len as usize) * area <= others
+        len <= self.leaf && self.blocks(len as usize) * area <= others
     }
 
     /// Blocks that hold `count` items.

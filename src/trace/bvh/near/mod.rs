@@ -57,7 +57,9 @@ pub(in crate::trace) trait Surveyor {
     /// Whether those in the tree are just these.
     fn is_exact(&self) -> bool;
     /// Whether the nearest points are wanted, besides their distances.
-    fn wants_points(&self) -> bool;
+    fn wants_points(&self) -> bool {
+        true
+    }
     /// Lengths in the tree are so many times those that were given: a power of two.
     fn scale(&self) -> f64;
 }
