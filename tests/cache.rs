@@ -149,7 +149,12 @@ fn foreign_files_are_named() {
     kept.refuses(&other.bytes, "other triangles or another preset");
     kept.refuses(b"solid teapot\n", "too short");
     kept.refuses(&[b'#'; 5000], "no file of this program");
-    for (at, words) in [(8, "is of version "), (12, "another byte order"), (16, "or layout"), (24, "arrays, where")] {
+    for (at, words) in [
+        (8, "is of version 2, or layout, other than this program's 3"),
+        (12, "another byte order"),
+        (16, "or layout"),
+        (24, "arrays, where"),
+    ] {
         let mut bytes = kept.bytes.clone();
         bytes[at] ^= 1;
         kept.refuses(&bytes, words);

@@ -227,12 +227,17 @@ impl Scene {
     }
 }
 
+/// The normal by the right-hand rule; zero for a triangle without an area.
+#[inline]
+fn normal([a, b, c]: [DVec3; 3], normalize: bool) -> DVec3 {
+    let normal = (b - a).cross(c - a);
+    if normalize { normal.normalize_or_zero() } else { normal }
+}
+
 impl Scene {
-    /// The normal by the right-hand rule; zero for a triangle without an area.
+    /// That of a triangle of the meshes.
     pub fn normal(&self, geometry: u32, primitive: u32, normalize: bool) -> DVec3 {
-        let [a, b, c] = self.precise.corners(geometry, primitive);
-        let normal = (b - a).cross(c - a);
-        if normalize { normal.normalize_or_zero() } else { normal }
+        normal(self.precise.corners(geometry, primitive), normalize)
     }
 
     /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, in each of which the
@@ -254,11 +259,9 @@ impl Scene {
                     *corners = indices.map(|i| positions[i as usize]);
                 }
             }
-            for (normal, [a, b, c]) in normals.chunks_exact_mut(3).zip(corners) {
+            for (three, corners) in normals.chunks_exact_mut(3).zip(corners) {
                 // Zero where there is no triangle.
-                let n = (b - a).cross(c - a);
-                let n = if normalize { n.normalize_or_zero() } else { n };
-                normal.copy_from_slice(&n.as_vec3().to_array());
+                three.copy_from_slice(&normal(corners, normalize).as_vec3().to_array());
             }
         }
     }

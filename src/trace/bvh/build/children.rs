@@ -1,10 +1,9 @@
 //! A node above the subtrees: the child with the largest surface is divided, until there are eight or none is worth it.
 
-use super::NODE_COST;
-use super::record::aabb;
 use super::split::{Range, Rule};
 use super::top::Shared;
-use crate::trace::bvh::node::{self, Node, WIDTH};
+use super::{NODE_COST, fill};
+use crate::trace::bvh::node::{Node, WIDTH};
 
 /// A child of the node that is made.
 #[derive(Clone, Copy, Debug)]
@@ -64,14 +63,8 @@ impl Children {
     pub fn node(&self, rule: &Rule) -> Node {
         let mut node = Node::empty();
         for (slot, child) in self.iter() {
-            let Range { first, len, .. } = child.range;
-            // An inner child's node is not known yet.
-            let mut below = node::Child::ROOT;
-            if child.is_leaf {
-                below = node::Child::leaf(first, len.div_ceil(rule.block));
-                node.items[slot] = len as u8;
-            }
-            node.set(slot, &aabb(&child.range.bounds), below);
+            let Range { first, len, bounds, .. } = &child.range;
+            fill(&mut node, slot, bounds, child.is_leaf.then_some((*first, *len)), rule);
         }
         node
     }

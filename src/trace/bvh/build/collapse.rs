@@ -7,10 +7,10 @@
 
 use super::binary::{Binary, Branch};
 use super::lanes::Boxes;
-use super::record::{aabb, half_area};
+use super::record::half_area;
 use super::split::Rule;
-use super::{NODE_COST, Slot, point};
-use crate::trace::bvh::node::{Child, Node, WIDTH};
+use super::{NODE_COST, Slot, fill, point};
+use crate::trace::bvh::node::{Node, WIDTH};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 
 /// Of 1, 2 .. 8 slots half of them.
@@ -37,13 +37,9 @@ impl Binary {
                 share = S::V8::select(cheaper, S::V8::splat(k as f32), share);
             }
             let area = half_area(&bounds);
-            // A little more, so that nodes are few where none has an area.
-            let mut node = NODE_COST * area + f32::MIN_POSITIVE;
-            if number == 0 {
-                // The root is a node in any case.
-                node = 0.0;
-            }
-            let node = node + least.to_array()[WIDTH - 1];
+            // A little more than by its area, so that nodes are few where none has any; and the root is a node in any case.
+            let own = if number > 0 { NODE_COST * area + f32::MIN_POSITIVE } else { 0.0 };
+            let node = own + least.to_array()[WIDTH - 1];
             let is_leaf = rule.prefers_leaf(len, area, node);
             let alone = S::V8::splat(if is_leaf { rule.blocks(len as usize) * area } else { node });
             let together = alone.less(least);
@@ -101,15 +97,10 @@ impl Binary {
                     waiting.extend(sides(number, slots, of_first));
                     continue;
                 }
-                // The number of a node is not known yet.
-                let mut child = Child::ROOT;
-                if branch.is_leaf {
-                    child = Child::leaf(branch.first, branch.len.div_ceil(rule.block));
-                    node.items[slot] = branch.len as u8;
-                } else {
+                fill(&mut node, slot, &branch.bounds, branch.is_leaf.then_some((branch.first, branch.len)), rule);
+                if !branch.is_leaf {
                     open.push((Some(Slot { node: index, slot: slot as u32 }), number, level + 1));
                 }
-                node.set(slot, &aabb(&branch.bounds), child);
                 slot += 1;
             }
             nodes.push(node);

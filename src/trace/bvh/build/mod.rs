@@ -164,6 +164,17 @@ fn join(mut top: Vec<Node>, subtrees: Vec<(Option<Slot>, Vec<Node>)>) -> Vec<Nod
     })
 }
 
+/// Fills a slot: with a leaf over so many items from the first on, or with a node whose number is not known yet.
+#[inline]
+fn fill(node: &mut Node, slot: usize, bounds: &[f32; 8], leaf: Option<(u32, u32)>, rule: &Rule) {
+    let mut child = Child::ROOT;
+    if let Some((first, len)) = leaf {
+        child = Child::leaf(first, len.div_ceil(rule.block));
+        node.items[slot] = len as u8;
+    }
+    node.set(slot, &record::aabb(bounds), child);
+}
+
 /// Lets a child's slot name its node.
 fn point(nodes: &mut [Node], slot: Option<Slot>, index: u32) {
     if let Some(Slot { node, slot }) = slot {
