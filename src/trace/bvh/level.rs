@@ -1,6 +1,7 @@
 //! Everything in one coordinate system: that of the world, or that of an object which is placed in it.
 
 use super::filter::Filter;
+use super::node::Child;
 use super::place::{Blur, Place};
 use super::preset::Options;
 use super::query::Query;
@@ -9,10 +10,10 @@ use super::simd::Simd;
 use super::slab::SlabRay;
 use super::triangles::TriangleTree;
 use super::walk::{self, Visit};
-use crate::math::{Aabb, Affine3};
+use crate::math::{Aabb, Affine3, Vec3};
 use crate::ray::Ray;
+use crate::trace::Part;
 use crate::trace::nearest::Nearest;
-use crate::trace::{Part, Placement};
 
 /// Everything in one coordinate system.
 pub(super) struct Level {
@@ -37,18 +38,9 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// The box around everything where it is placed: the triangles are what is turned. The object's own box, turned, would be half as
-    /// wide again for a ball.
-    ///
-    /// Takes at most so many `visits` of nodes, six times over; of none, it is the box that is turned.
-    pub fn placed_bounds(&self, placement: &Placement, visits: usize) -> Aabb {
-        let bounds = self.bounds();
-        placement.bounds_of(bounds, |way| {
-            // Its entries are f32.
-            let narrow = way.as_vec3();
-            let farthest = self.triangles.farthest(narrow, visits).max(self.shapes.farthest(narrow, visits));
-            farthest.min(bounds.farthest(way))
-        })
+    /// At least the scalar product of `way` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it.
+    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>) -> f64 {
+        self.triangles.farthest(way, visits, first).max(self.shapes.farthest(way, visits))
     }
 
     /// Offers the triangles that `ray`, in the world, hits in this level, which may be placed; all by itself.

@@ -195,8 +195,9 @@ impl Tree {
 
     /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
     /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
-    /// farther than what has been found and the 256th part of the width, or `visits` are over.
-    pub fn farthest(&self, way: Vec3, visits: usize, of_leaf: impl Fn(Child) -> f32) -> f64 {
+    /// farther than what has been found and the 256th part of the width, or `visits` are over. `first` is a leaf that is asked before
+    /// all others, and then one of those that reach farthest: of ways that differ little, mostly the same.
+    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>, of_leaf: impl Fn(Child) -> f32) -> f64 {
         if self.is_empty() {
             return f64::NEG_INFINITY;
         }
@@ -208,7 +209,7 @@ impl Tree {
         let upper = |component: f32| usize::from(component >= 0.0);
         let sides = [upper(x), 2 + upper(y), 4 + upper(z)];
         let spare = way.abs().dot(self.bounds.size()) / 256.0;
-        let mut most = f32::NEG_INFINITY;
+        let mut most = first.map_or(f32::NEG_INFINITY, |leaf| of_leaf(leaf) + spare);
         let mut open = Vec::with_capacity(8 * WIDTH);
         open.push((f32::INFINITY, Child::ROOT));
         for _ in 0..visits {
@@ -217,7 +218,10 @@ impl Tree {
                 continue;
             }
             if child.is_leaf() {
-                most = most.max((of_leaf(child) + spare).min(farthest));
+                let reach = (of_leaf(child) + spare).min(farthest);
+                if reach > most {
+                    (most, *first) = (reach, Some(child));
+                }
                 continue;
             }
             let node = self.node(child);
@@ -226,18 +230,18 @@ impl Tree {
             for slot in 0..WIDTH {
                 reach[slot] = x * bx[slot] + y * by[slot] + z * bz[slot];
             }
-            let (mut farthest, mut first) = (most, None);
+            let (mut farthest, mut next) = (most, None);
             for (slot, &reach) in reach.iter().enumerate() {
                 // Not so of an empty slot: there it is infinitely little, or not a number.
                 if reach > most {
                     if reach > farthest {
-                        (farthest, first) = (reach, Some(open.len()));
+                        (farthest, next) = (reach, Some(open.len()));
                     }
                     open.push((reach, node.child[slot]));
                 }
             }
-            if let (Some(first), Some(last)) = (first, open.len().checked_sub(1)) {
-                open.swap(first, last);
+            if let (Some(next), Some(last)) = (next, open.len().checked_sub(1)) {
+                open.swap(next, last);
             }
         }
         let most = open.iter().fold(most, |most, &(reach, _)| most.max(reach));

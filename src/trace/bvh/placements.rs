@@ -10,6 +10,7 @@ use super::preset::Options;
 use super::query::Query;
 use super::simd::Simd;
 use super::slab::SlabRay;
+use super::support::Outlines;
 use super::walk::{self, Visit};
 use crate::math::Vec3;
 use crate::ray::Ray;
@@ -25,10 +26,6 @@ pub(super) struct PlacementTree {
     spread: Spread,
 }
 
-/// Visits of nodes for the boxes of all placements together, so that many of them do not take long: some 50 for each of 2,500
-/// in each of six directions, more than are needed, and none for 200,000.
-const VISITS: usize = 1 << 17;
-
 /// A tree over those placements that `is_wanted`, and which each of them is, in the order of its leaves: one a leaf, for to enter an
 /// object costs many times what the test of its box does.
 pub(super) fn tree_over(
@@ -37,9 +34,9 @@ pub(super) fn tree_over(
     objects: &[Level],
     options: &Options<'_>,
 ) -> (Tree, Vec<usize>) {
-    let visits = VISITS / placements.len().max(1);
+    let outlines = Outlines::new(objects, placements.iter().filter(|placement| is_wanted(placement)));
     let item = |(i, placement): (usize, &Placement)| {
-        let bounds = objects[placement.object as usize].placed_bounds(placement, visits);
+        let bounds = outlines.around(placement);
         (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
     };
     let wanted = placements.par_iter().enumerate().filter(|(_, placement)| is_wanted(placement));
@@ -160,125 +157,5 @@ impl PlacementTree {
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         self.tree.bytes() + size_of_val(&self.places[..])
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use super::*;
-    use crate::math::{Aabb, DAffine3, DMat3, DVec3};
-    use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
-    use crate::trace::World;
-    use crate::trace::bvh::Bvh;
-    use crate::trace::bvh::preset::Preset;
-    use crate::trace::bvh::random::Random;
-
-    /// A mesh that is placed once, and may move.
-    fn placed(mesh: Mesh, transform: DAffine3, transform_end: Option<DAffine3>) -> World {
-        let scene = Scene {
-            geometries: vec![Geometry::Mesh(mesh)],
-            groups: vec![Group { name: String::new(), geometries: 0..1 }],
-            instances: vec![Instance { name: String::new(), group: 0, transform, transform_end }],
-            materials: Vec::new(),
-            ..Scene::default()
-        };
-        World::placed(&scene).expect("sound")
-    }
-
-    fn turned() -> DAffine3 {
-        DAffine3 {
-            matrix3: DMat3::from_rotation_z(TAU / 8.0) * DMat3::from_rotation_x(TAU / 8.0),
-            translation: DVec3::new(5.0, 0.0, 0.0),
-        }
-    }
-
-    fn ball() -> Mesh {
-        const STEPS: u32 = 48;
-        let point = |i: u32, j: u32| {
-            let (around, up) = (TAU * f64::from(i) / f64::from(STEPS), TAU * f64::from(j) / f64::from(2 * STEPS));
-            DVec3::new(up.sin() * around.cos(), up.sin() * around.sin(), up.cos()).as_vec3()
-        };
-        let positions = (0..=STEPS).flat_map(|j| (0..STEPS).map(move |i| point(i, j))).collect();
-        let faces = (0..STEPS).flat_map(|j| (0..STEPS).map(move |i| (j * STEPS, i, (i + 1) % STEPS)));
-        let triangles = faces
-            .flat_map(|(row, i, k)| [[row + i, row + k, row + STEPS + k], [row + i, row + STEPS + k, row + STEPS + i]]);
-        Mesh::new(positions, triangles.collect())
-    }
-
-    /// Triangles of all sizes here and there.
-    fn soup(random: &mut Random) -> Mesh {
-        let mut positions = Vec::new();
-        for _ in 0..300 {
-            let (place, size) = (random.vec3() * 10.0, 10.0_f32.powf(2.0 * random.unit() - 1.0));
-            positions.extend([random.vec3(), random.vec3(), random.vec3()].map(|corner| place + corner * size));
-        }
-        Mesh::new(positions, (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
-    }
-
-    /// A ball that is turned by an eighth is no wider than before, though its box would be; and no corner is outside.
-    #[test]
-    fn what_is_turned_is_held_tightly() {
-        let ball = ball();
-        let world = placed(ball.clone(), turned(), None);
-        let bounds = Bvh::build(&world).placements.tree().bounds();
-        let to_world = world.placements[0].to_world.as_daffine3();
-        for position in ball.positions.iter() {
-            let at = to_world.transform_point3(position.as_dvec3());
-            let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
-            assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
-        }
-        let size = bounds.size();
-        assert!(size.max_element() < 2.03, "{size}: the ball's diameter is 2, its turned box's 2.8 and more");
-    }
-
-    /// The same of what moves, at every time.
-    #[test]
-    fn what_moves_is_held_on_its_way() {
-        let mesh = soup(&mut Random::new(3));
-        let end = DAffine3 { matrix3: DMat3::from_rotation_y(0.4) * 1.5, translation: DVec3::new(-3.0, 8.0, 1.0) };
-        let world = placed(mesh.clone(), turned(), Some(end));
-        let placement = &world.placements[0];
-        assert!(placement.motion.is_some());
-        let bvh = Bvh::build(&world);
-        let (object, bounds) = (bvh.objects[0].bounds(), bvh.objects[0].placed_bounds(placement, 1000));
-        for i in 0..=10_u8 {
-            let to_world = placement.at(f32::from(i) / 10.0).to_world.as_daffine3();
-            for position in mesh.positions.iter() {
-                let at = to_world.transform_point3(position.as_dvec3());
-                let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
-                assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
-            }
-        }
-        let loose: Aabb = placement.bounds(object);
-        assert!(bounds.half_area() < 0.95 * loose.half_area(), "{bounds:?} for {loose:?}");
-    }
-
-    /// Every corner is within what is said to be farthest, however few nodes may be visited; and with many, one of them is there.
-    #[test]
-    fn nothing_is_farther_than_the_farthest() {
-        let mut random = Random::new(5);
-        for mesh in [ball(), soup(&mut random)] {
-            let world = placed(mesh.clone(), DAffine3::IDENTITY, None);
-            for preset in Preset::ALL {
-                let bvh = Bvh::build_with(&world, Options { preset, ..Options::default() });
-                let level = &bvh.objects[0];
-                let mut ways = vec![Vec3::X, Vec3::NEG_Y, Vec3::new(0.0, -0.0, -1.0), Vec3::ONE, Vec3::ZERO];
-                ways.extend((0..20).map(|_| random.vec3()));
-                for way in ways {
-                    let reach = mesh.positions.iter().map(|at| at.as_dvec3().dot(way.as_dvec3()));
-                    let most = reach.fold(f64::NEG_INFINITY, f64::max);
-                    for visits in [0, 1, 2, 7, 10_000] {
-                        let farthest = level.triangles.farthest(way, visits);
-                        assert!(farthest >= most, "{farthest} < {most} along {way} after {visits} of {preset:?}");
-                    }
-                    // The 256th part of the width to spare, and rounding.
-                    let wide = f64::from(way.abs().dot(level.bounds().size()));
-                    let farthest = level.triangles.farthest(way, 10_000);
-                    assert!(farthest <= most + wide / 250.0 + 1e-5, "{farthest} > {most} along {way}, {preset:?}");
-                }
-            }
-        }
     }
 }

@@ -56,7 +56,7 @@ impl ShapeTree {
 
     /// As [`Tree::farthest`], of the boxes around shapes.
     pub fn farthest(&self, way: Vec3, visits: usize) -> f64 {
-        self.tree.farthest(way, visits, |_| f32::INFINITY)
+        self.tree.farthest(way, visits, &mut None, |_| f32::INFINITY)
     }
 
     /// Memory it holds, in bytes.

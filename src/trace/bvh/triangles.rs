@@ -105,8 +105,8 @@ impl TriangleTree {
     }
 
     /// As [`Tree::farthest`], of the triangles themselves.
-    pub fn farthest(&self, way: Vec3, visits: usize) -> f64 {
-        self.tree.farthest(way, visits, |leaf| {
+    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>) -> f64 {
+        self.tree.farthest(way, visits, first, |leaf| {
             let of_block = |index| self.leaves.block(index, &mut None).farthest(way);
             leaf.blocks().map(of_block).fold(f32::NEG_INFINITY, f32::max)
         })

@@ -1,0 +1,327 @@
+//! How far objects reach: their support functions (Rockafellar 1970, *Convex analysis*), for the boxes around them where they are placed.
+//!
+//! Of a box around a placed object each side is the object's reach in one direction of its own coordinates. The reach of its own box
+//! would do, but is half as wide again for a ball that is turned. So the object's tree is searched for what reaches farthest, down to
+//! corners, which takes the better part of a microsecond.
+//!
+//! An object that is placed often has its reach tabulated instead, on a grid over the surface of a cube. A support function is convex,
+//! and as many times as large in a direction that is as many times as long: in a direction between three others it is at most what lies
+//! between their values. Such a bound is never too little, and for a ball at most a 64th of its radius too much, or a 256th on the finer grid.
+
+use rayon::prelude::*;
+
+use super::level::Level;
+use crate::math::{Aabb, DVec3, Vec3};
+use crate::trace::Placement;
+
+/// Nodes that are visited at most to find one reach; a ball of 8,192 triangles takes a dozen of them.
+const MOST_VISITS: usize = 64;
+
+/// Nodes that are visited at most for everything that is placed, so that many objects that are placed now and then do not take long.
+const ALL_VISITS: usize = 1 << 20;
+
+/// The boxes around objects where they are placed.
+pub(super) struct Outlines<'a> {
+    objects: &'a [Level],
+    /// One for each object that is placed often.
+    tables: Vec<Option<Table>>,
+    /// Nodes to be visited for a reach of other objects.
+    visits: usize,
+}
+
+impl<'a> Outlines<'a> {
+    /// For `placements` of `objects`.
+    pub fn new<'b>(objects: &'a [Level], placements: impl Iterator<Item = &'b Placement>) -> Self {
+        let mut times = vec![0; objects.len()];
+        placements.for_each(|placement| times[placement.object as usize] += 1);
+        let searches = times.iter().map(|&times| Table::cells(times).map_or(6 * times, Table::entries));
+        let visits = (ALL_VISITS / searches.sum::<usize>().max(1)).min(MOST_VISITS);
+        let table =
+            |(level, &times): (&Level, &usize)| Table::cells(times).map(|cells| Table::new(level, cells, visits));
+        Self { objects, tables: objects.par_iter().zip(&times).map(table).collect(), visits }
+    }
+
+    /// The box around `placement`, at all times.
+    pub fn around(&self, placement: &Placement) -> Aabb {
+        let level = &self.objects[placement.object as usize];
+        let (bounds, table) = (level.bounds(), &self.tables[placement.object as usize]);
+        placement.bounds_of(bounds, |way| {
+            let farthest = match table {
+                Some(table) => table.farthest(way),
+                // Its entries are f32.
+                None => level.farthest(way.as_vec3(), self.visits, &mut None),
+            };
+            farthest.min(bounds.farthest(way))
+        })
+    }
+}
+
+/// A support function's values on the surface of the cube from -1 to 1.
+struct Table {
+    /// Along each side of a face; a power of two, so that the grid is exact.
+    cells: usize,
+    /// Face by face and row by row, one value more than cells to a row. Faces are those of -x, x, -y, y, -z, z, with the other axes in their order.
+    reach: Vec<f64>,
+    /// More than rounding can add in a direction of which no component is larger than 1.
+    spare: f64,
+}
+
+impl Table {
+    /// How fine a grid is worth it for an object that is placed so many times; none where its placements by themselves are searched for
+    /// sooner.
+    fn cells(times: usize) -> Option<usize> {
+        match times {
+            0..128 => None,
+            128..4096 => Some(8),
+            4096.. => Some(16),
+        }
+    }
+
+    fn entries(cells: usize) -> usize {
+        6 * (cells + 1) * (cells + 1)
+    }
+
+    fn new(level: &Level, cells: usize, visits: usize) -> Self {
+        let side = cells + 1;
+        let mut reach = vec![0.0; Self::entries(cells)];
+        reach.par_chunks_mut(side).enumerate().for_each(|(row, values)| {
+            let (face, j) = (row / side, row % side);
+            let along = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
+            let mut first = None;
+            for (i, value) in values.iter_mut().enumerate() {
+                let mut way = Vec3::ZERO;
+                let axis = face / 2;
+                way[axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
+                let [p, q] = OTHERS[axis];
+                (way[p], way[q]) = (along(i), along(j));
+                *value = level.farthest(way, visits, &mut first);
+            }
+        });
+        let most = reach.iter().fold(0.0, |most: f64, reach| most.max(reach.abs()));
+        // A few roundings of what is at most `cells`, times values.
+        let spare = most * cells as f64 * 64.0 * f64::EPSILON;
+        Self { cells, reach, spare }
+    }
+
+    /// At least the reach in a direction; infinite or NaN where nothing is known.
+    fn farthest(&self, way: DVec3) -> f64 {
+        let axis = way.abs().max_position();
+        // The way is so many times as long as one on the cube.
+        let length = way[axis].abs();
+        let face = 2 * axis + usize::from(way[axis] > 0.0);
+        let [p, q] = OTHERS[axis];
+        let half = self.cells as f64 / 2.0;
+        let scale = half / length;
+        let place = |component: f64| {
+            let at = component * scale + half;
+            let cell = (at as usize).min(self.cells - 1);
+            (cell, at - cell as f64)
+        };
+        let ((i, f), (j, g)) = (place(way[p]), place(way[q]));
+        let side = self.cells + 1;
+        let row = &self.reach[(face * side + j) * side + i..][..side + 2];
+        let [low, right, up, across] = [row[0], row[1], row[side], row[side + 1]];
+        // The cell is cut into two triangles, along either diagonal.
+        let one = if f > g {
+            low * (1.0 - f) + right * (f - g) + across * g
+        } else {
+            low * (1.0 - g) + up * (g - f) + across * f
+        };
+        let other = if f + g < 1.0 {
+            low * (1.0 - f - g) + right * f + up * g
+        } else {
+            across * (f + g - 1.0) + up * (1.0 - f) + right * (1.0 - g)
+        };
+        length * (one.min(other) + self.spare)
+    }
+}
+
+/// The two axes beside each.
+const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::math::{DAffine3, DMat3};
+    use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
+    use crate::trace::World;
+    use crate::trace::bvh::Bvh;
+    use crate::trace::bvh::preset::{Options, Preset};
+    use crate::trace::bvh::random::Random;
+
+    /// A mesh that is placed once, and may move.
+    fn placed(mesh: Mesh, transform: DAffine3, transform_end: Option<DAffine3>) -> World {
+        let scene = Scene {
+            geometries: vec![Geometry::Mesh(mesh)],
+            groups: vec![Group { name: String::new(), geometries: 0..1 }],
+            instances: vec![Instance { name: String::new(), group: 0, transform, transform_end }],
+            materials: Vec::new(),
+            ..Scene::default()
+        };
+        World::placed(&scene).expect("sound")
+    }
+
+    fn turned() -> DAffine3 {
+        DAffine3 {
+            matrix3: DMat3::from_rotation_z(TAU / 8.0) * DMat3::from_rotation_x(TAU / 8.0),
+            translation: DVec3::new(5.0, 0.0, 0.0),
+        }
+    }
+
+    fn ball() -> Mesh {
+        const STEPS: u32 = 48;
+        let point = |i: u32, j: u32| {
+            let (around, up) = (TAU * f64::from(i) / f64::from(STEPS), TAU * f64::from(j) / f64::from(2 * STEPS));
+            DVec3::new(up.sin() * around.cos(), up.sin() * around.sin(), up.cos()).as_vec3()
+        };
+        let positions = (0..=STEPS).flat_map(|j| (0..STEPS).map(move |i| point(i, j))).collect();
+        let faces = (0..STEPS).flat_map(|j| (0..STEPS).map(move |i| (j * STEPS, i, (i + 1) % STEPS)));
+        let triangles = faces
+            .flat_map(|(row, i, k)| [[row + i, row + k, row + STEPS + k], [row + i, row + STEPS + k, row + STEPS + i]]);
+        Mesh::new(positions, triangles.collect())
+    }
+
+    /// Triangles of all sizes here and there.
+    fn soup(random: &mut Random) -> Mesh {
+        let mut positions = Vec::new();
+        for _ in 0..300 {
+            let (place, size) = (random.vec3() * 10.0, 10.0_f32.powf(2.0 * random.unit() - 1.0));
+            positions.extend([random.vec3(), random.vec3(), random.vec3()].map(|corner| place + corner * size));
+        }
+        Mesh::new(positions, (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+    }
+
+    /// A ball that is turned by an eighth is no wider than before, though its box would be; and no corner is outside.
+    #[test]
+    fn what_is_turned_is_held_tightly() {
+        let ball = ball();
+        let world = placed(ball.clone(), turned(), None);
+        let bounds = Bvh::build(&world).placements.tree().bounds();
+        let to_world = world.placements[0].to_world.as_daffine3();
+        for position in ball.positions.iter() {
+            let at = to_world.transform_point3(position.as_dvec3());
+            let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
+            assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
+        }
+        let size = bounds.size();
+        assert!(size.max_element() < 2.03, "{size}: the ball's diameter is 2, its turned box's 2.8 and more");
+    }
+
+    /// The same of what moves, at every time.
+    #[test]
+    fn what_moves_is_held_on_its_way() {
+        let mesh = soup(&mut Random::new(3));
+        let end = DAffine3 { matrix3: DMat3::from_rotation_y(0.4) * 1.5, translation: DVec3::new(-3.0, 8.0, 1.0) };
+        let world = placed(mesh.clone(), turned(), Some(end));
+        let placement = &world.placements[0];
+        assert!(placement.motion.is_some());
+        let bvh = Bvh::build(&world);
+        let (object, bounds) = (bvh.objects[0].bounds(), bvh.moving.tree().bounds());
+        for i in 0..=10_u8 {
+            let to_world = placement.at(f32::from(i) / 10.0).to_world.as_daffine3();
+            for position in mesh.positions.iter() {
+                let at = to_world.transform_point3(position.as_dvec3());
+                let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
+                assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
+            }
+        }
+        let loose: Aabb = placement.bounds(object);
+        assert!(bounds.half_area() < 0.95 * loose.half_area(), "{bounds:?} for {loose:?}");
+    }
+
+    /// Every corner is within what is said to be farthest, however few nodes may be visited; and with many, one of them is there.
+    #[test]
+    fn nothing_is_farther_than_the_farthest() {
+        let mut random = Random::new(5);
+        for mesh in [ball(), soup(&mut random)] {
+            let world = placed(mesh.clone(), DAffine3::IDENTITY, None);
+            for preset in Preset::ALL {
+                let bvh = Bvh::build_with(&world, Options { preset, ..Options::default() });
+                let level = &bvh.objects[0];
+                let mut ways = vec![Vec3::X, Vec3::NEG_Y, Vec3::new(0.0, -0.0, -1.0), Vec3::ONE, Vec3::ZERO];
+                ways.extend((0..20).map(|_| random.vec3()));
+                for way in ways {
+                    let most = reach(&mesh, way.as_dvec3());
+                    for visits in [0, 1, 2, 7, 10_000] {
+                        let farthest = level.farthest(way, visits, &mut None);
+                        assert!(farthest >= most, "{farthest} < {most} along {way} after {visits} of {preset:?}");
+                    }
+                    // The 256th part of the width to spare, and rounding.
+                    let wide = f64::from(way.abs().dot(level.bounds().size()));
+                    let farthest = level.farthest(way, 10_000, &mut None);
+                    assert!(farthest <= most + wide / 250.0 + 1e-5, "{farthest} > {most} along {way}, {preset:?}");
+                }
+            }
+        }
+    }
+
+    /// The farthest of all corners along `way`, in f64.
+    fn reach(mesh: &Mesh, way: DVec3) -> f64 {
+        mesh.positions.iter().map(|at| at.as_dvec3().dot(way)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// What is tabulated is never too little, also on the grid, on the edges of the cube and beside them, and for a ball little too much.
+    #[test]
+    fn a_table_reaches_as_far_and_little_farther() {
+        let mut random = Random::new(9);
+        for (mesh, is_ball) in [(ball(), true), (soup(&mut random), false)] {
+            let bvh = Bvh::build(&placed(mesh.clone(), DAffine3::IDENTITY, None));
+            let level = &bvh.objects[0];
+            for cells in [8, 16] {
+                let table = Table::new(level, cells, 10_000);
+                let mut worst = 0.0_f64;
+                for case in 0..20_000 {
+                    let mut way = random.vec3().as_dvec3() * 10.0_f64.powi(case % 9 - 4);
+                    match case % 4 {
+                        0 => way = (way / way.abs().max_element() * 8.0).round(),
+                        1 => way.x = way.y,
+                        2 => way.z = 0.0,
+                        _ => {}
+                    }
+                    let (most, farthest) = (reach(&mesh, way), table.farthest(way));
+                    assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
+                    worst = worst.max((farthest - most) / way.abs().max_element());
+                }
+                // What the search spares is the 256th part of the widths, at most three of them.
+                let allowed = 4.0 / (cells * cells) as f64 * 1.01 + 3.0 * 2.0 / 250.0;
+                assert!(!is_ball || worst < allowed, "{worst} of {cells} cells");
+                assert!(table.farthest(DVec3::ZERO).is_nan(), "nowhere is no way");
+            }
+        }
+    }
+
+    /// Placed often, an object is held nearly as tightly as where it is placed once.
+    #[test]
+    fn what_is_placed_often_is_held_tightly() {
+        let (ball, mut random) = (ball(), Random::new(11));
+        for times in [127, 128, 4096] {
+            let instance = |_| {
+                let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
+                let at = |by: f64| DAffine3 { matrix3: turn, translation: DVec3::splat(by) };
+                Instance { name: String::new(), group: 0, transform: at(5.0), transform_end: None }
+            };
+            let scene = Scene {
+                geometries: vec![Geometry::Mesh(ball.clone())],
+                groups: vec![Group { name: String::new(), geometries: 0..1 }],
+                instances: (0..times).map(instance).collect(),
+                ..Scene::default()
+            };
+            let world = World::placed(&scene).expect("sound");
+            let bvh = Bvh::build(&world);
+            let outlines = Outlines::new(&bvh.objects, world.placements.iter());
+            assert_eq!(outlines.tables[0].is_some(), times >= 128, "{times}");
+            for placement in &world.placements {
+                let (bounds, to_world) = (outlines.around(placement), placement.to_world.as_daffine3());
+                for position in ball.positions.iter().step_by(13) {
+                    let at = to_world.transform_point3(position.as_dvec3());
+                    let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
+                    assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
+                }
+                let size = bounds.size();
+                assert!(size.max_element() < 2.08, "{size}: the ball's diameter is 2, its turned box's up to 3.5");
+            }
+        }
+    }
+}
