@@ -6,6 +6,7 @@ use std::cell::Cell;
 use super::alone::Doubted;
 use super::arrivals::Arrivals;
 use super::flight::{self, Flight, Objects};
+use super::isa::Kernel;
 use super::placements::walk_over;
 use super::query::{Closest, Query};
 use super::simd::Simd;
@@ -108,42 +109,6 @@ impl Bvh {
         );
     }
 
-    /// Many rays among triangles, in flight together or one after the other; hits are computed several at a time. Also tells t in
-    /// f64, for the last 64 of them: that of ray i in the place of `first` + i.
-    #[inline(always)]
-    fn trace_apart<S: Simd, Q: Query>(
-        &self,
-        apart: &mut Apart,
-        first: usize,
-        rays: &[Ray],
-        answers: &mut [Q::Answer],
-        t: &mut [f64; bundle::RAYS],
-    ) {
-        answers.fill(Q::MISS);
-        if !self.has_triangles() {
-            return;
-        }
-        let mut arrivals = Arrivals::<Q>::new(self, rays, answers, first, t);
-        let Apart { flight, doubted } = apart;
-        if self.travel_alone(rays.len()) {
-            self.walk_one_by_one::<S, Q>(
-                doubted,
-                rays,
-                #[inline(always)]
-                |i, found| arrivals.take::<S>(i, found),
-            );
-        } else {
-            flight::trace::<S, Q>(
-                flight,
-                self,
-                rays,
-                #[inline(always)]
-                |i, found| arrivals.take::<S>(i, found),
-            );
-        }
-        arrivals.finish::<S>();
-    }
-
     fn has_triangles(&self) -> bool {
         !self.fixed.triangles.tree().is_empty() || self.placements.has_triangles()
     }
@@ -184,7 +149,8 @@ impl Bvh {
                 let from = open.trailing_zeros() as usize;
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
-                self.trace_apart::<S, Q>(apart, from, &rays[run.clone()], &mut answers[run], &mut tile.t);
+                let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut tile.t);
+                S::apart(Separate::<Q> { bvh: self, apart, first: from, rays, answers, t });
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -198,31 +164,10 @@ impl Bvh {
                 visitors.clear();
             }
             if !is_all {
-                self.trace_others::<S, Q>(&rays[chunk.clone()], &mut answers[chunk], &tile.t);
+                let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);
+                S::apart(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
             }
             in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
-        }
-    }
-
-    /// What there is besides triangles that stand still, for rays that have `answers`, with t in f64, among these.
-    #[inline(always)]
-    fn trace_others<S: Simd, Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer], t: &[f64; bundle::RAYS]) {
-        for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
-            let mut nearest = Nearest::new(ray);
-            if !Q::resume(&mut nearest, t, *answer) {
-                continue;
-            }
-            loop {
-                self.unbounded.offer(ray, &mut nearest);
-                self.fixed.trace_shapes::<S, Q>(ray, ray, None, &mut nearest);
-                self.enter_placements::<S, Q>(ray, &mut nearest);
-                self.enter_moving::<S, Q>(ray, &mut nearest);
-                if !nearest.is_open() {
-                    break;
-                }
-                nearest = self.triangles_again::<S>(ray);
-            }
-            *answer = Q::answer(nearest.hit());
         }
     }
 
@@ -244,6 +189,83 @@ impl Bvh {
     }
 }
 
+/// Many rays among triangles, in flight together or one after the other; hits are computed several at a time. Also tells t in
+/// f64, for the last 64 of them: that of ray i in the place of `first` + i.
+struct Separate<'a, Q: Query> {
+    bvh: &'a Bvh,
+    apart: &'a mut Apart,
+    first: usize,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    t: &'a mut [f64; bundle::RAYS],
+}
+
+impl<Q: Query> Kernel for Separate<'_, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, apart, first, rays, answers, t } = self;
+        answers.fill(Q::MISS);
+        if !bvh.has_triangles() {
+            return;
+        }
+        let mut arrivals = Arrivals::<Q>::new(bvh, rays, answers, first, t);
+        let Apart { flight, doubted } = apart;
+        if bvh.travel_alone(rays.len()) {
+            bvh.walk_one_by_one::<S, Q>(
+                doubted,
+                rays,
+                #[inline(always)]
+                |i, found| arrivals.take::<S>(i, found),
+            );
+        } else {
+            flight::trace::<S, Q>(
+                flight,
+                bvh,
+                rays,
+                #[inline(always)]
+                |i, found| arrivals.take::<S>(i, found),
+            );
+        }
+        arrivals.finish::<S>();
+    }
+}
+
+/// What there is besides triangles that stand still, for rays that have `answers`, with t in f64, among these.
+struct Others<'a, Q: Query> {
+    bvh: &'a Bvh,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    t: &'a [f64; bundle::RAYS],
+}
+
+impl<Q: Query> Kernel for Others<'_, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { bvh, rays, answers, t } = self;
+        for ((ray, answer), &t) in rays.iter().zip(answers).zip(t).filter(|((ray, _), _)| ray.is_valid()) {
+            let mut nearest = Nearest::new(ray);
+            if !Q::resume(&mut nearest, t, *answer) {
+                continue;
+            }
+            loop {
+                bvh.unbounded.offer(ray, &mut nearest);
+                bvh.fixed.trace_shapes::<S, Q>(ray, ray, None, &mut nearest);
+                bvh.enter_placements::<S, Q>(ray, &mut nearest);
+                bvh.enter_moving::<S, Q>(ray, &mut nearest);
+                if !nearest.is_open() {
+                    break;
+                }
+                nearest = bvh.triangles_again::<S>(ray);
+            }
+            *answer = Q::answer(nearest.hit());
+        }
+    }
+}
+
 /// A batch, for one instruction set at a time.
 struct BatchKernel<'a, Q: Query> {
     bvh: &'a Bvh,
@@ -253,7 +275,7 @@ struct BatchKernel<'a, Q: Query> {
     workspace: &'a mut Workspace,
 }
 
-impl<Q: Query> isa::Kernel for BatchKernel<'_, Q> {
+impl<Q: Query> Kernel for BatchKernel<'_, Q> {
     type Output = ();
 
     #[inline(always)]

@@ -121,17 +121,11 @@ impl Table {
         let side = self.cells + 1;
         let row = &self.reach[(face * side + j) * side + i..][..side + 2];
         let [low, right, up, across] = [row[0], row[1], row[side], row[side + 1]];
-        // The cell is cut into two triangles, along either diagonal.
-        let one = if f > g {
-            low * (1.0 - f) + right * (f - g) + across * g
-        } else {
-            low * (1.0 - g) + up * (g - f) + across * f
-        };
-        let other = if f + g < 1.0 {
-            low * (1.0 - f - g) + right * f + up * g
-        } else {
-            across * (f + g - 1.0) + up * (1.0 - f) + right * (1.0 - g)
-        };
+        // The cell is cut into two triangles, along either diagonal; the corners are weighted.
+        let (more, less, beside) = if f > g { (f, g, right) } else { (g, f, up) };
+        let one = low * (1.0 - more) + beside * (more - less) + across * less;
+        let (corner, u, v) = if f + g < 1.0 { (low, f, g) } else { (across, 1.0 - g, 1.0 - f) };
+        let other = corner * (1.0 - u - v) + right * u + up * v;
         length * (one.min(other) + self.spare)
     }
 }

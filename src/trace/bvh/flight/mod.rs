@@ -22,9 +22,11 @@ mod traveller;
 mod visitors;
 
 use std::cell::Cell;
+use std::marker::PhantomData;
 
 use super::Bvh;
 use super::found::Found;
+use super::isa::Kernel;
 use super::leaves::Leaves;
 use super::node::Child;
 use super::place::Blur;
@@ -205,74 +207,96 @@ pub(super) fn visit<S: Simd, Q: Query>(
     );
 }
 
+/// Runs as a function of its own ([`Simd::apart`]).
 #[inline(always)]
 fn run<S: Simd, Q: Query, G: Ground>(
     flight: &mut Flight,
     bvh: &Bvh,
     ground: &G,
     rays: &[Ray],
-    mut departures: impl Departures,
-    mut done: impl FnMut(usize, &Found),
+    departures: impl Departures,
+    done: impl FnMut(usize, &Found),
 ) {
-    let mut flying = Set::NOBODY;
-    for k in 0..RAYS {
-        let Some(start) = departures.next::<S>() else { break };
-        let next = flight.travellers[k].start::<G>(start, departures.ready());
-        flight.send::<S, G>(k, next, ground);
-        flying.insert(k);
-    }
-    let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
-    let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
-    while !flying.is_empty() {
-        let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
-        for k in arrived {
-            let traveller = &mut flight.travellers[k];
-            done(traveller.ray, &traveller.found);
-            if let Some(start) = departures.next::<S>() {
-                flight.next[k] = traveller.start::<G>(start, departures.ready());
-                at_nodes.insert(k);
-            } else {
-                flying.remove(k);
-            }
-        }
-        for k in at_nodes {
-            let (traveller, next) = (&mut flight.travellers[k], flight.next[k]);
-            let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
+    S::apart(Journey { flight, bvh, ground, rays, departures, done, query: PhantomData::<Q> });
+}
+
+/// A flight from the first departure to the last arrival.
+struct Journey<'a, Q, G, D, F> {
+    flight: &'a mut Flight,
+    bvh: &'a Bvh,
+    ground: &'a G,
+    rays: &'a [Ray],
+    departures: D,
+    done: F,
+    query: PhantomData<Q>,
+}
+
+impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found)> Kernel for Journey<'_, Q, G, D, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { flight, bvh, ground, rays, mut departures, mut done, .. } = self;
+        let mut flying = Set::NOBODY;
+        for k in 0..RAYS {
+            let Some(start) = departures.next::<S>() else { break };
+            let next = flight.travellers[k].start::<G>(start, departures.ready());
             flight.send::<S, G>(k, next, ground);
+            flying.insert(k);
         }
-        if G::IS_PUT_TOGETHER {
-            for k in at_leaves {
-                let (traveller, leaf) = (&mut flight.travellers[k], flight.next[k]);
-                let next = traveller.visit::<S, Q, G>(leaf, bvh, ground, rays);
-                flight.send::<S, G>(k, next, ground);
-            }
-        } else {
-            let mut count = 0;
-            for k in at_leaves {
-                let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
-                let block = ground.block(traveller.space, leaf.first(), &mut scratch);
-                let (sides, passed) = traveller.look::<S, G>(block);
-                sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
-                count += usize::from(passed != 0);
-                let next = traveller.pass(leaf);
-                flight.send::<S, G>(k, next, ground);
-            }
-            for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
-                let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
-                let block = ground.block(traveller.space, leaf.first(), &mut scratch);
-                if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
-                    flight.send::<S, G>(*k % RAYS, next, ground);
+        let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
+        let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
+        while !flying.is_empty() {
+            let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
+            for k in arrived {
+                let traveller = &mut flight.travellers[k];
+                done(traveller.ray, &traveller.found);
+                if let Some(start) = departures.next::<S>() {
+                    flight.next[k] = traveller.start::<G>(start, departures.ready());
+                    at_nodes.insert(k);
+                } else {
+                    flying.remove(k);
                 }
             }
-        }
-        if G::HAS_PLACEMENTS {
-            for k in returning {
-                let next = flight.travellers[k].leave();
+            for k in at_nodes {
+                let (traveller, next) = (&mut flight.travellers[k], flight.next[k]);
+                let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
                 flight.send::<S, G>(k, next, ground);
             }
-            for k in at_placements {
-                let next = flight.travellers[k].descend::<S>(flight.next[k], bvh, rays);
-                flight.send::<S, G>(k, next, ground);
+            if G::IS_PUT_TOGETHER {
+                for k in at_leaves {
+                    let (traveller, leaf) = (&mut flight.travellers[k], flight.next[k]);
+                    let next = traveller.visit::<S, Q, G>(leaf, bvh, ground, rays);
+                    flight.send::<S, G>(k, next, ground);
+                }
+            } else {
+                let mut count = 0;
+                for k in at_leaves {
+                    let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
+                    let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                    let (sides, passed) = traveller.look::<S, G>(block);
+                    sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
+                    count += usize::from(passed != 0);
+                    let next = traveller.pass(leaf);
+                    flight.send::<S, G>(k, next, ground);
+                }
+                for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
+                    let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
+                    let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                    if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
+                        flight.send::<S, G>(*k % RAYS, next, ground);
+                    }
+                }
+            }
+            if G::HAS_PLACEMENTS {
+                for k in returning {
+                    let next = flight.travellers[k].leave();
+                    flight.send::<S, G>(k, next, ground);
+                }
+                for k in at_placements {
+                    let next = flight.travellers[k].descend::<S>(flight.next[k], bvh, rays);
+                    flight.send::<S, G>(k, next, ground);
+                }
             }
         }
     }
