@@ -20,12 +20,12 @@ use crate::trace::spread::Spread;
 /// What a thread needs while it traces; kept from batch to batch, since clearing it costs as much as tracing some dozens of
 /// rays.
 struct Workspace {
-    apart: Apart,
+    singles: Singles,
     tile: tile::Scratch,
 }
 
 /// For rays that make no bundle: those in flight, or what one that walks alone has hit of which there was doubt.
-struct Apart {
+struct Singles {
     flight: Flight,
     doubted: Doubted,
 }
@@ -45,8 +45,8 @@ thread_local! {
 
 impl Workspace {
     fn new() -> Box<Self> {
-        let apart = Apart { flight: Flight::new(), doubted: None };
-        Box::new(Self { apart, tile: tile::Scratch::new() })
+        let singles = Singles { flight: Flight::new(), doubted: None };
+        Box::new(Self { singles, tile: tile::Scratch::new() })
     }
 }
 
@@ -65,7 +65,7 @@ impl Bvh {
     /// With room for a flight, that of the thread.
     pub(super) fn with_flight(&self, fly: impl FnOnce(&mut Flight)) {
         let mut workspace = WORKSPACE.take().unwrap_or_else(Workspace::new);
-        fly(&mut workspace.apart.flight);
+        fly(&mut workspace.singles.flight);
         WORKSPACE.set(Some(workspace));
     }
 
@@ -128,7 +128,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
         coherent: bool,
     ) {
-        let Workspace { apart, tile } = workspace;
+        let Workspace { singles, tile } = workspace;
         let is_all = self.has_only_triangles();
         let mut in_bundles = coherent && self.has_triangles();
         let mut objects = None;
@@ -150,7 +150,7 @@ impl Bvh {
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
                 let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut tile.t);
-                S::apart(Separate::<Q> { bvh: self, apart, first: from, rays, answers, t });
+                S::apart(Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t });
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -160,7 +160,7 @@ impl Bvh {
                     Some(objects) => objects,
                     None => objects.insert(Objects::new::<S>(self)),
                 };
-                flight::visit::<S, Q>(&mut apart.flight, self, objects, visitors, rays, answers);
+                flight::visit::<S, Q>(&mut singles.flight, self, objects, visitors, rays, answers);
                 visitors.clear();
             }
             if !is_all {
@@ -191,27 +191,27 @@ impl Bvh {
 
 /// Many rays among triangles, in flight together or one after the other; hits are computed several at a time. Also tells t in
 /// f64, for the last 64 of them: that of ray i in the place of `first` + i.
-struct Separate<'a, Q: Query> {
+struct Unbundled<'a, Q: Query> {
     bvh: &'a Bvh,
-    apart: &'a mut Apart,
+    singles: &'a mut Singles,
     first: usize,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     t: &'a mut [f64; bundle::RAYS],
 }
 
-impl<Q: Query> Kernel for Separate<'_, Q> {
+impl<Q: Query> Kernel for Unbundled<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, apart, first, rays, answers, t } = self;
+        let Self { bvh, singles, first, rays, answers, t } = self;
         answers.fill(Q::MISS);
         if !bvh.has_triangles() {
             return;
         }
         let mut arrivals = Arrivals::<Q>::new(bvh, rays, answers, first, t);
-        let Apart { flight, doubted } = apart;
+        let Singles { flight, doubted } = singles;
         if bvh.travel_alone(rays.len()) {
             bvh.walk_one_by_one::<S, Q>(
                 doubted,

@@ -158,10 +158,8 @@ fn of_f32(v: DVec3) -> DVec3 {
     v.as_vec3().as_dvec3()
 }
 
-/// How far a vector leads along and across a normal.
-fn parts(v: DVec3, normal: DVec3) -> (f64, f64) {
-    // f32 keeps the direction of a normal, not its length.
-    let unit = normal.normalize();
+/// How far a vector leads along and across a unit vector.
+fn parts(v: DVec3, unit: DVec3) -> (f64, f64) {
     let along = v.dot(unit);
     (along, (v - unit * along).length())
 }
@@ -170,24 +168,27 @@ impl Disc {
     /// Around corners in a box, of triangles that face there.
     fn around_corners(bounds: Aabb, facing: DVec3, corners: &[DVec3]) -> Self {
         let mut disc = Self::empty(bounds, facing);
-        let along = corners.iter().map(|&corner| parts(corner - disc.centre, disc.normal).0);
+        // f32 keeps the direction of a normal, not its length.
+        let unit = disc.normal.normalize();
+        let along = corners.iter().map(|&corner| parts(corner - disc.centre, unit).0);
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (x.min(low), x.max(high)));
         disc.shift(low, high);
         for &corner in corners {
-            let (along, across) = parts(corner - disc.centre, disc.normal);
+            let (along, across) = parts(corner - disc.centre, unit);
             disc.height = disc.height.max(along.abs());
             disc.radius = disc.radius.max(across);
         }
-        disc
+        disc.within(bounds)
     }
 
     /// Around discs that are in a box together.
     fn around(bounds: Aabb, facing: DVec3, discs: &[Self]) -> Self {
         let mut all = Self::empty(bounds, facing);
+        let unit = all.normal.normalize();
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for disc in discs {
-            let (along, across) = parts(disc.centre - all.centre, all.normal);
-            let cosine = disc.normal.normalize().dot(all.normal.normalize()).abs().min(1.0);
+            let (along, across) = parts(disc.centre - all.centre, unit);
+            let cosine = disc.normal.normalize().dot(unit).abs().min(1.0);
             let sine = (1.0 - cosine * cosine).sqrt() + 1e-7;
             let height = disc.height * cosine + disc.radius * sine;
             (low, high) = (low.min(along - height), high.max(along + height));
@@ -195,9 +196,13 @@ impl Disc {
         }
         // The middle of a box need not be near the surface.
         all.height = all.shift(low, high);
-        // No farther than the corners of the box.
-        let farthest = (bounds.max.as_dvec3() - all.centre).max(all.centre - bounds.min.as_dvec3()).length();
-        Self { height: all.height.min(farthest), radius: all.radius.min(farthest), ..all }
+        all.within(bounds)
+    }
+
+    /// No larger than to the farthest corner of a box that holds all of it.
+    fn within(self, bounds: Aabb) -> Self {
+        let farthest = (bounds.max.as_dvec3() - self.centre).max(self.centre - bounds.min.as_dvec3()).length();
+        Self { height: self.height.min(farthest), radius: self.radius.min(farthest), ..self }
     }
 
     /// Moves the centre along the normal to where there is as much on one side as on the other, of what reaches from `low` to `high`; and how much that is, roundings included.
@@ -263,6 +268,41 @@ mod tests {
         }
     }
 
+    /// The corners of each node that has a disc.
+    fn inner(bvh: &Bvh) -> Vec<usize> {
+        let triangles = &bvh.fixed.triangles;
+        let children = triangles.tree().nodes().iter().flat_map(|node| node.children());
+        let corners = |child| {
+            let mut all = Vec::new();
+            below(triangles, child, &mut all);
+            3 * all.len()
+        };
+        children.filter(|(_, child)| !child.is_leaf()).map(|(_, child)| corners(child)).collect()
+    }
+
+    /// Of a ball, those around corners are less wide.
+    #[test]
+    fn discs_around_corners_are_smaller() {
+        let at = |i: usize, k: usize| {
+            let (around, up) = (i as f32 * 0.1, (k as f32 - 15.0) * 0.1);
+            Vec3::new(up.cos() * around.cos(), up.cos() * around.sin(), up.sin())
+        };
+        let faces = (0..63).flat_map(|i| (0..30).map(move |k| (i, k)));
+        let quad = |(i, k)| [[at(i, k), at(i + 1, k), at(i, k + 1)], [at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]];
+        let bvh = built(&faces.flat_map(quad).collect::<Vec<_>>());
+        let triangles = &bvh.fixed.triangles;
+        let [around_corners, around_discs] = [MOST_CORNERS, 0].map(|most| Discs::around(triangles, most));
+        let (mut smaller, mut sums) = (0, [0.0, 0.0]);
+        for (i, node) in triangles.tree().nodes().iter().enumerate() {
+            for (slot, _) in node.children().filter(|(_, child)| !child.is_leaf()) {
+                let [a, b] = [&around_corners, &around_discs].map(|discs| f64::from(discs.0[i].radius[slot]));
+                (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
+                smaller += usize::from(a < b);
+            }
+        }
+        assert!(smaller > 5 && sums[0] < 0.95 * sums[1], "{smaller} smaller, {sums:?}");
+    }
+
     #[test]
     fn no_disc_is_farther_than_what_it_holds() {
         let mut random = Random::new(3);
@@ -272,11 +312,16 @@ mod tests {
                 let edge = random.vec3() * size;
                 [a, a + edge, a + edge * 0.5 + random.vec3() * (size * thin)]
             };
-            let triangles: Vec<_> = (0..300).map(|_| triangle()).collect();
-            let mut points: Vec<Vec3> = (0..50).map(|_| random.vec3() * 3.0 + Vec3::splat(away)).collect();
-            points.extend(triangles.iter().take(50).flatten());
+            let triangles: Vec<_> = (0..1500).map(|_| triangle()).collect();
+            let mut points: Vec<Vec3> = (0..20).map(|_| random.vec3() * 3.0 + Vec3::splat(away)).collect();
+            points.extend(triangles.iter().take(20).flatten());
             // Each around corners, some around corners and others around discs, all but leaves' around discs.
             let bvh = built(&triangles);
+            let inner = inner(&bvh);
+            assert!(
+                inner.iter().any(|&corners| corners <= 300) && inner.iter().any(|&corners| corners > 300),
+                "{inner:?}"
+            );
             for most in [usize::MAX, 300, 0] {
                 compare(&bvh, most, &points, |near, square| assert!(near <= square, "{near} > {square} of {most}"));
             }

@@ -38,7 +38,8 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// At least the scalar product of `way` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it.
+    /// At least the scalar product of `way` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it; `first` is
+    /// a leaf of the triangles.
     pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>) -> f64 {
         self.triangles.farthest(way, visits, first).max(self.shapes.farthest(way, visits))
     }

@@ -195,8 +195,8 @@ impl Tree {
 
     /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
     /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
-    /// farther than what has been found and the 256th part of the width, or `visits` are over. `first` is a leaf that is asked before
-    /// all others, and then one of those that reach farthest: of ways that differ little, mostly the same.
+    /// farther than what has been found and the 256th part of the width, or so many nodes and leaves have been visited. `first` is a leaf
+    /// that is asked before all others, and then one of those that reach farthest: of ways that differ little, mostly the same.
     pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>, of_leaf: impl Fn(Child) -> f32) -> f64 {
         if self.is_empty() {
             return f64::NEG_INFINITY;
@@ -209,14 +209,17 @@ impl Tree {
         let upper = |component: f32| usize::from(component >= 0.0);
         let sides = [upper(x), 2 + upper(y), 4 + upper(z)];
         let spare = way.abs().dot(self.bounds.size()) / 256.0;
-        let mut most = first.map_or(f32::NEG_INFINITY, |leaf| of_leaf(leaf) + spare);
+        let known = first.map(|leaf| of_leaf(leaf) + spare).filter(|reach| reach.is_finite());
+        let mut most = known.unwrap_or(f32::NEG_INFINITY);
         let mut open = Vec::with_capacity(8 * WIDTH);
         open.push((f32::INFINITY, Child::ROOT));
-        for _ in 0..visits {
+        let mut left = visits;
+        while left > 0 {
             let Some((farthest, child)) = open.pop() else { break };
             if farthest <= most {
                 continue;
             }
+            left -= 1;
             if child.is_leaf() {
                 let reach = (of_leaf(child) + spare).min(farthest);
                 if reach > most {

@@ -1,44 +1,52 @@
-//! How far objects reach: their support functions (Rockafellar 1970, *Convex analysis*), for the boxes around them where they are placed.
+//! How far objects reach in any direction: their support functions (Rockafellar 1970, *Convex analysis*), for the boxes around them where they are placed.
 //!
-//! Of a box around a placed object each side is the object's reach in one direction of its own coordinates. The reach of its own box
-//! would do, but is half as wide again for a ball that is turned. So the object's tree is searched for what reaches farthest, down to
+//! Of a box around a placed object each side is the object's support in one direction of its own coordinates. That of its own box
+//! would do, but is half as wide again for a ball that is turned. So the object's tree is searched for what lies farthest, down to
 //! corners, which takes the better part of a microsecond.
 //!
-//! An object that is placed often has its reach tabulated instead, on a grid over the surface of a cube. A support function is convex,
-//! and as many times as large in a direction that is as many times as long: in a direction between three others it is at most what lies
-//! between their values. Such a bound is never too little, and for a ball at most a 64th of its radius too much, or a 256th on the finer grid.
+//! For an object that is placed often it is tabulated instead, on a grid over the surface of a cube. A support function is convex, and as
+//! many times as large in a direction that is as many times as long: in a direction between three others it is at most what lies between
+//! their values. So the bound is never too little, and for a ball a 64th of its radius too much at most, or a 256th on the finer grid, besides what
+//! [searches](super::node::Tree::farthest) spare.
 
 use rayon::prelude::*;
 
 use super::level::Level;
+use super::node::Child;
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::trace::Placement;
 
-/// Nodes that are visited at most to find one reach; a ball of 8,192 triangles takes a dozen of them.
-const MOST_VISITS: usize = 64;
-
-/// Nodes that are visited at most for everything that is placed, so that many objects that are placed now and then do not take long.
+/// Nodes and leaves that are visited at most for all that is placed, so that many objects that are placed now and then do not take long;
+/// where objects hold shapes as well, as many again for these.
 const ALL_VISITS: usize = 1 << 20;
+
+/// But no fewer than these for an entry of a table, which is worth it: each serves many placements.
+const LEAST_VISITS: usize = 16;
 
 /// The boxes around objects where they are placed.
 pub(super) struct Outlines<'a> {
     objects: &'a [Level],
     /// One for each object that is placed often.
     tables: Vec<Option<Table>>,
-    /// Nodes to be visited for a reach of other objects.
+    /// For each search of other objects.
     visits: usize,
 }
 
 impl<'a> Outlines<'a> {
     /// For `placements` of `objects`.
     pub fn new<'b>(objects: &'a [Level], placements: impl Iterator<Item = &'b Placement>) -> Self {
-        let mut times = vec![0; objects.len()];
-        placements.for_each(|placement| times[placement.object as usize] += 1);
-        let searches = times.iter().map(|&times| Table::cells(times).map_or(6 * times, Table::entries));
-        let visits = (ALL_VISITS / searches.sum::<usize>().max(1)).min(MOST_VISITS);
-        let table =
-            |(level, &times): (&Level, &usize)| Table::cells(times).map(|cells| Table::new(level, cells, visits));
-        Self { objects, tables: objects.par_iter().zip(&times).map(table).collect(), visits }
+        // What moves has two boxes, at its start and at its end.
+        let mut boxes = vec![0; objects.len()];
+        for placement in placements.filter(|placement| !objects[placement.object as usize].bounds().is_empty()) {
+            boxes[placement.object as usize] += if placement.motion.is_some() { 2 } else { 1 };
+        }
+        let searches = boxes.iter().map(|&boxes| Table::cells(boxes).map_or(6 * boxes, Table::entries));
+        let visits = ALL_VISITS / searches.sum::<usize>().max(1);
+        let table = |(level, &boxes): (&Level, &usize)| {
+            let support = |way, first: &mut _| level.farthest(way, visits.max(LEAST_VISITS), first);
+            Table::cells(boxes).map(|cells| Table::new(cells, support))
+        };
+        Self { objects, tables: objects.par_iter().zip(&boxes).map(table).collect(), visits }
     }
 
     /// The box around `placement`, at all times.
@@ -48,7 +56,7 @@ impl<'a> Outlines<'a> {
         placement.bounds_of(bounds, |way| {
             let farthest = match table {
                 Some(table) => table.farthest(way),
-                // Its entries are f32.
+                // A row of a matrix of f32, so nothing is lost.
                 None => level.farthest(way.as_vec3(), self.visits, &mut None),
             };
             farthest.min(bounds.farthest(way))
@@ -61,16 +69,15 @@ struct Table {
     /// Along each side of a face; a power of two, so that the grid is exact.
     cells: usize,
     /// Face by face and row by row, one value more than cells to a row. Faces are those of -x, x, -y, y, -z, z, with the other axes in their order.
-    reach: Vec<f64>,
+    values: Vec<f64>,
     /// More than rounding can add in a direction of which no component is larger than 1.
     spare: f64,
 }
 
 impl Table {
-    /// How fine a grid is worth it for an object that is placed so many times; none where its placements by themselves are searched for
-    /// sooner.
-    fn cells(times: usize) -> Option<usize> {
-        match times {
+    /// How fine a grid is worth it for so many boxes; none where searches for each by itself are done sooner.
+    fn cells(boxes: usize) -> Option<usize> {
+        match boxes {
             0..128 => None,
             128..4096 => Some(8),
             4096.. => Some(16),
@@ -81,10 +88,11 @@ impl Table {
         6 * (cells + 1) * (cells + 1)
     }
 
-    fn new(level: &Level, cells: usize, visits: usize) -> Self {
+    /// Of a support function, which is asked for neighbours one after the other, as [`Level::farthest`] is.
+    fn new(cells: usize, support: impl Fn(Vec3, &mut Option<Child>) -> f64 + Sync) -> Self {
         let side = cells + 1;
-        let mut reach = vec![0.0; Self::entries(cells)];
-        reach.par_chunks_mut(side).enumerate().for_each(|(row, values)| {
+        let mut values = vec![0.0; Self::entries(cells)];
+        values.par_chunks_mut(side).enumerate().for_each(|(row, values)| {
             let (face, j) = (row / side, row % side);
             let along = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
             let mut first = None;
@@ -94,16 +102,16 @@ impl Table {
                 way[axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
                 let [p, q] = OTHERS[axis];
                 (way[p], way[q]) = (along(i), along(j));
-                *value = level.farthest(way, visits, &mut first);
+                *value = support(way, &mut first);
             }
         });
-        let most = reach.iter().fold(0.0, |most: f64, reach| most.max(reach.abs()));
+        let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         // A few roundings of what is at most `cells`, times values.
         let spare = most * cells as f64 * 64.0 * f64::EPSILON;
-        Self { cells, reach, spare }
+        Self { cells, values, spare }
     }
 
-    /// At least the reach in a direction; infinite or NaN where nothing is known.
+    /// At least the support in a direction whose components are those of f32; infinite or NaN where nothing is known.
     fn farthest(&self, way: DVec3) -> f64 {
         let axis = way.abs().max_position();
         // The way is so many times as long as one on the cube.
@@ -119,14 +127,11 @@ impl Table {
         };
         let ((i, f), (j, g)) = (place(way[p]), place(way[q]));
         let side = self.cells + 1;
-        let row = &self.reach[(face * side + j) * side + i..][..side + 2];
-        let [low, right, up, across] = [row[0], row[1], row[side], row[side + 1]];
-        // The cell is cut into two triangles, along either diagonal; the corners are weighted.
+        let corners = &self.values[(face * side + j) * side + i..][..side + 2];
+        let [low, right, up, across] = [corners[0], corners[1], corners[side], corners[side + 1]];
+        // The cell is cut into two triangles.
         let (more, less, beside) = if f > g { (f, g, right) } else { (g, f, up) };
-        let one = low * (1.0 - more) + beside * (more - less) + across * less;
-        let (corner, u, v) = if f + g < 1.0 { (low, f, g) } else { (across, 1.0 - g, 1.0 - f) };
-        let other = corner * (1.0 - u - v) + right * u + up * v;
-        length * (one.min(other) + self.spare)
+        length * (low * (1.0 - more) + beside * (more - less) + across * less + self.spare)
     }
 }
 
@@ -140,6 +145,7 @@ mod tests {
     use super::*;
     use crate::math::{DAffine3, DMat3};
     use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
+    use crate::shape::{Shape, Sphere};
     use crate::trace::World;
     use crate::trace::bvh::Bvh;
     use crate::trace::bvh::preset::{Options, Preset};
@@ -150,7 +156,7 @@ mod tests {
         let scene = Scene {
             geometries: vec![Geometry::Mesh(mesh)],
             groups: vec![Group { name: String::new(), geometries: 0..1 }],
-            instances: vec![Instance { name: String::new(), group: 0, transform, transform_end }],
+            instances: vec![instance(0, transform, transform_end)],
             materials: Vec::new(),
             ..Scene::default()
         };
@@ -256,33 +262,99 @@ mod tests {
         mesh.positions.iter().map(|at| at.as_dvec3().dot(way)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// What is tabulated is never too little, also on the grid, on the edges of the cube and beside them, and for a ball little too much.
+    /// What is tabulated is never too little, also on the grid, on the edges of the cube and beside them, at any length; and no more too much than is said, for a ball.
     #[test]
     fn a_table_reaches_as_far_and_little_farther() {
         let mut random = Random::new(9);
-        for (mesh, is_ball) in [(ball(), true), (soup(&mut random), false)] {
-            let bvh = Bvh::build(&placed(mesh.clone(), DAffine3::IDENTITY, None));
-            let level = &bvh.objects[0];
-            for cells in [8, 16] {
-                let table = Table::new(level, cells, 10_000);
-                let mut worst = 0.0_f64;
-                for case in 0..20_000 {
-                    let mut way = random.vec3().as_dvec3() * 10.0_f64.powi(case % 9 - 4);
-                    match case % 4 {
-                        0 => way = (way / way.abs().max_element() * 8.0).round(),
-                        1 => way.x = way.y,
-                        2 => way.z = 0.0,
-                        _ => {}
-                    }
-                    let (most, farthest) = (reach(&mesh, way), table.farthest(way));
-                    assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
-                    worst = worst.max((farthest - most) / way.abs().max_element());
+        let soup = soup(&mut random);
+        for cells in [8, 16] {
+            let ball = Table::new(cells, |way, _| way.as_dvec3().length());
+            let corners = Table::new(cells, |way, _| reach(&soup, way.as_dvec3()));
+            let (mut worst, finer) = (0.0_f64, 1.0 / (cells * cells) as f64);
+            for case in 0..20_000 {
+                let mut way = random.vec3() * [1.0, 10.0, 1e4, 1e30, 1e37, 1e-4, 1e-30, 1e-40][case % 8];
+                match case % 4 {
+                    0 => way = (way / way.abs().max_element() * 8.0).round(),
+                    1 => way.x = way.y,
+                    2 => way.z = 0.0,
+                    _ => {}
                 }
-                // What the search spares is the 256th part of the widths, at most three of them.
-                let allowed = 4.0 / (cells * cells) as f64 * 1.01 + 3.0 * 2.0 / 250.0;
-                assert!(!is_ball || worst < allowed, "{worst} of {cells} cells");
-                assert!(table.farthest(DVec3::ZERO).is_nan(), "nowhere is no way");
+                let way = way.as_dvec3();
+                let (most, farthest) = (way.length(), ball.farthest(way));
+                assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
+                worst = worst.max((farthest - most) / way.abs().max_element());
+                let (most, farthest) = (reach(&soup, way), corners.farthest(way));
+                assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
             }
+            assert!(worst > 0.8 * finer && worst < 1.0001 * finer, "{worst} of {cells} cells");
+            assert!(ball.farthest(DVec3::ZERO).is_nan(), "nowhere is no way");
+        }
+    }
+
+    fn instance(group: u32, transform: DAffine3, transform_end: Option<DAffine3>) -> Instance {
+        Instance { name: String::new(), group, transform, transform_end }
+    }
+
+    /// Turned and stretched anyhow, near `at`.
+    fn anyhow(random: &mut Random, size: f64) -> DAffine3 {
+        let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
+        let stretch = DMat3::from_diagonal((random.vec3().as_dvec3() + 1.5) * size);
+        DAffine3 { matrix3: turn * stretch, translation: random.vec3().as_dvec3() * 10.0 * size }
+    }
+
+    /// Whatever is placed, however often, large or small, whether it moves: no point of it is outside its box, and the box is no larger than the one around the object's own box;
+    /// on one thread the same as on several.
+    #[test]
+    fn boxes_hold_what_is_placed() {
+        let mut random = Random::new(13);
+        let soup = soup(&mut random);
+        let centre = Vec3::new(12.0, 1.0, -2.0);
+        let sphere = || Geometry::Shapes { shapes: vec![Shape::Sphere(Sphere { centre, radius: 3.0 })], material: 0 };
+        for (times, size, moves) in
+            [(1, 1.0, false), (127, 1.0, true), (128, 1e-12, false), (300, 1.0, true), (4096, 1e12, false)]
+        {
+            // Triangles, shapes, both, and nothing.
+            let geometries = vec![Geometry::Mesh(soup.clone()), sphere(), Geometry::Mesh(soup.clone()), sphere()];
+            let groups = [0..1, 1..2, 2..4, 4..4].map(|geometries| Group { name: String::new(), geometries });
+            let instances = (0..4 * times).map(|i| {
+                let transform = anyhow(&mut random, size);
+                let end = DAffine3 { translation: transform.translation * 1.5, ..transform };
+                instance(i % 4, transform, moves.then_some(end))
+            });
+            let scene =
+                Scene { geometries, groups: groups.to_vec(), instances: instances.collect(), ..Scene::default() };
+            let world = World::placed(&scene).expect("sound");
+            let bvh = Bvh::build(&world);
+            let outlines = Outlines::new(&bvh.objects, world.placements.iter());
+            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+            let again = alone.install(|| Outlines::new(&bvh.objects, world.placements.iter()));
+            let mut tables = 0;
+            for placement in &world.placements {
+                let (level, bounds) = (&bvh.objects[placement.object as usize], outlines.around(placement));
+                assert_eq!(bounds, again.around(placement));
+                tables += usize::from(outlines.tables[placement.object as usize].is_some());
+                let loose = placement.bounds(level.bounds());
+                assert_eq!(bounds.union(loose), loose);
+                let inside = |at: DVec3, to_world: &DAffine3| {
+                    let at = to_world.transform_point3(at);
+                    let outside = (bounds.min.as_dvec3() - at).max(at - bounds.max.as_dvec3()).max_element();
+                    assert!(outside <= 0.0, "{at} is {outside:e} out of {bounds:?}");
+                };
+                for time in [0.0, 0.3, 1.0] {
+                    let to_world = placement.at(time).to_world.as_daffine3();
+                    if !level.triangles.tree().is_empty() {
+                        soup.positions.iter().step_by(7).for_each(|at| inside(at.as_dvec3(), &to_world));
+                    }
+                    if !level.shapes.tree().is_empty() {
+                        let rows = [0, 1, 2].map(|axis| to_world.matrix3.row(axis));
+                        let poles = rows.map(|row| row.normalize() * 3.0);
+                        for pole in poles.into_iter().flat_map(|pole| [pole, -pole]) {
+                            inside(centre.as_dvec3() + pole * 0.999_999, &to_world);
+                        }
+                    }
+                }
+            }
+            assert_eq!(tables > 0, times >= 128 || moves && times >= 64, "{times}");
         }
     }
 
@@ -291,15 +363,14 @@ mod tests {
     fn what_is_placed_often_is_held_tightly() {
         let (ball, mut random) = (ball(), Random::new(11));
         for times in [127, 128, 4096] {
-            let instance = |_| {
+            let placed = |_| {
                 let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
-                let at = |by: f64| DAffine3 { matrix3: turn, translation: DVec3::splat(by) };
-                Instance { name: String::new(), group: 0, transform: at(5.0), transform_end: None }
+                instance(0, DAffine3 { matrix3: turn, translation: DVec3::splat(5.0) }, None)
             };
             let scene = Scene {
                 geometries: vec![Geometry::Mesh(ball.clone())],
                 groups: vec![Group { name: String::new(), geometries: 0..1 }],
-                instances: (0..times).map(instance).collect(),
+                instances: (0..times).map(placed).collect(),
                 ..Scene::default()
             };
             let world = World::placed(&scene).expect("sound");
