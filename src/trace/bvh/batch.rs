@@ -150,7 +150,7 @@ impl Bvh {
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
                 let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut tile.t);
-                S::apart(Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t });
+                S::apart_narrow(Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t });
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -165,7 +165,7 @@ impl Bvh {
             }
             if !is_all {
                 let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);
-                S::apart(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
+                S::apart_narrow(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
             }
             in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
         }

@@ -68,7 +68,10 @@ impl Bvh {
         done: &mut dyn FnMut(usize, Certain<'_>),
     ) {
         self.with_flight(|flight| {
-            isa::dispatch(self.isa, Fly { bvh: self, rays, blur, flight, decide, done, query: PhantomData::<Q> });
+            isa::dispatch_narrow(
+                self.isa,
+                Fly { bvh: self, rays, blur, flight, decide, done, query: PhantomData::<Q> },
+            );
         });
     }
 

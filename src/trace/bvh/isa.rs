@@ -80,6 +80,17 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
     }
 }
 
+/// Runs `kernel`, in which nothing is wider than eight lanes, with AVX2 where `isa` is AVX-512, whose masks come later to whom they concern: on a Zen 4, rays in flight and
+/// distances take 5 to 8 % less so. What walks alone needs more registers than AVX2 has, and takes 2 to 5 % more.
+#[inline(always)]
+pub(super) fn dispatch_narrow<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => dispatch(Isa::Avx2, kernel),
+        _ => dispatch(isa, kernel),
+    }
+}
+
 /// Not inlined: whoever has something better need not make room for it.
 #[inline(never)]
 pub(super) fn portable<K: Kernel>(kernel: K) -> K::Output {

@@ -207,7 +207,7 @@ pub(super) fn visit<S: Simd, Q: Query>(
     );
 }
 
-/// Runs as a function of its own ([`Simd::apart`]).
+/// Runs as a function of its own ([`Simd::apart_narrow`]).
 #[inline(always)]
 fn run<S: Simd, Q: Query, G: Ground>(
     flight: &mut Flight,
@@ -217,7 +217,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     departures: impl Departures,
     done: impl FnMut(usize, &Found),
 ) {
-    S::apart(Journey { flight, bvh, ground, rays, departures, done, query: PhantomData::<Q> });
+    S::apart_narrow(Journey { flight, bvh, ground, rays, departures, done, query: PhantomData::<Q> });
 }
 
 /// A flight from the first departure to the last arrival.

@@ -80,7 +80,7 @@ impl Bvh {
         let triangles = &self.fixed.triangles;
         if !triangles.tree().is_empty() {
             let mut seekers = vec![Seeker::NOBODY; travellers.min(Self::POINTS)];
-            isa::dispatch(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
+            isa::dispatch_narrow(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
         }
     }
 }

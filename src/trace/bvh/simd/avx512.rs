@@ -29,6 +29,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn apart_narrow<K: Kernel>(kernel: K) -> K::Output {
+        Avx2::apart(kernel)
+    }
+
+    #[inline(always)]
     fn prefetch(address: *const u8) {
         Avx2::prefetch(address);
     }

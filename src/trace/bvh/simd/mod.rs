@@ -42,6 +42,11 @@ pub(super) trait Simd {
     /// Runs a part of a kernel in a function of its own. All else ends up in one, in which nothing that lives long stays in a register: what
     /// is done once for many rays, and has a loop in it, is better apart.
     fn apart<K: Kernel>(kernel: K) -> K::Output;
+    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](super::isa::dispatch_narrow) runs it.
+    #[inline(always)]
+    fn apart_narrow<K: Kernel>(kernel: K) -> K::Output {
+        Self::apart(kernel)
+    }
     /// Rows become columns.
     fn transpose(rows: [Self::V8; 8]) -> [Self::V8; 8];
     /// Children that the mask names, the farthest first, by where they are entered (not below 0, nor -0); then others. How many it names.
