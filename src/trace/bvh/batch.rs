@@ -150,7 +150,7 @@ impl Bvh {
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
                 let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut tile.t);
-                S::apart_narrow(Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t });
+                Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -165,7 +165,7 @@ impl Bvh {
             }
             if !is_all {
                 let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);
-                S::apart_narrow(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
+                S::apart(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
             }
             in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
         }
@@ -189,8 +189,8 @@ impl Bvh {
     }
 }
 
-/// Many rays among triangles, in flight together or one after the other; hits are computed several at a time. Also tells t in
-/// f64, for the last 64 of them: that of ray i in the place of `first` + i.
+/// Rays among triangles that make no bundle; hits are computed several at a time. Also tells t in f64, for the last 64 of them: that of ray i
+/// in the place of `first` + i.
 struct Unbundled<'a, Q: Query> {
     bvh: &'a Bvh,
     singles: &'a mut Singles,
@@ -200,34 +200,58 @@ struct Unbundled<'a, Q: Query> {
     t: &'a mut [f64; bundle::RAYS],
 }
 
-impl<Q: Query> Kernel for Unbundled<'_, Q> {
+impl<Q: Query> Unbundled<'_, Q> {
+    #[inline(always)]
+    fn trace<S: Simd>(self) {
+        self.answers.fill(Q::MISS);
+        if !self.bvh.has_triangles() {
+            return;
+        }
+        if self.bvh.travel_alone(self.rays.len()) {
+            S::apart(OneByOne(self));
+        } else {
+            S::apart_narrow(InFlight(self));
+        }
+    }
+}
+
+/// One after the other.
+struct OneByOne<'a, Q: Query>(Unbundled<'a, Q>);
+
+impl<Q: Query> Kernel for OneByOne<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, singles, first, rays, answers, t } = self;
-        answers.fill(Q::MISS);
-        if !bvh.has_triangles() {
-            return;
-        }
+        let Unbundled { bvh, singles, first, rays, answers, t } = self.0;
         let mut arrivals = Arrivals::<Q>::new(bvh, rays, answers, first, t);
-        let Singles { flight, doubted } = singles;
-        if bvh.travel_alone(rays.len()) {
-            bvh.walk_one_by_one::<S, Q>(
-                doubted,
-                rays,
-                #[inline(always)]
-                |i, found| arrivals.take::<S>(i, found),
-            );
-        } else {
-            flight::trace::<S, Q>(
-                flight,
-                bvh,
-                rays,
-                #[inline(always)]
-                |i, found| arrivals.take::<S>(i, found),
-            );
-        }
+        bvh.walk_one_by_one::<S, Q>(
+            &mut singles.doubted,
+            rays,
+            #[inline(always)]
+            |i, found| arrivals.take::<S>(i, found),
+        );
+        arrivals.finish::<S>();
+    }
+}
+
+/// Together.
+struct InFlight<'a, Q: Query>(Unbundled<'a, Q>);
+
+impl<Q: Query> Kernel for InFlight<'_, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Unbundled { bvh, singles, first, rays, answers, t } = self.0;
+        let mut arrivals = Arrivals::<Q>::new(bvh, rays, answers, first, t);
+        flight::trace::<S, Q>(
+            &mut singles.flight,
+            bvh,
+            rays,
+            #[inline(always)]
+            |i, found| arrivals.take::<S>(i, found),
+        );
         arrivals.finish::<S>();
     }
 }

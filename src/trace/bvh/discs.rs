@@ -199,7 +199,7 @@ impl Disc {
         all.within(bounds)
     }
 
-    /// No larger than to the farthest corner of a box that holds all of it.
+    /// No larger than to the farthest corner of a box that holds all that counts: of a triangle that was cut, another box holds the rest.
     fn within(self, bounds: Aabb) -> Self {
         let farthest = (bounds.max.as_dvec3() - self.centre).max(self.centre - bounds.min.as_dvec3()).length();
         Self { height: self.height.min(farthest), radius: self.radius.min(farthest), ..self }

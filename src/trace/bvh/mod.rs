@@ -225,7 +225,7 @@ impl Bvh {
         self.preset
     }
 
-    /// The instruction set its kernels use.
+    /// The most that its kernels may use of the processor's instructions.
     pub fn isa(&self) -> Isa {
         self.isa
     }

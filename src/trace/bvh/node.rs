@@ -196,7 +196,8 @@ impl Tree {
     /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
     /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
     /// farther than what has been found and the 256th part of the width, or so many nodes and leaves have been visited. `first` is a leaf
-    /// that is asked before all others, and then one of those that reach farthest: of ways that differ little, mostly the same.
+    /// that is asked before all others, besides these, and then one of those that reach farthest: of ways that differ little, mostly the same. Infinite where
+    /// nothing may be visited.
     pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>, of_leaf: impl Fn(Child) -> f32) -> f64 {
         if self.is_empty() {
             return f64::NEG_INFINITY;

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
-ISA: str
+ISA: str  # The most that kernels may use of the processor's instructions.
 
 _Floats = NDArray[np.float32] | NDArray[np.float64]
 _Ids = NDArray[np.uint32]

@@ -207,7 +207,7 @@ pub(super) fn visit<S: Simd, Q: Query>(
     );
 }
 
-/// Runs as a function of its own ([`Simd::apart_narrow`]).
+/// Runs as a function of its own ([`Simd::apart_narrow`]), so `departures` and `done` are of no instruction set, or of one that is narrow.
 #[inline(always)]
 fn run<S: Simd, Q: Query, G: Ground>(
     flight: &mut Flight,

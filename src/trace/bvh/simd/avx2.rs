@@ -24,7 +24,7 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn apart<K: Kernel>(kernel: K) -> K::Output {
-        // SAFETY: it is called by kernels of this instruction set.
+        // SAFETY: it is called by kernels of this instruction set, or of AVX-512, which nobody has without this.
         unsafe { isa::avx2_apart(kernel) }
     }
 

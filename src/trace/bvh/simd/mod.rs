@@ -42,7 +42,8 @@ pub(super) trait Simd {
     /// Runs a part of a kernel in a function of its own. All else ends up in one, in which nothing that lives long stays in a register: what
     /// is done once for many rays, and has a loop in it, is better apart.
     fn apart<K: Kernel>(kernel: K) -> K::Output;
-    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](super::isa::dispatch_narrow) runs it.
+    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](super::isa::dispatch_narrow) runs it: with another instruction set than
+    /// this, perhaps, so nothing that the part is given may be of this one.
     #[inline(always)]
     fn apart_narrow<K: Kernel>(kernel: K) -> K::Output {
         Self::apart(kernel)
