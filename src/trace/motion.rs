@@ -151,12 +151,12 @@ impl Placement {
     /// The same, and tighter, of an object of which more is known: `farthest` is at least the scalar product of any of its points with
     /// the given direction, in the object's coordinates.
     pub fn bounds_of(&self, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
+        let Some(motion) = &self.motion else { return bounds_at(&self.to_world, object, farthest) };
         if object.is_empty() {
             return Aabb::EMPTY;
         }
         let start = self.to_world.as_daffine3();
         let reach = object.min.abs().max(object.max.abs()).as_dvec3();
-        let Some(motion) = &self.motion else { return bounds_under(&start, reach, DVec3::ZERO, &farthest) };
         // Points run along straight lines but for the rounding of the transform to f32.
         let end = motion.end.as_daffine3();
         let most = start.matrix3.abs().max_entries(&end.matrix3.abs());
@@ -164,6 +164,15 @@ impl Placement {
         let slack = rounding * (1.01 * f64::from(UNIT_ROUNDOFF));
         bounds_under(&start, reach, slack, &farthest).union(bounds_under(&end, reach, slack, &farthest))
     }
+}
+
+/// The box in the world of an object that a transform places; `farthest` is as of [`Placement::bounds_of`].
+pub(super) fn bounds_at(to_world: &Affine3, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
+    if object.is_empty() {
+        return Aabb::EMPTY;
+    }
+    let reach = object.min.abs().max(object.max.abs()).as_dvec3();
+    bounds_under(&to_world.as_daffine3(), reach, DVec3::ZERO, &farthest)
 }
 
 /// `reach` is the largest magnitude of each coordinate of the object.

@@ -257,11 +257,16 @@ impl Placement {
     /// `ray` in the object's coordinates, at the same t: the direction is not normalised again. Off by the rounding of
     /// each component to f32, so it serves to find boxes and shapes; triangles are tested in the world.
     pub fn object_ray(&self, ray: &Ray) -> Ray {
-        Ray {
-            origin: self.to_object.transform_point3(ray.origin.as_dvec3()).as_vec3(),
-            direction: self.to_object.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
-            ..*ray
-        }
+        object_ray(&self.to_object, ray)
+    }
+}
+
+/// The same, by the transform.
+pub(super) fn object_ray(to_object: &DAffine3, ray: &Ray) -> Ray {
+    Ray {
+        origin: to_object.transform_point3(ray.origin.as_dvec3()).as_vec3(),
+        direction: to_object.transform_vector3(ray.direction.as_dvec3()).as_vec3(),
+        ..*ray
     }
 }
 

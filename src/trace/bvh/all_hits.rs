@@ -90,7 +90,7 @@ impl Kernel for Gather<'_> {
         }
         walk_over::<S, Closest>(bvh.placements.tree(), ray, bvh.placements.spread(), limit, |number| {
             let place = bvh.placements.at(number);
-            let object = &bvh.objects[place.placement.object as usize];
+            let object = &bvh.objects[place.object as usize];
             object.gather::<S>(ray, Some(place), gathered);
             Visit::Until(limit)
         });
@@ -118,7 +118,7 @@ impl Level {
             });
         }
         // The rounding of the ray is part of what shapes are asked.
-        let local = place.map_or(*ray, |place| place.placement.object_ray(ray));
+        let local = place.map_or(*ray, |place| place.object_ray(ray));
         if !self.shapes.tree().is_empty() && local.is_valid() {
             let slab = SlabRay::new::<S>(&local, self.shapes.tree().reach(), Blur::NONE);
             walk::single::<S, Closest>(self.shapes.tree(), &slab, limit, |leaf| {

@@ -83,7 +83,7 @@ impl Bvh {
             #[inline(always)]
             |number| {
                 let place = self.placements.at(number);
-                let level = &self.objects[place.placement.object as usize];
+                let level = &self.objects[place.object as usize];
                 level.trace_placed_shapes::<S, Q>(ray, place, nearest);
                 Visit::after::<Q>(nearest)
             },
@@ -180,7 +180,7 @@ impl Bvh {
         if self.placements.has_triangles() {
             walk_over::<S, Closest>(self.placements.tree(), ray, &Spread::NONE, nearest.limit(), |number| {
                 let place = self.placements.at(number);
-                let level = &self.objects[place.placement.object as usize];
+                let level = &self.objects[place.object as usize];
                 level.trace_triangles::<S, Closest>(ray, Some(place), &mut nearest);
                 Visit::after::<Closest>(&nearest)
             });

@@ -12,12 +12,14 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::Bvh;
+use super::level::Through;
 use super::node::{Child, Tree};
 use super::triangles::TriangleTree;
 use crate::math::{Aabb, DVec3, Vec3, gamma64};
 use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::shape::triangle::{Corners, Placed};
 use crate::trace::Placement;
+use crate::trace::motion::bounds_at;
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,19 +156,26 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The placement with this index among the leaves of the upper tree.
-    fn placement(&self, index: u32) -> &'a Placement {
-        match index.checked_sub(self.bvh.placements.len()) {
-            None => &self.bvh.placements.at(index).placement,
-            Some(moving) => self.bvh.moving.at(moving),
-        }
+    /// The triangles of what is placed under this index among the leaves of the upper trees, and where they are.
+    fn placed(&self, index: u32) -> (&'a TriangleTree, Through<'a>) {
+        let (object, through) = match index.checked_sub(self.bvh.placements.len()) {
+            None => {
+                let place = self.bvh.placements.at(index);
+                (place.object, place.through())
+            }
+            Some(moving) => {
+                let Placement { object, instance, to_world, .. } = self.bvh.moving.at(moving);
+                (*object, Through { instance: *instance, to_world })
+            }
+        };
+        (&self.bvh.objects[object as usize].triangles, through)
     }
 
     fn triangles(&self, level: Level) -> Option<&'a TriangleTree> {
         match level {
             Level::Fixed => Some(&self.bvh.fixed.triangles),
             Level::Placements | Level::Moving => None,
-            Level::Placed(index) => Some(&self.bvh.objects[self.placement(index).object as usize].triangles),
+            Level::Placed(index) => Some(self.placed(index).0),
         }
     }
 
@@ -191,7 +200,10 @@ impl<'a> Search<'a> {
 
     fn push(&mut self, level: Level, bounds: Aabb, child: Child) {
         let bounds = match level {
-            Level::Placed(placement) => self.placement(placement).bounds(bounds),
+            Level::Placed(index) => {
+                let (_, Through { to_world, .. }) = self.placed(index);
+                bounds_at(to_world, bounds, |way| bounds.farthest(way))
+            }
             Level::Fixed | Level::Placements | Level::Moving => bounds,
         };
         let outside = (bounds.min.as_dvec3() - self.point).max(self.point - bounds.max.as_dvec3()).max(DVec3::ZERO);
@@ -211,8 +223,8 @@ impl<'a> Search<'a> {
                 let part = triangles.part(block.part[lane]);
                 let (corners, instance) = match level {
                     Level::Placed(index) => {
-                        let placement = self.placement(index);
-                        (Placed { corners, to_world: &placement.to_world }.rounded(), placement.instance)
+                        let (_, Through { instance, to_world }) = self.placed(index);
+                        (Placed { corners, to_world }.rounded(), instance)
                     }
                     Level::Fixed | Level::Placements | Level::Moving => (corners.rounded(), part.instance),
                 };

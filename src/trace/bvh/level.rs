@@ -70,7 +70,7 @@ impl Level {
     /// Shapes of an object in its place, for a ray of the world.
     #[inline(always)]
     pub fn trace_placed_shapes<S: Simd, Q: Query>(&self, ray: &Ray, place: &Place, nearest: &mut Nearest) {
-        let local = place.placement.object_ray(ray);
+        let local = place.object_ray(ray);
         if local.is_valid() {
             self.trace_shapes::<S, Q>(ray, &local, Some(place.through()), nearest);
         }

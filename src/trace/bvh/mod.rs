@@ -208,7 +208,7 @@ impl Bvh {
         let objects: Vec<f64> =
             self.objects.iter().map(|level| of(level) / area(level.bounds()).max(f64::MIN_POSITIVE)).collect();
         let placed = self.placements.tree().cost(|items| {
-            let costs = items.map(|item| objects[self.placements.at(item).placement.object as usize]);
+            let costs = items.map(|item| objects[self.placements.at(item).object as usize]);
             costs.sum()
         });
         let moving = self.moving.tree().cost(|items| {

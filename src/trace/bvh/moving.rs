@@ -67,10 +67,9 @@ impl MovingTree {
             limit,
             #[inline(always)]
             |number| {
-                let placement = self.at(number);
+                let placement = self.at(number).at(ray.moment());
                 let level = &objects[placement.object as usize];
-                let reach = level.triangles.tree().reach();
-                enter(level, &Place::new(placement.at(ray.moment()).into_owned(), reach))
+                enter(level, &Place::new(&placement, level.triangles.tree().reach()))
             },
         );
     }

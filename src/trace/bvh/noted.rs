@@ -136,7 +136,7 @@ impl Bvh {
             return (&self.fixed.triangles, None);
         }
         let place = self.placements.at(place);
-        (&self.objects[place.placement.object as usize].triangles, Some(place.through()))
+        (&self.objects[place.object as usize].triangles, Some(place.through()))
     }
 
     /// t in f64 and hits as of [`TriangleTree::hits`], for triangles of placed objects; and where f64 is not precise enough, exactly. Only lanes of
@@ -185,11 +185,11 @@ impl Bvh {
     #[inline(always)]
     fn placed(&self, place: u32) -> (&TriangleTree, Location) {
         let place = self.placements.at(place);
-        let m = &place.placement.to_world;
+        let m = &place.to_world;
         let (x, y, z, t) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation);
         let columns = [x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z, t.x, t.y, t.z];
-        let location = Location { columns, slack: place.slack, instance: place.placement.instance };
-        (&self.objects[place.placement.object as usize].triangles, location)
+        let location = Location { columns, slack: place.slack, instance: place.instance };
+        (&self.objects[place.object as usize].triangles, location)
     }
 
     /// What is noted for one ray, by [`triangle::intersect`](crate::shape::triangle::intersect).

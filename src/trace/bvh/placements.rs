@@ -94,17 +94,15 @@ impl PlacementTree {
     /// Takes those that stand still. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
         let (tree, order) = tree_over(placements, |placement| placement.motion.is_none(), objects, options);
-        let place = |i: usize| {
-            let placement = placements[i].clone();
-            let triangles = &objects[placement.object as usize].triangles;
-            let (reach, grain) = (triangles.tree().reach(), triangles.grain());
-            Place::new(placement, reach).with_grain(grain)
+        let place = |&i: &usize| {
+            let triangles = &objects[placements[i].object as usize].triangles;
+            Place::new(&placements[i], triangles.tree().reach()).with_grain(triangles.grain())
         };
-        let places: Vec<Place> = order.into_iter().map(place).collect();
-        let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.placement.object as usize]));
+        let places: Vec<Place> = order.iter().map(place).collect();
+        let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());
-        let spread = spread_over(places.iter().map(|place| &place.placement), objects);
+        let spread = spread_over(order.iter().map(|&i| &placements[i]), objects);
         Self { tree, places, has_triangles, has_shapes, spread }
     }
 

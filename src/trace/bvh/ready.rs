@@ -4,7 +4,7 @@
 
 use super::filter::{Filter, Filters};
 use super::place::Blur;
-use super::simd::{Array, Mask, Simd, Vector, size};
+use super::simd::{Array, Mask, Simd, Vector, everywhere, size};
 use super::slab::{SlabRay, Slabs, least_t};
 use super::woop::Margin;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -137,12 +137,17 @@ pub(super) fn ready<S: Simd>(columns: [S::V8; 8], reach: Vec3, blur: Blur) -> ([
     let splat = S::V8::splat;
     let [x, y, z, ..] = columns;
     let off = size([x, y, z]).mul_add(splat(blur.direction), splat(blur.origin));
-    ready_blurred::<S>(columns, reach, off, blur.direction)
+    ready_blurred::<S>(columns, everywhere(reach), off, splat(blur.direction))
 }
 
 /// The same of rays whose origins are off by `off`, and whose directions by `turn` of their largest component.
 #[inline(always)]
-pub(super) fn ready_blurred<S: Simd>(columns: [S::V8; 8], reach: Vec3, off: S::V8, turn: f32) -> ([ReadyRay; 8], u32) {
+pub(super) fn ready_blurred<S: Simd>(
+    columns: [S::V8; 8],
+    reach: [S::V8; 3],
+    off: S::V8,
+    turn: S::V8,
+) -> ([ReadyRay; 8], u32) {
     let splat = S::V8::splat;
     let zero = splat(0.0);
     let [x, y, z, dx, dy, dz, tmin, tmax] = columns;
@@ -160,7 +165,7 @@ pub(super) fn ready_blurred<S: Simd>(columns: [S::V8; 8], reach: Vec3, off: S::V
     }
     // As `least_t`.
     let least = tmin.mul(splat(1.0 - 4.0 * UNIT_ROUNDOFF)).sub(splat(f32::MIN_POSITIVE)).max(zero);
-    let filter = Filters::new(origin, direction, tmin, splat(turn));
+    let filter = Filters::new(origin, direction, tmin, turn);
     let Margin { width, of_depth, of_size } = filter.margin;
     let [rx, ry, rz] = reciprocals;
     let [nx, ny, nz] = near;
@@ -175,7 +180,7 @@ pub(super) fn ready_blurred<S: Simd>(columns: [S::V8; 8], reach: Vec3, off: S::V
     let first = S::transpose([rx, ry, rz, least, nx, ny, nz, zero]);
     let second = S::transpose([fx, fy, fz, sx, sy, sz, tmax, limit]);
     let third = S::transpose([x, y, z, p, q, kx, ky, kz]);
-    let fourth = S::transpose([width, of_depth, of_size, against, shorten, begin, off, splat(turn)]);
+    let fourth = S::transpose([width, of_depth, of_size, against, shorten, begin, off, turn]);
     let mut ready = [ReadyRay::NONE; 8];
     for i in 0..8 {
         let rows = [first[i].to_array(), second[i].to_array(), third[i].to_array(), fourth[i].to_array()];

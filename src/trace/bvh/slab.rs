@@ -115,13 +115,13 @@ impl<V: Vector> Slabs<V> {
 
     /// Of as many rays as there are lanes, axis by axis. Origins are off by `off`, directions by `turn` of their largest component.
     #[inline(always)]
-    pub fn of_rays(origin: [V; 3], direction: [V; 3], reach: Vec3, off: V, turn: f32) -> [Self; 3] {
+    pub fn of_rays(origin: [V; 3], direction: [V; 3], reach: [V; 3], off: V, turn: V) -> [Self; 3] {
         let splat = V::splat;
-        let ([x, y, z], [dx, dy, dz]) = (origin, direction);
+        let ([x, y, z], [dx, dy, dz], [rx, ry, rz]) = (origin, direction, reach);
         let largest = size(direction);
         let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
-        let [sx, sy, sz] = [x.abs().add(splat(reach.x)), y.abs().add(splat(reach.y)), z.abs().add(splat(reach.z))];
-        let stray = smallest.div(largest).mul(splat(4.0)).add(splat(1.1 * turn));
+        let [sx, sy, sz] = [x.abs().add(rx), y.abs().add(ry), z.abs().add(rz)];
+        let stray = smallest.div(largest).mul(splat(4.0)).add(turn.mul(splat(1.1)));
         let stray = stray.mul_add(sx.max(sy).max(sz), off.mul_add(splat(1.1), splat(f32::MIN_POSITIVE)));
         [
             Self::new(x, dx, sx, smallest, stray),

@@ -41,18 +41,18 @@ impl Bvh {
         }
         let world = among_boxes::<Portable>(self.moving.tree(), ray, self.moving.spread());
         for number in items(&mut steps, self.moving.tree(), &world, limit) {
-            let placement = self.moving.at(number).at(ray.moment()).into_owned();
+            let placement = self.moving.at(number).at(ray.moment());
             let reach = self.objects[placement.object as usize].triangles.tree().reach();
-            self.count_object(&mut steps, &Place::new(placement, reach), ray, limit);
+            self.count_object(&mut steps, &Place::new(&placement, reach), ray, limit);
         }
         steps
     }
 
     fn count_object(&self, steps: &mut Steps, place: &Place, ray: &Ray, limit: f32) {
         steps.objects += 1;
-        let shapes = place.placement.object_ray(ray);
+        let shapes = place.object_ray(ray);
         let (local, blur) = place.local::<Portable>(ray);
-        let level = &self.objects[place.placement.object as usize];
+        let level = &self.objects[place.object as usize];
         count_level(steps, level, (&local, blur), shapes.is_valid().then_some(&shapes), limit);
     }
 }

@@ -10,7 +10,7 @@ use crate::trace::bvh::place::{Blur, EightRays, Place};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::{Closest, Query};
 use crate::trace::bvh::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::{Simd, everywhere};
 use crate::trace::bvh::triangles::TriangleTree;
 use crate::trace::bvh::walk::{self, Visit};
 
@@ -177,13 +177,13 @@ impl Bvh {
     pub(in crate::trace::bvh) fn ready_at<S: Simd>(&self, number: u32, rays: [&Ray; 8]) -> ([ReadyRay; 8], u32) {
         let (place, triangles) = self.object_at(number);
         let EightRays { columns, off, turn, known } = place.eight::<S>(columns_of::<S>(rays));
-        let (ready, valid) = ready_blurred::<S>(columns, triangles.tree().reach(), off, turn);
+        let (ready, valid) = ready_blurred::<S>(columns, everywhere(triangles.tree().reach()), off, turn);
         (ready, valid & known)
     }
 
     #[inline(always)]
     pub(in crate::trace::bvh) fn object_at(&self, number: u32) -> (&Place, &TriangleTree) {
         let place = self.placements.at(number);
-        (place, &self.objects[place.placement.object as usize].triangles)
+        (place, &self.objects[place.object as usize].triangles)
     }
 }

@@ -29,14 +29,14 @@ use super::found::Found;
 use super::isa::Kernel;
 use super::leaves::Leaves;
 use super::node::Child;
-use super::place::Blur;
+use super::place::{Blur, EightRays, Place};
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
-use super::ready::{ReadyRay, ReadyRays};
+use super::ready::{MANY, ReadyRay, ReadyRays, ready_blurred};
 use super::set::{Set, TRAVELLERS};
-use super::simd::{Simd, Vector};
+use super::simd::{Array, Simd, Vector};
 use super::woop::Sides;
-use crate::math::Aabb;
+use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;
 pub(super) use ground::Objects;
@@ -47,6 +47,9 @@ pub(super) use visitors::Visitors;
 
 /// Rays in flight.
 const RAYS: usize = TRAVELLERS;
+
+/// So many wait at placements before they go into them, unless nobody else has a step to take.
+const ENOUGH: u32 = RAYS as u32 / 2;
 
 /// Room for a flight.
 pub(super) struct Flight {
@@ -71,6 +74,52 @@ impl Flight {
             self.space[k] = space;
         }
         S::prefetch(ground.address(space, next));
+    }
+
+    /// Those at placements go into them, eight at a time: to be made ready for its object each by itself costs a ray as much as four nodes.
+    #[inline(always)]
+    fn descend<S: Simd, G: Ground>(&mut self, mut waiting: Set, bvh: &Bvh, ground: &G, rays: &[Ray]) {
+        while !waiting.is_empty() {
+            let group = waiting.take_eight();
+            let (ready, known) = if group.len() >= MANY {
+                self.ready_in_places::<S>(group, bvh, rays)
+            } else {
+                ([ReadyRay::NONE; 8], 0)
+            };
+            for (i, k) in group.enumerate() {
+                let (traveller, leaf) = (&mut self.travellers[k], self.next[k]);
+                let next = if known >> i & 1 != 0 {
+                    let number = leaf.first();
+                    traveller.descend_ready(number, bvh.placements.at(number).object, &ready[i % 8])
+                } else {
+                    traveller.descend::<S>(leaf, bvh, rays)
+                };
+                self.send::<S, G>(k, next, ground);
+            }
+        }
+    }
+
+    /// Up to eight of those at placements made ready for the objects, in their order, and a bit for each for which that could be done.
+    #[inline(always)]
+    fn ready_in_places<S: Simd>(&self, group: Set, bvh: &Bvh, rays: &[Ray]) -> ([ReadyRay; 8], u32) {
+        let mut others = group;
+        let Some(mut k) = others.next() else { return ([ReadyRay::NONE; 8], 0) };
+        let (first, _) = bvh.object_at(self.next[k].first());
+        let (mut places, mut some) = ([first; 8], [&rays[self.travellers[k].ray]; 8]);
+        let (mut reach, mut has_triangles) = ([[0.0; 8]; 3], 0);
+        for i in 0..8 {
+            let (place, triangles) = bvh.object_at(self.next[k].first());
+            (places[i], some[i]) = (place, &rays[self.travellers[k].ray]);
+            let Vec3 { x, y, z } = triangles.tree().reach();
+            (reach[0][i], reach[1][i], reach[2][i]) = (x, y, z);
+            has_triangles |= u32::from(!triangles.tree().is_empty()) << i;
+            // Where they are fewer than eight, the last again.
+            k = others.next().unwrap_or(k);
+        }
+        let EightRays { columns, off, turn, known } = Place::each::<S>(places, some);
+        let reach = [S::V8::load(&reach[0]), S::V8::load(&reach[1]), S::V8::load(&reach[2])];
+        let (ready, valid) = ready_blurred::<S>(columns, reach, off, turn);
+        (ready, valid & known & has_triangles)
     }
 
     /// Who of `flying` takes which step.
@@ -293,9 +342,9 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found)> Kernel for Jou
                     let next = flight.travellers[k].leave();
                     flight.send::<S, G>(k, next, ground);
                 }
-                for k in at_placements {
-                    let next = flight.travellers[k].descend::<S>(flight.next[k], bvh, rays);
-                    flight.send::<S, G>(k, next, ground);
+                let nobody_else = at_nodes.is_empty() && at_leaves.is_empty() && returning.is_empty();
+                if nobody_else || at_placements.len() >= ENOUGH {
+                    flight.descend::<S, G>(at_placements, bvh, ground, rays);
                 }
             }
         }

@@ -205,14 +205,18 @@ impl Traveller {
     #[inline(always)]
     pub fn descend<S: Simd>(&mut self, leaf: Child, bvh: &Bvh, rays: &[Ray]) -> Child {
         let number = leaf.first();
-        let place = bvh.placements.at(number);
-        let object = place.placement.object;
-        let tree = bvh.objects[object as usize].triangles.tree();
-        if tree.is_empty() {
+        let (place, triangles) = bvh.object_at(number);
+        if triangles.tree().is_empty() {
             return self.pop();
         }
         let (local, blur) = place.local::<S>(&rays[self.ray]);
-        self.ready[1] = ReadyRay::new::<S>(&local, tree.reach(), blur);
+        self.descend_ready(number, place.object, &ReadyRay::new::<S>(&local, triangles.tree().reach(), blur))
+    }
+
+    /// Into a placement of an object that has triangles, for which the ray was made ready.
+    #[inline(always)]
+    pub fn descend_ready(&mut self, number: u32, object: u32, ready: &ReadyRay) -> Child {
+        self.ready[1] = *ready;
         let top = self.len % STACK;
         (self.near[top], self.stack[top]) = (0, Child::NONE);
         self.len = top + 1;

@@ -95,7 +95,7 @@ impl<Q: Query> Departures for Queue<'_, Q> {
             self.group &= self.group - 1;
             self.slot += 1;
             if !Q::is_enough(self.answers[ray].get()) {
-                let object = self.bvh.placements.at(place).placement.object;
+                let object = self.bvh.placements.at(place).object;
                 return Some(Start { ray, place, space: Space::object(object) });
             }
         }

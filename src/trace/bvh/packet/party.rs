@@ -12,7 +12,7 @@ use super::{Asked, RAYS};
 use crate::math::Vec3;
 use crate::trace::bvh::node::{Node, WIDTH};
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, everywhere};
 use crate::trace::bvh::slab::Slabs;
 use crate::trace::bvh::walk::Enter;
 
@@ -40,7 +40,7 @@ impl<'a, Q: Query, V: Vector + Array<RAYS>, const N: usize> Party<'a, Q, V, N> {
                 let ([x, y, z], [dx, dy, dz]) = (&packet.origin, &packet.direction);
                 let origin = [V::load(x), V::load(y), V::load(z)];
                 let direction = [V::load(dx), V::load(dy), V::load(dz)];
-                *slabs = Slabs::of_rays(origin, direction, reach, zero, 0.0);
+                *slabs = Slabs::of_rays(origin, direction, everywhere(reach), zero, zero);
                 for (slabs, is_backward) in slabs.iter().zip(beam.is_backward) {
                     let backward = if is_backward { 0xff } else { 0 };
                     asks &= (slabs.is_negative.bits() ^ backward) & lanes == 0;

@@ -28,6 +28,7 @@ use super::build::lanes::Boxes;
 use super::bundle::{PerRay, RAYS, axes};
 use super::isa::Kernel;
 use super::node::{Child, Node};
+use crate::math::Vec3;
 
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {
@@ -149,6 +150,12 @@ pub(super) trait Vector: Copy {
 #[inline(always)]
 pub(super) fn size<V: Vector>([x, y, z]: [V; 3]) -> V {
     x.abs().max(y.abs()).max(z.abs())
+}
+
+/// A vector in every lane, component by component.
+#[inline(always)]
+pub(super) fn everywhere<V: Vector>(v: Vec3) -> [V; 3] {
+    [V::splat(v.x), V::splat(v.y), V::splat(v.z)]
 }
 
 /// Loaded from and stored to an array.
