@@ -81,6 +81,10 @@ fn every_hit_is_that_of_exact_arithmetic() {
         precise.occluded_batch(&traced, &mut any);
         let (mut ends, mut all) = (Vec::new(), Vec::new());
         precise.all_hits_batch(&traced, &mut ends, &mut all);
+        let (mut ends_of_names, mut all_names) = (Vec::new(), Vec::new());
+        precise.all_names_batch(&traced, &mut ends_of_names, &mut all_names);
+        assert_eq!(ends_of_names, ends);
+        assert_eq!(all_names, all.iter().map(|hit| (hit.geometry, hit.primitive)).collect::<Vec<_>>());
         let mut counts = vec![0; rays.len()];
         precise.count_batch(&traced, &mut counts);
         let mut hits = 0;

@@ -4,7 +4,7 @@ use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use twincast::trace::precise::{PreciseHit, PreciseRay};
+use twincast::trace::precise::{Precise, PreciseRay};
 
 use crate::arrays::{CHUNK, Ends, Points, Rays};
 use crate::pool;
@@ -67,21 +67,31 @@ impl Scene {
     ) -> PyResult<Crossings<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let (ray, primitive, location) = pool::run(py, threads, || {
-            let found = self.found(&rays, |task| {
-                let (mut ray, mut primitive, mut location) = (Vec::new(), Vec::new(), Vec::new());
-                for (i, hits) in task.by_ray() {
-                    for hit in &hits[..hits.len().min(most)] {
-                        ray.push((task.first + i) as i64);
-                        primitive.push(i64::from(hit.primitive));
-                        if locations {
-                            let PreciseRay { origin, direction, .. } = task.rays[i];
-                            location.extend((origin + direction * hit.t).to_array());
+            let found = if locations {
+                self.found(&rays, Precise::all_hits_batch, |task| {
+                    let mut columns = Columns::default();
+                    for (i, hits) in task.by_ray() {
+                        let PreciseRay { origin, direction, .. } = task.rays[i];
+                        for hit in &hits[..hits.len().min(most)] {
+                            columns.push(task.first + i, hit.primitive);
+                            columns.location.extend((origin + direction * hit.t).to_array());
                         }
                     }
-                }
-                (ray, primitive, location)
-            });
-            (joined(&found, |found| &found.0), joined(&found, |found| &found.1), joined(&found, |found| &found.2))
+                    columns
+                })
+            } else {
+                self.found(&rays, Precise::all_names_batch, |task| {
+                    let mut columns = Columns::default();
+                    for (i, names) in task.by_ray() {
+                        for &(_, primitive) in &names[..names.len().min(most)] {
+                            columns.push(task.first + i, primitive);
+                        }
+                    }
+                    columns
+                })
+            };
+            let (ray, primitive) = (joined(&found, |found| &found.ray), joined(&found, |found| &found.primitive));
+            (ray, primitive, joined(&found, |found| &found.location))
         })?;
         Ok((ray.into_pyarray(py), primitive.into_pyarray(py), table(py, location, 3)?))
     }
@@ -106,31 +116,51 @@ impl Scene {
     }
 }
 
+/// Columns of [`Crossings`], of one task.
+#[derive(Default)]
+struct Columns {
+    ray: Vec<i64>,
+    primitive: Vec<i64>,
+    location: Vec<f64>,
+}
+
+impl Columns {
+    fn push(&mut self, ray: usize, primitive: u32) {
+        self.ray.push(ray as i64);
+        self.primitive.push(i64::from(primitive));
+    }
+}
+
 /// What one task has found.
-struct Task<'a> {
+struct Task<'a, H> {
     /// The number of its first ray.
     first: usize,
     rays: &'a [PreciseRay],
     /// Of each ray where its hits end.
     ends: &'a [usize],
-    hits: &'a [PreciseHit],
+    hits: &'a [H],
 }
 
-impl Task<'_> {
+impl<H> Task<'_, H> {
     /// The number of each of its rays, the first being 0, and its hits.
-    fn by_ray(&self) -> impl Iterator<Item = (usize, &[PreciseHit])> {
+    fn by_ray(&self) -> impl Iterator<Item = (usize, &[H])> {
         let begins = std::iter::once(&0).chain(self.ends);
         begins.zip(self.ends).map(|(&begin, &end)| &self.hits[begin..end]).enumerate()
     }
 }
 
 impl Scene {
-    /// What `keep` keeps of all hits, task by task.
-    fn found<T: Send>(&self, rays: &Rays<'_>, keep: impl Fn(&Task<'_>) -> T + Sync) -> Vec<T> {
+    /// What `keep` keeps of all hits, as `ask` gives them, task by task.
+    fn found<H: Send, T: Send>(
+        &self,
+        rays: &Rays<'_>,
+        ask: fn(&Precise, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
+        keep: impl Fn(&Task<'_, H>) -> T + Sync,
+    ) -> Vec<T> {
         let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
-        let found = chunks.map_init(Default::default, |(ends, hits), chunk| {
+        let found = chunks.map_init(<(Vec<usize>, Vec<H>)>::default, |(ends, hits), chunk| {
             let rays = rays.some(rays.chunk(chunk));
-            self.precise.all_hits_batch(&rays, ends, hits);
+            ask(&self.precise, &rays, ends, hits);
             keep(&Task { first: chunk * CHUNK, rays: &rays, ends, hits })
         });
         found.collect()
@@ -145,7 +175,7 @@ impl Scene {
         real: impl Fn(f64) -> F + Sync,
     ) -> PyResult<List<'py>> {
         let (splits, [ray, primitive, geometry], t, uv) = pool::run(py, threads, || {
-            let found = self.found(rays, |task| {
+            let found = self.found(rays, Precise::all_hits_batch, |task| {
                 let (mut ids, mut t, mut uv) = ([const { Vec::new() }; 3], Vec::new(), Vec::new());
                 for (i, hits) in task.by_ray() {
                     for hit in hits {

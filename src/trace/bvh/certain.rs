@@ -25,9 +25,9 @@ use crate::trace::nearest::Nearest;
 /// What is certain about a ray.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) enum Certain<'a> {
-    /// It hits the `sure` triangles for sure, may hit the `open` ones, and hits no others; [`Bvh::triangle`] has their names. None is open but
-    /// where all hits are wanted.
-    Hits { sure: &'a [u32], open: &'a [u32] },
+    /// It hits the `sure` triangles for sure, may hit the `open` ones, and hits no others; [`Bvh::triangle`] has their names. Where all hits are wanted,
+    /// `t` has bounds on t of each that is sure; else there are none, and none is open.
+    Hits { sure: &'a [u32], t: &'a [[f32; 2]], open: &'a [u32] },
     /// Nothing.
     Doubt,
 }
@@ -110,8 +110,8 @@ impl<Q: Query> Kernel for Fly<'_, Q> {
             |ray, found| {
                 let (noted, is_noted) = ([found.noted], found.noted != NONE);
                 let is_open = found.is_in_doubt() && (Q::DOUBTS || !is_noted);
-                let sure = if is_noted { &noted[..] } else { found.listed.sure() };
-                done(ray, if is_open { Certain::Doubt } else { Certain::Hits { sure, open: found.listed.open() } });
+                let (sure, t) = if is_noted { (&noted[..], &[][..]) } else { (found.listed.sure(), found.listed.t()) };
+                done(ray, if is_open { Certain::Doubt } else { Certain::Hits { sure, t, open: found.listed.open() } });
             },
         );
     }
@@ -214,7 +214,7 @@ query!(Any, any: true, all: false, |found, id, t, ray| {
 
 query!(All, any: false, all: true, |found, id, t, ray| {
     match t {
-        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.listed.push(id),
+        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.listed.push(id, [low, high]),
         Some([low, high]) if high < ray.tmin || ray.tmax < low => {}
         _ => found.listed.push_open(id),
     }

@@ -41,6 +41,8 @@ pub(super) struct Found {
 pub(super) struct Listed {
     /// Block and lane of each: from the front of those that are sure, from the back of those that are not.
     ids: [u32; Self::MOST],
+    /// Bounds on t of those that are sure.
+    t: [[f32; 2]; Self::MOST],
     sures: usize,
     opens: usize,
     is_in_doubt: bool,
@@ -49,7 +51,8 @@ pub(super) struct Listed {
 impl Listed {
     /// As many as are kept; a ray with more is in doubt.
     const MOST: usize = 24;
-    const NONE: Self = Self { ids: [NONE; Self::MOST], sures: 0, opens: 0, is_in_doubt: false };
+    const NONE: Self =
+        Self { ids: [NONE; Self::MOST], t: [[0.0; 2]; Self::MOST], sures: 0, opens: 0, is_in_doubt: false };
 
     #[inline(always)]
     fn start(&mut self) {
@@ -63,9 +66,9 @@ impl Listed {
     }
 
     #[inline(always)]
-    pub fn push(&mut self, id: u32) {
+    pub fn push(&mut self, id: u32, t: [f32; 2]) {
         if self.has_room() {
-            self.ids[self.sures] = id;
+            (self.ids[self.sures], self.t[self.sures]) = (id, t);
             self.sures += 1;
         }
     }
@@ -83,6 +86,12 @@ impl Listed {
     #[inline(always)]
     pub fn sure(&self) -> &[u32] {
         &self.ids[..self.sures.min(Self::MOST)]
+    }
+
+    /// Bounds on their t.
+    #[inline(always)]
+    pub fn t(&self) -> &[[f32; 2]] {
+        &self.t[..self.sures.min(Self::MOST)]
     }
 
     /// Those that may be hit.

@@ -3,6 +3,8 @@
 //! Each batch goes through flights first, which name what is hit for sure, and what may be where all hits are wanted; t, u and v come from the corners in f64, in a step of its own
 //! ([`Pairs`]). Then those that are in doubt go one by one.
 
+use std::ops::Range;
+
 use super::frame::{self, LocalRay};
 use super::{Precise, PreciseHit, PreciseRay};
 use crate::math::{DVec3, Vec3};
@@ -108,7 +110,7 @@ impl Precise {
             let mut again = Vec::new();
             pairs.clear();
             self.certain(Wanted::All, rays, |i, certain| match certain {
-                Certain::Hits { sure, open } => {
+                Certain::Hits { sure, open, .. } => {
                     if is_whole(&rays[i]) {
                         counts[i] = sure.len() as u32;
                     } else {
@@ -136,41 +138,86 @@ impl Precise {
     pub fn all_hits_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, hits: &mut Vec<PreciseHit>) {
         ends.clear();
         hits.clear();
-        let (mut crossings, mut pairs) = (Crossings::default(), Pairs::default());
-        // All hits in order of arrival, and of each ray where its hits are among them.
-        let (mut arrived, mut places) = (Vec::new(), Vec::new());
+        let mut arrivals = Arrivals::default();
         for rays in rays.chunks(CHUNK) {
-            places.clear();
-            places.resize(rays.len(), 0..0);
-            let mut again = Vec::new();
-            pairs.clear();
-            self.certain(Wanted::All, rays, |i, certain| match certain {
-                Certain::Hits { sure, open } => {
-                    let first = pairs.len();
-                    pairs.extend(i, sure, true);
-                    pairs.extend(i, open, false);
-                    places[i] = first..pairs.len();
-                }
-                Certain::Doubt => again.push(i),
-            });
-            arrived.clear();
-            for (i, met) in pairs.meet(self, rays) {
-                arrived.push(if let Met::Hit(hit) = met { Some(hit) } else { None });
-                if let Met::Touch = met {
-                    again.push(i);
-                }
-            }
-            for i in again {
-                let first = arrived.len();
-                arrived.extend(self.all(&rays[i], &mut crossings).iter().copied().map(Some));
-                places[i] = first..arrived.len();
-            }
-            for place in &places {
-                let first = hits.len();
-                hits.extend(arrived[place.clone()].iter().flatten());
-                hits[first..].sort_unstable_by(PreciseHit::order);
+            self.all_of_chunk(rays, &mut arrivals, |_, _, _| false);
+            for i in 0..rays.len() {
+                arrivals.put_in_order(i, hits);
                 ends.push(hits.len());
             }
+        }
+    }
+
+    /// The geometry and the primitive of each hit of [`Self::all_hits_batch`], in the same order, without computing t, u and v of a ray whose hits lie so far apart
+    /// that they are in order without. (Where sizes squared times a direction vanish in f64, the latter may miss what is named here.)
+    pub fn all_names_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, names: &mut Vec<(u32, u32)>) {
+        ends.clear();
+        names.clear();
+        let (mut arrivals, mut hits) = (Arrivals::default(), Vec::new());
+        // Hits that are in order, and of each ray where its own are among them.
+        let (mut ids, mut clear) = (Vec::new(), Vec::new());
+        for rays in rays.chunks(CHUNK) {
+            ids.clear();
+            clear.clear();
+            clear.resize(rays.len(), 0..0);
+            self.all_of_chunk(rays, &mut arrivals, |i, sure, t| {
+                let first = ids.len();
+                ids.extend(sure.iter().copied().zip(t.iter().copied()));
+                clear[i] = first..ids.len();
+                let own = &mut ids[first..];
+                own.sort_unstable_by(|(_, [a, _]), (_, [b, _])| a.total_cmp(b));
+                let are_apart = own.windows(2).all(|pair| pair[0].1[1] < pair[1].1[0]);
+                if !are_apart {
+                    ids.truncate(first);
+                    clear[i] = 0..0;
+                }
+                are_apart
+            });
+            // All of them together, so that the processor waits for many at once.
+            let named: Vec<(u32, u32)> = ids.iter().map(|&(id, _)| self.bvh.triangle(id)).collect();
+            for (i, clear) in clear.iter().enumerate() {
+                names.extend(&named[clear.clone()]);
+                hits.clear();
+                arrivals.put_in_order(i, &mut hits);
+                names.extend(hits.iter().map(|hit| (hit.geometry, hit.primitive)));
+                ends.push(names.len());
+            }
+        }
+    }
+
+    /// All hits of each ray of a chunk, but of those that `take` takes: it is told the ray, and what it hits for sure, with bounds on t, where there is nothing else.
+    fn all_of_chunk(
+        &self,
+        rays: &[PreciseRay],
+        arrivals: &mut Arrivals,
+        mut take: impl FnMut(usize, &[u32], &[[f32; 2]]) -> bool,
+    ) {
+        let Arrivals { pairs, crossings, hits, places } = arrivals;
+        pairs.clear();
+        hits.clear();
+        places.clear();
+        places.resize(rays.len(), 0..0);
+        let mut again = Vec::new();
+        self.certain(Wanted::All, rays, |i, certain| match certain {
+            Certain::Hits { sure, t, open: [] } if is_whole(&rays[i]) && take(i, sure, t) => {}
+            Certain::Hits { sure, open, .. } => {
+                let first = pairs.len();
+                pairs.extend(i, sure, true);
+                pairs.extend(i, open, false);
+                places[i] = first..pairs.len();
+            }
+            Certain::Doubt => again.push(i),
+        });
+        for (i, met) in pairs.meet(self, rays) {
+            hits.push(if let Met::Hit(hit) = met { Some(hit) } else { None });
+            if let Met::Touch = met {
+                again.push(i);
+            }
+        }
+        for i in again {
+            let first = hits.len();
+            hits.extend(self.all(&rays[i], crossings).iter().copied().map(Some));
+            places[i] = first..hits.len();
         }
     }
 
@@ -280,6 +327,26 @@ struct Pairs {
     names: Vec<(u32, u32)>,
     indices: Vec<[u32; 3]>,
     corners: Vec<[DVec3; 3]>,
+}
+
+/// All hits of a chunk's rays.
+#[derive(Default)]
+struct Arrivals {
+    pairs: Pairs,
+    crossings: Crossings,
+    /// In order of arrival; nothing where a pair came to nothing.
+    hits: Vec<Option<PreciseHit>>,
+    /// Of each ray where its hits are among them.
+    places: Vec<Range<usize>>,
+}
+
+impl Arrivals {
+    /// Adds those of a ray, by t and then by id.
+    fn put_in_order(&self, ray: usize, all: &mut Vec<PreciseHit>) {
+        let first = all.len();
+        all.extend(self.hits[self.places[ray].clone()].iter().flatten());
+        all[first..].sort_unstable_by(PreciseHit::order);
+    }
 }
 
 /// What a pair comes to.
