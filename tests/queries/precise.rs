@@ -34,11 +34,11 @@ struct Case {
     traced: Vec<PreciseRay>,
 }
 
-/// Triangles and rays on a grid, among them rays through corners and along axes, then placed far away and scaled.
+/// Triangles and rays on a grid, among them some that coincide and rays through corners and along axes, then placed far away and scaled.
 fn case(random: &mut Random, away: i64, scale: f64) -> Case {
     let mut point =
         |size: i32| -> Whole { [0; 3].map(|_| i128::from((random.unit() * size as f32) as i32 - size / 2)) };
-    let corners: Vec<[Whole; 3]> = (0..200)
+    let mut corners: Vec<[Whole; 3]> = (0..200)
         .map(|_| {
             let first = point(400);
             let mut near = || {
@@ -48,6 +48,8 @@ fn case(random: &mut Random, away: i64, scale: f64) -> Case {
             [first, near(), near()]
         })
         .collect();
+    // Some lie there twice.
+    corners.extend_from_within(..40);
     let rays = (0..400).map(|i| {
         let origin = point(800);
         let target = if i % 3 == 0 { corners[i / 3][i % 2] } else { point(400) };
@@ -99,6 +101,8 @@ fn every_hit_is_that_of_exact_arithmetic() {
                 (Some(found), Some(least)) => {
                     let (_, t) = expected[found.primitive as usize].expect("what is named is hit");
                     assert!((t - least).abs() <= 1e-13 * least && (found.t - least).abs() <= 1e-11 * least);
+                    let twin = corners.iter().position(|c| *c == corners[found.primitive as usize]);
+                    assert_eq!(twin, Some(found.primitive as usize), "of two that coincide the first one is hit");
                     hits += 1;
                 }
                 (found, least) => assert!(found.is_none() && least.is_none(), "{found:?}, {least:?}"),

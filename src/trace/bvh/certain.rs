@@ -5,8 +5,8 @@
 //! caller has the corners in f64. Where a hit decides how far the ray looks, the caller is asked at once: to give the ray up and walk it again, tried first, took a quarter of the time. Where
 //! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Only ids are told; the caller computes t.
 //!
-//! What no single triangle can tell is left open, and the caller decides the ray by [`super::candidates`]: which of several hits at nearly
-//! the same t is first, and how often a ray crosses at an edge.
+//! What no single triangle can tell is left to the caller: which of several hits at nearly the same t is first, who are told together; and how often a ray crosses
+//! at an edge, for which it decides the ray by [`super::candidates`].
 
 use std::marker::PhantomData;
 
@@ -25,8 +25,8 @@ use crate::trace::nearest::Nearest;
 /// What is certain about a ray.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::trace) enum Certain<'a> {
-    /// It hits the `sure` triangles for sure, may hit the `open` ones, and hits no others; [`Bvh::triangle`] has their names. Where all hits are wanted,
-    /// `t` has bounds on t of each that is sure; else there are none, and none is open.
+    /// It hits the `sure` triangles for sure, may hit the `open` ones, and no others that are wanted: one of the sure ones is the nearest, or any, or they are all. [`Bvh::triangle`] has
+    /// their names, `t` bounds on the t of each that is sure, but where any will do. None is open but where all are wanted.
     Hits { sure: &'a [u32], t: &'a [[f32; 2]], open: &'a [u32] },
     /// Nothing.
     Doubt,
@@ -196,7 +196,7 @@ macro_rules! query {
 }
 
 query!(First, any: false, all: false, |found, id, t, ray| {
-    let is_clear = t.is_some_and(|t| t[0] > found.limit || found.note(id, t, ray.tmin));
+    let is_clear = t.is_some_and(|t| found.list(id, t, ray));
     if !is_clear {
         found.listed.doubt();
     }

@@ -73,6 +73,12 @@ impl Listed {
         }
     }
 
+    /// Nothing but this one.
+    #[inline(always)]
+    fn only(&mut self, id: u32, t: [f32; 2]) {
+        (self.ids[0], self.t[0], self.sures) = (id, t, 1);
+    }
+
     /// One that may be hit.
     #[inline(always)]
     pub fn push_open(&mut self, id: u32) {
@@ -143,6 +149,29 @@ impl Found {
             (self.sure, self.limit) = (low, high);
         }
         is_nearest
+    }
+
+    /// Lists a triangle that is hit for sure between `low` and `high`, if it is for sure within the ray's range and may be the nearest: alone where it is that for sure, with its rivals where bounds
+    /// do not tell. Whether it could be told how it stands to them.
+    #[inline(always)]
+    pub fn list(&mut self, id: u32, [low, high]: [f32; 2], ray: &Ray) -> bool {
+        if low > self.limit {
+            return true;
+        }
+        if low < ray.tmin {
+            return false;
+        }
+        if high <= self.sure {
+            self.listed.only(id, [low, high]);
+            (self.sure, self.limit) = (low, high);
+            return true;
+        }
+        let is_within = high <= ray.tmax.min(f32::MAX);
+        if is_within {
+            self.listed.push(id, [low, high]);
+            (self.sure, self.limit) = (self.sure.min(low), self.limit.min(high));
+        }
+        is_within
     }
 
     /// Whether a hit is noted, but not computed.

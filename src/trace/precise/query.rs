@@ -30,23 +30,7 @@ impl Precise {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
         let mut pairs = Pairs::default();
         for (rays, hits) in rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)) {
-            hits.fill(None);
-            let mut open = Vec::new();
-            pairs.clear();
-            self.certain(Wanted::First, rays, |i, certain| match certain {
-                Certain::Hits { sure, .. } => pairs.extend(i, &sure[..sure.len().min(1)], true),
-                Certain::Doubt => open.push(i),
-            });
-            for (i, met) in pairs.meet(self, rays) {
-                match met {
-                    Met::Hit(hit) => hits[i] = Some(hit),
-                    // The range was widened: within it for sure is not within the range.
-                    Met::Nothing | Met::Touch => open.push(i),
-                }
-            }
-            for i in open {
-                hits[i] = self.closest(&rays[i]);
-            }
+            self.nearest_of_chunk(rays, &mut pairs, hits, |_, _| false);
         }
     }
 
@@ -57,15 +41,50 @@ impl Precise {
     /// Unless there is one answer a ray.
     pub fn first_batch(&self, rays: &[PreciseRay], names: &mut [Option<(u32, u32)>]) {
         assert_eq!(rays.len(), names.len(), "one name a ray");
+        let (mut pairs, mut hits, mut found) = (Pairs::default(), [None; CHUNK], Vec::new());
         for (rays, names) in rays.chunks(CHUNK).zip(names.chunks_mut(CHUNK)) {
-            names.fill(None);
-            let mut found = Vec::new();
-            let open = self.surely_hit(Wanted::First, rays, |i, id| found.push((i, id)));
+            found.clear();
+            let hits = &mut hits[..rays.len()];
+            self.nearest_of_chunk(rays, &mut pairs, hits, |i, id| {
+                found.push((i, id));
+                true
+            });
+            for (name, hit) in names.iter_mut().zip(hits) {
+                *name = hit.map(|hit| (hit.geometry, hit.primitive));
+            }
             // All of them together, so that the processor waits for many at once.
             found.iter().for_each(|&(i, id)| names[i] = Some(self.bvh.triangle(id)));
-            for i in open {
-                names[i] = self.closest(&rays[i]).map(|hit| (hit.geometry, hit.primitive));
+        }
+    }
+
+    /// The nearest hit of each ray of a chunk, but of those that `take` takes: it is told the ray and the triangle that it hits first for sure.
+    fn nearest_of_chunk(
+        &self,
+        rays: &[PreciseRay],
+        pairs: &mut Pairs,
+        hits: &mut [Option<PreciseHit>],
+        mut take: impl FnMut(usize, u32) -> bool,
+    ) {
+        hits.fill(None);
+        let mut open = Vec::new();
+        pairs.clear();
+        self.certain(Wanted::First, rays, |i, certain| match certain {
+            Certain::Hits { sure: &[id], .. } if is_whole(&rays[i]) && take(i, id) => {}
+            Certain::Hits { sure, .. } => pairs.extend(i, sure, true),
+            Certain::Doubt => open.push(i),
+        });
+        for (i, met) in pairs.meet(self, rays) {
+            match met {
+                Met::Hit(hit) => {
+                    let is_nearer = hits[i].is_none_or(|other| hit.order(&other).is_lt());
+                    hits[i] = if is_nearer { Some(hit) } else { hits[i] };
+                }
+                // The range was widened: within it for sure is not within the range.
+                Met::Nothing | Met::Touch => open.push(i),
             }
+        }
+        for i in open {
+            hits[i] = self.closest(&rays[i]);
         }
     }
 
@@ -77,24 +96,19 @@ impl Precise {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
         for (rays, occluded) in rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)) {
             occluded.fill(false);
-            for i in self.surely_hit(Wanted::Any, rays, |i, _| occluded[i] = true) {
+            let mut open = Vec::new();
+            self.certain(Wanted::Any, rays, |i, certain| match certain {
+                Certain::Hits { sure: [], .. } => {}
+                // The range was widened: within it for sure is not within the range.
+                Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
+                    occluded[i] = true;
+                }
+                Certain::Hits { .. } | Certain::Doubt => open.push(i),
+            });
+            for i in open {
                 occluded[i] = self.occluded(&rays[i]);
             }
         }
-    }
-
-    /// Tells `take` the triangle that each ray of a chunk hits for sure, the first or any; the rays about which that leaves a doubt.
-    fn surely_hit(&self, wanted: Wanted, rays: &[PreciseRay], mut take: impl FnMut(usize, u32)) -> Vec<usize> {
-        let mut open = Vec::new();
-        self.certain(wanted, rays, |i, certain| match certain {
-            Certain::Hits { sure: [], .. } => {}
-            // The range was widened: within it for sure is not within the range.
-            Certain::Hits { sure: [id, ..], .. } if is_whole(&rays[i]) || self.hit(&rays[i], *id).is_some() => {
-                take(i, *id)
-            }
-            Certain::Hits { .. } | Certain::Doubt => open.push(i),
-        });
-        open
     }
 
     /// How often each ray crosses a triangle, into `counts` of the same length; what counts is said at
