@@ -151,7 +151,7 @@ impl Placement {
     /// The same, and tighter, of an object of which more is known: `farthest` is at least the scalar product of any of its points with
     /// the given direction, in the object's coordinates.
     pub fn bounds_of(&self, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
-        let Some(motion) = &self.motion else { return bounds_at(&self.to_world, object, farthest) };
+        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, farthest) };
         if object.is_empty() {
             return Aabb::EMPTY;
         }
@@ -167,7 +167,7 @@ impl Placement {
 }
 
 /// The box in the world of an object that a transform places; `farthest` is as of [`Placement::bounds_of`].
-pub(super) fn bounds_at(to_world: &Affine3, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
+pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
     if object.is_empty() {
         return Aabb::EMPTY;
     }

@@ -48,8 +48,11 @@ fn case(random: &mut Random, away: i64, scale: f64) -> Case {
             [first, near(), near()]
         })
         .collect();
-    // Some lie there twice.
+    // Some lie there twice, and some more often than a ray keeps hits.
     corners.extend_from_within(..40);
+    for i in 40..50 {
+        corners.extend([corners[i]; 30]);
+    }
     let rays = (0..400).map(|i| {
         let origin = point(800);
         let target = if i % 3 == 0 { corners[i / 3][i % 2] } else { point(400) };
@@ -89,7 +92,7 @@ fn every_hit_is_that_of_exact_arithmetic() {
         assert_eq!(all_names, all.iter().map(|hit| (hit.geometry, hit.primitive)).collect::<Vec<_>>());
         let mut counts = vec![0; rays.len()];
         precise.count_batch(&traced, &mut counts);
-        let mut hits = 0;
+        let (mut hits, mut twins, mut many) = (0, 0, 0);
         for (i, &(origin, d)) in rays.iter().enumerate() {
             let expected: Vec<Option<(bool, f64)>> = corners.iter().map(|&c| hit(origin, d, c)).collect();
             let least = expected.iter().flatten().map(|&(_, t)| t).reduce(f64::min);
@@ -104,6 +107,8 @@ fn every_hit_is_that_of_exact_arithmetic() {
                     let twin = corners.iter().position(|c| *c == corners[found.primitive as usize]);
                     assert_eq!(twin, Some(found.primitive as usize), "of two that coincide the first one is hit");
                     hits += 1;
+                    twins += u32::from((0..40).contains(&found.primitive));
+                    many += u32::from((40..50).contains(&found.primitive));
                 }
                 (found, least) => assert!(found.is_none() && least.is_none(), "{found:?}, {least:?}"),
             }
@@ -117,7 +122,10 @@ fn every_hit_is_that_of_exact_arithmetic() {
                 }
             }
         }
-        assert!(hits > 100, "{hits}");
+        assert!(
+            hits > 100 && twins > 10 && many > 5,
+            "{hits}, {twins} of one that is there twice, {many} of one that is there more often"
+        );
     }
 }
 

@@ -250,7 +250,7 @@ impl<Q: Query> Kernel for InFlight<'_, Q> {
             bvh,
             rays,
             #[inline(always)]
-            |i, found| arrivals.take::<S>(i, found),
+            |i, found, _| arrivals.take::<S>(i, found),
         );
         arrivals.finish::<S>();
     }

@@ -3,7 +3,7 @@
 //! A scene in f64 is traced as a scene in f32 that is a little off, by rays that are a little off. The reject test has bounds for that
 //! ([`Blur`]), so nearly always it either leaves out a triangle or knows it to be hit, whatever the rounding. Where it does not, the
 //! caller has the corners in f64. Where a hit decides how far the ray looks, the caller is asked at once: to give the ray up and walk it again, tried first, took a quarter of the time. Where
-//! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Only ids are told; the caller computes t.
+//! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Ids are told, and bounds on t; the caller computes t.
 //!
 //! What no single triangle can tell is left to the caller: which of several hits at nearly the same t is first, who are told together; and how often a ray crosses
 //! at an edge, for which it decides the ray by [`super::candidates`].
@@ -16,6 +16,7 @@ use super::filter::Candidates;
 use super::flight::{self, Decide};
 use super::found::{Found, NONE};
 use super::isa::{self, Kernel};
+use super::listed::Listed;
 use super::place::Blur;
 use super::query::{Query, Verdict};
 use super::simd::Simd;
@@ -107,11 +108,11 @@ impl<Q: Query> Kernel for Fly<'_, Q> {
             blur,
             decide,
             #[inline(always)]
-            |ray, found| {
+            |ray, found, listed| {
                 let (noted, is_noted) = ([found.noted], found.noted != NONE);
-                let is_open = found.is_in_doubt() && (Q::DOUBTS || !is_noted);
-                let (sure, t) = if is_noted { (&noted[..], &[][..]) } else { (found.listed.sure(), found.listed.t()) };
-                done(ray, if is_open { Certain::Doubt } else { Certain::Hits { sure, t, open: found.listed.open() } });
+                let is_open = listed.is_in_doubt() && (Q::DOUBTS || !is_noted);
+                let (sure, t) = if is_noted { (&noted[..], &[][..]) } else { (listed.sure(), listed.t()) };
+                done(ray, if is_open { Certain::Doubt } else { Certain::Hits { sure, t, open: listed.open() } });
             },
         );
     }
@@ -173,6 +174,7 @@ macro_rules! query {
             #[inline(always)]
             fn take(
                 found: &mut Found,
+                listed: &mut Listed,
                 _: &Bvh,
                 _: u32,
                 index: u32,
@@ -181,42 +183,42 @@ macro_rules! query {
                 ray: &Ray,
                 decide: impl Fn(usize) -> Verdict,
             ) {
-                let take: fn(&mut Found, u32, Option<[f32; 2]>, &Ray) -> bool = $take;
+                let take: fn(&mut Found, &mut Listed, u32, Option<[f32; 2]>, &Ray) -> bool = $take;
                 each(
                     index,
                     candidates,
                     #[inline(always)]
                     |lane| if $all { Verdict::Doubt } else { decide(lane) },
                     #[inline(always)]
-                    |id, t| take(found, id, t, ray),
+                    |id, t| take(found, listed, id, t, ray),
                 );
             }
         }
     };
 }
 
-query!(First, any: false, all: false, |found, id, t, ray| {
-    let is_clear = t.is_some_and(|t| found.list(id, t, ray));
+query!(First, any: false, all: false, |found, listed, id, t, ray| {
+    let is_clear = t.is_some_and(|t| found.list(listed, id, t, ray));
     if !is_clear {
-        found.listed.doubt();
+        listed.doubt();
     }
     is_clear
 });
 
 // A doubt matters only if nothing else is hit.
-query!(Any, any: true, all: false, |found, id, t, ray| {
+query!(Any, any: true, all: false, |found, listed, id, t, ray| {
     let is_hit = t.is_some_and(|t| found.note(id, t, ray.tmin));
     if !is_hit {
-        found.listed.doubt();
+        listed.doubt();
     }
     !is_hit
 });
 
-query!(All, any: false, all: true, |found, id, t, ray| {
+query!(All, any: false, all: true, |_, listed, id, t, ray| {
     match t {
-        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => found.listed.push(id, [low, high]),
+        Some([low, high]) if ray.tmin <= low && high <= ray.tmax => listed.push(id, [low, high]),
         Some([low, high]) if high < ray.tmin || ray.tmax < low => {}
-        _ => found.listed.push_open(id),
+        _ => listed.push_open(id),
     }
-    !found.is_in_doubt()
+    !listed.is_in_doubt()
 });

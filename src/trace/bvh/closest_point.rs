@@ -19,7 +19,7 @@ use crate::math::{Aabb, DVec3, Vec3, gamma64};
 use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::shape::triangle::{Corners, Placed};
 use crate::trace::Placement;
-use crate::trace::motion::bounds_at;
+use crate::trace::motion::bounds_placed;
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,7 +202,8 @@ impl<'a> Search<'a> {
         let bounds = match level {
             Level::Placed(index) => {
                 let (_, Through { to_world, .. }) = self.placed(index);
-                bounds_at(to_world, bounds, |way| bounds.farthest(way))
+                // Where it stands at time 0, as its triangles are measured.
+                bounds_placed(to_world, bounds, |way| bounds.farthest(way))
             }
             Level::Fixed | Level::Placements | Level::Moving => bounds,
         };

@@ -7,6 +7,7 @@
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::filter::Candidates;
+use super::listed::Listed;
 use super::query::Query;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
@@ -32,84 +33,6 @@ pub(super) struct Found {
     nearest: Nearest,
     /// Which triangle it is: block and lane.
     computed: u32,
-    /// For queries that leave doubts to the caller.
-    pub listed: Listed,
-}
-
-/// All that a ray hits for sure, all that it may hit, and whether nothing can be said.
-#[derive(Clone, Copy)]
-pub(super) struct Listed {
-    /// Block and lane of each: from the front of those that are sure, from the back of those that are not.
-    ids: [u32; Self::MOST],
-    /// Bounds on t of those that are sure.
-    t: [[f32; 2]; Self::MOST],
-    sures: usize,
-    opens: usize,
-    is_in_doubt: bool,
-}
-
-impl Listed {
-    /// As many as are kept; a ray with more is in doubt.
-    const MOST: usize = 24;
-    const NONE: Self =
-        Self { ids: [NONE; Self::MOST], t: [[0.0; 2]; Self::MOST], sures: 0, opens: 0, is_in_doubt: false };
-
-    #[inline(always)]
-    fn start(&mut self) {
-        (self.sures, self.opens, self.is_in_doubt) = (0, 0, false);
-    }
-
-    #[inline(always)]
-    fn has_room(&mut self) -> bool {
-        self.is_in_doubt |= self.sures + self.opens >= Self::MOST;
-        !self.is_in_doubt
-    }
-
-    #[inline(always)]
-    pub fn push(&mut self, id: u32, t: [f32; 2]) {
-        if self.has_room() {
-            (self.ids[self.sures], self.t[self.sures]) = (id, t);
-            self.sures += 1;
-        }
-    }
-
-    /// Nothing but this one.
-    #[inline(always)]
-    fn only(&mut self, id: u32, t: [f32; 2]) {
-        (self.ids[0], self.t[0], self.sures) = (id, t, 1);
-    }
-
-    /// One that may be hit.
-    #[inline(always)]
-    pub fn push_open(&mut self, id: u32) {
-        if self.has_room() {
-            self.opens += 1;
-            self.ids[Self::MOST - self.opens] = id;
-        }
-    }
-
-    /// Those that are hit for sure.
-    #[inline(always)]
-    pub fn sure(&self) -> &[u32] {
-        &self.ids[..self.sures.min(Self::MOST)]
-    }
-
-    /// Bounds on their t.
-    #[inline(always)]
-    pub fn t(&self) -> &[[f32; 2]] {
-        &self.t[..self.sures.min(Self::MOST)]
-    }
-
-    /// Those that may be hit.
-    #[inline(always)]
-    pub fn open(&self) -> &[u32] {
-        &self.ids[Self::MOST - self.opens.min(Self::MOST)..]
-    }
-
-    #[inline(always)]
-    pub fn doubt(&mut self) {
-        self.is_in_doubt = true;
-    }
 }
 
 impl Found {
@@ -122,7 +45,6 @@ impl Found {
         is_computed: false,
         nearest: Nearest::NONE,
         computed: NONE,
-        listed: Listed::NONE,
     };
 
     /// Nothing yet, up to the ray's tmax, and that rounded up. What lies so far that t overflows is in doubt, whose decision is that it is not
@@ -130,13 +52,6 @@ impl Found {
     #[inline(always)]
     pub fn start(&mut self, [tmax, limit]: [f32; 2]) {
         (self.sure, self.limit, self.noted, self.is_computed) = (tmax.min(f32::MAX), limit, NONE, false);
-        self.listed.start();
-    }
-
-    /// Whether the ray is left to the caller.
-    #[inline(always)]
-    pub fn is_in_doubt(&self) -> bool {
-        self.listed.is_in_doubt
     }
 
     /// Notes a triangle that is hit for sure between `low` and `high`, if it is for sure within the range, and nearer than what was
@@ -154,24 +69,21 @@ impl Found {
     /// Lists a triangle that is hit for sure between `low` and `high`, if it is for sure within the ray's range and may be the nearest: alone where it is that for sure, with its rivals where bounds
     /// do not tell. Whether it could be told how it stands to them.
     #[inline(always)]
-    pub fn list(&mut self, id: u32, [low, high]: [f32; 2], ray: &Ray) -> bool {
+    pub fn list(&mut self, listed: &mut Listed, id: u32, [low, high]: [f32; 2], ray: &Ray) -> bool {
         if low > self.limit {
             return true;
         }
-        if low < ray.tmin {
+        // Written so that NaN is a doubt.
+        let is_within = ray.tmin <= low && high <= ray.tmax.min(f32::MAX);
+        if !is_within {
             return false;
         }
         if high <= self.sure {
-            self.listed.only(id, [low, high]);
-            (self.sure, self.limit) = (low, high);
-            return true;
+            listed.clear();
         }
-        let is_within = high <= ray.tmax.min(f32::MAX);
-        if is_within {
-            self.listed.push(id, [low, high]);
-            (self.sure, self.limit) = (self.sure.min(low), self.limit.min(high));
-        }
-        is_within
+        listed.push(id, [low, high]);
+        (self.sure, self.limit) = (self.sure.min(low), self.limit.min(high));
+        true
     }
 
     /// Whether a hit is noted, but not computed.
@@ -280,6 +192,59 @@ impl Found {
             self.nearest
         } else {
             Nearest::new(ray)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::trace::bvh::random::Random;
+
+    /// Hits with bounds around their t, in any order: the nearest is listed, and nobody who is behind another for sure when it comes; or a bound is out of range, and
+    /// that is said.
+    #[test]
+    fn the_nearest_is_always_listed() {
+        let mut random = Random::new(1);
+        let (mut doubts, mut rivals, mut alone) = (0, 0, 0);
+        for case in 0..20_000 {
+            let wide = [0.0, 0.01, 0.3][case % 3];
+            let ray = Ray { tmin: 0.1, tmax: 1.9, ..Ray::new(Vec3::ZERO, Vec3::X) };
+            let hits: Vec<(f32, [f32; 2])> = (0..1 + case % 7)
+                .map(|_| {
+                    let t = 1.0 + random.unit();
+                    (t, [t - wide * random.unit().abs(), t + wide * random.unit().abs()])
+                })
+                .collect();
+            let (mut found, mut listed) = (Found::NONE, Listed::NONE);
+            found.start([ray.tmax, ray.tmax.next_up()]);
+            let is_clear = hits.iter().zip(0..).all(|(&(_, t), id)| found.list(&mut listed, id, t, &ray));
+            if !is_clear {
+                let is_crossed = |end: f32| hits.iter().any(|(_, [low, high])| *low < end && end < *high);
+                let is_outside = hits.iter().any(|(t, _)| !(ray.tmin..=ray.tmax).contains(t));
+                assert!(is_outside || is_crossed(ray.tmin) || is_crossed(ray.tmax), "{case}: {hits:?}");
+                doubts += 1;
+                continue;
+            }
+            let within = hits.iter().zip(0..).filter(|((t, _), _)| *t <= ray.tmax);
+            let nearest = within.min_by(|((a, _), _), ((b, _), _)| a.total_cmp(b)).map(|(_, id)| id);
+            let is_listed = nearest.map_or(listed.sure().is_empty(), |id| listed.sure().contains(&id));
+            assert!(is_listed, "{case}: {hits:?}, {:?}", listed.sure());
+            assert!(!listed.is_in_doubt());
+            *if listed.sure().len() > 1 { &mut rivals } else { &mut alone } += 1;
+        }
+        assert!(doubts > 1000 && rivals > 1000 && alone > 1000, "{doubts} doubts, {rivals} with rivals, {alone} alone");
+    }
+
+    /// What is no number is a doubt.
+    #[test]
+    fn bounds_that_are_not_a_number_are_a_doubt() {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X);
+        for t in [[f32::NAN, 1.0], [1.0, f32::NAN], [1.0, f32::INFINITY]] {
+            let (mut found, mut listed) = (Found::NONE, Listed::NONE);
+            found.start([ray.tmax, ray.tmax]);
+            assert!(!found.list(&mut listed, 0, t, &ray), "{t:?}");
         }
     }
 }

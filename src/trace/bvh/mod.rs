@@ -62,6 +62,7 @@ mod found;
 mod isa;
 mod leaves;
 mod level;
+mod listed;
 mod meshes;
 mod moving;
 mod near;

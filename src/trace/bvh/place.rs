@@ -40,7 +40,7 @@ impl Blur {
     const UNKNOWN: Self = Self { origin: f32::INFINITY, direction: 0.0 };
 }
 
-/// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines, their hits the third.
+/// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines, their hits the last two.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Place {

@@ -4,6 +4,7 @@ use super::Bvh;
 use super::block::Block;
 use super::filter::Candidates;
 use super::found::Found;
+use super::listed::Listed;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 
@@ -25,11 +26,12 @@ pub(super) trait Query {
     }
     /// What is found so far, where a hit of another kind of primitive had the exact `t`; none where no more is wanted.
     fn resume(nearest: &mut Nearest, t: f64, answer: Self::Answer) -> bool;
-    /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided by who asked for the flight.
+    /// Takes the candidates of block `index` of the triangles at `place`; those in doubt may be decided, or listed for, who asked for the flight.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // What a step of a flight has.
     fn take(
         found: &mut Found,
+        _listed: &mut Listed,
         bvh: &Bvh,
         place: u32,
         index: u32,

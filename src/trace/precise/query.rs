@@ -41,7 +41,8 @@ impl Precise {
     /// Unless there is one answer a ray.
     pub fn first_batch(&self, rays: &[PreciseRay], names: &mut [Option<(u32, u32)>]) {
         assert_eq!(rays.len(), names.len(), "one name a ray");
-        let (mut pairs, mut hits, mut found) = (Pairs::default(), [None; CHUNK], Vec::new());
+        let (mut pairs, mut found) = (Pairs::default(), Vec::new());
+        let mut hits = vec![None; rays.len().min(CHUNK)];
         for (rays, names) in rays.chunks(CHUNK).zip(names.chunks_mut(CHUNK)) {
             found.clear();
             let hits = &mut hits[..rays.len()];
@@ -75,12 +76,10 @@ impl Precise {
         });
         for (i, met) in pairs.meet(self, rays) {
             match met {
-                Met::Hit(hit) => {
-                    let is_nearer = hits[i].is_none_or(|other| hit.order(&other).is_lt());
-                    hits[i] = if is_nearer { Some(hit) } else { hits[i] };
-                }
+                Met::Hit(hit) if hits[i].is_none_or(|other| hit.order(&other).is_lt()) => hits[i] = Some(hit),
+                Met::Hit(_) => {}
                 // The range was widened: within it for sure is not within the range.
-                Met::Nothing | Met::Touch => open.push(i),
+                Met::Nothing | Met::Touch => push_once(&mut open, i),
             }
         }
         for i in open {
@@ -138,7 +137,7 @@ impl Precise {
                 match met {
                     Met::Hit(_) => counts[i] += 1,
                     Met::Nothing => {}
-                    Met::Touch => again.push(i),
+                    Met::Touch => push_once(&mut again, i),
                 }
             }
             for i in again {
@@ -163,7 +162,7 @@ impl Precise {
     }
 
     /// The geometry and the primitive of each hit of [`Self::all_hits_batch`], in the same order, without computing t, u and v of a ray whose hits lie so far apart
-    /// that they are in order without. (Where sizes squared times a direction vanish in f64, the latter may miss what is named here.)
+    /// that they are in order without. (Where sizes squared times a direction vanish in f64, [`Self::all_hits_batch`] may miss what is named here.)
     pub fn all_names_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, names: &mut Vec<(u32, u32)>) {
         ends.clear();
         names.clear();
@@ -225,7 +224,7 @@ impl Precise {
         for (i, met) in pairs.meet(self, rays) {
             hits.push(if let Met::Hit(hit) = met { Some(hit) } else { None });
             if let Met::Touch = met {
-                again.push(i);
+                push_once(&mut again, i);
             }
         }
         for i in again {
@@ -431,7 +430,48 @@ fn in_range(ray: &PreciseRay, hit: TriangleHit, geometry: u32, primitive: u32) -
     ray.has(hit.t).then_some(hit)
 }
 
+/// Adds a ray, whose pairs come one after the other, once for all of them.
+fn push_once(rays: &mut Vec<usize>, ray: usize) {
+    if rays.last() != Some(&ray) {
+        rays.push(ray);
+    }
+}
+
 /// Whether its range is all there is ahead.
 fn is_whole(ray: &PreciseRay) -> bool {
     ray.tmin == 0.0 && ray.tmax == f64::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::precise::PreciseMesh;
+
+    /// Squares one behind the other, as far apart as is said.
+    fn squares(apart: f64) -> Precise {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let positions = (0..3).flat_map(|k| corners.map(|[x, y]| DVec3::new(x, y, apart * f64::from(k)))).collect();
+        let triangles = (0..3).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|i| 4 * k + i))).collect();
+        Precise::new(vec![PreciseMesh { positions, triangles }]).expect("squares")
+    }
+
+    /// Hits that lie apart are named by the flight; for those that do not, t is computed.
+    #[test]
+    fn t_is_computed_where_bounds_do_not_tell() {
+        for (apart, is_known) in [(0.3, true), (1e-9, false)] {
+            let precise = squares(apart);
+            let ray = PreciseRay::new(DVec3::new(0.31, 0.17, -2.0), DVec3::new(0.01, 0.02, 1.0));
+            let mut told = Vec::new();
+            precise.all_of_chunk(&[ray], &mut Arrivals::default(), |i, sure, t| {
+                assert_eq!((i, sure.len(), t.len()), (0, 3, 3));
+                told = t.to_vec();
+                true
+            });
+            told.sort_by(|[a, _], [b, _]| a.total_cmp(b));
+            assert_eq!(told.windows(2).all(|pair| pair[0][1] < pair[1][0]), is_known, "{told:?}");
+            let (mut ends, mut names) = (Vec::new(), Vec::new());
+            precise.all_names_batch(&[ray], &mut ends, &mut names);
+            assert_eq!((ends, names), (vec![3], vec![(0, 0), (0, 2), (0, 4)]));
+        }
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! A single ray's walk ([`super::walk`]) is bound by latency, not by work: each step needs the node that the one before
 //! has chosen, and how many children are entered is anyone's guess, so every other node is mispredicted. Here a round
-//! gives every ray of the flight one step. Steps of different rays do not depend on each other, and what can be is told without
+//! gives every ray of the flight one step, but those that wait at placements. Steps of different rays do not depend on each other, and what can be is told without
 //! branches: who is at a node, at a leaf, or has arrived, by masks of what all of them reach next; which child of a node comes first, by
 //! minima; and at a leaf all rays look on which sides of edges they pass ([`Sight`]) before
 //! those that may pass within a triangle are gone through again. A branch there, taken for every other leaf, cost an eighth of the time, for
@@ -12,7 +12,8 @@
 //!
 //! **Placed objects.** A ray that comes to a placement goes on in the object's tree, in the object's coordinates, on the same
 //! stack: t is the same there, so a hit shortens what waits above as well. Walking the object's tree alone, there and
-//! then, would be bound by latency again.
+//! then, would be bound by latency again. To make it ready for the object costs as much as several nodes, but eight together, each for an object of its own, not much
+//! more than one: so whoever comes to a placement waits until half of the flight does.
 //!
 //! **Visitors.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`visit`]). Those of several bundles set out
 //! together, in the objects' coordinates from the beginning.
@@ -28,6 +29,7 @@ use super::Bvh;
 use super::found::Found;
 use super::isa::Kernel;
 use super::leaves::Leaves;
+use super::listed::Listed;
 use super::node::Child;
 use super::place::{Blur, EightRays, Place};
 use super::placements::FIXED;
@@ -47,9 +49,6 @@ pub(super) use visitors::Visitors;
 
 /// Rays in flight.
 const RAYS: usize = TRAVELLERS;
-
-/// So many wait at placements before they go into them, unless nobody else has a step to take.
-const ENOUGH: u32 = RAYS as u32 / 2;
 
 /// Room for a flight.
 pub(super) struct Flight {
@@ -76,16 +75,24 @@ impl Flight {
         S::prefetch(ground.address(space, next));
     }
 
-    /// Those at placements go into them, eight at a time: to be made ready for its object each by itself costs a ray as much as four nodes.
+    /// Those at placements go into them, made ready eight at a time; of fewer than [`MANY`] each by itself, if there is `nobody_else`.
     #[inline(always)]
-    fn descend<S: Simd, G: Ground>(&mut self, mut waiting: Set, bvh: &Bvh, ground: &G, rays: &[Ray]) {
+    fn descend<S: Simd, G: Ground>(
+        &mut self,
+        mut waiting: Set,
+        nobody_else: bool,
+        bvh: &Bvh,
+        ground: &G,
+        rays: &[Ray],
+    ) {
         while !waiting.is_empty() {
             let group = waiting.take_eight();
-            let (ready, known) = if group.len() >= MANY {
-                self.ready_in_places::<S>(group, bvh, rays)
-            } else {
-                ([ReadyRay::NONE; 8], 0)
-            };
+            let are_many = group.len() >= MANY;
+            if !are_many && !nobody_else {
+                return;
+            }
+            let (ready, known) =
+                if are_many { self.ready_in_places::<S>(group, bvh, rays) } else { ([ReadyRay::NONE; 8], 0) };
             for (i, k) in group.enumerate() {
                 let (traveller, leaf) = (&mut self.travellers[k], self.next[k]);
                 let next = if known >> i & 1 != 0 {
@@ -196,7 +203,12 @@ impl Departures for Outside<'_> {
 
 /// Answers all rays among triangles, of which there are some: `done` is told of each valid one what it has found.
 #[inline(always)]
-pub(super) fn trace<S: Simd, Q: Query>(flight: &mut Flight, bvh: &Bvh, rays: &[Ray], done: impl FnMut(usize, &Found)) {
+pub(super) fn trace<S: Simd, Q: Query>(
+    flight: &mut Flight,
+    bvh: &Bvh,
+    rays: &[Ray],
+    done: impl FnMut(usize, &Found, &Listed),
+) {
     let fixed = &bvh.fixed.triangles;
     let bounds = fixed.tree().bounds();
     if bvh.placements.has_triangles() {
@@ -220,7 +232,7 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
     rays: &[Ray],
     blur: Blur,
     decide: Decide<'_>,
-    done: impl FnMut(usize, &Found),
+    done: impl FnMut(usize, &Found, &Listed),
 ) {
     let triangles = &bvh.fixed.triangles;
     if !triangles.tree().is_empty() {
@@ -248,7 +260,7 @@ pub(super) fn visit<S: Simd, Q: Query>(
         rays,
         Queue::<Q>::new(bvh, visitors, rays, answers),
         #[inline(always)]
-        |ray, found| {
+        |ray, found, _| {
             if found.is_hit() {
                 answers[ray].set(Q::answer(Some(SOMETHING)));
             }
@@ -264,7 +276,7 @@ fn run<S: Simd, Q: Query, G: Ground>(
     ground: &G,
     rays: &[Ray],
     departures: impl Departures,
-    done: impl FnMut(usize, &Found),
+    done: impl FnMut(usize, &Found, &Listed),
 ) {
     S::apart_narrow(Journey { flight, bvh, ground, rays, departures, done, query: PhantomData::<Q> });
 }
@@ -280,7 +292,7 @@ struct Journey<'a, Q, G, D, F> {
     query: PhantomData<Q>,
 }
 
-impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found)> Kernel for Journey<'_, Q, G, D, F> {
+impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kernel for Journey<'_, Q, G, D, F> {
     type Output = ();
 
     #[inline(always)]
@@ -299,7 +311,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found)> Kernel for Jou
             let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
             for k in arrived {
                 let traveller = &mut flight.travellers[k];
-                done(traveller.ray, &traveller.found);
+                done(traveller.ray, &traveller.found, &traveller.listed);
                 if let Some(start) = departures.next::<S>() {
                     flight.next[k] = traveller.start::<G>(start, departures.ready());
                     at_nodes.insert(k);
@@ -343,8 +355,8 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found)> Kernel for Jou
                     flight.send::<S, G>(k, next, ground);
                 }
                 let nobody_else = at_nodes.is_empty() && at_leaves.is_empty() && returning.is_empty();
-                if nobody_else || at_placements.len() >= ENOUGH {
-                    flight.descend::<S, G>(at_placements, bvh, ground, rays);
+                if nobody_else || 2 * at_placements.len() >= flying.len() {
+                    flight.descend::<S, G>(at_placements, nobody_else, bvh, ground, rays);
                 }
             }
         }

@@ -10,6 +10,7 @@ use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::build::MAX_DEPTH;
 use crate::trace::bvh::found::Found;
+use crate::trace::bvh::listed::Listed;
 use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
@@ -68,6 +69,8 @@ pub(super) struct Traveller {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
+    /// For queries that leave doubts to the caller.
+    pub listed: Listed,
     /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is
     /// stored beside.
     stack: [Child; STACK + WIDTH],
@@ -79,6 +82,7 @@ impl Traveller {
     pub const NONE: Self = Self {
         ready: [ReadyRay::NONE; 2],
         found: Found::NONE,
+        listed: Listed::NONE,
         ray: 0,
         len: 1,
         space: Space::UPPER,
@@ -93,6 +97,7 @@ impl Traveller {
     pub fn start<G: Ground>(&mut self, Start { ray, place, space }: Start, ready: &ReadyRay) -> Child {
         self.ready[0] = *ready;
         self.found.start(ready.end());
+        self.listed.start();
         (self.ray, self.len) = (ray, 1);
         if G::HAS_PLACES {
             (self.place, self.space) = (place, space);
@@ -177,6 +182,7 @@ impl Traveller {
         let number = self.ray;
         Q::take(
             &mut self.found,
+            &mut self.listed,
             bvh,
             place,
             index,
@@ -186,7 +192,7 @@ impl Traveller {
             #[inline(always)]
             |lane| ground.decide(number, block, lane),
         );
-        if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.found.is_in_doubt() {
+        if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.listed.is_in_doubt() {
             self.space = Space::UPPER;
             return Some(Child::NONE);
         }
