@@ -1,6 +1,7 @@
 //! A ray of a flight, and the one step at a time that it takes.
 
 use std::hint::select_unpredictable;
+use std::ops::{Deref, DerefMut};
 
 use bytemuck::{Pod, Zeroable};
 
@@ -69,13 +70,34 @@ pub(super) struct Traveller {
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
-    /// For queries that leave doubts to the caller.
-    pub listed: Listed,
     /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is
     /// stored beside.
-    stack: [Child; STACK + WIDTH],
+    stack: Lines<Child>,
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
-    near: [u32; STACK + WIDTH],
+    near: Lines<u32>,
+    /// For queries that leave doubts to the caller.
+    pub listed: Listed,
+}
+
+/// A stack that begins with a cache line: what most rays have waiting, and what is stored above it, is in that one.
+#[repr(align(64))]
+#[derive(Clone, Copy)]
+struct Lines<T>([T; STACK + WIDTH]);
+
+impl<T> Deref for Lines<T> {
+    type Target = [T; STACK + WIDTH];
+
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Lines<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
 }
 
 impl Traveller {
@@ -87,8 +109,8 @@ impl Traveller {
         len: 1,
         space: Space::UPPER,
         place: FIXED,
-        stack: [Child::NONE; STACK + WIDTH],
-        near: [0; STACK + WIDTH],
+        stack: Lines([Child::NONE; STACK + WIDTH]),
+        near: Lines([0; STACK + WIDTH]),
     };
 
     /// Sets out with a ray of its own, for the root of the tree in the space where it starts; from the fixed triangles, where there are placements, then for
@@ -294,7 +316,7 @@ mod tests {
                         (traveller.near[i + 1], traveller.stack[i + 1]) = (near, child);
                     }
                     dispatch(isa, Shorten(&mut traveller));
-                    let kept = traveller.near.into_iter().zip(traveller.stack).take(traveller.len).skip(1);
+                    let kept = traveller.near.0.into_iter().zip(traveller.stack.0).take(traveller.len).skip(1);
                     assert_eq!(kept.collect::<Vec<_>>(), expected, "{isa:?}: {len} entries, up to {limit}");
                     assert_eq!(traveller.stack[0], Child::NONE);
                 }
