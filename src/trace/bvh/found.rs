@@ -67,7 +67,7 @@ impl Found {
     }
 
     /// Lists a triangle that is hit for sure between `low` and `high`, if it is for sure within the ray's range and may be the nearest: alone where it is that for sure, with its rivals where bounds
-    /// do not tell. Whether it could be told how it stands to them.
+    /// do not tell. False where it may be out of range.
     #[inline(always)]
     pub fn list(&mut self, listed: &mut Listed, id: u32, [low, high]: [f32; 2], ray: &Ray) -> bool {
         if low > self.limit {
@@ -202,8 +202,8 @@ mod tests {
     use crate::math::Vec3;
     use crate::trace::bvh::random::Random;
 
-    /// Hits with bounds around their t, in any order: the nearest is listed, and nobody who is behind another for sure when it comes; or a bound is out of range, and
-    /// that is said.
+    /// Hits with bounds around their t, in any order: the nearest is listed, alone where bounds tell it from all others, and nobody who is behind one that came before for sure; or a bound is
+    /// out of range, and that is said.
     #[test]
     fn the_nearest_is_always_listed() {
         let mut random = Random::new(1);
@@ -232,6 +232,17 @@ mod tests {
             let is_listed = nearest.map_or(listed.sure().is_empty(), |id| listed.sure().contains(&id));
             assert!(is_listed, "{case}: {hits:?}, {:?}", listed.sure());
             assert!(!listed.is_in_doubt());
+            for &id in listed.sure() {
+                let (_, [low, _]) = hits[id as usize];
+                let is_behind = hits[..id as usize].iter().any(|(_, [_, high])| *high < low);
+                assert!(!is_behind, "{case}: {id} of {hits:?}");
+            }
+            if let Some(nearest) = nearest {
+                let (_, [_, high]) = hits[nearest as usize];
+                let others = hits.iter().zip(0..).filter(|(_, id)| *id != nearest);
+                let is_clear = others.map(|((_, [low, _]), _)| *low).all(|low| high < low);
+                assert!(!is_clear || listed.sure() == [nearest], "{case}: {hits:?}, {:?}", listed.sure());
+            }
             *if listed.sure().len() > 1 { &mut rivals } else { &mut alone } += 1;
         }
         assert!(doubts > 1000 && rivals > 1000 && alone > 1000, "{doubts} doubts, {rivals} with rivals, {alone} alone");

@@ -4,7 +4,7 @@ use super::found::NONE;
 
 /// What a ray hits for sure, all of it or what may be the nearest; what it may hit; and whether nothing can be said.
 #[derive(Clone, Copy)]
-pub(in crate::trace::bvh) struct Listed {
+pub(super) struct Listed {
     /// Block and lane of each: from the front of those that are sure, from the back of those that are not.
     ids: [u32; Self::MOST],
     /// Bounds on t of those that are sure.

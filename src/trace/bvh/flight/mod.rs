@@ -13,7 +13,7 @@
 //! **Placed objects.** A ray that comes to a placement goes on in the object's tree, in the object's coordinates, on the same
 //! stack: t is the same there, so a hit shortens what waits above as well. Walking the object's tree alone, there and
 //! then, would be bound by latency again. To make it ready for the object costs as much as several nodes, but eight together, each for an object of its own, not much
-//! more than one: so whoever comes to a placement waits until half of the flight does.
+//! more than one: so whoever comes to a placement waits until half of the flight does, or nobody else has a step to take.
 //!
 //! **Visitors.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`visit`]). Those of several bundles set out
 //! together, in the objects' coordinates from the beginning.
@@ -80,7 +80,7 @@ impl Flight {
     fn descend<S: Simd, G: Ground>(
         &mut self,
         mut waiting: Set,
-        nobody_else: bool,
+        mut nobody_else: bool,
         bvh: &Bvh,
         ground: &G,
         rays: &[Ray],
@@ -103,6 +103,7 @@ impl Flight {
                 };
                 self.send::<S, G>(k, next, ground);
             }
+            nobody_else = false;
         }
     }
 

@@ -72,19 +72,23 @@ pub(super) struct Traveller {
     pub found: Found,
     /// Children waiting to be visited. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is
     /// stored beside.
-    stack: Lines<Child>,
+    stack: AlignedStack<Child>,
     /// Where the ray enters each: the bits of an f32, of which the lowest three are not part of it. Not told where order does not matter.
-    near: Lines<u32>,
+    near: AlignedStack<u32>,
     /// For queries that leave doubts to the caller.
     pub listed: Listed,
 }
 
+/// As many lines from one traveller to the next let those that steps need fall into different sets of a cache of 64 sets: four of 32 travellers in one at most.
+#[cfg(target_pointer_width = "64")]
+const _: () = assert!(size_of::<Traveller>() == 78 * 64);
+
 /// A stack that begins with a cache line: what most rays have waiting, and what is stored above it, is in that one.
 #[repr(align(64))]
 #[derive(Clone, Copy)]
-struct Lines<T>([T; STACK + WIDTH]);
+struct AlignedStack<T>([T; STACK + WIDTH]);
 
-impl<T> Deref for Lines<T> {
+impl<T> Deref for AlignedStack<T> {
     type Target = [T; STACK + WIDTH];
 
     #[inline(always)]
@@ -93,7 +97,7 @@ impl<T> Deref for Lines<T> {
     }
 }
 
-impl<T> DerefMut for Lines<T> {
+impl<T> DerefMut for AlignedStack<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut self.0
@@ -109,8 +113,8 @@ impl Traveller {
         len: 1,
         space: Space::UPPER,
         place: FIXED,
-        stack: Lines([Child::NONE; STACK + WIDTH]),
-        near: Lines([0; STACK + WIDTH]),
+        stack: AlignedStack([Child::NONE; STACK + WIDTH]),
+        near: AlignedStack([0; STACK + WIDTH]),
     };
 
     /// Sets out with a ray of its own, for the root of the tree in the space where it starts; from the fixed triangles, where there are placements, then for
