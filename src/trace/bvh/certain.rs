@@ -162,6 +162,7 @@ macro_rules! query {
         impl Query for $name {
             const ANY: bool = $any;
             const DOUBTS: bool = !$any;
+            const LISTS: bool = true;
             const IN_ORDER: bool = !$all;
             type Answer = ();
             const MISS: () = ();

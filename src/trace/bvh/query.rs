@@ -14,6 +14,8 @@ pub(super) trait Query {
     const ANY: bool;
     /// Whether a ray that is in doubt stops there, and is left to the caller.
     const DOUBTS: bool = false;
+    /// Whether it lists hits or doubts for who asked for the flight.
+    const LISTS: bool = false;
     /// Whether what is near is better visited before what is far.
     const IN_ORDER: bool = true;
     type Answer: Copy;

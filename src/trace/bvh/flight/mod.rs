@@ -302,7 +302,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
         let mut flying = Set::NOBODY;
         for k in 0..RAYS {
             let Some(start) = departures.next::<S>() else { break };
-            let next = flight.travellers[k].start::<G>(start, departures.ready());
+            let next = flight.travellers[k].start::<Q, G>(start, departures.ready());
             flight.send::<S, G>(k, next, ground);
             flying.insert(k);
         }
@@ -314,7 +314,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                 let traveller = &mut flight.travellers[k];
                 done(traveller.ray, &traveller.found, &traveller.listed);
                 if let Some(start) = departures.next::<S>() {
-                    flight.next[k] = traveller.start::<G>(start, departures.ready());
+                    flight.next[k] = traveller.start::<Q, G>(start, departures.ready());
                     at_nodes.insert(k);
                 } else {
                     flying.remove(k);

@@ -120,10 +120,12 @@ impl Traveller {
     /// Sets out with a ray of its own, for the root of the tree in the space where it starts; from the fixed triangles, where there are placements, then for
     /// theirs. What it reaches next: that root.
     #[inline(always)]
-    pub fn start<G: Ground>(&mut self, Start { ray, place, space }: Start, ready: &ReadyRay) -> Child {
+    pub fn start<Q: Query, G: Ground>(&mut self, Start { ray, place, space }: Start, ready: &ReadyRay) -> Child {
         self.ready[0] = *ready;
         self.found.start(ready.end());
-        self.listed.start();
+        if Q::LISTS {
+            self.listed.start();
+        }
         (self.ray, self.len) = (ray, 1);
         if G::HAS_PLACES {
             (self.place, self.space) = (place, space);
