@@ -62,7 +62,7 @@ fn the_rays_on_a_scan_with_z_up_are_those_of_embree_ref() {
 #[test]
 fn a_subject_is_a_rule_or_a_file() {
     let triangles =
-        |name| Subject::new(name, UpAxis::Y).map(|(s, _)| (s.world.primitive_count(), s.stored_triangles()));
+        |name| Subject::new(name, UpAxis::Y).map(|(s, _)| (s.world.primitive_count(), s.world.stored_triangles()));
     assert_eq!(triangles("terrain7").unwrap(), (98, 98));
     assert_eq!(triangles("architecture3").unwrap(), (3 * 4140 + 2, 3 * 4140 + 2), "on a floor");
     assert_eq!(triangles("instances5").unwrap(), (5 * 8192 + 2, 8192 + 2), "one mesh, and a floor");

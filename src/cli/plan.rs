@@ -11,7 +11,7 @@ use super::camera::CameraArgs;
 use super::common::SceneArgs;
 use super::engine::BackendArg;
 use super::picture::PictureArgs;
-use super::render::{parse_threads, stored_triangles};
+use super::render::parse_threads;
 use super::{interrupt, progress, say, warn};
 use crate::error::{Error, Result};
 use crate::lab::savings::{Saving, Setup, Table};
@@ -122,7 +122,7 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
     let rays = settings.expected_rays(&plan);
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let build = match accel {
-        Accel::Bvh => args.build.choose(args.backend, stored_triangles(&world), &rays, pixels)?,
+        Accel::Bvh => args.build.choose(args.backend, world.stored_triangles(), &rays, pixels)?,
         _ => None,
     };
     let accelerator = if args.backend == BackendArg::Embree { "embree" } else { accel.name() };

@@ -36,7 +36,6 @@ use crate::render::Renderer;
 use crate::scene::{Environment, Geometry, Light, Request, Scene};
 use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
-use crate::trace::{Primitives, World};
 
 /// Render a scene
 #[derive(Clone, Debug, Args)]
@@ -221,7 +220,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         }
 
         let pixels = u64::from(width) * u64::from(height);
-        let stored = stored_triangles(&world);
+        let stored = world.stored_triangles();
         // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
         let build = match accel.0 {
             Accel::Bvh => {
@@ -362,14 +361,6 @@ fn placed_triangles(scene: &Scene) -> u64 {
     };
     let placed = scene.instances.iter().flat_map(|instance| scene.group_geometries(instance.group));
     placed.map(|(_, geometry)| triangles(geometry)).sum()
-}
-
-pub(super) fn stored_triangles(world: &World) -> u64 {
-    let triangles = world.parts.iter().map(|part| match &part.primitives {
-        Primitives::Triangles { triangles, .. } => triangles.len() as u64,
-        Primitives::Shapes(_) => 0,
-    });
-    triangles.sum()
 }
 
 fn parse_threshold(text: &str) -> std::result::Result<f64, String> {

@@ -92,6 +92,15 @@ impl World {
         let part = &self.parts[lookup.first_part + (hit.geometry - lookup.first_geometry) as usize];
         (part, lookup.placement.map(|p| &self.placements[p as usize]))
     }
+
+    /// Triangles as stored: those of an object that is placed twice count once.
+    pub fn stored_triangles(&self) -> u64 {
+        let triangles = self.parts.iter().map(|part| match &part.primitives {
+            Primitives::Triangles { triangles, .. } => triangles.len() as u64,
+            Primitives::Shapes(_) => 0,
+        });
+        triangles.sum()
+    }
 }
 
 impl World {

@@ -114,7 +114,7 @@ impl Setup<'_> {
     fn build(&self) -> Result<(Vec<AnyTracer>, Vec<BuildRow>)> {
         let mut built: Vec<Option<Built>> = self.contenders.iter().map(|_| None).collect();
         let mut rates = vec![Vec::new(); built.len()];
-        let triangles = self.subject.stored_triangles() as f64;
+        let triangles = self.subject.world.stored_triangles() as f64;
         for _ in 0..self.repeat {
             for ((contender, slot), rates) in self.contenders.iter().zip(&mut built).zip(&mut rates) {
                 // Its memory goes before the next one takes its own.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result, Warning};
 use crate::io::{self, LoadOptions, UpAxis};
 use crate::math::DAffine3;
 use crate::scene::{self, Camera, Geometry, Group, Instance, Material, Mesh, Scene, choose_origin};
-use crate::trace::{Primitives, World};
+use crate::trace::World;
 
 /// Triangles of the largest terrain: 2 n^2 at this n are 800 million.
 const LARGEST_TERRAIN: u32 = 20_000;
@@ -103,15 +103,6 @@ impl Subject {
         let odd = || Error::input(name, "", "is too small or too large to be looked at");
         let camera = view.camera(world.centre).ok_or_else(odd)?;
         Ok((Self { name: name.to_owned(), scene, world, view, camera }, warnings))
-    }
-
-    /// Triangles as stored: those of an object that is placed twice count once.
-    pub fn stored_triangles(&self) -> u64 {
-        let triangles = self.world.parts.iter().map(|part| match &part.primitives {
-            Primitives::Triangles { triangles, .. } => triangles.len() as u64,
-            Primitives::Shapes(_) => 0,
-        });
-        triangles.sum()
     }
 }
 

@@ -62,7 +62,7 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
             rows.push([scene.to_owned(), engine, width, median, min, max, wrong, rays, rate, low, high]);
             Point { group: m.engine, label: m.width.rays().to_string(), x: m.mrays_per_s, y }
         });
-        let triangles = subject.stored_triangles();
+        let triangles = subject.world.stored_triangles();
         panels.push(Panel { title: format!("{scene}: {triangles} triangles"), points: points.collect() });
     }
     let legend: Vec<&str> = names.iter().map(String::as_str).collect();
