@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::math::{Aabb, Vec3, is_traceable};
 use crate::memory;
 use crate::trace::bvh::meshes::{Mesh, Meshes};
+use crate::trace::bvh::room;
 
 /// Bits of a code for each axis.
 const BITS: u32 = 10;
@@ -47,8 +48,7 @@ pub(in crate::trace::bvh) fn sorted(meshes: &Meshes) -> Vec<Coded> {
     if coded.par_iter().any(|item| item.code == UNTRACEABLE) {
         coded.retain(|item| item.code != UNTRACEABLE);
     }
-    radix_sort(&mut coded);
-    coded
+    sorted_by_code(coded)
 }
 
 /// From a triangle to the cell of its middle, the cells being cubes.
@@ -86,59 +86,104 @@ fn spread(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// Bits that are sorted by at a time.
-const DIGIT_BITS: u32 = 11;
+/// Bits by which chunks are sorted at first, the highest ones.
+const TOP_BITS: u32 = LARGE_BIT + 1 - 2 * LOW_BITS;
 
-/// Stable, by counting eleven bits at a time.
-fn radix_sort(coded: &mut Vec<Coded>) {
-    let mut counts = [[0u32; 1 << DIGIT_BITS]; 3];
-    for item in coded.iter() {
-        for (pass, counts) in counts.iter_mut().enumerate() {
-            counts[digit(item, pass)] += 1;
+/// Bits that buckets are sorted by at a time, twice.
+const LOW_BITS: u32 = 10;
+
+/// Codes that are sorted by their highest bits at a time: they fit the second cache.
+const CHUNK: usize = 1 << 15;
+
+/// Buckets of at most this many are sorted by comparing: to go through all counts would take longer.
+const BY_COMPARING: usize = 256;
+
+/// By rising code, those with equal codes as they came: each chunk by the highest bits, what has these in common from all
+/// chunks into one bucket, and each bucket by the other bits; all of it by all threads. Numbers rise in `coded`.
+fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
+    let by_chunks = coded.par_chunks_mut(CHUNK).map(|chunk| {
+        let mut sorted = vec![Coded { code: 0, number: 0 }; chunk.len()];
+        let ends = counting_sort(chunk, &mut sorted, TOP_BITS, 2 * LOW_BITS);
+        chunk.copy_from_slice(&sorted);
+        ends
+    });
+    let ends: Vec<Vec<u32>> = by_chunks.collect();
+    let of_bucket = |bucket: usize, ends: &[u32]| {
+        let first = if bucket > 0 { ends[bucket - 1] } else { 0 };
+        first as usize..ends[bucket] as usize
+    };
+    let len = |bucket| ends.iter().map(|ends| of_bucket(bucket, ends).len()).sum();
+    let buckets: Vec<(usize, usize)> = (0..1 << TOP_BITS).into_par_iter().map(|bucket| (len(bucket), bucket)).collect();
+    let mut sorted = room::fill(buckets.clone(), |bucket, room| {
+        for (chunk, ends) in coded.chunks(CHUNK).zip(&ends) {
+            chunk[of_bucket(bucket, ends)].iter().for_each(|&item| room.push(item));
         }
+    });
+    drop(coded);
+    let mut rest = &mut sorted[..];
+    let mut jobs = Vec::with_capacity(buckets.len());
+    for (len, _) in buckets {
+        let (own, others) = rest.split_at_mut(len);
+        rest = others;
+        jobs.push(own);
     }
-    let mut other = memory::with_capacity(coded.len());
-    other.extend_from_slice(coded);
-    for (pass, counts) in counts.iter_mut().enumerate() {
-        let mut sum = 0;
-        for count in counts.iter_mut() {
-            sum += std::mem::replace(count, sum);
+    jobs.into_par_iter().for_each(|bucket| {
+        if bucket.len() <= BY_COMPARING {
+            bucket.sort_unstable_by_key(|item| u64::from(item.code) << 32 | u64::from(item.number));
+            return;
         }
-        for &item in coded.iter() {
-            let place = &mut counts[digit(&item, pass)];
-            other[*place as usize] = item;
-            *place += 1;
-        }
-        std::mem::swap(coded, &mut other);
-    }
+        let mut other = vec![Coded { code: 0, number: 0 }; bucket.len()];
+        counting_sort(bucket, &mut other, LOW_BITS, 0);
+        counting_sort(&other, bucket, LOW_BITS, LOW_BITS);
+    });
+    sorted
 }
 
-#[inline(always)]
-fn digit(item: &Coded, pass: usize) -> usize {
-    (item.code >> (DIGIT_BITS * pass as u32)) as usize % (1 << DIGIT_BITS)
+/// Stable, by `bits` of the codes from bit `shift` on; and where those with each digit end.
+fn counting_sort(from: &[Coded], to: &mut [Coded], bits: u32, shift: u32) -> Vec<u32> {
+    let digit = |item: &Coded| (item.code >> shift) as usize % (1 << bits);
+    let mut places = vec![0u32; 1 << bits];
+    for item in from {
+        places[digit(item)] += 1;
+    }
+    let mut sum = 0;
+    for place in &mut places {
+        sum += std::mem::replace(place, sum);
+    }
+    for item in from {
+        let place = &mut places[digit(item)];
+        to[*place as usize] = *item;
+        *place += 1;
+    }
+    places
 }
 
 /// Lengths of the clusters, in order: each of at most `most` items, and cut from others where the highest bit of the codes
 /// changes.
 pub(in crate::trace::bvh) fn clusters(sorted: &[Coded], most: usize) -> Vec<usize> {
+    if sorted.len() > CHUNK {
+        let (left, right) = sorted.split_at(cut(sorted));
+        let (mut left, mut right) = rayon::join(|| clusters(left, most), || clusters(right, most));
+        left.append(&mut right);
+        return left;
+    }
     let mut lengths = Vec::with_capacity(2 * sorted.len() / most + 1);
     let mut open = vec![sorted];
     while let Some(range) = open.pop() {
-        let [first, .., last] = range else {
-            lengths.extend((range.len() == 1).then_some(1));
-            continue;
-        };
-        if range.len() <= most {
+        if range.len() > most {
+            let (left, right) = range.split_at(cut(range));
+            open.extend([right, left]);
+        } else if !range.is_empty() {
             lengths.push(range.len());
-            continue;
         }
-        let highest = (first.code ^ last.code).checked_ilog2();
-        // Equal codes are halved.
-        let cut = highest.map_or(range.len() / 2, |bit| range.partition_point(|item| item.code >> bit & 1 == 0));
-        let (left, right) = range.split_at(cut);
-        open.extend([right, left]);
     }
     lengths
+}
+
+/// Where two or more items are cut in two: equal codes in the middle.
+fn cut(range: &[Coded]) -> usize {
+    let highest = (range[0].code ^ range[range.len() - 1].code).checked_ilog2();
+    highest.map_or(range.len() / 2, |bit| range.partition_point(|item| item.code >> bit & 1 == 0))
 }
 
 #[cfg(test)]
@@ -164,21 +209,28 @@ mod tests {
         assert_eq!(clusters(&coded(&[9]), 4), [1]);
         assert_eq!(clusters(&coded(&[0, 1, 7, 8, 9]), 4), [3, 2]);
         assert_eq!(clusters(&coded(&[3; 10]), 4), [2, 3, 2, 3]);
+        // By several threads: 2,048 halves of halves, and so on.
+        let halves = clusters(&coded(&[3; 40_000]), 32);
+        assert_eq!((halves.len(), halves.iter().sum::<usize>()), (2048, 40_000));
+        assert!(halves.iter().all(|len| (19..=20).contains(len)));
     }
 
+    /// Few codes and many, of one bucket and of all: buckets on either side of [`BY_COMPARING`], and chunks that are not full.
     #[test]
     fn sorting_is_stable() {
-        let mut state = 1u32;
-        let mut coded: Vec<Coded> = (0..10_000)
-            .map(|number| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                Coded { code: (state >> 1) & 0x7fc0_07ff, number }
-            })
-            .collect();
-        let mut expected = coded.clone();
-        expected.sort_by_key(|item| item.code);
-        radix_sort(&mut coded);
-        let numbers = |list: &[Coded]| list.iter().map(|item| item.number).collect::<Vec<_>>();
-        assert_eq!(numbers(&coded), numbers(&expected));
+        for (count, bits) in [(0, 0), (1, 0x7fff_ffff), (100_000, 0x7fc0_07ff), (100_000, 0x7fff_ffff), (70_000, 0x3ff)]
+        {
+            let mut state = 1u32;
+            let coded: Vec<Coded> = (0..count)
+                .map(|number| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    Coded { code: (state >> 1) & bits, number }
+                })
+                .collect();
+            let mut expected = coded.clone();
+            expected.sort_by_key(|item| item.code);
+            let pairs = |list: &[Coded]| list.iter().map(|item| (item.code, item.number)).collect::<Vec<_>>();
+            assert!(pairs(&sorted_by_code(coded)) == pairs(&expected), "{count} with bits {bits:x}");
+        }
     }
 }
