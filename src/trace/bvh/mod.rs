@@ -111,6 +111,8 @@ pub use steps::Steps;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
@@ -132,6 +134,9 @@ pub struct Bvh {
     isa: Isa,
     travel: Travel,
 }
+
+/// Levels of at most this many primitives are built side by side.
+const SMALL: usize = 1 << 16;
 
 /// A part's ids, as hits name them.
 #[derive(Clone, Copy, Debug)]
@@ -158,9 +163,13 @@ impl Bvh {
     /// Where this processor does not have `options.isa`.
     pub fn build_with(world: &World, options: Options<'_>) -> Self {
         options.isa.demand();
-        let build = |parts: &[Part]| TriangleTree::build(parts, &options);
-        let triangles = levels(world).into_iter().map(build).collect();
-        Self::over(triangles, world, &options)
+        let build = |parts: &&[Part]| TriangleTree::build(parts, &options);
+        let levels = levels(world);
+        // Large ones one after the other, for what is sorted for a tree is larger than the tree.
+        let is_small = |parts: &&[Part]| parts.iter().map(|part| part.primitives.len()).sum::<usize>() <= SMALL;
+        let small: Vec<_> = levels.par_iter().map(|parts| is_small(parts).then(|| build(parts))).collect();
+        let triangles = small.into_iter().zip(&levels).map(|(built, parts)| built.unwrap_or_else(|| build(parts)));
+        Self::over(triangles.collect(), world, &options)
     }
 
     /// Of the trees over the triangles of each of [`levels`]; the others are built.
@@ -170,9 +179,8 @@ impl Bvh {
         let parts = levels(world);
         assert_eq!(triangles.len(), parts.len(), "a tree a level");
         let level = |(triangles, parts)| Level::new(triangles, parts, options);
-        let mut levels = triangles.into_iter().zip(parts).map(level);
-        let fixed = levels.next().expect("the fixed parts are a level");
-        let objects: Vec<Level> = levels.collect();
+        let mut objects: Vec<Level> = triangles.into_par_iter().zip(parts).map(level).collect();
+        let fixed = objects.remove(0);
         let placements = PlacementTree::build(&world.placements, &objects, options);
         let moving = MovingTree::build(&world.placements, &objects, options);
         Self {
@@ -261,5 +269,36 @@ impl Tracer for Bvh {
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], batch: Batch) {
         self.run_batch::<Occluded>(rays, occluded, batch);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::scene::{Geometry, Group, Instance, Scene, terrain};
+
+    /// Those that are built by themselves among those that are built side by side.
+    #[test]
+    fn each_object_has_its_own_tree() {
+        let sides = [1, 200, 3, 190, 2];
+        let scene = Scene {
+            geometries: sides.map(|n| Geometry::Mesh(terrain(n))).into(),
+            groups: (0..sides.len() as u32).map(|i| Group { name: String::new(), geometries: i..i + 1 }).collect(),
+            instances: (0..sides.len() as u32)
+                .map(|group| Instance {
+                    name: String::new(),
+                    group,
+                    transform: DAffine3::IDENTITY,
+                    transform_end: None,
+                })
+                .collect(),
+            ..Scene::default()
+        };
+        let world = World::placed(&scene).expect("sound");
+        let bvh = Bvh::build(&world);
+        let counts: Vec<usize> = bvh.objects.iter().map(|object| object.triangles.count()).collect();
+        assert_eq!(counts, sides.map(|n| 2 * (n * n) as usize));
+        assert!(counts.iter().any(|&count| count > SMALL) && counts.iter().any(|&count| count < SMALL));
     }
 }
