@@ -64,7 +64,7 @@ impl Blocks for Numbers {
 const NONE: u32 = u32::MAX;
 
 /// Nodes that are gone through by one thread.
-const CHUNK: usize = 512;
+const CHUNK: usize = 64;
 
 impl Leaves {
     /// Makes the blocks of `tree`, whose leaves name ranges of `items`, and lets these name ranges of blocks instead.

@@ -98,7 +98,7 @@ impl PlacementTree {
             let triangles = &objects[placements[i].object as usize].triangles;
             Place::new(&placements[i], triangles.tree().reach()).with_grain(triangles.grain())
         };
-        let places: Vec<Place> = order.iter().map(place).collect();
+        let places: Vec<Place> = order.par_iter().map(place).collect();
         let any = |test: fn(&Level) -> bool| places.iter().any(|place| test(&objects[place.object as usize]));
         let has_triangles = any(|level| !level.triangles.tree().is_empty());
         let has_shapes = any(|level| !level.shapes.tree().is_empty());

@@ -1,7 +1,7 @@
 //! A range of items divided in two again and again: the binary tree from which [`collapse`](super::collapse) makes the wide one.
 
-use super::split::{Range, Rule, Split};
-use super::subtree::Local;
+use super::split::{Range, Rule};
+use super::subtree::{Local, in_halves};
 use crate::trace::bvh::node::WIDTH;
 use crate::trace::bvh::simd::Simd;
 
@@ -43,12 +43,11 @@ impl Binary {
     /// halves of the whole they do.
     #[inline(always)]
     pub fn new<S: Simd>(whole: Range, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
-        let in_halves = |len: u32| len.next_power_of_two().trailing_zeros();
         debug_assert!(in_halves(whole.len) <= levels, "{} items in {levels} levels", whole.len);
         let most = (3 * whole.len / rule.block + 1).min(2 * whole.len);
         let mut branches: Vec<Branch> = Vec::with_capacity(most as usize);
-        let mut open = vec![(whole, 0, None::<usize>)];
-        while let Some((range, depth, above)) = open.pop() {
+        let mut open = vec![(whole, levels, None::<usize>)];
+        while let Some((range, levels, above)) = open.pop() {
             let number = branches.len();
             if let Some(above) = above {
                 branches[above].second = number as u32;
@@ -57,15 +56,48 @@ impl Binary {
             if range.len <= rule.block {
                 continue;
             }
-            let split = if depth + in_halves(range.len) < levels { local.find(&range) } else { Split::HALF };
-            if rule.prefers_leaf(range.len, range.half_area(), split.cost) {
-                continue;
-            }
-            let [first, second] = local.apply(&range, &split);
+            let Some([first, second]) = local.divide(&range, levels) else { continue };
             // The first comes next.
-            open.push((second, depth + 1, Some(number)));
-            open.push((first, depth + 1, None));
+            open.push((second, levels - 1, Some(number)));
+            open.push((first, levels - 1, None));
         }
         Self { branches }
     }
+
+    /// Of pieces in order; besides the numbers of those branches that were not in a piece, and so have no costs yet.
+    pub fn joined(pieces: Vec<Piece>, rule: &Rule) -> (Self, Vec<usize>) {
+        let len = |piece: &Piece| match piece {
+            Piece::Branch { .. } => 1,
+            Piece::Whole(binary) => binary.branches.len(),
+        };
+        let mut starts = Vec::with_capacity(pieces.len());
+        let mut count = 0;
+        for piece in &pieces {
+            starts.push(count);
+            count += len(piece);
+        }
+        let (mut branches, mut joints) = (Vec::with_capacity(count), Vec::new());
+        for (i, piece) in pieces.into_iter().enumerate() {
+            match piece {
+                Piece::Branch { range, second } => {
+                    joints.push(starts[i]);
+                    branches.push(Branch { second: starts[i + second] as u32, ..Branch::new(&range, rule) });
+                }
+                Piece::Whole(mut binary) => {
+                    let divided = binary.branches.iter_mut().filter(|branch| branch.second != 0);
+                    divided.for_each(|branch| branch.second += starts[i] as u32);
+                    branches.append(&mut binary.branches);
+                }
+            }
+        }
+        (Self { branches }, joints)
+    }
+}
+
+/// A part of a binary tree.
+pub(super) enum Piece {
+    /// A branch by itself. Its first side is the next piece, its second one so many pieces after it.
+    Branch { range: Range, second: usize },
+    /// All that is below.
+    Whole(Binary),
 }

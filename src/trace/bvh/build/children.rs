@@ -29,7 +29,8 @@ pub(super) struct Children {
 
 impl Children {
     /// Of `range`.
-    pub fn new(range: Range, rule: &Rule, shared: &mut Shared<'_>) -> Self {
+    pub fn new(range: Range, shared: &mut Shared<'_>) -> Self {
+        let rule = shared.rule;
         let mut children = Self { list: [Child::NONE; WIDTH], len: 1 };
         children.list[0] = Child::new(range, rule);
         while children.len < WIDTH {

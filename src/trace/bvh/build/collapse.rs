@@ -17,43 +17,49 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 const HALVES: [f32; WIDTH] = [0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0];
 
 impl Binary {
-    /// Finds what each branch costs, and how slots are best shared out.
+    /// Finds what each branch costs, and how slots are best shared out. The first of the whole tree `is_root`.
     #[inline(always)]
-    pub fn weigh<S: Simd>(&mut self, rule: &Rule) {
+    pub fn weigh<S: Simd>(&mut self, rule: &Rule, is_root: bool) {
         for number in (0..self.branches.len()).rev() {
-            let Branch { second, bounds, len, .. } = self.branches[number];
-            if second == 0 {
-                continue;
-            }
-            let (first, second) = (&self.branches[number + 1].costs, &self.branches[second as usize].costs);
-            // Lane i is for i + 1 slots. Where costs are no numbers, slots go to both sides alike.
-            let (mut least, mut share) = (S::V8::splat(f32::INFINITY), S::V8::load(&HALVES));
-            for k in 1..WIDTH {
-                let mut others = [0.0; WIDTH];
-                others.copy_from_slice(&second[WIDTH - k..][..WIDTH]);
-                let cost = S::V8::splat(first[WIDTH + k - 1]).add(S::V8::load(&others));
-                let cheaper = cost.less(least);
-                least = S::V8::select(cheaper, cost, least);
-                share = S::V8::select(cheaper, S::V8::splat(k as f32), share);
-            }
-            let area = half_area(&bounds);
-            // A little more than by its area, so that nodes are few where none has any; and the root is a node in any case.
-            let own = if number > 0 { NODE_COST * area + f32::MIN_POSITIVE } else { 0.0 };
-            let node = own + least.to_array()[WIDTH - 1];
-            let is_leaf = rule.prefers_leaf(len, area, node);
-            let alone = S::V8::splat(if is_leaf { rule.blocks(len as usize) * area } else { node });
-            let together = alone.less(least);
-            let costs = S::V8::select(together, alone, least).to_array();
-            let (together, share) = (together.bits(), share.truncate());
-            let branch = &mut self.branches[number];
-            branch.is_leaf = is_leaf;
-            branch.costs[WIDTH..].copy_from_slice(&costs);
-            branch.costs[WIDTH] = alone.to_array()[0];
-            for (slot, (of_first, share)) in branch.shares.iter_mut().zip(share).enumerate() {
-                *of_first = if together >> slot & 1 != 0 { 0 } else { share as u8 };
-            }
-            branch.shares[0] = share[WIDTH - 1] as u8;
+            self.weigh_branch::<S>(number, rule, is_root && number == 0);
         }
+    }
+
+    /// The same of one branch, whose sides have been weighed; what is not divided costs what it does as a leaf.
+    #[inline(always)]
+    pub fn weigh_branch<S: Simd>(&mut self, number: usize, rule: &Rule, is_root: bool) {
+        let Branch { second, bounds, len, .. } = self.branches[number];
+        if second == 0 {
+            return;
+        }
+        let (first, second) = (&self.branches[number + 1].costs, &self.branches[second as usize].costs);
+        // Lane i is for i + 1 slots. Where costs are no numbers, slots go to both sides alike.
+        let (mut least, mut share) = (S::V8::splat(f32::INFINITY), S::V8::load(&HALVES));
+        for k in 1..WIDTH {
+            let mut others = [0.0; WIDTH];
+            others.copy_from_slice(&second[WIDTH - k..][..WIDTH]);
+            let cost = S::V8::splat(first[WIDTH + k - 1]).add(S::V8::load(&others));
+            let cheaper = cost.less(least);
+            least = S::V8::select(cheaper, cost, least);
+            share = S::V8::select(cheaper, S::V8::splat(k as f32), share);
+        }
+        let area = half_area(&bounds);
+        // A little more than by its area, so that nodes are few where none has any; and the root is a node in any case.
+        let own = if is_root { 0.0 } else { NODE_COST * area + f32::MIN_POSITIVE };
+        let node = own + least.to_array()[WIDTH - 1];
+        let is_leaf = rule.prefers_leaf(len, area, node);
+        let alone = S::V8::splat(if is_leaf { rule.blocks(len as usize) * area } else { node });
+        let together = alone.less(least);
+        let costs = S::V8::select(together, alone, least).to_array();
+        let (together, share) = (together.bits(), share.truncate());
+        let branch = &mut self.branches[number];
+        branch.is_leaf = is_leaf;
+        branch.costs[WIDTH..].copy_from_slice(&costs);
+        branch.costs[WIDTH] = alone.to_array()[0];
+        for (slot, (of_first, share)) in branch.shares.iter_mut().zip(share).enumerate() {
+            *of_first = if together >> slot & 1 != 0 { 0 } else { share as u8 };
+        }
+        branch.shares[0] = share[WIDTH - 1] as u8;
     }
 
     /// The nodes of the wide tree, each before what is below it, of at most `levels`: at least a third of the binary tree's, rounded up.
@@ -235,7 +241,7 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self) {
-            self.0.weigh::<S>(&RULE);
+            self.0.weigh::<S>(&RULE, true);
         }
     }
 
@@ -275,7 +281,7 @@ mod tests {
             branch.bounds = [0.0; 8];
             branch.costs[WIDTH..].fill(0.0);
         });
-        binary.weigh::<Portable>(&RULE);
+        binary.weigh::<Portable>(&RULE, true);
         assert_eq!(binary.nodes(&RULE, 9).len(), 1 + 4 + 32);
     }
 
@@ -293,7 +299,7 @@ mod tests {
             shape = Shape::fork(cluster(1e3 * 2f32.powi(level + 1)), shape);
         }
         let mut binary = shape.binary();
-        binary.weigh::<Portable>(&RULE);
+        binary.weigh::<Portable>(&RULE, true);
         let (deep, flat) = (binary.nodes(&RULE, usize::MAX), binary.nodes(&RULE, 9));
         assert!(cost(&deep, 0).1 > 9 && cost(&flat, 0).1 <= 9, "{} and {}", cost(&deep, 0).1, cost(&flat, 0).1);
         let mut all = Vec::new();

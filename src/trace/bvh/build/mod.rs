@@ -18,8 +18,8 @@
 //! Ranges of items are divided in two until they fill a block, and of the branches of that binary tree those become nodes that make the
 //! wide one cheapest. Leaves are charged by blocks, ceil(n / block), so that they fill.
 //!
-//! That is done for subtrees, each by one thread. The nodes above are made one after the other, each by all threads: the child with
-//! the largest surface is divided until there are eight or none is worth it. There are few of these, and nothing has to be kept of their binary tree. The
+//! That is done for subtrees, each by one thread unless there are few. Of a node above these the child with the largest surface is divided until there are eight or
+//! none is worth it, and what is below each child is made beside the others. There are few of these nodes, and nothing has to be kept of their binary tree. The
 //! tree is the same for any number of threads and any instruction set: what a range becomes depends on what is in it and above it,
 //! chunks have a fixed size, and no arithmetic is fused.
 
@@ -38,23 +38,25 @@ mod top;
 
 use rayon::prelude::*;
 
-use super::isa::{self, Isa};
 use super::node::{Child, Node, Tree};
 use super::preset::Options;
 use super::room;
 use children::Children;
 pub(super) use record::{Record, triangle_items};
 use split::{Range, Rule};
-use subtree::SubtreeKernel;
+use subtree::Subtree;
 use top::Shared;
 
 /// Levels a tree can have: the stack of a walk is made for it.
 pub(super) const MAX_DEPTH: usize = 36;
 
-/// Ranges of at most this many items are tasks of one thread.
+/// Ranges of at most this many items are subtrees.
 const TASK: u32 = 1 << 14;
 
-/// Levels of nodes above tasks: whatever is below these is a task, of however many items. No mesh but one made for it gets there.
+/// Where there are fewer subtrees for each thread than this, several threads make one.
+const FEW: usize = 4;
+
+/// Levels of nodes above subtrees: whatever is below these is one, of however many items. No mesh but one made for it gets there.
 const TOP_LEVELS: usize = 18;
 
 /// Levels of all nodes. One more is left for what others put below a tree's leaves (`clusters`).
@@ -66,18 +68,19 @@ const _: () = assert!(Child::NAMES as u64 >> (3 * (LEVELS - TOP_LEVELS)) == 0);
 /// Cost of visiting a node, in tests of a block. Measured: with a half rates are the same and a triangle takes a byte more, with two rays are 1 to 4 % slower.
 pub(super) const NODE_COST: f32 = 1.0;
 
-/// A range that becomes a node and what is below it.
-struct Task {
-    range: Range,
-    /// Levels above it.
-    depth: usize,
-}
-
 /// A slot of a node.
 #[derive(Clone, Copy)]
 struct Slot {
     node: u32,
     slot: u32,
+}
+
+/// What a range became.
+enum Built {
+    /// A node, without the indices of its inner ones, and what is in those of its slots.
+    Upper { node: Box<Node>, below: Vec<(usize, Built)> },
+    /// What one thread made of the items from the first on: nodes, each before what is below it.
+    Subtree { first: u32, nodes: Vec<Node> },
 }
 
 /// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
@@ -91,57 +94,72 @@ pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Optio
     if items.is_empty() {
         return Tree::new(Vec::new());
     }
-    let (rule, isa) = (Rule { block, leaf: block * most }, options.isa);
-    let (top, tasks) = upper_nodes(items, &rule, isa);
-    let in_top = items.len() - tasks.iter().map(|(_, task)| task.range.len as usize).sum::<usize>();
-    let mut rest = items;
-    let mut jobs = Vec::with_capacity(tasks.len());
-    let mut first = 0;
-    for (parent, task) in tasks {
-        // Between them are leaves of the upper nodes.
-        let (_, own) = rest.split_at_mut((task.range.first - first) as usize);
-        let (own, others) = own.split_at_mut(task.range.len as usize);
-        (rest, first) = (others, task.range.first + task.range.len);
-        jobs.push((parent, task, own));
-    }
-    let built: Vec<(Option<Slot>, Vec<Node>)> = jobs
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|(parent, task, items)| {
-            let count = items.len();
-            let nodes = isa::dispatch(
-                isa,
-                SubtreeKernel { rule: &rule, items, range: task.range, levels: LEVELS - task.depth },
-            );
-            options.report(count);
-            (parent, nodes)
-        })
-        .collect();
-    options.report(in_top);
-    Tree::new(join(top, built))
+    let threads = rayon::current_num_threads();
+    let is_small = threads > 1 && items.len() < threads * FEW * TASK as usize;
+    let builder = Builder { rule: &Rule { block, leaf: block * most }, is_small, options };
+    let whole = top::whole(items, options.isa);
+    Tree::new(in_order(builder.build(whole, items, 0)))
 }
 
-/// The nodes over everything of more than [`TASK`] items, down to [`TOP_LEVELS`], and the tasks below them, in the order of the items.
-fn upper_nodes(items: &mut [Record], rule: &Rule, isa: Isa) -> (Vec<Node>, Vec<(Option<Slot>, Task)>) {
-    let mut shared = Shared { rule, items, isa };
-    let (mut nodes, mut tasks) = (Vec::new(), Vec::new());
-    let mut open = vec![(None, Task { range: shared.whole(), depth: 0 })];
-    while let Some((parent, task)) = open.pop() {
-        if task.range.len <= TASK || task.depth == TOP_LEVELS {
-            tasks.push((parent, task));
-            continue;
+/// What all ranges are built with.
+#[derive(Clone, Copy)]
+struct Builder<'a> {
+    rule: &'a Rule,
+    /// Whether there are too few subtrees for each to be made by one thread.
+    is_small: bool,
+    options: &'a Options<'a>,
+}
+
+impl Builder<'_> {
+    /// Of `items`, which are those of `range`, with so many levels above them.
+    fn build(self, range: Range, items: &mut [Record], depth: usize) -> Built {
+        let Self { rule, is_small, options } = self;
+        let isa = options.isa;
+        if range.len <= TASK || depth == TOP_LEVELS {
+            let subtree = Subtree { rule, items, range, levels: LEVELS - depth };
+            let nodes = if is_small { subtree.nodes_by_all(isa) } else { subtree.nodes(isa) };
+            options.report(range.len as usize);
+            return Built::Subtree { first: range.first, nodes };
         }
-        let index = nodes.len() as u32;
-        point(&mut nodes, parent, index);
-        let children = Children::new(task.range, rule, &mut shared);
-        nodes.push(children.node(rule));
-        for (slot, child) in children.iter().rev().filter(|(_, child)| !child.is_leaf) {
-            let parent = Slot { node: index, slot: slot as u32 };
-            open.push((Some(parent), Task { range: child.range, depth: task.depth + 1 }));
+        let children = Children::new(range, &mut Shared { rule, items, base: range.first, isa });
+        let mut inner: Vec<(usize, Range)> =
+            children.iter().filter(|(_, child)| !child.is_leaf).map(|(slot, child)| (slot, child.range)).collect();
+        options.report((range.len - inner.iter().map(|(_, range)| range.len).sum::<u32>()) as usize);
+        inner.sort_by_key(|(_, range)| range.first);
+        let (mut rest, mut first) = (items, range.first);
+        let mut jobs = Vec::with_capacity(inner.len());
+        for (slot, range) in inner {
+            // Between them are leaves.
+            let (_, own) = rest.split_at_mut((range.first - first) as usize);
+            let (own, others) = own.split_at_mut(range.len as usize);
+            (rest, first) = (others, range.first + range.len);
+            jobs.push((slot, range, own));
+        }
+        let below = jobs.into_par_iter().with_max_len(1);
+        let below = below.map(|(slot, range, items)| (slot, self.build(range, items, depth + 1)));
+        Built::Upper { node: Box::new(children.node(rule)), below: below.collect() }
+    }
+}
+
+/// All nodes: the upper ones, each before what is below it, and then the subtrees in the order of their items.
+fn in_order(built: Built) -> Vec<Node> {
+    let (mut top, mut subtrees) = (Vec::new(), Vec::new());
+    let mut open = vec![(None, built)];
+    while let Some((parent, built)) = open.pop() {
+        match built {
+            Built::Subtree { first, nodes } => subtrees.push((parent, first, nodes)),
+            Built::Upper { node, mut below } => {
+                let index = top.len() as u32;
+                point(&mut top, parent, index);
+                top.push(*node);
+                below.sort_by_key(|(slot, _)| std::cmp::Reverse(*slot));
+                let slot = |slot| Some(Slot { node: index, slot: slot as u32 });
+                open.extend(below.into_iter().map(|(at, built)| (slot(at), built)));
+            }
         }
     }
-    tasks.sort_by_key(|(_, task)| task.range.first);
-    (nodes, tasks)
+    subtrees.sort_by_key(|(_, first, _)| *first);
+    join(top, subtrees.into_iter().map(|(parent, _, nodes)| (parent, nodes)).collect())
 }
 
 /// Puts the subtrees' nodes behind those above them.
@@ -188,6 +206,7 @@ mod tests {
 
     use super::*;
     use crate::math::{Aabb, Vec3};
+    use crate::trace::bvh::isa::Isa;
     use crate::trace::bvh::random::Random;
 
     /// Boxes of a size, scattered by a linear congruence; numbered in order.
@@ -269,18 +288,21 @@ mod tests {
         }
     }
 
+    /// With few subtrees for each thread, which are made in pieces, and with many.
     #[test]
     fn instruction_sets_and_threads_give_the_same_tree() {
-        let build = |isa, threads| {
+        let build = |isa, threads, count| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            let mut items = items(60_000, 0.02);
+            let mut items = items(count, 0.02);
             let tree = pool.install(|| build(&mut items, 4, Child::MOST, &Options { isa, ..Options::default() }));
             let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
             (format!("{tree:?}"), numbers)
         };
-        let expected = build(Isa::Portable, 1);
-        for threads in [1, 3] {
-            assert!(build(Isa::detect(), threads) == expected);
+        for count in [60_000, 150_000] {
+            let expected = build(Isa::Portable, 1, count);
+            for threads in [1, 2, 3] {
+                assert!(build(Isa::detect(), threads, count) == expected, "{count} items, {threads} threads");
+            }
         }
     }
 }

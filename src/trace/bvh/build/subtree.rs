@@ -1,16 +1,19 @@
-//! A subtree by one thread, all of it compiled for one instruction set.
+//! A subtree, compiled for one instruction set: by one thread, or in pieces by several.
 
-use super::binary::Binary;
+use super::binary::{Binary, Piece};
 use super::bins::{self, Bins, Grid};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::sweep;
-use crate::trace::bvh::isa::Kernel;
+use crate::trace::bvh::isa::{self, Isa, Kernel};
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
 
-/// Builds the nodes over a range's items, the root first. Leaves name ranges of items by their index in the whole.
-pub(super) struct SubtreeKernel<'a> {
+/// Ranges of at most this many items are pieces of one thread.
+const PIECE: u32 = 1 << 11;
+
+/// What is to be made of a range.
+pub(super) struct Subtree<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
     pub range: Range,
@@ -18,17 +21,112 @@ pub(super) struct SubtreeKernel<'a> {
     pub levels: usize,
 }
 
-impl Kernel for SubtreeKernel<'_> {
-    type Output = Vec<Node>;
+impl Subtree<'_> {
+    /// The nodes over the range's items, the root first. Leaves name ranges of items by their index in the whole.
+    pub fn nodes(self, isa: Isa) -> Vec<Node> {
+        let Self { rule, items, range, levels } = self;
+        let binary =
+            isa::dispatch(isa, BinaryKernel { is_root: true, ..BinaryKernel::new(rule, items, range, levels) });
+        binary.nodes(rule, levels)
+    }
+
+    /// The same, for threads that have nothing else to do.
+    pub fn nodes_by_all(self, isa: Isa) -> Vec<Node> {
+        let Self { rule, items, range, levels } = self;
+        if range.len <= PIECE {
+            return Subtree { rule, items, range, levels }.nodes(isa);
+        }
+        let mut pieces = Vec::new();
+        BinaryKernel::new(rule, items, range, levels).pieces(isa, &mut pieces);
+        isa::dispatch(isa, JoinKernel { pieces, rule }).nodes(rule, levels)
+    }
+}
+
+/// The binary tree of a range, with costs.
+struct BinaryKernel<'a> {
+    rule: &'a Rule,
+    items: &'a mut [Record],
+    range: Range,
+    /// Levels that it may have.
+    levels: u32,
+    is_root: bool,
+}
+
+impl<'a> BinaryKernel<'a> {
+    /// For so many levels of nodes. Where it comes to that, a node takes three levels of the binary tree.
+    fn new(rule: &'a Rule, items: &'a mut [Record], range: Range, levels: usize) -> Self {
+        Self { rule, items, range, levels: 3 * levels as u32, is_root: false }
+    }
+
+    /// Adds its pieces, each branch before its first side, and all of that before its second.
+    fn pieces(self, isa: Isa, pieces: &mut Vec<Piece>) {
+        let Self { rule, items, range, levels, is_root } = self;
+        let sides = (range.len > PIECE)
+            .then(|| isa::dispatch(isa, DivideKernel { rule, items: &mut *items, range, levels }))
+            .flatten();
+        let Some([first, second]) = sides else {
+            pieces.push(Piece::Whole(isa::dispatch(isa, BinaryKernel { rule, items, range, levels, is_root })));
+            return;
+        };
+        let (first_items, second_items) = items.split_at_mut(first.len as usize);
+        let side = |range, items| BinaryKernel { rule, items, range, levels: levels - 1, is_root: false };
+        let (first, second) = (side(first, first_items), side(second, second_items));
+        let branch = pieces.len();
+        pieces.push(Piece::Branch { range, second: 0 });
+        let mut others = Vec::new();
+        rayon::join(|| first.pieces(isa, pieces), || second.pieces(isa, &mut others));
+        pieces[branch] = Piece::Branch { range, second: pieces.len() - branch };
+        pieces.append(&mut others);
+    }
+}
+
+impl Kernel for BinaryKernel<'_> {
+    type Output = Binary;
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> Vec<Node> {
-        let Self { rule, items, range, levels } = self;
+    fn run<S: Simd>(self) -> Binary {
+        let Self { rule, items, range, levels, is_root } = self;
         let mut local = Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData };
-        // Where it comes to that, a node takes three levels of the binary tree.
-        let mut binary = Binary::new(range, 3 * levels as u32, rule, &mut local);
-        binary.weigh::<S>(rule);
-        binary.nodes(rule, levels)
+        let mut binary = Binary::new(range, levels, rule, &mut local);
+        binary.weigh::<S>(rule, is_root);
+        binary
+    }
+}
+
+/// The two sides of a range; none where it is better a leaf.
+struct DivideKernel<'a> {
+    rule: &'a Rule,
+    items: &'a mut [Record],
+    range: Range,
+    levels: u32,
+}
+
+impl Kernel for DivideKernel<'_> {
+    type Output = Option<[Range; 2]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Option<[Range; 2]> {
+        let Self { rule, items, range, levels } = self;
+        Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData }.divide(&range, levels)
+    }
+}
+
+/// The binary tree of a root, of its pieces.
+struct JoinKernel<'a> {
+    pieces: Vec<Piece>,
+    rule: &'a Rule,
+}
+
+impl Kernel for JoinKernel<'_> {
+    type Output = Binary;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Binary {
+        let (mut binary, joints) = Binary::joined(self.pieces, self.rule);
+        for &number in joints.iter().rev() {
+            binary.weigh_branch::<S>(number, self.rule, number == 0);
+        }
+        binary
     }
 }
 
@@ -41,9 +139,19 @@ pub(super) struct Local<'a, S> {
 }
 
 impl<S: Simd> Local<'_, S> {
+    /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything else; none where a leaf is no worse.
+    #[inline(always)]
+    pub fn divide(&mut self, range: &Range, levels: u32) -> Option<[Range; 2]> {
+        let split = if in_halves(range.len) < levels { self.find(range) } else { Split::HALF };
+        if self.rule.prefers_leaf(range.len, range.half_area(), split.cost) {
+            return None;
+        }
+        Some(self.apply(range, &split))
+    }
+
     /// The best way to divide `range`.
     #[inline(always)]
-    pub fn find(&mut self, range: &Range) -> Split {
+    fn find(&mut self, range: &Range) -> Split {
         let items = &self.items[range.within(self.base)];
         let best = if items.len() <= sweep::MOST {
             sweep::best::<S>(items, self.rule)
@@ -57,11 +165,17 @@ impl<S: Simd> Local<'_, S> {
 
     /// Does it.
     #[inline(always)]
-    pub fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
         let items = &mut self.items[range.within(self.base)];
         let sides = split.partition::<S>(items, range);
         if sides[0].len > 0 && sides[1].len > 0 { sides } else { Split::HALF.partition::<S>(items, range) }
     }
+}
+
+/// Levels of a binary tree over `len` items that is divided down the middle.
+#[inline(always)]
+pub(super) fn in_halves(len: u32) -> u32 {
+    len.next_power_of_two().trailing_zeros()
 }
 
 /// The best plane between `N` bins.

@@ -14,32 +14,32 @@ use crate::trace::bvh::simd::{Simd, Vector};
 /// Items in a chunk.
 const CHUNK: usize = 1 << 15;
 
-/// Divides ranges of all items by all threads.
+/// The range of all `items`.
+pub(super) fn whole(items: &[Record], isa: Isa) -> Range {
+    let chunk = |items| isa::dispatch(isa, RangeKernel(items));
+    let whole = items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
+    Range { len: items.len() as u32, ..whole }
+}
+
+/// Divides ranges of `items`, the first of which has the index `base`, by all threads.
 pub(super) struct Shared<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
+    pub base: u32,
     pub isa: Isa,
 }
 
 impl Shared<'_> {
-    /// The range of all items.
-    pub fn whole(&self) -> Range {
-        let isa = self.isa;
-        let chunk = |items| isa::dispatch(isa, RangeKernel(items));
-        let whole = self.items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
-        Range { len: self.items.len() as u32, ..whole }
-    }
-
     /// The best way to divide `range`.
     pub fn find(&mut self, range: &Range) -> Split {
-        let items = &self.items[range.within(0)];
+        let items = &self.items[range.within(self.base)];
         isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
     }
 
     /// Does it.
     pub fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
         let isa = self.isa;
-        let items = &mut self.items[range.within(0)];
+        let items = &mut self.items[range.within(self.base)];
         if matches!(split.cut, super::split::Cut::Half) {
             return isa::dispatch(isa, PartitionKernel { items, range, split });
         }
@@ -65,30 +65,55 @@ impl Shared<'_> {
 /// of the left side behind.
 fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
     let (front, back) = items.split_at_mut(left_len);
-    let (mut gaps, mut strays) = (Vec::new(), Vec::new());
+    let (mut gaps, mut strays) = (Pieces::new(front), Pieces::new(back));
     let mut at = 0;
     for [left, right] in sides {
         let middle = at + left.len as usize;
         let end = middle + right.len as usize;
-        gaps.push(middle.min(left_len)..end.min(left_len));
-        strays.push(at.max(left_len) - left_len..middle.max(left_len) - left_len);
+        gaps.take(middle.min(left_len)..end.min(left_len));
+        strays.take(at.max(left_len) - left_len..middle.max(left_len) - left_len);
         at = end;
     }
-    let mut strays = strays.into_iter().filter(|range| !range.is_empty());
-    let mut stray = strays.next().unwrap_or(0..0);
-    for mut gap in gaps {
-        while !gap.is_empty() {
-            if stray.is_empty() {
-                stray = strays.next().unwrap_or(0..0);
-                if stray.is_empty() {
-                    return;
-                }
-            }
-            let len = gap.len().min(stray.len());
-            front[gap.start..gap.start + len].swap_with_slice(&mut back[stray.start..stray.start + len]);
-            gap.start += len;
-            stray.start += len;
+    let (mut gaps, mut strays) = (gaps.taken.into_iter(), strays.taken.into_iter());
+    let (mut gap, mut stray): (&mut [Record], &mut [Record]) = (&mut [], &mut []);
+    let mut pairs = Vec::new();
+    loop {
+        if gap.is_empty() {
+            let Some(next) = gaps.next() else { break };
+            gap = next;
         }
+        if stray.is_empty() {
+            stray = strays.next().expect("as many are astray as there are gaps");
+        }
+        let len = gap.len().min(stray.len());
+        let (a, b) = (gap.split_off_mut(..len), stray.split_off_mut(..len));
+        pairs.push((a.expect("so many"), b.expect("so many")));
+    }
+    pairs.into_par_iter().for_each(|(a, b)| a.swap_with_slice(b));
+}
+
+/// Parts of a slice, taken from the front to the end.
+struct Pieces<'a> {
+    rest: &'a mut [Record],
+    /// Index of the first that is left.
+    first: usize,
+    taken: Vec<&'a mut [Record]>,
+}
+
+impl<'a> Pieces<'a> {
+    fn new(rest: &'a mut [Record]) -> Self {
+        Self { rest, first: 0, taken: Vec::new() }
+    }
+
+    /// Takes a range; an empty one is left out.
+    fn take(&mut self, range: std::ops::Range<usize>) {
+        if range.is_empty() {
+            return;
+        }
+        let (_, rest) = std::mem::take(&mut self.rest).split_at_mut(range.start - self.first);
+        let (taken, rest) = rest.split_at_mut(range.len());
+        (self.rest, self.first) = (rest, range.end);
+        self.taken.push(taken);
     }
 }
 
