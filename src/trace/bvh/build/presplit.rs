@@ -12,6 +12,7 @@ use super::record::Record;
 use crate::math::{Aabb, Vec3};
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::Child;
+use crate::trace::bvh::room;
 
 /// New references for each triangle, at most.
 const BUDGET: f64 = 0.3;
@@ -31,8 +32,10 @@ pub(in crate::trace::bvh) fn presplit(items: &[Record], meshes: &Meshes) -> Vec<
     let whole = items.par_iter().map(Record::bounds).reduce(|| Aabb::EMPTY, Aabb::union);
     let grid = Grid { origin: whole.min, size: whole.size().max_element() };
     let corners = |item: &Record| meshes.of_part(item.part()).corners(item.primitive());
-    // Summed in order, so that the sum does not depend on threads.
-    let area: f64 = items.iter().map(|item| f64::from(item.bounds().half_area())).sum();
+    // Chunk by chunk and in order, so that the sum does not depend on threads.
+    let area = |items: &[Record]| items.iter().map(|item| f64::from(item.bounds().half_area())).sum();
+    let areas: Vec<f64> = items.par_chunks(CHUNK).map(area).collect();
+    let area: f64 = areas.iter().sum();
     let least = (LARGE * area / items.len().max(1) as f64) as f32;
     let priorities: Vec<f32> =
         items.par_iter().map(|item| grid.priority(&item.bounds(), &corners(item), least)).collect();
@@ -49,7 +52,8 @@ pub(in crate::trace::bvh) fn presplit(items: &[Record], meshes: &Meshes) -> Vec<
             pieces
         })
         .collect();
-    pieces.concat()
+    let counted = pieces.into_iter().map(|pieces| (pieces.len(), pieces)).collect();
+    room::fill(counted, |pieces: Vec<Record>, room| pieces.into_iter().for_each(|piece| room.push(piece)))
 }
 
 /// How often a triangle is cut.
