@@ -163,12 +163,13 @@ impl Bvh {
     /// Where this processor does not have `options.isa`.
     pub fn build_with(world: &World, options: Options<'_>) -> Self {
         options.isa.demand();
-        let build = |parts: &&[Part]| TriangleTree::build(parts, &options);
+        let build = |parts: &[Part], others| TriangleTree::build(parts, &options, others);
         let levels = levels(world);
         // Large ones one after the other, for what is sorted for a tree is larger than the tree.
-        let is_small = |parts: &&[Part]| parts.iter().map(|part| part.primitives.len()).sum::<usize>() <= SMALL;
-        let small: Vec<_> = levels.par_iter().map(|parts| is_small(parts).then(|| build(parts))).collect();
-        let triangles = small.into_iter().zip(&levels).map(|(built, parts)| built.unwrap_or_else(|| build(parts)));
+        let is_small = |parts: &[Part]| parts.iter().map(|part| part.primitives.len()).sum::<usize>() <= SMALL;
+        let others = levels.iter().filter(|parts| is_small(parts)).count().saturating_sub(1);
+        let small: Vec<_> = levels.par_iter().map(|parts| is_small(parts).then(|| build(parts, others))).collect();
+        let triangles = small.into_iter().zip(&levels).map(|(built, parts)| built.unwrap_or_else(|| build(parts, 0)));
         Self::over(triangles.collect(), world, &options)
     }
 

@@ -46,8 +46,8 @@ fn triangles(part: &Part) -> Option<Triangles> {
 }
 
 impl TriangleTree {
-    /// Over the traceable triangles of `parts`.
-    pub fn build(parts: &[Part], options: &Options<'_>) -> Self {
+    /// Over the traceable triangles of `parts`, while so many `others` of its size are built.
+    pub fn build(parts: &[Part], options: &Options<'_>, others: usize) -> Self {
         let (tree, leaves, count) = match options.preset {
             Preset::Fast => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
@@ -56,7 +56,7 @@ impl TriangleTree {
                 if options.preset == Preset::High {
                     items = presplit::presplit(&items, &Meshes::new(parts));
                 }
-                let mut tree = build::build(&mut items, LANES as u32, Child::MOST, options);
+                let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
                 (tree, leaves, count)
             }

@@ -11,7 +11,7 @@
 //! | `binary` | a subtree's items, divided again and again |
 //! | `collapse` | which branches of that become nodes |
 //! | `children` | a node above the subtrees |
-//! | `subtree`, `top` | ranges divided by one thread, by all threads |
+//! | `subtree`, `top` | small ranges, large ones |
 //! | `presplit` | large triangles in several places: the high preset |
 //! | `morton` | neighbours along a curve: the fast preset |
 //!
@@ -79,7 +79,7 @@ struct Slot {
 enum Built {
     /// A node, without the indices of its inner ones, and what is in those of its slots.
     Upper { node: Box<Node>, below: Vec<(usize, Built)> },
-    /// What one thread made of the items from the first on: nodes, each before what is below it.
+    /// The nodes over items from the first on, each before what is below it.
     Subtree { first: u32, nodes: Vec<Node> },
 }
 
@@ -90,12 +90,20 @@ enum Built {
 /// # Panics
 /// With more than [`Child::NAMES`] items.
 pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Options<'_>) -> Tree {
+    build_beside(0, items, block, most, options)
+}
+
+/// The same while so many `others` of its size are built.
+///
+/// # Panics
+/// As [`build`].
+pub(super) fn build_beside(others: usize, items: &mut [Record], block: u32, most: u32, options: &Options<'_>) -> Tree {
     assert!(items.len() <= Child::NAMES, "more primitives than leaves can name");
     if items.is_empty() {
         return Tree::new(Vec::new());
     }
     let threads = rayon::current_num_threads();
-    let is_small = threads > 1 && items.len() < threads * FEW * TASK as usize;
+    let is_small = threads > 1 && items.len().saturating_mul(1 + others) < threads * FEW * TASK as usize;
     let builder = Builder { rule: &Rule { block, leaf: block * most }, is_small, options };
     let whole = top::whole(items, options.isa);
     Tree::new(in_order(builder.build(whole, items, 0)))
@@ -269,16 +277,20 @@ mod tests {
 
     /// Clusters, each half as large as the one before and beside it: the upper nodes, the binary trees below and the nodes chosen from these would all be deeper
     /// than they may.
+    fn shrinking(clusters: u32, each: u32) -> Vec<Record> {
+        let mut state = Random::new(3);
+        let item = |i: u32| {
+            let size = 0.5f32.powi((i / each) as i32);
+            let corner = Vec3::splat(size) + state.vec3().abs() * size / 4.0;
+            Record::new(&Aabb { min: corner, max: corner + Vec3::splat(size / 64.0) }, 7, i)
+        };
+        (0..clusters * each).map(item).collect()
+    }
+
     #[test]
     fn no_tree_is_deeper_than_a_walk_allows() {
         for (clusters, each) in [(100, 500), (120, 4000)] {
-            let mut state = Random::new(3);
-            let item = |i: u32| {
-                let size = 0.5f32.powi((i / each) as i32);
-                let corner = Vec3::splat(size) + state.vec3().abs() * size / 4.0;
-                Record::new(&Aabb { min: corner, max: corner + Vec3::splat(size / 64.0) }, 7, i)
-            };
-            let mut items: Vec<Record> = (0..clusters * each).map(item).collect();
+            let mut items = shrinking(clusters, each);
             let tree = build(&mut items, 1, 1, &Options::default());
             let mut seen = vec![false; items.len()];
             check(&tree, &items, Child::ROOT, 1, &mut seen);
@@ -291,17 +303,21 @@ mod tests {
     /// With few subtrees for each thread, which are made in pieces, and with many.
     #[test]
     fn instruction_sets_and_threads_give_the_same_tree() {
-        let build = |isa, threads, count| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            let mut items = items(count, 0.02);
-            let tree = pool.install(|| build(&mut items, 4, Child::MOST, &Options { isa, ..Options::default() }));
-            let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
-            (format!("{tree:?}"), numbers)
-        };
-        for count in [60_000, 150_000] {
-            let expected = build(Isa::Portable, 1, count);
-            for threads in [1, 2, 3] {
-                assert!(build(Isa::detect(), threads, count) == expected, "{count} items, {threads} threads");
+        let cases = [items(60_000, 0.02), items(150_000, 0.02), items(20_000, 0.0), shrinking(100, 500)];
+        let coincident: Vec<Record> = (0..20_000).map(|i| Record::new(&items(1, 1.0)[0].bounds(), 7, i)).collect();
+        for case in cases.into_iter().chain([coincident]) {
+            let build = |isa, threads, others| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+                let mut items = case.clone();
+                let options = Options { isa, ..Options::default() };
+                let tree = pool.install(|| build_beside(others, &mut items, 2, 2, &options));
+                let numbers: Vec<u32> = items.iter().map(Record::primitive).collect();
+                (format!("{tree:?}"), numbers)
+            };
+            let expected = build(Isa::Portable, 1, 0);
+            for (threads, others) in [(1, 0), (2, 0), (3, 0), (3, 1000)] {
+                let same = build(Isa::detect(), threads, others) == expected;
+                assert!(same, "{} items, {threads} threads, {others} beside", case.len());
             }
         }
     }

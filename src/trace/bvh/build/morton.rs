@@ -92,7 +92,7 @@ const TOP_BITS: u32 = LARGE_BIT + 1 - 2 * LOW_BITS;
 /// Bits that buckets are sorted by at a time, twice.
 const LOW_BITS: u32 = 10;
 
-/// Codes that are sorted by their highest bits at a time: they fit the second cache.
+/// What one thread sorts by the highest bits, or cuts into clusters, at a time: codes and their copy fit the second cache.
 const CHUNK: usize = 1 << 15;
 
 /// Buckets of at most this many are sorted by comparing: to go through all counts would take longer.
@@ -101,6 +101,10 @@ const BY_COMPARING: usize = 256;
 /// By rising code, those with equal codes as they came: each chunk by the highest bits, what has these in common from all
 /// chunks into one bucket, and each bucket by the other bits; all of it by all threads. Numbers rise in `coded`.
 fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
+    if coded.len() <= BY_COMPARING {
+        sort_by_comparing(&mut coded);
+        return coded;
+    }
     let by_chunks = coded.par_chunks_mut(CHUNK).map(|chunk| {
         let mut sorted = vec![Coded { code: 0, number: 0 }; chunk.len()];
         let ends = counting_sort(chunk, &mut sorted, TOP_BITS, 2 * LOW_BITS);
@@ -129,14 +133,18 @@ fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
     }
     jobs.into_par_iter().for_each(|bucket| {
         if bucket.len() <= BY_COMPARING {
-            bucket.sort_unstable_by_key(|item| u64::from(item.code) << 32 | u64::from(item.number));
-            return;
+            return sort_by_comparing(bucket);
         }
         let mut other = vec![Coded { code: 0, number: 0 }; bucket.len()];
         counting_sort(bucket, &mut other, LOW_BITS, 0);
         counting_sort(&other, bucket, LOW_BITS, LOW_BITS);
     });
     sorted
+}
+
+/// By numbers, too, since those with equal codes came by rising number.
+fn sort_by_comparing(coded: &mut [Coded]) {
+    coded.sort_unstable_by_key(|item| u64::from(item.code) << 32 | u64::from(item.number));
 }
 
 /// Stable, by `bits` of the codes from bit `shift` on; and where those with each digit end.
@@ -209,17 +217,29 @@ mod tests {
         assert_eq!(clusters(&coded(&[9]), 4), [1]);
         assert_eq!(clusters(&coded(&[0, 1, 7, 8, 9]), 4), [3, 2]);
         assert_eq!(clusters(&coded(&[3; 10]), 4), [2, 3, 2, 3]);
-        // By several threads: 2,048 halves of halves, and so on.
-        let halves = clusters(&coded(&[3; 40_000]), 32);
-        assert_eq!((halves.len(), halves.iter().sum::<usize>()), (2048, 40_000));
-        assert!(halves.iter().all(|len| (19..=20).contains(len)));
+        // By several threads: of cells of all sizes, some of them with equal codes.
+        fn one_by_one(sorted: &[Coded], most: usize) -> Vec<usize> {
+            if sorted.len() <= most {
+                return (!sorted.is_empty()).then_some(sorted.len()).into_iter().collect();
+            }
+            let different = sorted[0].code ^ sorted[sorted.len() - 1].code;
+            let bit = |item: &Coded| item.code & (1 << different.checked_ilog2().unwrap_or(0)) != 0;
+            let middle = sorted.len() / 2;
+            let at = if different == 0 { middle } else { sorted.iter().position(bit).expect("the last one") };
+            [one_by_one(&sorted[..at], most), one_by_one(&sorted[at..], most)].concat()
+        }
+        let mut codes: Vec<u32> = (0..100_000u32).map(|i| i.wrapping_mul(i) >> (i % 13) & 0x3fff_ffff).collect();
+        codes.sort_unstable();
+        let codes = coded(&codes);
+        assert_eq!(clusters(&codes, 32), one_by_one(&codes, 32));
     }
 
     /// Few codes and many, of one bucket and of all: buckets on either side of [`BY_COMPARING`], and chunks that are not full.
     #[test]
     fn sorting_is_stable() {
-        for (count, bits) in [(0, 0), (1, 0x7fff_ffff), (100_000, 0x7fc0_07ff), (100_000, 0x7fff_ffff), (70_000, 0x3ff)]
-        {
+        let some_bits = [0x7fff_ffff, 0x7fc0_07ff, 0x00ff_ffff, 0x000f_fc00, 0x3ff];
+        let many = some_bits.map(|bits| (100_000, bits));
+        for (count, bits) in [(0, 0), (1, 0), (200, 0x7fff_ffff)].into_iter().chain(many) {
             let mut state = 1u32;
             let coded: Vec<Coded> = (0..count)
                 .map(|number| {

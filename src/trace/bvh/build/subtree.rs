@@ -32,13 +32,14 @@ impl Subtree<'_> {
 
     /// The same, for threads that have nothing else to do.
     pub fn nodes_by_all(self, isa: Isa) -> Vec<Node> {
-        let Self { rule, items, range, levels } = self;
-        if range.len <= PIECE {
-            return Subtree { rule, items, range, levels }.nodes(isa);
+        if self.range.len <= PIECE {
+            return self.nodes(isa);
         }
+        let Self { rule, items, range, levels } = self;
         let mut pieces = Vec::new();
         BinaryKernel::new(rule, items, range, levels).pieces(isa, &mut pieces);
-        isa::dispatch(isa, JoinKernel { pieces, rule }).nodes(rule, levels)
+        let (binary, joints) = Binary::joined(pieces, rule);
+        isa::dispatch(isa, WeighKernel { binary, joints, rule }).nodes(rule, levels)
     }
 }
 
@@ -60,17 +61,17 @@ impl<'a> BinaryKernel<'a> {
 
     /// Adds its pieces, each branch before its first side, and all of that before its second.
     fn pieces(self, isa: Isa, pieces: &mut Vec<Piece>) {
-        let Self { rule, items, range, levels, is_root } = self;
+        let Self { rule, items, range, levels, .. } = self;
+        let side = |range, levels, items| BinaryKernel { rule, items, range, levels, is_root: false };
         let sides = (range.len > PIECE)
             .then(|| isa::dispatch(isa, DivideKernel { rule, items: &mut *items, range, levels }))
             .flatten();
         let Some([first, second]) = sides else {
-            pieces.push(Piece::Whole(isa::dispatch(isa, BinaryKernel { rule, items, range, levels, is_root })));
+            pieces.push(Piece::Whole(isa::dispatch(isa, side(range, levels, items))));
             return;
         };
         let (first_items, second_items) = items.split_at_mut(first.len as usize);
-        let side = |range, items| BinaryKernel { rule, items, range, levels: levels - 1, is_root: false };
-        let (first, second) = (side(first, first_items), side(second, second_items));
+        let (first, second) = (side(first, levels - 1, first_items), side(second, levels - 1, second_items));
         let branch = pieces.len();
         pieces.push(Piece::Branch { range, second: 0 });
         let mut others = Vec::new();
@@ -111,20 +112,21 @@ impl Kernel for DivideKernel<'_> {
     }
 }
 
-/// The binary tree of a root, of its pieces.
-struct JoinKernel<'a> {
-    pieces: Vec<Piece>,
+/// A whole binary tree, with costs of those branches too that join others.
+struct WeighKernel<'a> {
+    binary: Binary,
+    joints: Vec<usize>,
     rule: &'a Rule,
 }
 
-impl Kernel for JoinKernel<'_> {
+impl Kernel for WeighKernel<'_> {
     type Output = Binary;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Binary {
-        let (mut binary, joints) = Binary::joined(self.pieces, self.rule);
-        for &number in joints.iter().rev() {
-            binary.weigh_branch::<S>(number, self.rule, number == 0);
+        let Self { mut binary, joints, rule } = self;
+        for number in joints.into_iter().rev() {
+            binary.weigh_branch::<S>(number, rule, number == 0);
         }
         binary
     }

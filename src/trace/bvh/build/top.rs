@@ -65,7 +65,7 @@ impl Shared<'_> {
 /// of the left side behind.
 fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
     let (front, back) = items.split_at_mut(left_len);
-    let (mut gaps, mut strays) = (Pieces::new(front), Pieces::new(back));
+    let (mut gaps, mut strays) = (Rest::new(front), Rest::new(back));
     let mut at = 0;
     for [left, right] in sides {
         let middle = at + left.len as usize;
@@ -92,15 +92,15 @@ fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
     pairs.into_par_iter().for_each(|(a, b)| a.swap_with_slice(b));
 }
 
-/// Parts of a slice, taken from the front to the end.
-struct Pieces<'a> {
+/// What is left of a slice from which ranges are taken, from the front to the end.
+struct Rest<'a> {
     rest: &'a mut [Record],
     /// Index of the first that is left.
     first: usize,
     taken: Vec<&'a mut [Record]>,
 }
 
-impl<'a> Pieces<'a> {
+impl<'a> Rest<'a> {
     fn new(rest: &'a mut [Record]) -> Self {
         Self { rest, first: 0, taken: Vec::new() }
     }
