@@ -165,7 +165,7 @@ impl Bvh {
         options.isa.demand();
         let build = |parts: &[Part], others| TriangleTree::build(parts, &options, others);
         let levels = levels(world);
-        // Large ones one after the other, for what is sorted for a tree is larger than the tree.
+        // Large ones one after the other, so that what is sorted for a tree is there once.
         let is_small = |parts: &[Part]| parts.iter().map(|part| part.primitives.len()).sum::<usize>() <= SMALL;
         let others = levels.iter().filter(|parts| is_small(parts)).count().saturating_sub(1);
         let small: Vec<_> = levels.par_iter().map(|parts| is_small(parts).then(|| build(parts, others))).collect();

@@ -134,17 +134,10 @@ impl Builder<'_> {
             children.iter().filter(|(_, child)| !child.is_leaf).map(|(slot, child)| (slot, child.range)).collect();
         options.report((range.len - inner.iter().map(|(_, range)| range.len).sum::<u32>()) as usize);
         inner.sort_by_key(|(_, range)| range.first);
-        let (mut rest, mut first) = (items, range.first);
-        let mut jobs = Vec::with_capacity(inner.len());
-        for (slot, range) in inner {
-            // Between them are leaves.
-            let (_, own) = rest.split_at_mut((range.first - first) as usize);
-            let (own, others) = own.split_at_mut(range.len as usize);
-            (rest, first) = (others, range.first + range.len);
-            jobs.push((slot, range, own));
-        }
-        let below = jobs.into_par_iter().with_max_len(1);
-        let below = below.map(|(slot, range, items)| (slot, self.build(range, items, depth + 1)));
+        // Between them are leaves.
+        let own = top::parts(items, inner.iter().map(|(_, inner)| inner.within(range.first)));
+        let below = inner.into_par_iter().zip(own).with_max_len(1);
+        let below = below.map(|((slot, range), items)| (slot, self.build(range, items, depth + 1)));
         Built::Upper { node: Box::new(children.node(rule)), below: below.collect() }
     }
 }

@@ -118,20 +118,14 @@ fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
     };
     let len = |bucket| ends.iter().map(|ends| of_bucket(bucket, ends).len()).sum();
     let buckets: Vec<(usize, usize)> = (0..1 << TOP_BITS).into_par_iter().map(|bucket| (len(bucket), bucket)).collect();
-    let mut sorted = room::fill(buckets.clone(), |bucket, room| {
+    let mut sorted = room::fill(buckets, |bucket, room| {
         for (chunk, ends) in coded.chunks(CHUNK).zip(&ends) {
             chunk[of_bucket(bucket, ends)].iter().for_each(|&item| room.push(item));
         }
     });
     drop(coded);
-    let mut rest = &mut sorted[..];
-    let mut jobs = Vec::with_capacity(buckets.len());
-    for (len, _) in buckets {
-        let (own, others) = rest.split_at_mut(len);
-        rest = others;
-        jobs.push(own);
-    }
-    jobs.into_par_iter().for_each(|bucket| {
+    let top = |item: &Coded| item.code >> (2 * LOW_BITS);
+    sorted.par_chunk_by_mut(|a, b| top(a) == top(b)).for_each(|bucket| {
         if bucket.len() <= BY_COMPARING {
             return sort_by_comparing(bucket);
         }

@@ -65,56 +65,47 @@ impl Shared<'_> {
 /// of the left side behind.
 fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
     let (front, back) = items.split_at_mut(left_len);
-    let (mut gaps, mut strays) = (Rest::new(front), Rest::new(back));
+    let (mut gaps, mut strays) = (Vec::new(), Vec::new());
     let mut at = 0;
     for [left, right] in sides {
         let middle = at + left.len as usize;
         let end = middle + right.len as usize;
-        gaps.take(middle.min(left_len)..end.min(left_len));
-        strays.take(at.max(left_len) - left_len..middle.max(left_len) - left_len);
+        gaps.push(middle.min(left_len)..end.min(left_len));
+        strays.push(at.max(left_len) - left_len..middle.max(left_len) - left_len);
         at = end;
     }
-    let (mut gaps, mut strays) = (gaps.taken.into_iter(), strays.taken.into_iter());
-    let (mut gap, mut stray): (&mut [Record], &mut [Record]) = (&mut [], &mut []);
-    let mut pairs = Vec::new();
-    loop {
-        if gap.is_empty() {
-            let Some(next) = gaps.next() else { break };
-            gap = next;
+    let mut strays = strays.into_iter().filter(|range| !range.is_empty());
+    let mut stray = 0..0;
+    let (mut here, mut there) = (Vec::new(), Vec::new());
+    for mut gap in gaps {
+        while !gap.is_empty() {
+            if stray.is_empty() {
+                stray = strays.next().expect("as many are astray as there are gaps");
+            }
+            let len = gap.len().min(stray.len());
+            here.push(gap.start..gap.start + len);
+            there.push(stray.start..stray.start + len);
+            gap.start += len;
+            stray.start += len;
         }
-        if stray.is_empty() {
-            stray = strays.next().expect("as many are astray as there are gaps");
-        }
-        let len = gap.len().min(stray.len());
-        let (a, b) = (gap.split_off_mut(..len), stray.split_off_mut(..len));
-        pairs.push((a.expect("so many"), b.expect("so many")));
     }
-    pairs.into_par_iter().for_each(|(a, b)| a.swap_with_slice(b));
+    let pairs = parts(front, here).into_par_iter().zip(parts(back, there));
+    pairs.for_each(|(here, there)| here.swap_with_slice(there));
 }
 
-/// What is left of a slice from which ranges are taken, from the front to the end.
-struct Rest<'a> {
-    rest: &'a mut [Record],
-    /// Index of the first that is left.
-    first: usize,
-    taken: Vec<&'a mut [Record]>,
-}
-
-impl<'a> Rest<'a> {
-    fn new(rest: &'a mut [Record]) -> Self {
-        Self { rest, first: 0, taken: Vec::new() }
-    }
-
-    /// Takes a range; an empty one is left out.
-    fn take(&mut self, range: std::ops::Range<usize>) {
-        if range.is_empty() {
-            return;
-        }
-        let (_, rest) = std::mem::take(&mut self.rest).split_at_mut(range.start - self.first);
-        let (taken, rest) = rest.split_at_mut(range.len());
-        (self.rest, self.first) = (rest, range.end);
-        self.taken.push(taken);
-    }
+/// The given ranges of a slice, which follow one another.
+pub(super) fn parts(
+    mut items: &mut [Record],
+    ranges: impl IntoIterator<Item = std::ops::Range<usize>>,
+) -> Vec<&mut [Record]> {
+    let mut first = 0;
+    let part = |range: std::ops::Range<usize>| {
+        let (_, rest) = std::mem::take(&mut items).split_at_mut(range.start - first);
+        let (part, rest) = rest.split_at_mut(range.len());
+        (items, first) = (rest, range.end);
+        part
+    };
+    ranges.into_iter().map(part).collect()
 }
 
 impl Range {
