@@ -110,10 +110,11 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// The largest scalar product of `way` with any of its points.
+    /// How far it reaches along `way`, and against it: the largest scalar products of these with any of its points.
     #[inline]
-    pub fn farthest(&self, way: DVec3) -> f64 {
-        way.dot(DVec3::select(way.cmplt(DVec3::ZERO), self.min.as_dvec3(), self.max.as_dvec3()))
+    pub fn extent(&self, way: DVec3) -> [f64; 2] {
+        let (a, b) = (way * self.min.as_dvec3(), way * self.max.as_dvec3());
+        [a.max(b).element_sum(), -a.min(b).element_sum()]
     }
 
     /// Half the surface area, the measure of the surface area heuristic; 0 where empty.

@@ -145,13 +145,13 @@ impl Placement {
 
     /// A box around the object whose own box is `object`, in world coordinates, at all times; rounded outwards.
     pub fn bounds(&self, object: Aabb) -> Aabb {
-        self.bounds_of(object, |way| object.farthest(way))
+        self.bounds_of(object, |way| object.extent(way))
     }
 
-    /// The same, and tighter, of an object of which more is known: `farthest` is at least the scalar product of any of its points with
-    /// the given direction, in the object's coordinates.
-    pub fn bounds_of(&self, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
-        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, farthest) };
+    /// The same, and tighter, of an object of which more is known: `extent` is at least the scalar product of any of its points with
+    /// the given direction, in the object's coordinates, and with the opposite one.
+    pub fn bounds_of(&self, object: Aabb, extent: impl Fn(DVec3) -> [f64; 2]) -> Aabb {
+        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, extent) };
         if object.is_empty() {
             return Aabb::EMPTY;
         }
@@ -162,29 +162,29 @@ impl Placement {
         let most = start.matrix3.abs().max_entries(&end.matrix3.abs());
         let rounding = most * reach + start.translation.abs().max(end.translation.abs());
         let slack = rounding * (1.01 * f64::from(UNIT_ROUNDOFF));
-        bounds_under(&start, reach, slack, &farthest).union(bounds_under(&end, reach, slack, &farthest))
+        bounds_under(&start, reach, slack, &extent).union(bounds_under(&end, reach, slack, &extent))
     }
 }
 
-/// The box in the world of an object that a transform places; `farthest` is as of [`Placement::bounds_of`].
-pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, farthest: impl Fn(DVec3) -> f64) -> Aabb {
+/// The box in the world of an object that a transform places; `extent` is as of [`Placement::bounds_of`].
+pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, extent: impl Fn(DVec3) -> [f64; 2]) -> Aabb {
     if object.is_empty() {
         return Aabb::EMPTY;
     }
     let reach = object.min.abs().max(object.max.abs()).as_dvec3();
-    bounds_under(&to_world.as_daffine3(), reach, DVec3::ZERO, &farthest)
+    bounds_under(&to_world.as_daffine3(), reach, DVec3::ZERO, &extent)
 }
 
 /// `reach` is the largest magnitude of each coordinate of the object.
-fn bounds_under(to_world: &DAffine3, reach: DVec3, slack: DVec3, farthest: &impl Fn(DVec3) -> f64) -> Aabb {
+fn bounds_under(to_world: &DAffine3, reach: DVec3, slack: DVec3, extent: &impl Fn(DVec3) -> [f64; 2]) -> Aabb {
     let DAffine3 { matrix3, translation } = to_world;
     // f64 rounding of the sums, far below one step of f32.
     let slack = slack + (matrix3.abs() * reach + translation.abs()) * gamma64(16);
     let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
     for axis in 0..3 {
-        let way = matrix3.row(axis);
-        min[axis] = ((translation[axis] - farthest(-way) - slack[axis]) as f32).next_down();
-        max[axis] = ((translation[axis] + farthest(way) + slack[axis]) as f32).next_up();
+        let [along, against] = extent(matrix3.row(axis));
+        min[axis] = ((translation[axis] - against - slack[axis]) as f32).next_down();
+        max[axis] = ((translation[axis] + along + slack[axis]) as f32).next_up();
     }
     Aabb { min, max }
 }

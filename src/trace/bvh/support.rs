@@ -54,12 +54,13 @@ impl<'a> Outlines<'a> {
         let level = &self.objects[placement.object as usize];
         let (bounds, table) = (level.bounds(), &self.tables[placement.object as usize]);
         placement.bounds_of(bounds, |way| {
-            let farthest = match table {
-                Some(table) => table.farthest(way),
+            let [along, against] = match table {
+                Some(table) => table.extent(way),
                 // A row of a matrix of f32, so nothing is lost.
-                None => level.farthest(way.as_vec3(), self.visits, &mut None),
+                None => [way, -way].map(|way| level.farthest(way.as_vec3(), self.visits, &mut None)),
             };
-            farthest.min(bounds.farthest(way))
+            let [most, most_against] = bounds.extent(way);
+            [along.min(most), against.min(most_against)]
         })
     }
 }
@@ -68,8 +69,8 @@ impl<'a> Outlines<'a> {
 struct Table {
     /// Along each side of a face; a power of two, so that the grid is exact.
     cells: usize,
-    /// Face by face and row by row, one value more than cells to a row. Faces are those of -x, x, -y, y, -z, z, with the other axes in their order.
-    values: Vec<f64>,
+    /// Face by face and row by row, one more than cells to a row; along and against. Faces are those of x, y, z, with the other axes in their order.
+    values: Vec<[f64; 2]>,
     /// More than rounding can add in a direction of which no component is larger than 1.
     spare: f64,
 }
@@ -84,54 +85,61 @@ impl Table {
         }
     }
 
+    /// Values that it has.
     fn entries(cells: usize) -> usize {
-        6 * (cells + 1) * (cells + 1)
+        2 * 3 * (cells + 1) * (cells + 1)
     }
 
     /// Of a support function, which is asked for neighbours one after the other, as [`Level::farthest`] is.
     fn new(cells: usize, support: impl Fn(Vec3, &mut Option<Child>) -> f64 + Sync) -> Self {
         let side = cells + 1;
-        let mut values = vec![0.0; Self::entries(cells)];
+        let mut values = vec![[0.0; 2]; Self::entries(cells) / 2];
         values.par_chunks_mut(side).enumerate().for_each(|(row, values)| {
-            let (face, j) = (row / side, row % side);
-            let along = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
-            let mut first = None;
-            for (i, value) in values.iter_mut().enumerate() {
+            let (axis, j) = (row / side, row % side);
+            let component = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
+            let mut first = [None; 2];
+            for (i, [along, against]) in values.iter_mut().enumerate() {
                 let mut way = Vec3::ZERO;
-                let axis = face / 2;
-                way[axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
+                way[axis] = 1.0;
                 let [p, q] = OTHERS[axis];
-                (way[p], way[q]) = (along(i), along(j));
-                *value = support(way, &mut first);
+                (way[p], way[q]) = (component(i), component(j));
+                *along = support(way, &mut first[0]);
+                *against = support(-way, &mut first[1]);
             }
         });
-        let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let most = values.as_flattened().iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         // A few roundings of what is at most `cells`, times values.
         let spare = most * cells as f64 * 64.0 * f64::EPSILON;
         Self { cells, values, spare }
     }
 
-    /// At least the support in a direction whose components are those of f32; infinite or NaN where nothing is known.
-    fn farthest(&self, way: DVec3) -> f64 {
-        let axis = way.abs().max_position();
-        // The way is so many times as long as one on the cube.
-        let length = way[axis].abs();
-        let face = 2 * axis + usize::from(way[axis] > 0.0);
+    /// At least the support in a direction whose components are those of f32, and in the opposite one; infinite or NaN where nothing is known.
+    #[inline]
+    fn extent(&self, way: DVec3) -> [f64; 2] {
+        // The largest component, and where along and against are on its face: without branches, which nobody can predict.
+        let size = way.abs();
+        let axis = usize::from(size.y > size.x);
+        let axis = if size.z > size[axis] { 2 } else { axis };
+        let is_against = usize::from(way[axis] < 0.0);
         let [p, q] = OTHERS[axis];
         let half = self.cells as f64 / 2.0;
-        let scale = half / length;
+        // The way is so many times as long as one on the cube, which it runs along or against.
+        let (length, scale) = (size[axis], half / way[axis]);
         let place = |component: f64| {
             let at = component * scale + half;
-            let cell = (at as usize).min(self.cells - 1);
+            let cell = (at as i32 as usize).min(self.cells - 1);
             (cell, at - cell as f64)
         };
         let ((i, f), (j, g)) = (place(way[p]), place(way[q]));
         let side = self.cells + 1;
-        let corners = &self.values[(face * side + j) * side + i..][..side + 2];
-        let [low, right, up, across] = [corners[0], corners[1], corners[side], corners[side + 1]];
+        let corners = &self.values[(axis * side + j) * side + i..][..side + 2];
         // The cell is cut into two triangles.
-        let (more, less, beside) = if f > g { (f, g, right) } else { (g, f, up) };
-        length * (low * (1.0 - more) + beside * (more - less) + across * less + self.spare)
+        let beside = if f > g { 1 } else { side };
+        let (more, less) = (f.max(g), f.min(g));
+        let [low, beside, across] = [&corners[0], &corners[beside], &corners[side + 1]];
+        let on = |k: usize| low[k] * (1.0 - more) + beside[k] * (more - less) + across[k] * less;
+        let extent = [on(0), on(1)].map(|value| length * (value + self.spare));
+        [extent[is_against], extent[1 - is_against]]
     }
 }
 
@@ -281,14 +289,17 @@ mod tests {
                     _ => {}
                 }
                 let way = way.as_dvec3();
-                let (most, farthest) = (way.length(), ball.farthest(way));
-                assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
-                worst = worst.max((farthest - most) / way.abs().max_element());
-                let (most, farthest) = (reach(&soup, way), corners.farthest(way));
-                assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
+                for way in [way, -way] {
+                    let (most, farthest) = (way.length(), ball.extent(way)[0]);
+                    assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
+                    worst = worst.max((farthest - most) / way.abs().max_element());
+                    let (most, [farthest, against]) = (reach(&soup, way), corners.extent(way));
+                    assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
+                    assert_eq!([against, farthest], corners.extent(-way));
+                }
             }
             assert!(worst > 0.8 * finer && worst < 1.0001 * finer, "{worst} of {cells} cells");
-            assert!(ball.farthest(DVec3::ZERO).is_nan(), "nowhere is no way");
+            assert!(ball.extent(DVec3::ZERO).iter().all(|at| at.is_nan()), "nowhere is no way");
         }
     }
 
