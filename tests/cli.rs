@@ -235,7 +235,7 @@ fn builds_never_change_a_picture_and_memory_is_kept() {
     let folder = Folder::new();
     let auto = folder.render("auto.exr", &["-v"]);
     assert!(text(&auto.stdout).contains("rays a triangle are"), "{}", text(&auto.stdout));
-    for build in ["fast", "default", "high", "compact"] {
+    for build in ["fast", "default", "high", "compact", "fast-compact"] {
         let output = folder.render("other.exr", &["-v", "--build", build, "--max-memory", "1T"]);
         let summary = text(&output.stdout);
         assert!(summary.contains(&format!("{build}: asked for")), "{summary}");
@@ -244,7 +244,7 @@ fn builds_never_change_a_picture_and_memory_is_kept() {
     let output = folder.render("none.exr", &["--max-memory", "1M"]);
     let message = text(&output.stderr);
     assert_eq!((output.status.code(), message.lines().count()), (Some(3), 1), "{message}");
-    assert!(message.contains("compact build") && message.contains("give at least --max-memory"), "{message}");
+    assert!(message.contains("fast-compact build") && message.contains("give at least --max-memory"), "{message}");
     assert!(!std::fs::exists(folder.path("none.exr")).unwrap());
 }
 

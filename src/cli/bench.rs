@@ -49,14 +49,14 @@ pub(super) struct BenchArgs {
     )]
     rays: Vec<RaysArg>,
 
-    /// Modes: native's default, native-fast, native-high, native-compact; Embree's fast, robust, compact, and high (quality,
+    /// Modes: native's default, native-fast, native-high, native-compact, native-fast-compact; Embree's fast, robust, compact, and high (quality,
     /// fast otherwise)
     #[arg(
         long,
         value_name = "MODE,...",
         value_enum,
         value_delimiter = ',',
-        default_value = "default,native-fast,native-high,native-compact,fast,robust,compact,high"
+        default_value = "default,native-fast,native-high,native-compact,native-fast-compact,fast,robust,compact,high"
     )]
     modes: Vec<ModeArg>,
 
@@ -154,6 +154,8 @@ enum ModeArg {
     NativeHigh,
     /// Native, in least memory
     NativeCompact,
+    /// Native, built fastest in least memory
+    NativeFastCompact,
     /// Embree, medium quality, rays may slip between triangles
     Fast,
     /// Embree, medium quality, robust
@@ -199,11 +201,12 @@ mod with_embree {
     use crate::trace::embree::{self, Embree, Options, Quality};
 
     /// Every mode, native first.
-    const MODES: [ModeArg; 8] = [
+    const MODES: [ModeArg; 9] = [
         ModeArg::Default,
         ModeArg::NativeFast,
         ModeArg::NativeHigh,
         ModeArg::NativeCompact,
+        ModeArg::NativeFastCompact,
         ModeArg::Fast,
         ModeArg::Robust,
         ModeArg::Compact,
@@ -303,6 +306,7 @@ mod with_embree {
             ModeArg::NativeFast => native(Preset::Fast),
             ModeArg::NativeHigh => native(Preset::High),
             ModeArg::NativeCompact => native(Preset::Compact),
+            ModeArg::NativeFastCompact => native(Preset::FastCompact),
             ModeArg::Fast => embree("fast", medium),
             ModeArg::Robust => embree("robust", Options { robust: true, ..medium }),
             ModeArg::Compact => embree("compact", Options { compact: true, ..medium }),

@@ -40,6 +40,8 @@ enum Build {
     High,
     /// A fifth of the memory, slower to trace
     Compact,
+    /// Soonest ready, in as little memory, slowest to trace
+    FastCompact,
 }
 
 impl Build {
@@ -50,6 +52,7 @@ impl Build {
             Self::Default => Some(Preset::Default),
             Self::High => Some(Preset::High),
             Self::Compact => Some(Preset::Compact),
+            Self::FastCompact => Some(Preset::FastCompact),
         }
     }
 }
@@ -66,7 +69,7 @@ impl BuildArgs {
     /// [`Error::Backend`] where it cannot.
     pub(super) fn check_file(&self, backend: BackendArg, scene: &Path) -> Result<()> {
         let Some(promised) = self.max_memory.and_then(|_| io::promised(scene)) else { return Ok(()) };
-        self.decide(backend, promised.triangles, 0, promised.bytes).map(drop)
+        self.decide(backend, promised.triangles, Rays::default(), promised.bytes).map(drop)
     }
 
     /// How to build the native tree over so many triangles, for so many rays; none where only Embree renders.
@@ -80,11 +83,11 @@ impl BuildArgs {
         rays: &Rays,
         pixels: u64,
     ) -> Result<Option<BuildChoice>> {
-        self.decide(backend, triangles, rays.total(), pixels.saturating_mul(BYTES_A_PIXEL))
+        self.decide(backend, triangles, *rays, pixels.saturating_mul(BYTES_A_PIXEL))
     }
 
     /// The same, with so many bytes still to come beside the tree.
-    fn decide(&self, backend: BackendArg, triangles: u64, rays: u64, to_come: u64) -> Result<Option<BuildChoice>> {
+    fn decide(&self, backend: BackendArg, triangles: u64, rays: Rays, to_come: u64) -> Result<Option<BuildChoice>> {
         if self.max_memory.is_some() {
             // A render holds OpenImageIO's libraries sooner or later, and may be loading them just now. Where that fails, whoever wants a
             // picture says so.

@@ -2,11 +2,12 @@
 //! is.
 //!
 //! The model is linear: a preset costs so much for every triangle and every ray, and the cheapest whose memory fits is
-//! taken. Finer models (depth, occlusion, coherence) would need what only the finished tree tells, and move the limits
+//! taken. Finer models (depth, occlusion) would need what only the finished tree tells, and move the limits
 //! by less than machines differ.
 
 use std::fmt;
 
+use super::Rays;
 use crate::trace::bvh::Preset;
 
 /// Bytes that Embree holds for a triangle at most, while it builds and beside the mesh; measured on 20 million.
@@ -18,7 +19,7 @@ pub struct BuildRequest {
     /// Triangles as stored: those of an instanced mesh count once.
     pub triangles: u64,
     /// Rays that will be traced, at most.
-    pub rays: u64,
+    pub rays: Rays,
     /// Bytes that the process holds before it builds, the meshes among them, and those it will need for the picture.
     pub held: u64,
     /// Bytes that it may hold at any time; none for no limit.
@@ -53,24 +54,28 @@ pub struct NotEnoughMemory {
 struct Cost {
     /// Nanoseconds to build a triangle, one thread.
     build: f64,
-    /// Nanoseconds to trace a ray, one thread; a mixture of camera and shadow rays on a large mesh.
+    /// Nanoseconds to trace a ray from the camera or to a light, one thread.
     ray: f64,
+    /// The same of a mirrored, refracted or scattered one, which shares its way with no other.
+    onward: f64,
     /// Bytes a triangle of the finished tree.
     tree: u64,
     /// Bytes a triangle beside the tree while it is built.
     building: u64,
 }
 
-/// Measured on terrains of 2 and 20 million triangles; of bytes, what no mesh tried exceeds. The time to build includes
-/// the system's for handing out the memory, which is why the compact tree is soon ready too. The differences decide:
-/// `Compact` pays below 2.2 rays a triangle, `High` above 170.
+/// Measured on terrains of 2 and 20 million triangles, scans and `architecture`; of bytes, what no mesh tried exceeds. The time to build includes
+/// the system's for handing out the memory, which is why compact trees are soon ready. The differences decide: of rays from the
+/// camera and to lights `FastCompact` pays below two thirds of one a triangle, `Fast` below nine, `High` above 160; of others below a twentieth, below two, above 16.
+/// `Compact` is for rays that would pay for `Default` where there is not the memory.
 const fn cost(preset: Preset) -> Cost {
     match preset {
-        Preset::Fast => Cost { build: 260.0, ray: 220.0, tree: 66, building: 33 },
-        Preset::Default => Cost { build: 290.0, ray: 163.0, tree: 58, building: 40 },
-        // A third more references, and a tenth won on rays: an assumption.
-        Preset::High => Cost { build: 2500.0, ray: 150.0, tree: 84, building: 60 },
-        Preset::Compact => Cost { build: 210.0, ray: 200.0, tree: 16, building: 40 },
+        Preset::Fast => Cost { build: 105.0, ray: 95.0, onward: 340.0, tree: 66, building: 33 },
+        Preset::Default => Cost { build: 290.0, ray: 75.0, onward: 250.0, tree: 58, building: 40 },
+        // Where triangles are long and thin; nothing is won where they are not.
+        Preset::High => Cost { build: 450.0, ray: 74.0, onward: 240.0, tree: 84, building: 60 },
+        Preset::Compact => Cost { build: 210.0, ray: 115.0, onward: 650.0, tree: 16, building: 40 },
+        Preset::FastCompact => Cost { build: 75.0, ray: 140.0, onward: 900.0, tree: 18, building: 20 },
     }
 }
 
@@ -82,8 +87,9 @@ impl BuildRequest {
     }
 
     fn nanoseconds(&self, preset: Preset) -> f64 {
-        let Cost { build, ray, .. } = cost(preset);
-        build * self.triangles as f64 + ray * self.rays as f64
+        let Cost { build, ray, onward, .. } = cost(preset);
+        let Rays { camera, onward: others, shadow } = self.rays;
+        build * self.triangles as f64 + ray * (camera as f64 + shadow as f64) + onward * others as f64
     }
 
     /// Whether what is held anyway fits.
@@ -105,7 +111,7 @@ impl BuildRequest {
         let cheaper = |a: &Preset, b: &Preset| self.nanoseconds(*a).total_cmp(&self.nanoseconds(*b));
         let candidates = || Preset::ALL.into_iter().filter(allowed);
         let Some(preset) = candidates().filter(|preset| self.memory(*preset) <= limit).min_by(cheaper) else {
-            let least = candidates().min_by_key(|preset| self.memory(*preset)).unwrap_or(Preset::Compact);
+            let least = candidates().min_by_key(|preset| self.memory(*preset)).unwrap_or(Preset::FastCompact);
             return Err(NotEnoughMemory { preset: Some(least), needed: self.memory(least), limit });
         };
         let unlimited = candidates().min_by(cheaper).unwrap_or(preset);
@@ -114,9 +120,9 @@ impl BuildRequest {
         } else if preset != unlimited {
             format!("{} would take more memory than there may be", unlimited.name())
         } else {
-            let rays = self.rays as f64 / self.triangles as f64;
+            let rays = self.rays.total() as f64 / self.triangles as f64;
             let judged = match preset {
-                Preset::Fast | Preset::Compact => "too few to pay for a better tree",
+                Preset::Fast | Preset::Compact | Preset::FastCompact => "too few to pay for a better tree",
                 Preset::Default => "enough for a good tree, too few for the best",
                 Preset::High => "enough to pay for the best tree",
             };
@@ -141,7 +147,7 @@ impl fmt::Display for NotEnoughMemory {
         }
         write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
         match preset {
-            Some(Preset::Compact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
+            Some(Preset::FastCompact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
             Some(_) => {
                 write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
             }
@@ -154,20 +160,33 @@ impl fmt::Display for NotEnoughMemory {
 mod tests {
     use super::*;
 
-    const MESH: BuildRequest =
-        BuildRequest { triangles: 1_000_000, rays: 0, held: 500 << 20, max_memory: None, wanted: None };
+    const MESH: BuildRequest = BuildRequest {
+        triangles: 1_000_000,
+        rays: Rays { camera: 0, onward: 0, shadow: 0 },
+        held: 500 << 20,
+        max_memory: None,
+        wanted: None,
+    };
 
-    fn preset(rays: u64, max_memory: Option<u64>) -> Option<Preset> {
+    fn preset(rays: Rays, max_memory: Option<u64>) -> Option<Preset> {
         BuildRequest { rays, max_memory, ..MESH }.choose().ok().map(|choice| choice.preset)
     }
 
     #[test]
     fn rays_pay_for_triangles() {
-        use Preset::{Compact, Default, High};
-        // The limits follow from the costs: (290 - 210) / (200 - 163) and (2500 - 290) / (163 - 150).
-        let millions = [(0, Compact), (2, Compact), (3, Default), (169, Default), (171, High), (10_000, High)];
-        for (rays, expected) in millions {
-            assert_eq!(preset(rays * 1_000_000, None), Some(expected), "{rays}");
+        use Preset::{Default, Fast, FastCompact, High};
+        // The limits follow from the costs: (105 - 75) / (140 - 95), (290 - 105) / (95 - 75) and (450 - 290) / (75 - 74).
+        let of_camera =
+            [(0.0, FastCompact), (0.6, FastCompact), (0.7, Fast), (9.0, Fast), (9.5, Default), (159.0, Default)];
+        for (rays, expected) in of_camera.into_iter().chain([(161.0, High), (10_000.0, High)]) {
+            let half = (rays * 500_000.0) as u64;
+            assert_eq!(preset(Rays { camera: half, shadow: half, onward: 0 }, None), Some(expected), "{rays}");
+        }
+        // (105 - 75) / (900 - 340), (290 - 105) / (340 - 250) and (450 - 290) / (250 - 240).
+        let others = [(0.05, FastCompact), (0.06, Fast), (2.0, Fast), (2.1, Default), (15.9, Default), (16.1, High)];
+        for (rays, expected) in others {
+            let onward = (rays * 1e6) as u64;
+            assert_eq!(preset(Rays { onward, ..Rays::default() }, None), Some(expected), "{rays} onward");
         }
         assert!(BuildRequest { triangles: 0, ..MESH }.choose().is_ok());
         assert!(BuildRequest { triangles: u64::MAX, ..MESH }.choose().is_ok());
@@ -175,26 +194,36 @@ mod tests {
 
     #[test]
     fn memory_comes_first() {
-        use Preset::{Compact, Default, High};
+        use Preset::{Compact, Default, FastCompact, High};
         let held = MESH.held;
-        let at = |rays, bytes: u64| preset(rays, Some(held + bytes * MESH.triangles));
-        let many = 1_000_000_000;
-        let chosen = [144, 143, 98, 97, 56, 55].map(|bytes| at(many, bytes));
-        assert_eq!(chosen, [Some(High), Some(Default), Some(Default), Some(Compact), Some(Compact), None]);
+        let many = Rays { camera: 1_000_000_000, ..Rays::default() };
+        let at = |bytes: u64| preset(many, Some(held + bytes * MESH.triangles));
+        let expected = [
+            (144, High),
+            (143, Default),
+            (98, Default),
+            (97, Compact),
+            (56, Compact),
+            (55, FastCompact),
+            (38, FastCompact),
+        ];
+        assert_eq!(expected.map(|(bytes, _)| at(bytes)), expected.map(|(_, preset)| Some(preset)));
+        assert_eq!(at(37), None);
         let error = BuildRequest { max_memory: Some(held), ..MESH }.choose().unwrap_err();
-        assert_eq!(error, NotEnoughMemory { preset: Some(Compact), needed: held + 56_000_000, limit: held });
+        assert_eq!(error, NotEnoughMemory { preset: Some(FastCompact), needed: held + 38_000_000, limit: held });
         let text = error.to_string();
         let error = BuildRequest { max_memory: Some(held - 1), ..MESH }.fits().unwrap_err();
         assert_eq!((error.needed, MESH.fits()), (held, Ok(())));
         // What the message asks for is enough.
-        assert!(text.contains("limit of 500 MiB") && text.contains("--max-memory 554M"), "{text}");
-        assert!(preset(0, Some(554 << 20)).is_some() && preset(0, Some(553 << 20)).is_none());
+        assert!(text.contains("limit of 500 MiB") && text.contains("--max-memory 537M"), "{text}");
+        assert!(preset(many, Some(537 << 20)).is_some() && preset(many, Some(536 << 20)).is_none());
     }
 
     #[test]
     fn a_wish_is_kept_or_refused() {
         for wanted in Preset::ALL {
-            let request = BuildRequest { wanted: Some(wanted), rays: 1 << 30, ..MESH };
+            let request =
+                BuildRequest { wanted: Some(wanted), rays: Rays { camera: 1 << 30, ..Rays::default() }, ..MESH };
             let choice = request.choose().unwrap();
             assert_eq!((choice.preset, choice.why.as_str()), (wanted, "asked for"));
             let error = BuildRequest { max_memory: Some(choice.memory - 1), ..request }.choose().unwrap_err();

@@ -8,7 +8,7 @@ use super::meshes::Meshes;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::room;
 use super::simd::Simd;
-use crate::math::is_traceable;
+use crate::math::{Aabb, is_traceable};
 use crate::memory::Array;
 use crate::trace::Part;
 
@@ -71,13 +71,8 @@ impl Leaves {
     pub fn new(tree: &mut Tree, items: &[Record], parts: &[Part], compact: bool) -> Self {
         let meshes = Meshes::new(parts);
         if compact {
-            let block = |items: &[Record]| {
-                let mut block = [NONE; LANES];
-                for (number, item) in block.iter_mut().zip(items) {
-                    *number = meshes.number(item.part(), item.primitive());
-                }
-                block
-            };
+            let block =
+                |items: &[Record]| numbered(items.iter().map(|item| meshes.number(item.part(), item.primitive())));
             return Self::of_numbers(blocks(tree, items, block), meshes);
         }
         Self::of_blocks(blocks(tree, items, |items| {
@@ -106,6 +101,15 @@ impl Leaves {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
             Self::Numbers(numbers) => scratch.insert(numbers.read(index)),
+        }
+    }
+
+    /// The box around a block's triangles.
+    #[inline]
+    pub fn bounds(&self, index: u32) -> Aabb {
+        match self {
+            Self::Blocks(blocks) => blocks[index as usize].bounds(),
+            Self::Numbers(numbers) => numbers.bounds(index),
         }
     }
 
@@ -201,6 +205,14 @@ impl Leaves {
     }
 }
 
+/// A block of the numbers of up to eight triangles.
+#[inline(always)]
+pub(super) fn numbered(triangles: impl Iterator<Item = u32>) -> [u32; LANES] {
+    let mut block = [NONE; LANES];
+    block.iter_mut().zip(triangles).for_each(|(number, triangle)| *number = triangle);
+    block
+}
+
 /// One block for each eight items of a leaf.
 fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) -> T + Sync) -> Vec<T> {
     let of_node = |node: &Node| node.items.iter().map(|&items| usize::from(items).div_ceil(LANES)).sum::<usize>();
@@ -222,10 +234,22 @@ impl Numbers {
     #[inline]
     fn read(&self, index: u32) -> Block {
         let mut block = Block::EMPTY;
-        for &number in self.blocks[index as usize].iter().filter(|&&number| number != NONE) {
-            self.meshes.push(&mut block, number);
-        }
+        self.of_block(index).for_each(|number| self.meshes.push(&mut block, number));
         block
+    }
+
+    /// The box around a block's triangles.
+    fn bounds(&self, index: u32) -> Aabb {
+        Aabb::around(self.of_block(index).flat_map(|number| {
+            let (mesh, primitive) = self.meshes.find(number);
+            mesh.corners(primitive)
+        }))
+    }
+
+    /// The numbers in a block.
+    #[inline(always)]
+    fn of_block(&self, index: u32) -> impl Iterator<Item = u32> {
+        self.blocks[index as usize].into_iter().filter(|&number| number != NONE)
     }
 
     /// Not inlined: where there are blocks, scratch would be cleared for nothing.

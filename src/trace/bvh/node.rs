@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
+use super::room;
 use crate::math::{Aabb, UNIT_ROUNDOFF, Vec3};
 use crate::memory::Array;
 use crate::trace::limits;
@@ -285,15 +286,17 @@ impl Tree {
     }
 
     /// This tree, whose leaves name one of `items` each, with nodes in their place: the item's primitive is the node's index.
-    pub fn over(self, items: &[Record], below: &mut Vec<Node>) -> Self {
-        let mut nodes = self.nodes.into_vec();
-        let base = nodes.len() as u32;
-        for child in nodes.iter_mut().flat_map(|node| &mut node.child) {
+    pub fn over(self, items: &[Record], below: Vec<Node>) -> Self {
+        let mut above = self.nodes.into_vec();
+        let base = above.len() as u32;
+        for child in above.iter_mut().flat_map(|node| &mut node.child) {
             if child.is_leaf() && *child != Child::NONE {
                 *child = Child::inner(base + items[child.first() as usize].primitive());
             }
         }
-        nodes.append(below);
+        const CHUNK: usize = 1 << 12;
+        let chunks = [&above[..]].into_iter().chain(below.chunks(CHUNK)).map(|nodes| (nodes.len(), nodes));
+        let nodes = room::fill(chunks.collect(), |nodes, room| nodes.iter().for_each(|&node| room.push(node)));
         Self { nodes: nodes.into(), ..self }
     }
 

@@ -14,11 +14,13 @@ pub enum Preset {
     High,
     /// The default tree in least memory: leaves hold numbers of triangles, whose corners are fetched from the mesh.
     Compact,
+    /// The fast tree in least memory, which is built sooner still.
+    FastCompact,
 }
 
 impl Preset {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Fast, Self::Default, Self::High, Self::Compact];
+    pub const ALL: [Self; 5] = [Self::Fast, Self::Default, Self::High, Self::Compact, Self::FastCompact];
 
     /// In lower case.
     pub const fn name(self) -> &'static str {
@@ -27,7 +29,13 @@ impl Preset {
             Self::Default => "default",
             Self::High => "high",
             Self::Compact => "compact",
+            Self::FastCompact => "fast-compact",
         }
+    }
+
+    /// Whether leaves hold numbers of triangles, and not their corners.
+    pub(super) const fn is_compact(self) -> bool {
+        matches!(self, Self::Compact | Self::FastCompact)
     }
 }
 

@@ -49,7 +49,7 @@ impl TriangleTree {
     /// Over the traceable triangles of `parts`, while so many `others` of its size are built.
     pub fn build(parts: &[Part], options: &Options<'_>, others: usize) -> Self {
         let (tree, leaves, count) = match options.preset {
-            Preset::Fast => clusters::build(parts, options),
+            Preset::Fast | Preset::FastCompact => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
                 let mut items = build::triangle_items(parts);
                 let count = items.len();
@@ -57,7 +57,7 @@ impl TriangleTree {
                     items = presplit::presplit(&items, &Meshes::new(parts));
                 }
                 let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
-                let leaves = Leaves::new(&mut tree, &items, parts, options.preset == Preset::Compact);
+                let leaves = Leaves::new(&mut tree, &items, parts, options.preset.is_compact());
                 (tree, leaves, count)
             }
         };
@@ -92,10 +92,7 @@ impl TriangleTree {
             return Err(refit::changed("other triangles that can be hit"));
         }
         let leaves = &self.leaves;
-        self.tree.refit(|blocks| {
-            let bounds = |index| leaves.block(index, &mut None).bounds();
-            blocks.map(bounds).fold(Aabb::EMPTY, Aabb::union)
-        });
+        self.tree.refit(|blocks| blocks.map(|index| leaves.bounds(index)).fold(Aabb::EMPTY, Aabb::union));
         self.parts = parts.iter().map(ids).collect();
         Ok(())
     }

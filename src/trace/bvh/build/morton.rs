@@ -14,11 +14,14 @@ use crate::memory;
 use crate::trace::bvh::meshes::{Mesh, Meshes};
 use crate::trace::bvh::room;
 
-/// Bits of a code for each axis.
-const BITS: u32 = 10;
+/// Bits of a code for the three axes together.
+const BITS: u32 = 30;
+
+/// The most bits for one axis.
+const MOST_BITS: u32 = 16;
 
 /// Set in the codes of large triangles.
-const LARGE_BIT: u32 = 3 * BITS;
+const LARGE_BIT: u32 = BITS;
 
 /// No code of a triangle that can be hit.
 const UNTRACEABLE: u32 = u32::MAX;
@@ -51,39 +54,61 @@ pub(in crate::trace::bvh) fn sorted(meshes: &Meshes) -> Vec<Coded> {
     sorted_by_code(coded)
 }
 
-/// From a triangle to the cell of its middle, the cells being cubes.
+/// From a triangle to the cell of its middle, the cells being nearly cubes: each bit halves the longest side of what is left (Vinkler, Bittner,
+/// Havran 2017, *Extended Morton codes for high performance bounding volume hierarchy construction*). With as many bits for each
+/// axis, a terrain would leave most of those for its height unused, and twenty triangles of twenty million would be in a cell.
 struct Grid {
     /// Three times the smallest corner: corners are added up, not averaged.
     origin: Vec3,
-    scale: f32,
+    /// Cells to a unit of these sums, for each axis.
+    scale: Vec3,
+    /// The last cell of each axis.
+    last: [u32; 3],
+    /// Where in a code the bits of an axis's cell are, for each of its two bytes.
+    spread: Box<[[[u32; 256]; 2]; 3]>,
     /// Triangles wider than this come last, by themselves: among small ones they would spoil a whole cluster's box.
     large: f32,
 }
 
 impl Grid {
     fn new(bounds: &Aabb) -> Self {
-        let size = 3.0 * bounds.size().max_element();
-        let scale = ((1 << BITS) as f32 / size).min(f32::MAX);
-        Self { origin: 3.0 * bounds.min, scale: if size > 0.0 { scale } else { 0.0 }, large: size / 48.0 }
+        let size = 3.0 * bounds.size();
+        let mut bits = [const { Vec::new() }; 3];
+        let mut left = size;
+        for bit in (0..BITS).rev() {
+            let axis = left.max_position();
+            if left[axis] > 0.0 {
+                bits[axis].push(bit);
+                left[axis] = if bits[axis].len() < MOST_BITS as usize { left[axis] / 2.0 } else { 0.0 };
+            }
+        }
+        let (mut scale, mut spread) = (Vec3::ZERO, Box::new([[[0; 256]; 2]; 3]));
+        for axis in 0..3 {
+            if size[axis] > 0.0 {
+                scale[axis] = ((1 << bits[axis].len()) as f32 / size[axis]).min(f32::MAX);
+            }
+            for (place, bit) in bits[axis].iter().rev().enumerate() {
+                let byte = spread[axis][place / 8].iter_mut().enumerate();
+                byte.filter(|(cell, _)| cell >> (place % 8) & 1 != 0).for_each(|(_, code)| *code |= 1 << bit);
+            }
+        }
+        let last = bits.map(|bits| (1 << bits.len()) - 1);
+        Self { origin: 3.0 * bounds.min, scale, last, spread, large: size.max_element() / 48.0 }
     }
 
     #[inline]
     fn code(&self, corners: &[Vec3; 3]) -> u32 {
-        let cell = (corners[0] + corners[1] + corners[2] - self.origin) * self.scale;
-        // The cast saturates, and makes NaN 0.
-        let [x, y, z] = cell.to_array().map(|x| spread((x as u32).min((1 << BITS) - 1)));
+        let cell = ((corners[0] + corners[1] + corners[2] - self.origin) * self.scale).to_array();
+        let of_axis = |axis: usize| {
+            // The cast saturates, and makes NaN 0.
+            let cell = (cell[axis] as u32).min(self.last[axis]);
+            let [low, high] = &self.spread[axis];
+            low[cell as usize % 256] | high[(cell >> 8) as usize % 256]
+        };
         let extent = corners[0].max(corners[1]).max(corners[2]) - corners[0].min(corners[1]).min(corners[2]);
-        u32::from(extent.max_element() > self.large) << LARGE_BIT | x << 2 | y << 1 | z
+        let is_large = u32::from(extent.max_element() > self.large);
+        is_large << LARGE_BIT | of_axis(0) | of_axis(1) | of_axis(2)
     }
-}
-
-/// Two zeros between each two of the ten lowest bits.
-#[inline]
-fn spread(x: u32) -> u32 {
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
 }
 
 /// Bits by which chunks are sorted at first, the highest ones.
@@ -192,16 +217,34 @@ fn cut(range: &[Coded]) -> usize {
 mod tests {
     use super::*;
 
+    /// The code of a point, in its digits.
+    fn digits(size: Vec3, at: Vec3) -> String {
+        format!("{:030b}", Grid::new(&Aabb { min: Vec3::ZERO, max: size }).code(&[at; 3]))
+    }
+
     #[test]
     fn codes_interleave_bits() {
+        // As many for each axis of a cube, the first for x; and of a cell each axis's own.
+        let cube = Vec3::splat(1024.0);
         for x in [0u32, 1, 2, 5, 0x155, 0x2aa, 0x3ff] {
-            let expected = (0..BITS).fold(0, |sum, bit| sum | (x >> bit & 1) << (3 * bit));
-            assert_eq!(spread(x), expected);
+            let expected = |axis| (0..10).fold(0, |sum, bit| sum | (x >> bit & 1) << (3 * bit + 2 - axis));
+            for axis in 0..3 {
+                let at = (x as f32 + 0.5) * Vec3::AXES[axis];
+                assert_eq!(digits(cube, at), format!("{:030b}", expected(axis)), "{x} on axis {axis}");
+            }
         }
-        let grid = Grid::new(&Aabb { min: Vec3::ZERO, max: Vec3::new(1024.0, 3.0, 512.0) });
-        assert_eq!(grid.code(&[Vec3::new(1.5, 2.5, 3.5); 3]), 0b011_101);
+        // Halved: x six times, then x and z by turns until both are as short as y, then all three.
+        let flat = Vec3::new(4096.0, 2.0, 64.0);
+        let of_x = digits(flat, Vec3::X * 4096.0);
+        assert_eq!(of_x, "111111101010101010010010010010");
+        assert_eq!(digits(flat, Vec3::Z * 64.0), "000000010101010100100100100100");
+        assert_eq!(digits(flat, Vec3::Y * 2.0), "000000000000000001001001001001");
+        // No more than there is a table for, and none for what has no extent.
+        assert_eq!(digits(Vec3::Y, Vec3::Y), format!("{}{}", "1".repeat(16), "0".repeat(14)));
+        assert_eq!(digits(Vec3::ZERO, Vec3::ONE), "0".repeat(30));
+        assert_eq!(digits(cube, Vec3::MAX), "1".repeat(30), "outside counts as at the border");
+        let grid = Grid::new(&Aabb { min: Vec3::ZERO, max: cube });
         assert_eq!(grid.code(&[Vec3::ZERO, Vec3::ZERO, Vec3::X * 65.0]) >> LARGE_BIT, 1);
-        assert_eq!(grid.code(&[Vec3::MAX; 3]), (1 << 30) - 1, "outside counts as at the border");
     }
 
     #[test]

@@ -153,9 +153,10 @@ fn read(
         let meshes = Meshes::new(parts);
         let tree = Tree::new(arrays.get::<Node>(2 * level)?);
         let blocks = 2 * level + 1;
-        let leaves = match preset {
-            Preset::Compact => Leaves::of_numbers(arrays.get::<[u32; LANES]>(blocks)?, meshes.clone()),
-            Preset::Fast | Preset::Default | Preset::High => Leaves::of_blocks(arrays.get(blocks)?),
+        let leaves = if preset.is_compact() {
+            Leaves::of_numbers(arrays.get::<[u32; LANES]>(blocks)?, meshes.clone())
+        } else {
+            Leaves::of_blocks(arrays.get(blocks)?)
         };
         let count = check::check(&tree, &leaves, parts, &meshes, preset == Preset::High)?;
         Ok(TriangleTree::new(parts, tree, leaves, count))
