@@ -45,7 +45,7 @@ pub enum Error {
     #[error("{0}")]
     Unavailable(String),
     /// Stopped by the user.
-    #[error("interrupted; no file was changed")]
+    #[error("interrupted; what was not finished is not written")]
     Interrupted,
 }
 

@@ -11,10 +11,14 @@ use crate::image;
 use crate::io;
 use crate::memory::process;
 use crate::plan::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory, Rays};
+use crate::render::Aov;
 use crate::trace::bvh::Preset;
 
 /// Bytes that a picture takes for each pixel: four floats, once more while it is written.
 const BYTES_A_PIXEL: u64 = 32;
+
+/// The same for each further channel: its sum, and what is written of it. Measured.
+const BYTES_A_CHANNEL: u64 = 10;
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct BuildArgs {
@@ -72,7 +76,8 @@ impl BuildArgs {
         self.decide(backend, promised.triangles, Rays::default(), promised.bytes).map(drop)
     }
 
-    /// How to build the native tree over so many triangles, for so many rays; none where only Embree renders.
+    /// How to build the native tree over so many triangles, for so many rays, beside a picture of so many pixels with these channels; none where only
+    /// Embree renders.
     ///
     /// # Errors
     /// [`Error::Backend`] where there is not the memory for it.
@@ -82,8 +87,11 @@ impl BuildArgs {
         triangles: u64,
         rays: &Rays,
         pixels: u64,
+        aovs: &[Aov],
     ) -> Result<Option<BuildChoice>> {
-        self.decide(backend, triangles, *rays, pixels.saturating_mul(BYTES_A_PIXEL))
+        let channels = aovs.iter().map(|aov| aov.channels() as u64).sum::<u64>();
+        let picture = pixels.saturating_mul(BYTES_A_PIXEL + channels * BYTES_A_CHANNEL);
+        self.decide(backend, triangles, *rays, picture)
     }
 
     /// The same, with so many bytes still to come beside the tree.

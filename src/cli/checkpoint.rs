@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::engine::BackendArg;
+use super::say;
 use crate::error::{Error, Result};
 use crate::output;
 use crate::render::Checkpoint;
@@ -66,6 +67,14 @@ impl Kept {
     /// As the library takes it.
     pub(super) fn by<'a>(&'a self, engine: &'a str) -> Checkpoint<'a> {
         Checkpoint { path: &self.path, every: self.every, resume: self.resume, engine }
+    }
+
+    /// Says where an interrupted render is kept.
+    pub(super) fn tell(&self) -> Result<()> {
+        if !self.path.exists() {
+            return Ok(());
+        }
+        say(format_args!("{:<8}  {}: --resume goes on from there", "kept", self.path.display()))
     }
 
     /// Removes the file, which is of no more use; none may be there.

@@ -122,7 +122,7 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
     let rays = settings.expected_rays(&plan);
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let build = match accel {
-        Accel::Bvh => args.build.choose(args.backend, world.stored_triangles(), &rays, pixels)?,
+        Accel::Bvh => args.build.choose(args.backend, world.stored_triangles(), &rays, pixels, &[])?,
         _ => None,
     };
     let accelerator = if args.backend == BackendArg::Embree { "embree" } else { accel.name() };

@@ -225,7 +225,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         let build = match accel.0 {
             Accel::Bvh => {
                 let rays = settings.expected_rays(renderer.plan());
-                args.build.choose(args.backend, stored, &rays, pixels)?
+                args.build.choose(args.backend, stored, &rays, pixels, &settings.aovs)?
             }
             _ => None,
         };
@@ -248,6 +248,9 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             Ok((outcome, denoised))
         });
         warn(display.and_then(Display::finish).as_slice());
+        if let (Err(Error::Interrupted), Some(kept)) = (&outcome, &kept) {
+            kept.tell()?;
+        }
         let (outcome, denoised) = outcome?;
         let pass = &outcome.passes[0];
         let picture = &pass.picture;

@@ -28,7 +28,7 @@ pub struct WriteOptions {
 /// The samples of OpenEXR files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Depth {
-    /// IEEE binary16: 11 significant bits, up to 65504.
+    /// IEEE binary16: 11 significant bits, up to 65504. A picture with more light than that has binary32.
     #[default]
     Half,
     /// IEEE binary32: the pixels as they are.
@@ -49,6 +49,9 @@ pub(super) struct Encoding {
     /// Edge of a tile; 0 for rows, as most formats have them.
     pub tile: u32,
 }
+
+/// The largest finite number of binary16.
+const MOST_HALF: f32 = 65504.0;
 
 /// What is written with and without OpenImageIO.
 pub(super) const COMMON: [&str; 4] = ["exr", "jpeg", "jpg", "png"];
@@ -117,7 +120,7 @@ pub fn write_channels(
         return Err(Error::output(path, "only OpenEXR files (.exr) hold more channels than colours"));
     }
     channels::check(channels, image.pixels.len())?;
-    let encoding = encoding(&suffix, options);
+    let encoding = encoding(&suffix, options, image);
     let coding = (encoding, &options.response);
     output::write_atomically(path, |part| write_part(path, part, image, channels, coding, metadata))
 }
@@ -148,9 +151,9 @@ pub(crate) fn has_common_suffix(path: &Path) -> bool {
 pub fn check_writable(path: &Path) -> Result<()> {
     let suffix = writable_suffix(path)?;
     let options = WriteOptions::default();
-    let encoding = encoding(&suffix, &options);
     output::check_writable(path)?;
-    let (image, coding, metadata) = (Image::new(16, 16), (encoding, &options.response), Metadata::default());
+    let (image, metadata) = (Image::new(16, 16), Metadata::default());
+    let coding = (encoding(&suffix, &options, &image), &options.response);
     output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }
 
@@ -204,9 +207,11 @@ fn write_part(
     })
 }
 
-fn encoding(suffix: &str, options: &WriteOptions) -> Encoding {
+fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
     if EXR.contains(&suffix) {
-        let kind = if options.depth == Depth::Half { Type::Half } else { Type::Float };
+        // What is more would come back as infinite.
+        let fits = || image.pixels.iter().all(|pixel| !pixel.is_finite() || pixel.abs().max_element() <= MOST_HALF);
+        let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
         Encoding { kind, alpha: true, tile: options.tile }
     } else if RADIANCE.contains(&suffix) {
         Encoding { kind: Type::Float, alpha: false, tile: 0 }
@@ -278,12 +283,21 @@ mod tests {
     fn suffixes_choose_the_encoding() {
         let options = WriteOptions { depth: Depth::Float, tile: 32, ..WriteOptions::default() };
         let of = |suffix| {
-            let e = encoding(suffix, &options);
+            let e = encoding(suffix, &options, &Image::new(1, 1));
             (e.kind, e.alpha, e.tile)
         };
         assert_eq!(of("exr"), (Type::Float, true, 32));
         assert_eq!(of("hdr"), (Type::Float, false, 0));
         assert_eq!(of("png"), (Type::U8, true, 0));
         assert_eq!(of("jpg"), (Type::U8, false, 0));
+    }
+
+    #[test]
+    fn light_that_halves_do_not_hold_is_kept() {
+        for (light, kind) in [(65504.0, Type::Half), (65505.0, Type::Float), (f32::INFINITY, Type::Half)] {
+            let mut image = Image::new(2, 1);
+            image.pixels[1].y = light;
+            assert_eq!(encoding("exr", &WriteOptions::default(), &image).kind, kind, "{light}");
+        }
     }
 }

@@ -9,9 +9,9 @@ use crate::io::Placeless;
 use crate::math::Vec3;
 use crate::scene::{Geometry, Mesh, Scene};
 
-/// Whether all indices are in range, attributes match, transforms are finite, and there is something to render.
-pub(super) fn check(scene: &Scene) -> Placeless<()> {
-    if scene.primitive_count_checked()? == 0 {
+/// Whether all indices are in range, attributes match, transforms are finite, and there is something to render, unless it `may_be_empty`.
+pub(super) fn check(scene: &Scene, may_be_empty: bool) -> Placeless<()> {
+    if scene.primitive_count_checked()? == 0 && !may_be_empty {
         return Err("nothing to render: it has no triangles; give a file with at least one".into());
     }
     for geometry in &scene.geometries {
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn finds_every_fault() {
-        assert_eq!(check(&good()), Ok(()));
+        assert_eq!(check(&good(), false), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
         let faults: [(&str, Breaks); 10] = [
             ("nothing to render", |_, mesh| mesh.triangles = vec![].into()),
@@ -132,7 +132,7 @@ mod tests {
             let Geometry::Mesh(mut mesh) = scene.geometries.remove(0) else { unreachable!() };
             fault(&mut scene, &mut mesh);
             scene.geometries.push(Geometry::Mesh(mesh));
-            let message = check(&scene).unwrap_err();
+            let message = check(&scene, false).unwrap_err();
             assert!(message.contains(expected), "{message} has no {expected}");
         }
     }

@@ -28,12 +28,14 @@ mod weld;
 use std::path::Path;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
 use self::weld::weld;
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec2};
 use crate::memory::Mapped;
 use crate::scene::{Geometry, Mesh, Scene};
 
@@ -166,12 +168,19 @@ pub fn load_watched(
     };
     drop(file);
     scene.transform(&options.transform());
-    check::check(&scene).map_err(|message| Error::input(path, "", message))?;
+    // At some time of an animation there may be nothing to see.
+    let may_be_empty = options.animation.time.is_some();
+    check::check(&scene, may_be_empty).map_err(|message| Error::input(path, "", message))?;
     scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
             options.normals.apply(mesh);
         }
+    }
+    let vague: usize = scene.geometries.iter_mut().map(make_finite).sum();
+    if vague > 0 {
+        let message = format!("{vague} colours or texture coordinates are not finite; they count as 0");
+        warnings.push(Warning::new(path, "", message));
     }
     let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
     if bad > 0 {
@@ -179,6 +188,17 @@ pub fn load_watched(
         warnings.push(Warning::new(path, "", message));
     }
     Ok((scene, warnings))
+}
+
+/// Has colours and texture coordinates that are not finite be 0, and tells how many these are.
+fn make_finite(geometry: &mut Geometry) -> usize {
+    fn each<T: Copy + Default + Send + Sync>(values: &mut [T], is_finite: impl Fn(&T) -> bool + Sync) -> usize {
+        let odd = values.par_iter_mut().with_min_len(1 << 14).filter(|value| !is_finite(value));
+        odd.map(|value| *value = T::default()).count()
+    }
+    let Geometry::Mesh(mesh) = geometry else { return 0 };
+    let uvs = |uvs: &mut [Vec2]| each(uvs, |uv| uv.is_finite());
+    each(&mut mesh.colors, |color| color.is_finite()) + uvs(&mut mesh.uvs) + uvs(&mut mesh.second_uvs)
 }
 
 impl LoadOptions {

@@ -4,7 +4,7 @@
 //! the statement looks like when it is right.
 
 use super::Placeless;
-use super::text::{Words, number, quoted};
+use super::text::{Words, number, quoted, without_mark};
 use crate::math::{DVec3, Vec3};
 
 /// Longest side of a picture that a file may ask for.
@@ -21,7 +21,7 @@ pub(super) struct Statement<'a> {
 
 /// The statements of a text.
 pub(super) fn statements(text: &[u8]) -> impl Iterator<Item = Statement<'_>> {
-    text.split(|&byte| byte == b'\n').zip(1..).filter_map(|(text, line)| {
+    without_mark(text).split(|&byte| byte == b'\n').zip(1..).filter_map(|(text, line)| {
         let words = Words::new(without_comment(text), line);
         let statement = Statement { line, usage: "", words };
         (!statement.words.rest().is_empty()).then_some(statement)

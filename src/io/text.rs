@@ -6,6 +6,11 @@
 use std::borrow::Cow;
 use std::str::FromStr;
 
+/// A text without the mark that some editors put before UTF-8 (U+FEFF).
+pub(super) fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
 /// Lines of a text, numbered from 1, without their ends (`\n` or `\r\n`).
 pub(super) struct Lines<'a> {
     rest: &'a [u8],

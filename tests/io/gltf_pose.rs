@@ -41,6 +41,14 @@ fn origin(scene: &Scene) -> DVec3 {
     scene.instances[0].transform.translation
 }
 
+/// What shrinks to nothing is not there at that time, which is no fault of the file.
+#[test]
+fn at_some_time_there_may_be_nothing() {
+    let files = animated("scale", "LINEAR", &[0., 1.], "VEC3", &[1., 1., 1., 0., 0., 0.]).files();
+    let count = |time| posed(&files, at(time)).primitive_count();
+    assert_eq!((count(0.0), count(0.5), count(1.0)), (1, 1, 0));
+}
+
 #[test]
 fn values_between_keys() {
     let values = [0., 0., 0., 4., 2., 0., 4., 2., 8.];

@@ -36,6 +36,31 @@ fn every_form_of_index() {
     assert_eq!(corners(meshes(&Files::one("a.obj", format!("f 1 2 3\n{VERTICES}")).scene("a.obj"))[0]), expected);
 }
 
+/// Editors put it before UTF-8: in front of the first vertex it must not lose that.
+#[test]
+fn a_byte_order_mark_is_passed_over() {
+    let marked = |text: &str| format!("\u{feff}{text}");
+    let text = marked("v 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib a.mtl\nusemtl red\nf 1 2 3\n");
+    let files = Files::one("a.obj", text).and("a.mtl", marked("newmtl red\nKd 1 0 0\n"));
+    let (scene, warnings) = files.load("a.obj");
+    assert_eq!((corners(meshes(&scene)[0]), warnings.len()), (vec![[Vec3::ZERO, Vec3::X, Vec3::Y]], 0));
+    assert_eq!(scene.materials[meshes(&scene)[0].material as usize].diffuse, Vec3::X);
+    let nff = "s 0 0 0 1\n";
+    let scenes = [nff.to_owned(), marked(nff)].map(|text| Files::one("a.nff", text).scene("a.nff"));
+    assert_eq!(scenes[0].primitive_count(), scenes[1].primitive_count());
+}
+
+/// Pictures must not become NaN by them.
+#[test]
+fn colours_and_texture_coordinates_that_are_no_numbers_count_as_nothing() {
+    let text = "v 0 0 0 nan 0 1\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1e39 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    let (scene, warnings) = Files::one("a.obj", text).load("a.obj");
+    let mesh = meshes(&scene)[0];
+    assert!(mesh.colors.iter().all(|color| color.is_finite()) && mesh.uvs.iter().all(|uv| uv.is_finite()), "{mesh:?}");
+    assert_eq!((mesh.colors[1].truncate(), mesh.uvs[2]), (Vec3::ONE, Vec2::Y));
+    assert!(warnings.len() == 1 && warnings[0].message.contains("2 colours or texture coordinates"), "{warnings:?}");
+}
+
 #[test]
 fn polygons_concave_ones_too() {
     // An arrow head whose fan from the first corner would cover area outside it.

@@ -113,6 +113,23 @@ fn binary_attributes_are_those_of_the_text() {
     }
 }
 
+/// Some write bytes as words.
+#[test]
+fn colours_of_32_bits_are_those_of_8() {
+    let text = |scalar: &str| {
+        let colours = ["red", "green", "blue", "alpha"].map(|name| format!("property {scalar} {name}\n")).concat();
+        let head = header("ascii", 3, 1).replace("property float z\n", &format!("property float z\n{colours}"));
+        head + "0 0 0 255 128 0 255\n1 0 0 1 2 3 128\n0 1 0 0 0 0 0\n3 0 1 2\n"
+    };
+    let of = |scalar| meshes(&Files::one("a.ply", text(scalar)).scene("a.ply"))[0].colors.clone();
+    let (expected, words) = (of("uchar"), [of("int"), of("uint")]);
+    for colors in words {
+        assert_eq!(colors.len(), 3);
+        let differs = colors.iter().zip(&expected).map(|(a, b)| (*a - *b).abs().max_element());
+        assert!(differs.fold(0.0, f32::max) < 1e-6, "{colors:?}, {expected:?}");
+    }
+}
+
 #[test]
 fn polygons_and_strips() {
     let vertices = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";

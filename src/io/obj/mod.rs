@@ -21,7 +21,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use self::statement::{Faces, Part, Slots};
-use super::text::quoted;
+use super::text::{quoted, without_mark};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::memory;
@@ -91,7 +91,7 @@ impl Skipped {
 
 /// Reads an OBJ file, and the MTL files it names.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let stretches = stretch::divide(file);
+    let stretches = stretch::divide(without_mark(file));
     let (begins, counts) = stretch::begins(&stretches);
     let mut positions: Vec<DVec3> = memory::zeroed(counts[0]);
     let mut uvs: Vec<Vec2> = memory::zeroed(counts[1]);

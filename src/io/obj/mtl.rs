@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result, Warning};
 use crate::io::Placeless;
-use crate::io::text::{Lines, Words, name, number, quoted};
+use crate::io::text::{Lines, Words, name, number, quoted, without_mark};
 use crate::io::{system_message, texture};
 use crate::math::{Affine2, Vec2, Vec3};
 use crate::memory::Mapped;
@@ -70,7 +70,7 @@ impl Library {
     fn parse(&mut self, file: &Path, bytes: &[u8], warnings: &mut Vec<Warning>) -> Result<()> {
         let mut entry: Option<(String, Entry)> = None;
         let mut ignored: Option<(usize, String)> = None;
-        for (line, text) in Lines::new(bytes) {
+        for (line, text) in Lines::new(without_mark(bytes)) {
             let mut words = Words::new(&text, line);
             let Some(keyword) = words.next() else { continue };
             let fail = |message: String| Error::input(file, format!("line {line}"), message);

@@ -91,8 +91,8 @@ impl Scalar {
             Self::U8 => f64::from(u8::MAX),
             Self::I16 => f64::from(i16::MAX),
             Self::U16 => f64::from(u16::MAX),
-            Self::I32 => f64::from(i32::MAX),
-            Self::U32 => f64::from(u32::MAX),
+            // Whoever writes 32 bits means bytes: nobody measures colours in billions.
+            Self::I32 | Self::U32 => f64::from(u8::MAX),
             Self::F32 | Self::F64 => 1.0,
         }
     }

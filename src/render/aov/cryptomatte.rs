@@ -15,6 +15,9 @@ use crate::scene::{Geometry, Scene};
 /// Ids of a pixel that are written.
 const RANKS: usize = 6;
 
+/// A number and a share for each.
+pub(super) const CHANNELS: usize = 2 * RANKS;
+
 /// What covers a pixel: ids and the weights of the samples that hit them, in the order in which they were hit first.
 pub(in crate::render) type Coverage = Vec<(u32, f32)>;
 
@@ -118,7 +121,7 @@ fn id(name: &str) -> u32 {
 
 /// The channels of a layer.
 fn ranked(layer: &str, coverage: &[Coverage], weights: &[f32]) -> Vec<Channel> {
-    let mut planes = vec![vec![0.0; coverage.len()]; 2 * RANKS];
+    let mut planes = vec![vec![0.0; coverage.len()]; CHANNELS];
     for (i, (covers, weight)) in coverage.iter().zip(weights).enumerate() {
         // A filter may be negative in parts; a share that comes out so is none.
         let mut covers: Coverage = covers.iter().copied().filter(|(_, share)| *share > 0.0).collect();

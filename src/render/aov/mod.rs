@@ -103,6 +103,16 @@ impl Aov {
         PLAIN.into_iter().map(|(_, aov)| aov).chain(light).collect()
     }
 
+    /// How many channels it has.
+    pub const fn channels(&self) -> usize {
+        match self {
+            Self::Depth | Self::Primitive | Self::Geometry | Self::Instance | Self::Samples | Self::Time => 1,
+            Self::Uv => 2,
+            Self::Position | Self::Normal | Self::Albedo | Self::Light { .. } => 3,
+            Self::CryptoObject | Self::CryptoMaterial => cryptomatte::CHANNELS,
+        }
+    }
+
     fn plain_name(&self) -> Option<&'static str> {
         PLAIN.iter().find(|(_, aov)| aov == self).map(|(name, _)| *name)
     }

@@ -1,9 +1,9 @@
 //! Triangles along a space-filling curve (Lauterbach, Garland, Sengupta, Luebke, Manocha 2009, *Fast BVH construction on
 //! GPUs*): the quick way to blocks of neighbours.
 //!
-//! The fast preset sorts triangles by Morton code, cuts the curve into clusters of up to 32 at borders of cells, and puts each
-//! four of a cluster that follow one another into a block. A cluster becomes one node; the tree above the clusters is
-//! built by the surface area heuristic, over a twentieth of the items (Garanzha, Pantaleoni, McAllister 2011, *Simpler
+//! The fast presets sort triangles by Morton code, cut the curve into clusters of up to 64 at borders of cells, and put each
+//! eight of a cluster that follow one another into a block. A cluster becomes one node; the tree above the clusters is
+//! built by the surface area heuristic, over a fortieth of the items (Garanzha, Pantaleoni, McAllister 2011, *Simpler
 //! and faster HLBVH with work queues*). A tree by the heuristic down to the blocks, tried first, took twice as long and was
 //! no better: most of what is lost is lost in the blocks.
 
