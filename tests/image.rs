@@ -253,7 +253,7 @@ fn broken_inputs_are_errors() {
         write(&path, &exact_in_half(), Depth::Half);
         path
     };
-    for name in ["a.png", "a.exr"] {
+    for name in ["a.png", "a.exr", "a.jpg"] {
         let path = good(name);
         let bytes = fs::read(&path).unwrap();
         for keep in [0, 1, 4, 20, 100, bytes.len() / 2] {

@@ -165,6 +165,12 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// claims more than 2^28 pixels, or more than its size makes plausible.
 pub fn read(path: &Path) -> Result<Image> {
     let bytes = file_size(path)?;
+    if JPEG.contains(&suffix(path).as_str()) {
+        let whole = std::fs::read(path).map_err(|error| Error::input(path, "", error.to_string()))?;
+        if super::is_cut_short(&whole) {
+            return Err(Error::input(path, "", "is cut short"));
+        }
+    }
     prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
     backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))

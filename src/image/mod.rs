@@ -10,6 +10,7 @@ mod compare;
 pub mod denoise;
 mod file;
 pub mod flip;
+mod jpeg;
 #[cfg(any(feature = "oiio", feature = "oidn"))]
 mod loading;
 mod metadata;
@@ -31,6 +32,7 @@ pub use file::{
     Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
 };
 pub(crate) use file::{has_common_suffix, prepare};
+pub(crate) use jpeg::is_cut_short;
 pub use metadata::{Metadata, Window};
 pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 

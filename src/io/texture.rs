@@ -8,6 +8,7 @@ use image::error::ImageError;
 use image::{ImageReader, Limits};
 
 use crate::error::{Error, Result};
+use crate::image::is_cut_short;
 use crate::io::Placeless;
 use crate::memory::Mapped;
 use crate::scene::Texture;
@@ -52,6 +53,9 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
         return Err(format!(
             "claims {width} x {height} pixels; at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all are read"
         ));
+    }
+    if is_cut_short(bytes) {
+        return Err("is a broken picture: it is cut short".to_owned());
     }
     let image = reader()?.decode().map_err(|e| broken(&e))?.into_rgba8();
     let (width, height) = image.dimensions();
