@@ -56,9 +56,9 @@ impl Crossings {
     }
 
     /// Takes a crossing of the triangle with these corners and this (primitive, geometry, instance).
-    pub fn take(&mut self, corners: &[DVec3; 3], crossing: Crossing, (primitive, geometry, instance): (u32, u32, u32)) {
+    pub fn take(&mut self, corners: &[DVec3; 3], crossing: Crossing, id: (u32, u32, u32)) {
         let Crossing { hit, touch } = crossing;
-        let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance };
+        let hit = PreciseHit::new(hit, id);
         match touch {
             None => self.found.push(hit),
             Some(touch) => {

@@ -22,6 +22,7 @@ use crate::error::{Error, Result};
 use crate::math::{DAabb, DVec3, LARGEST_COORDINATE, Vec3};
 use crate::ray::Hit;
 use crate::scene::{Geometry, Material, Mesh, Scene};
+use crate::shape::triangle::TriangleHit;
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Discs};
 use frame::Frame;
@@ -43,7 +44,7 @@ pub struct PreciseRay {
 /// A hit, with numbers in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreciseHit {
-    /// Distance in units of the ray's direction; finite.
+    /// Distance in units of the ray's direction; finite, and never -0.
     pub t: f64,
     /// Weight of the triangle's second corner.
     pub u: f64,
@@ -76,6 +77,12 @@ impl PreciseRay {
 }
 
 impl PreciseHit {
+    /// On the triangle of this (primitive, geometry, instance). Adding 0 makes one zero of the two: t decides before the id does.
+    #[inline]
+    pub(super) fn new(hit: TriangleHit, (primitive, geometry, instance): (u32, u32, u32)) -> Self {
+        Self { t: hit.t + 0.0, u: hit.u, v: hit.v, primitive, geometry, instance }
+    }
+
     /// The order that decides between hits at equal t: the lowest wins.
     pub const fn id(&self) -> (u32, u32, u32) {
         (self.instance, self.geometry, self.primitive)

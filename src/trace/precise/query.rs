@@ -426,7 +426,7 @@ fn hit_of(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32)
 
 #[inline]
 fn in_range(ray: &PreciseRay, hit: TriangleHit, geometry: u32, primitive: u32) -> Option<PreciseHit> {
-    let hit = PreciseHit { t: hit.t, u: hit.u, v: hit.v, primitive, geometry, instance: 0 };
+    let hit = PreciseHit::new(hit, (primitive, geometry, 0));
     ray.has(hit.t).then_some(hit)
 }
 
@@ -453,6 +453,32 @@ mod tests {
         let positions = (0..3).flat_map(|k| corners.map(|[x, y]| DVec3::new(x, y, apart * f64::from(k)))).collect();
         let triangles = (0..3).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|i| 4 * k + i))).collect();
         Precise::new(vec![PreciseMesh { positions, triangles }]).expect("squares")
+    }
+
+    /// A ray that starts on an edge, or in a corner, meets all that touch there at t = 0, of which some compute -0.
+    #[test]
+    fn zeros_of_both_signs_are_one_distance() {
+        let rim = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [-1.0, 0.0, 1.0], [0.0, -1.0, -0.5]].map(DVec3::from);
+        let positions = std::iter::once(DVec3::ZERO).chain(rim).collect();
+        let triangles = vec![[0, 1, 2], [2, 3, 0], [0, 3, 4], [4, 1, 0], [0, 2, 1]];
+        let precise = Precise::new(vec![PreciseMesh { positions, triangles }]).expect("a fan");
+        let starts = [DVec3::ZERO, rim[0] * 0.5, rim[1] * 0.5, rim[2] * 0.5, rim[3] * 0.5];
+        let ways = [[0.1, 0.2, 1.0], [-0.3, 0.2, -1.0], [0.1, -0.7, 1.0], [0.3, 0.2, -0.9], [0.5, 0.1, 0.7]];
+        for (start, way) in starts.iter().flat_map(|&start| ways.map(|way| (start, DVec3::from(way)))) {
+            let ray = PreciseRay::new(start, way);
+            let hits = (0..5).filter_map(|i| precise.hit_of(&ray, 0, i));
+            let lowest = hits.filter(|hit| hit.t == 0.0).map(|hit| hit.primitive).min().expect("it starts on one");
+            let mut nearest = [None];
+            precise.closest_batch(&[ray], &mut nearest);
+            let nearest = nearest[0].expect("a hit");
+            assert_eq!((nearest.t.to_bits(), nearest.primitive), (0, lowest), "{ray:?}");
+            let mut names = [None];
+            precise.first_batch(&[ray], &mut names);
+            assert_eq!(names, [Some((0, lowest))], "{ray:?}");
+            let (mut ends, mut all) = (Vec::new(), Vec::new());
+            precise.all_hits_batch(&[ray], &mut ends, &mut all);
+            assert!(all.iter().all(|hit| hit.t.is_sign_positive()), "{all:?}");
+        }
     }
 
     /// Hits that lie apart are named by the flight; for those that do not, t is computed.
