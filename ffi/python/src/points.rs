@@ -37,6 +37,7 @@ impl Scene {
         let rows = points.rows("points")?;
         let count = rows.len();
         let found: Vec<Option<NearestPoint>> = pool::run(py, threads, || {
+            self.precise.prepare_for_points();
             along(&rows, None, |points, found| self.precise.nearest_point_batch(points, found))
         })?;
         let id = |id: fn(&NearestPoint) -> u32| -> Vec<u32> {
@@ -69,6 +70,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rows = points.rows("points")?;
         let distances = pool::run(py, threads, || {
+            self.precise.prepare_for_points();
             let is_closed = samples > 0 && self.precise.is_closed();
             along(&rows, f64::NAN, |points, distances| {
                 let mut inside = vec![false; points.len()];

@@ -1,7 +1,8 @@
 //! The threads that queries run on.
 //!
 //! Rayon's global pool would be shared with every other extension, and after a `fork` (Python's `multiprocessing` on Linux) its threads
-//! are gone and the first query would wait for ever. So each process has pools of its own, one for each number of threads that was asked for.
+//! are gone and the first query would wait for ever. So each process has pools of its own, one for each number of threads that was asked for, of
+//! which the last few are kept.
 
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,25 +17,36 @@ struct Entry {
     pool: Arc<ThreadPool>,
 }
 
+/// Those that were used last, the last one at the end. Only locked with the interpreter's lock held, so that nobody forks meanwhile.
 static POOLS: Mutex<Vec<Entry>> = Mutex::new(Vec::new());
+
+/// So many pools are kept, for a program that takes turns between a few numbers of threads.
+const KEPT: usize = 4;
 
 /// More threads than this are a mistake.
 const MOST: usize = 1024;
 
 fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
-    let process = process::id();
-    if let Some(entry) = pools.iter().find(|entry| (entry.process, entry.threads) == (process, threads)) {
-        return Ok(Arc::clone(&entry.pool));
-    }
+    let (process, threads) = (process::id(), threads.min(MOST));
     // Pools of the process that this one was forked from have no threads here: to drop them would wait for these.
     pools.extract_if(.., |entry| entry.process != process).for_each(std::mem::forget);
-    let built =
-        ThreadPoolBuilder::new().num_threads(threads.min(MOST)).thread_name(|i| format!("twincast-{i}")).build();
-    let built = built.map_err(|error| PyRuntimeError::new_err(format!("no threads to run on: {error}")))?;
-    let pool = Arc::new(built);
-    pools.push(Entry { process, threads, pool: Arc::clone(&pool) });
+    let entry = match pools.iter().position(|entry| entry.threads == threads) {
+        Some(i) => pools.remove(i),
+        None => Entry { process, threads, pool: Arc::new(build(threads)?) },
+    };
+    let pool = Arc::clone(&entry.pool);
+    pools.push(entry);
+    if pools.len() > KEPT {
+        // Its threads end once they have nothing to do; a query that runs on it holds it until then.
+        pools.remove(0);
+    }
     Ok(pool)
+}
+
+fn build(threads: usize) -> PyResult<ThreadPool> {
+    let built = ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("twincast-{i}")).build();
+    built.map_err(|error| PyRuntimeError::new_err(format!("no threads to run on: {error}")))
 }
 
 /// Runs `work` on so many threads, 0 for one a core, without the interpreter's lock.

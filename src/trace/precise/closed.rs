@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Precise, is_traceable};
+use super::{Precise, is_traceable, made_outside};
 use crate::math::DVec3;
 
 /// More than distances in f64 are off by, relative to the largest coordinate of what they were computed from.
@@ -13,11 +13,7 @@ impl Precise {
     /// place. Then every ray from a point crosses them an odd number of times, or each an even number; crossings are those of
     /// [`count_batch`](Self::count_batch).
     pub fn is_closed(&self) -> bool {
-        // Not computed within the cell: a thread that waits for its helpers there might be given another query that waits for the cell.
-        self.closed.get().copied().unwrap_or_else(|| {
-            let is_closed = self.edges_are_even();
-            *self.closed.get_or_init(|| is_closed)
-        })
+        *made_outside(&self.closed, || self.edges_are_even())
     }
 
     fn edges_are_even(&self) -> bool {

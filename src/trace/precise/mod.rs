@@ -164,6 +164,15 @@ impl Precise {
     }
 }
 
+/// What is in the cell, or comes to be: made outside of it, twice at worst. Within it, a thread that waits for its helpers might be given another query,
+/// which waits for the cell; and in a process that is forked meanwhile the cell would wait for ever for a thread that is not there.
+fn made_outside<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    cell.get().unwrap_or_else(|| {
+        let made = make();
+        cell.get_or_init(|| made)
+    })
+}
+
 /// Whether a corner is one that triangles with it can be hit.
 fn is_traceable(p: DVec3) -> bool {
     p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan()

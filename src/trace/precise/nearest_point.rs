@@ -2,10 +2,10 @@
 //!
 //! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
-use super::{Precise, is_traceable};
+use super::{Precise, is_traceable, made_outside};
 use crate::math::DVec3;
 use crate::shape::closest::{TrianglePoint, closest_point};
-use crate::trace::bvh::{Bvh, NearestTriangle, Sought, Surveyor};
+use crate::trace::bvh::{Bvh, Discs, NearestTriangle, Sought, Surveyor};
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,8 +83,16 @@ impl Precise {
         for (points, answers) in points.chunks(run).zip(answers.chunks_mut(run)) {
             survey.runs.push(Run { points, answers, asked: 0 });
         }
-        let discs = self.discs.get_or_init(|| self.bvh.discs());
-        self.bvh.nearest_triangles(discs, survey.runs.len(), &mut survey);
+        self.bvh.nearest_triangles(self.discs(), survey.runs.len(), &mut survey);
+    }
+
+    /// Makes what points need besides the tree, which the first of them does otherwise: threads that ask their first points together would make it once each.
+    pub fn prepare_for_points(&self) {
+        self.discs();
+    }
+
+    fn discs(&self) -> &Discs {
+        made_outside(&self.discs, || self.bvh.discs())
     }
 
     /// By a look at every triangle, which are all about as far away.

@@ -1,0 +1,92 @@
+"""The threads that queries run on; and processes that are forked from them."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import twincast
+
+TASKS = "/proc/self/task"
+
+
+def scene():
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+    return scene
+
+
+RAY = np.float32([[0.25, 0.25, 1, 0, 0, -1]])
+
+
+@pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
+def test_few_pools_are_kept():
+    one = scene()
+    before = len(os.listdir(TASKS))
+    for threads in range(3, 20):
+        assert one.cast_rays(RAY, nthreads=threads)["t_hit"].tolist() == [1]
+    # Four at most; those of the others end when they notice.
+    most = before + 19 + 18 + 17 + 16
+    until = time.monotonic() + 20
+    while len(os.listdir(TASKS)) > most and time.monotonic() < until:
+        time.sleep(0.01)
+    assert len(os.listdir(TASKS)) <= most
+
+
+@pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
+def test_too_many_threads_are_the_same_pool():
+    program = (
+        "import os, sys; sys.path.insert(0, sys.argv[1]); from test_threads import *; one = scene()\n"
+        "for threads in (1100, 1200, 1300): one.cast_rays(RAY, nthreads=threads)\n"
+        "assert len(os.listdir(TASKS)) < 1200, len(os.listdir(TASKS))\n"
+    )
+    subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)
+
+
+def test_pools_that_are_in_use_are_not_ended(rng):
+    from concurrent.futures import ThreadPoolExecutor
+
+    one = scene()
+    rays = np.hstack([rng.random((20000, 3)), rng.normal(size=(20000, 3))])
+    expected = one.count_intersections(rays)
+    with ThreadPoolExecutor(8) as pool:
+        for answer in pool.map(lambda i: one.count_intersections(rays, nthreads=i % 9 + 1), range(90)):
+            assert np.array_equal(answer, expected)
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+def test_a_fork_while_another_thread_asks_for_its_first_distance():
+    """Whatever that thread has begun, it does not end it in the child."""
+    import threading
+
+    side = np.arange(700)
+    x, y = (part.ravel() for part in np.meshgrid(side, side))
+    corners = np.stack([x, y, np.sin(x) + np.cos(y)], axis=1).astype(np.float32)
+    first = (y * 700 + x)[(x < 699) & (y < 699)]
+    faces = np.concatenate([np.stack([first, first + 1, first + 701], 1), np.stack([first, first + 701, first + 700], 1)])
+    large = twincast.RaycastingScene()
+    large.add_triangles(corners, faces)
+    # The tree alone.
+    large.cast_rays(RAY)
+    context = multiprocessing.get_context("fork")
+    queue = context.SimpleQueue()
+    point = np.float32([[0, 0, 100]])
+    asked = threading.Thread(target=large.compute_distance, args=(point,))
+    asked.start()
+    children = []
+    for _ in range(8):
+        time.sleep(0.004)
+        children.append(context.Process(target=lambda: queue.put(large.compute_distance(point).tolist()), daemon=True))
+        children[-1].start()
+    asked.join()
+    expected = large.compute_distance(point).tolist()
+    for child in children:
+        child.join(60)
+        hung = child.is_alive()
+        child.kill()
+        assert not hung, "the child waits for a thread that it has not"
+        assert queue.get() == expected
