@@ -1,9 +1,9 @@
-//! Rays and points as NumPy holds them: f32 or f64, of any strides, read in place.
+//! Rays and points as NumPy holds them: f32 or f64, of any strides, read in place; and arrays for the answers.
 
 use std::ops::Range;
 
 use numpy::ndarray::{ArrayView1, ArrayView2};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use twincast::Ray;
@@ -12,6 +12,26 @@ use twincast::trace::precise::PreciseRay;
 
 /// Rays, or points, that a thread takes at a time.
 pub const CHUNK: usize = 1024;
+
+/// Shorter directions in f32, and origins farther away, are traced in f64: without them t is below 1e38, as meshes that are traced in f32 lie nearer than
+/// 1e14 (`trace::precise`); and no direction is denormal.
+const SHORTEST: f32 = 1e-18;
+const FARTHEST: f32 = 1e19;
+
+/// So many zeros, which nobody has to write: pages that the system gives when they are touched, by the thread that answers.
+///
+/// # Errors
+/// `MemoryError` where there is no room. For that NumPy makes them: a vector would end the process.
+pub fn zeros<'py, T: Element>(py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyArray1<T>>> {
+    let zeros = py.import("numpy")?.call_method1("zeros", (count, T::get_dtype(py)))?;
+    Ok(zeros.cast_into()?)
+}
+
+/// The nearest f32, but no infinite one, which would be a miss.
+#[inline]
+pub fn finite_f32(x: f64) -> f32 {
+    (x as f32).min(f32::MAX)
+}
 
 /// An array of three columns.
 #[derive(FromPyObject)]
@@ -171,13 +191,23 @@ impl<'a> Rays<'a> {
         which.map(|i| self.at(i)).collect()
     }
 
-    /// The same in f32; for those that [are](Self::are_f32).
-    pub fn rounded(&self, which: Range<usize>) -> Vec<Ray> {
+    /// The same in f32, for those that [are](Self::are_f32); none where f32 is too narrow for what one of them meets.
+    pub fn rounded(&self, which: Range<usize>) -> Option<Vec<Ray>> {
         let tmin = self.tmin as f32;
         let rounded = |i| {
             let (origin, direction) = (self.origins.rounded(i), self.directions.rounded(self.direction(i)));
             Ray { origin, direction, tmin, tmax: self.tmax(i) as f32, time: 0.0 }
         };
-        which.map(rounded).collect()
+        let rays: Vec<Ray> = which.map(rounded).collect();
+        rays.iter().all(suits_f32).then_some(rays)
     }
+}
+
+/// Whether f32 is wide enough for the ray and for where it meets meshes; rays that miss anyway do.
+#[inline]
+fn suits_f32(ray: &Ray) -> bool {
+    let (length, away) = (ray.direction.abs().max_element(), ray.origin.abs().max_element());
+    let is_short = length > 0.0 && length < SHORTEST;
+    let is_far = away > FARTHEST && away < f32::INFINITY;
+    !is_short && !is_far
 }

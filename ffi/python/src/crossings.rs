@@ -1,12 +1,12 @@
 //! All hits of many rays, and how many they are.
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::trace::precise::{Precise, PreciseRay};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays};
+use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, zeros};
 use crate::pool;
 use crate::scene::{Scene, table};
 
@@ -37,16 +37,17 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let counts = pool::run(py, threads, || {
-            let mut counts = vec![0; rays.len()];
+        let answers = zeros(py, rays.len())?;
+        let mut counts = answers.readwrite();
+        let counts = counts.as_slice_mut()?;
+        pool::run(py, threads, || {
             counts.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, counts)| {
                 let mut found = [0; CHUNK];
                 self.precise.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
                 counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
             });
-            counts
         })?;
-        Ok(counts.into_pyarray(py))
+        Ok(answers)
     }
 
     /// All hits; of each ray the first `most`. Locations only where they are asked for, else without rows.
@@ -109,7 +110,7 @@ impl Scene {
     ) -> PyResult<List<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         if rays.are_f32() {
-            self.list_in(py, &rays, threads, |x| x as f32)
+            self.list_in(py, &rays, threads, finite_f32)
         } else {
             self.list_in(py, &rays, threads, |x| x)
         }

@@ -7,7 +7,7 @@ use twincast::math::DVec3;
 use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
 use twincast::{Batch, Hit, Tracer};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays};
+use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, zeros};
 use crate::{pool, value_error};
 
 /// No triangle, or no mesh, in arrays of unsigned numbers.
@@ -79,9 +79,10 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let first = pool::run(py, threads, || {
-            // Zeros that nobody has to write, here and below: the threads that answer are the first to touch the pages.
-            let mut first = vec![0; rays.len()];
+        let answers = zeros(py, rays.len())?;
+        let mut first = answers.readwrite();
+        let first = first.as_slice_mut()?;
+        pool::run(py, threads, || {
             first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
                 let mut hits = [None; CHUNK];
                 if let Some(hits) = self.exact_hits(&rays, chunk, &mut hits) {
@@ -95,9 +96,8 @@ impl Scene {
                     first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
                 }
             });
-            first
         })?;
-        Ok(first.into_pyarray(py))
+        Ok(answers)
     }
 
     /// Whether each ray hits anything.
@@ -113,21 +113,19 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
-        let occluded = pool::run(py, threads, || {
-            let mut occluded = vec![false; rays.len()];
+        let answers = zeros(py, rays.len())?;
+        let mut occluded = answers.readwrite();
+        let occluded = occluded.as_slice_mut()?;
+        pool::run(py, threads, || {
             occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
                 let which = rays.chunk(chunk);
-                match exact {
-                    Some(bvh) => {
-                        let rays = rays.rounded(which);
-                        bvh.occluded_batch(&rays, occluded, Batch::of(&rays));
-                    }
+                match exact.and_then(|bvh| Some((bvh, rays.rounded(which.clone())?))) {
+                    Some((bvh, rays)) => bvh.occluded_batch(&rays, occluded, Batch::of(&rays)),
                     None => self.precise.occluded_batch(&rays.some(which), occluded),
                 }
             });
-            occluded
         })?;
-        Ok(occluded.into_pyarray(py))
+        Ok(answers)
     }
 
     /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
@@ -146,10 +144,13 @@ impl Scene {
     ) -> PyResult<Cast<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
-        let (t, uv, primitive, geometry, normal) = pool::run(py, threads, || {
-            let (mut t, mut uv) = (vec![0f32; count], vec![0f32; 2 * count]);
-            let (mut primitive, mut geometry) = (vec![0; count], vec![0; count]);
-            let mut normal = vec![0f32; 3 * count];
+        let (all_t, all_uv, all_normals) = (zeros(py, count)?, zeros(py, 2 * count)?, zeros(py, 3 * count)?);
+        let (primitives, geometries) = (zeros(py, count)?, zeros(py, count)?);
+        let (mut t, mut uv, mut normal) = (all_t.readwrite(), all_uv.readwrite(), all_normals.readwrite());
+        let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
+        let (t, uv, normal) = (t.as_slice_mut()?, uv.as_slice_mut()?, normal.as_slice_mut()?);
+        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
+        pool::run(py, threads, || {
             let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = tasks.into_par_iter().zip(ids).enumerate();
@@ -158,17 +159,16 @@ impl Scene {
                 for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
                     (t[i], primitive[i], geometry[i]) = (f32::INFINITY, INVALID, INVALID);
                     if let Some(hit) = hit {
-                        t[i] = hit.t;
+                        // Of the two zeros the one without a sign.
+                        t[i] = hit.t + 0.0;
                         uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
                         (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
                     }
                 }
                 self.normals_of(primitive, geometry, normalize, normal);
             });
-            (t, uv, primitive, geometry, normal)
         })?;
-        let (primitive, geometry) = (primitive.into_pyarray(py), geometry.into_pyarray(py));
-        Ok((t.into_pyarray(py), table(py, uv, 2)?, primitive, geometry, table(py, normal, 3)?))
+        Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries, all_normals.reshape([count, 3])?))
     }
 
     /// The nearest hits in f64; a miss has t infinite, ids -1 and zeros.
@@ -184,9 +184,13 @@ impl Scene {
     ) -> PyResult<Closest<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
-        let (t, uv, primitive, geometry) = pool::run(py, threads, || {
-            let (mut t, mut uv) = (vec![0f64; count], vec![0f64; 2 * count]);
-            let (mut primitive, mut geometry) = (vec![0; count], vec![0; count]);
+        let (all_t, all_uv) = (zeros(py, count)?, zeros(py, 2 * count)?);
+        let (primitives, geometries) = (zeros(py, count)?, zeros(py, count)?);
+        let (mut t, mut uv) = (all_t.readwrite(), all_uv.readwrite());
+        let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
+        let (t, uv) = (t.as_slice_mut()?, uv.as_slice_mut()?);
+        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
+        pool::run(py, threads, || {
             let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
             let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
             tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
@@ -200,9 +204,8 @@ impl Scene {
                     }
                 }
             });
-            (t, uv, primitive, geometry)
         })?;
-        Ok((t.into_pyarray(py), table(py, uv, 2)?, primitive.into_pyarray(py), geometry.into_pyarray(py)))
+        Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries))
     }
 
     /// The normals of triangles, of unit length; zero for `INVALID`, and for triangles without an area.
@@ -266,7 +269,7 @@ impl Scene {
         }
     }
 
-    /// The hits of a chunk of the rays, if rays and meshes are in f32, and so need no more.
+    /// The hits of a chunk of the rays, if rays and meshes are in f32, and need no more.
     fn exact_hits<'a>(
         &self,
         rays: &Rays<'_>,
@@ -274,7 +277,7 @@ impl Scene {
         hits: &'a mut [Option<Hit>; CHUNK],
     ) -> Option<&'a [Option<Hit>]> {
         let bvh = self.precise.exact().filter(|_| rays.are_f32())?;
-        let rays = rays.rounded(rays.chunk(chunk));
+        let rays = rays.rounded(rays.chunk(chunk))?;
         let hits = &mut hits[..rays.len()];
         bvh.closest_batch(&rays, hits, Batch::of(&rays));
         Some(hits)
@@ -288,7 +291,7 @@ impl Scene {
         let hits = &mut hits[..rays.chunk(chunk).len()];
         let mut precise = [None; CHUNK];
         let rounded = |PreciseHit { t, u, v, primitive, geometry, instance }| Hit {
-            t: t as f32,
+            t: finite_f32(t),
             u: u as f32,
             v: v as f32,
             primitive,

@@ -193,6 +193,56 @@ def test_vertices_that_are_not_finite_are_not_hit():
     assert first.tolist() == [3]
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_rays_that_start_on_the_surface(rng, dtype):
+    """At corners and middles of edges t is 0 in several triangles; a zero with a sign is not before one without."""
+    case = Case(rng, (-8, 0), dtype=dtype)
+    step = dtype(2.0**-8)
+    corners = 2 * np.rint(case.vertices / step / 2).astype(np.int64)[case.faces]
+    starts = np.concatenate([corners[:, 0], (corners[:, 1] + corners[:, 2]) // 2])
+    directions = rng.integers(-64, 65, starts.shape) * 2 + 1
+    hit, _, t = brute.intersect(np.rint(case.vertices / step).astype(np.int64), case.faces, starts, directions)
+    lowest = np.where(hit & (t == 0), np.arange(len(case.faces)), len(case.faces)).min(axis=1)
+    on = lowest < len(case.faces)
+    assert on.sum() > 300
+    rays = np.hstack([starts * step, directions * step]).astype(dtype)[on]
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(case.vertices, case.faces)
+    cast = scene.cast_rays(rays)
+    assert (cast["t_hit"] == 0).all() and not np.signbit(cast["t_hit"]).any()
+    assert np.array_equal(cast["primitive_ids"], lowest[on])
+    assert not np.signbit(scene.list_intersections(rays)["t_hit"]).any()
+    assert np.array_equal(mesh(case).intersects_first(rays[:, :3], rays[:, 3:]), lowest[on])
+
+
+@pytest.mark.parametrize("length", [1.0, 1e-20, 1e-39, 1e-44])
+def test_short_directions_in_f32(length):
+    """Denormal ones, and those that f32 has no t for: all queries agree on what is hit."""
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+    for away in (1.0, 1e10, 1e19, 1e25):
+        origins = np.float32([[0.25, 0.25, away], [0.25, 0.25, -away], [0.9, 0.9, away], [0.25, 0.25, away]])
+        directions = np.float32([[0, 0, -length], [0, 0, length], [0, 0, -length], [0, 0, length]])
+        rays, expected = np.hstack([origins, directions]), [True, True, False, False]
+        cast = scene.cast_rays(rays)
+        assert np.isfinite(cast["t_hit"]).tolist() == expected
+        assert (cast["primitive_ids"] == 0).tolist() == expected
+        t = away / directions[1, 2].astype(np.float64)
+        assert np.allclose(cast["t_hit"][:2], min(t, np.finfo(np.float32).max), rtol=1e-6)
+        assert scene.test_occlusions(rays).tolist() == expected
+        assert scene.count_intersections(rays).tolist() == expected
+        assert scene.list_intersections(rays)["ray_ids"].tolist() == [0, 1]
+        assert np.array_equal(scene.list_intersections(rays)["t_hit"], cast["t_hit"][:2])
+
+        class Mesh:
+            vertices, faces = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+
+        intersector = twincast.RayMeshIntersector(Mesh())
+        assert intersector.intersects_any(origins, directions).tolist() == expected
+        assert intersector.intersects_first(origins, directions).tolist() == [0, 0, -1, -1]
+        assert intersector.intersects_id(origins, directions)[1].tolist() == [0, 1]
+
+
 def test_threads_do_not_change_answers(rng):
     case = Case(rng, (-8, 0), triangles=2000, count=5000)
     rays = np.hstack([case.origins, case.directions])
