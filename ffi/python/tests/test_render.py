@@ -39,6 +39,10 @@ def test_several_meshes_and_kinds():
 
     alone = twincast.render(Mesh(), size=(32, 32))
     assert (alone == twincast.render([TRIANGLE], size=(32, 32))).all()
+    beside = (TRIANGLE[0] + [3, 0, 0], TRIANGLE[1])
+    both = twincast.render([TRIANGLE, beside], size=(32, 32))
+    assert (both == twincast.render((TRIANGLE, beside), size=(32, 32))).all(), "two meshes, not vertices and faces"
+    assert (both == twincast.render((Mesh(), beside), size=(32, 32))).all()
     trimesh = pytest.importorskip("trimesh")
     scene = trimesh.Scene([trimesh.creation.box()])
     assert (twincast.render(scene, size=(16, 16))[..., 3] > 0).any()

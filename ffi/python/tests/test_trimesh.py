@@ -86,6 +86,34 @@ def test_hits_are_cut_at_the_nearest(sphere):
     assert sphere.ray.intersects_id(*ray, multiple_hits=False)[0].tolist() == all_tri[:1].tolist()
 
 
+    assert [len(part) for part in sphere.ray.intersects_id(*ray, multiple_hits=False, max_hits=1)] == [1, 1]
+    for many in (True, False):
+        nothing = sphere.ray.intersects_id(*ray, multiple_hits=many, max_hits=0, return_locations=True)
+        assert [part.shape for part in nothing] == [(0,), (0,), (0, 3)]
+        assert [part.dtype for part in nothing] == [np.int64, np.int64, np.float64]
+
+
+def test_the_border_of_an_open_mesh():
+    """It is touched from everywhere, but crossed as if a ray lay a little aside: half of it, by rule."""
+
+    class Mesh:
+        vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        faces = np.array([[0, 1, 2], [0, 2, 3]])
+
+    intersector = twincast.RayMeshIntersector(Mesh())
+    middles = np.array([[0.5, 0, 1], [1, 0.5, 1], [0.5, 1, 1], [0, 0.5, 1]])
+    down = np.broadcast_to([0.0, 0, -1], middles.shape)
+    assert intersector.intersects_any(middles, down).all()
+    assert len(intersector.intersects_id(middles, down, multiple_hits=False)[0]) == 4
+    _, ray = intersector.intersects_id(middles, down)
+    assert len(ray) == 2
+    # Two that together are closed again are crossed once.
+    beyond = Mesh()
+    beyond.vertices = Mesh.vertices + [1.0, 0, 0]
+    _, next_to = twincast.RayMeshIntersector(beyond).intersects_id(middles[1:2], down[1:2])
+    assert (1 in ray) + len(next_to) == 1
+
+
 def test_points_inside(rng):
     """The closed form of a cube; and of one with a cavity."""
     outer, inner = trimesh.creation.box(extents=[2, 2, 2]), trimesh.creation.box(extents=[1, 1, 1])

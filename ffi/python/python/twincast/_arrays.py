@@ -66,6 +66,46 @@ def indices(name: str, value: Any, columns: int = 3) -> np.ndarray:
     return array.astype(np.uint32)
 
 
+def whole(name: str, value: Any) -> np.ndarray:
+    """``value`` as an array; one of floats that hold whole numbers becomes int64.
+
+    Raises
+    ------
+    TypeError
+        Where it is no array.
+    """
+    array = _array(name, value)
+    is_whole = array.dtype.kind == "f" and (np.abs(array) < 2**53).all() and (array == np.trunc(array)).all()
+    return array.astype(np.int64) if is_whole else array
+
+
+def triangles(name: str, value: Any, vertices: np.ndarray) -> np.ndarray:
+    """``value`` as an (n, 3) array of uint32, the numbers of ``vertices``; raises as :func:`indices` does, also where there are fewer vertices."""
+    array = indices(name, value)
+    if array.size and array.max() >= len(vertices):
+        raise ValueError(f"{name}: vertex {array.max()} is named, but there are {len(vertices)} vertices")
+    return array
+
+
+def vector(name: str, value: Any) -> np.ndarray:
+    """``value`` as a (3,) array of float64; raises as :func:`floats` does, also where it is not finite."""
+    return _finite(name, value, (3,))
+
+
+def matrix(name: str, value: Any, size: int) -> np.ndarray:
+    """``value`` as a (size, size) array of float64; raises as :func:`floats` does, also where it is not finite."""
+    return _finite(name, value, (size, size))
+
+
+def _finite(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    array = floats(name, value, shape[-1]).astype(np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{name} must have the shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, not {array.tolist()}")
+    return array
+
+
 def _array(name: str, value: Any) -> np.ndarray:
     if isinstance(value, np.ndarray):
         # Of a subclass, such as trimesh's that watches for changes, the plain array.

@@ -7,21 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from . import _arrays
+from . import _arguments, _arrays
 
 
 def rays_looking_at(
     fov_deg: float, center: Any, eye: Any, up: Any, width_px: int, height_px: int
 ) -> np.ndarray:
     """See :meth:`twincast.RaycastingScene.create_rays_pinhole`."""
+    fov_deg, width_px = _arguments.real("fov_deg", fov_deg), _arguments.whole("width_px", width_px, least=1)
     if not 0 < fov_deg < 180:
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
-    center, eye, up = (_vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
+    center, eye, up = (_arrays.vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
     ahead = center - eye
     # Open3D's camera has x to the left and y up, so that its pictures are turned by half a turn; who is used to that turns them back.
     left = np.cross(up, ahead)
     if not np.linalg.norm(left) > 0:
-        raise ValueError("center, eye and up: they must be finite, and not lie on one line")
+        raise ValueError("center, eye and up: the view must have a direction, and up another")
     axes = np.array([axis / np.linalg.norm(axis) for axis in (left, np.cross(ahead, left), ahead)])
     extrinsic = np.eye(4)
     extrinsic[:3, :3] = axes
@@ -35,28 +36,18 @@ def rays_from_matrices(
     intrinsic_matrix: Any, extrinsic_matrix: Any, width_px: int, height_px: int
 ) -> np.ndarray:
     """See :meth:`twincast.RaycastingScene.create_rays_pinhole`."""
-    intrinsic = _matrix("intrinsic_matrix", intrinsic_matrix, 3)
-    extrinsic = _matrix("extrinsic_matrix", extrinsic_matrix, 4)
-    if width_px < 1 or height_px < 1:
-        raise ValueError(f"width_px and height_px must be at least 1, not {width_px} and {height_px}")
+    intrinsic = _arrays.matrix("intrinsic_matrix", intrinsic_matrix, 3)
+    extrinsic = _arrays.matrix("extrinsic_matrix", extrinsic_matrix, 4)
+    width_px = _arguments.whole("width_px", width_px, least=1)
+    height_px = _arguments.whole("height_px", height_px, least=1)
+    try:
+        to_camera = np.linalg.inv(intrinsic)
+    except np.linalg.LinAlgError:
+        raise ValueError(f"intrinsic_matrix must have an inverse; it is {intrinsic.tolist()}") from None
     # Through the pixels' middles.
     x, y = np.meshgrid(np.arange(width_px) + 0.5, np.arange(height_px) + 0.5)
-    to_world = extrinsic[:3, :3].T @ np.linalg.inv(intrinsic)
+    to_world = extrinsic[:3, :3].T @ to_camera
     rays = np.empty((height_px, width_px, 6), dtype=np.float32)
     rays[..., :3] = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
     rays[..., 3:] = np.stack([x, y, np.ones_like(x)], axis=-1) @ to_world.T
     return rays
-
-
-def _vector(name: str, value: Any) -> np.ndarray:
-    vector = _arrays.floats(name, value, 3).astype(np.float64)
-    if vector.shape != (3,):
-        raise ValueError(f"{name} must have the shape (3,), not {vector.shape}")
-    return vector
-
-
-def _matrix(name: str, value: Any, size: int) -> np.ndarray:
-    matrix = _arrays.floats(name, value, size).astype(np.float64)
-    if matrix.shape != (size, size):
-        raise ValueError(f"{name} must have the shape ({size}, {size}), not {matrix.shape}")
-    return matrix

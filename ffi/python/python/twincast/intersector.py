@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _arrays, _native
+from . import _arguments, _arrays, _native
 
 
 class RayMeshIntersector:
@@ -15,8 +15,8 @@ class RayMeshIntersector:
     ``mesh.ray = twincast.RayMeshIntersector(mesh)`` swaps it in for one mesh, and ``mesh.contains`` and whatever else of trimesh asks
     ``mesh.ray`` follows. The tree is built at the first query, and again once the mesh has changed.
 
-    All of it is decided on the mesh's float64 vertices and float64 rays, so there is no scale at which it breaks down:
-    ``scale_to_box`` is there for trimesh's sake and changes nothing.
+    All of it is decided on the mesh's float64 vertices and float64 rays, for coordinates up to 1.8e18 and edges down to 1e-75 (below 1e-100 f64
+    is too narrow for products of three lengths): ``scale_to_box`` is there for trimesh's sake and changes nothing.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class RayMeshIntersector:
     def __init__(self, geometry: Any, scale_to_box: bool = True, *, threads: int = 0) -> None:
         self.mesh = geometry
         self._scale_to_box = scale_to_box
-        self._threads = threads
+        self._threads = _arguments.whole("threads", threads)
         self._cached: tuple[int, _native.Scene] | None = None
 
     @property
@@ -40,7 +40,7 @@ class RayMeshIntersector:
         cached = self._cached
         if cached is None or cached[0] != key:
             vertices = _arrays.vectors("mesh.vertices", self.mesh.vertices)
-            faces = _arrays.indices("mesh.faces", self.mesh.faces)
+            faces = _arrays.triangles("mesh.faces", self.mesh.faces, vertices)
             # Assigned at once, so that threads that ask at the same time build twice at worst.
             cached = self._cached = (key, _native.Scene([(vertices, faces)], self._threads))
         return cached[1]
@@ -80,7 +80,9 @@ class RayMeshIntersector:
         """Which triangles rays hit.
 
         All hits come from one traversal. A ray through an edge or a corner that several triangles share crosses there once, so a
-        closed mesh is hit an even number of times from outside.
+        closed mesh is hit an even number of times from outside. Of the border of an open mesh half counts, by a rule that makes meshes that
+        continue each other be crossed once where they meet; a ray that hits it elsewhere hits nothing here. The first hit alone
+        (``multiple_hits=False``) is what :meth:`intersects_first` tells, crossing or not.
 
         Parameters
         ----------
@@ -102,14 +104,13 @@ class RayMeshIntersector:
             Only with ``return_locations``.
         """
         origins, directions = _rays(ray_origins, ray_directions)
-        if max_hits is not None and max_hits < 0:
-            raise ValueError(f"max_hits must be at least 0, not {max_hits}")
-        if not multiple_hits:
+        most = 2**63 - 1 if max_hits is None else _arguments.whole("max_hits", max_hits)
+        if not multiple_hits and most > 0:
             return self._first(origins, directions, return_locations)
         ray, tri, locations = self._scene.crossings(
             origins,
             directions,
-            most=2**63 - 1 if max_hits is None else max_hits,
+            most=most,
             locations=return_locations,
             threads=self._threads,
         )
@@ -129,7 +130,7 @@ class RayMeshIntersector:
         return self._scene.first(*_rays(ray_origins, ray_directions), threads=self._threads)
 
     def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
-        """Whether each ray hits the surface: (n,) bool."""
+        """Whether each ray hits the surface: (n,) bool; True as well where it only touches an edge or a corner."""
         return self._scene.occluded(*_rays(ray_origins, ray_directions), threads=self._threads)
 
     def contains_points(self, points: Any) -> np.ndarray:

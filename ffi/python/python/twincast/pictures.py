@@ -9,10 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from . import _arrays, _native
+from . import _arguments, _arrays, _native
 
 #: Diffuse reflectance, linear, of meshes that have no colour.
 GREY = (0.7, 0.7, 0.7)
+
+#: Vertices (v, 3), triangles (t, 3) and colour.
+_Mesh = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
+
+#: The most of the numbers that the native part has in 32 bits.
+_U32 = 2**32 - 1
 
 
 def render(
@@ -40,14 +46,15 @@ def render(
     ----------
     scene : path or mesh or meshes
         A file (.glb, .gltf, .obj, .ply, .stl, .toml, .nff, .test); or a mesh: anything with ``vertices`` (v, 3) and ``faces`` (t, 3), a
-        pair of such arrays, or a list of these. Meshes are lit from the camera.
+        pair of such arrays, or several of these. Meshes are lit from the camera.
     size : (width, height), optional
         In pixels; the file's, else 1280 x 720.
     spp : int, optional
         Samples a pixel; the file's, else 4.
     eye, look_at, up : (3,) float, optional
         Where the camera is, what it looks at and what is up, in the coordinates of the scene. Without ``eye`` the file's camera, or one that
-        shows everything.
+        shows everything. Where ``up`` is along the view, up in the picture is what it becomes for a camera that is tilted until it looks up or
+        down.
     fov : float
         Vertical field of view in degrees, with ``eye``.
     camera : str, optional
@@ -61,7 +68,7 @@ def render(
     seed : int, optional
         Chooses among equally good sample patterns.
     up_axis, unit : str
-        Of a file: y or z; m, cm, mm or in.
+        Of a file: y or z; m, cm, mm or in. Meshes are taken as they are.
     normals : str, optional
         flat or smooth; for a file also "file", what it says, which is usual.
     threads : int
@@ -84,27 +91,21 @@ def render(
     UserWarning
         Of what is odd about a file, but can be rendered.
     """
-    is_file = isinstance(scene, (str, os.PathLike))
-    meshes = None if is_file else [_mesh(mesh) for mesh in _meshes(scene)]
-    view = None
-    if eye is not None:
-        target = _centre(meshes) if look_at is None and meshes is not None else look_at
-        if target is None:
-            raise ValueError("look_at must be given with eye, for a file")
-        view = (_vector("eye", eye), _vector("look_at", target), _vector("up", up), float(fov))
-    elif look_at is not None:
-        raise ValueError("eye must be given with look_at")
     wishes = {
         "size": None if size is None else _size(size),
-        "spp": spp,
-        "seed": seed,
-        "view": view,
+        "spp": None if spp is None else _arguments.whole("spp", spp, least=1, most=_U32),
+        "seed": None if seed is None else _arguments.whole("seed", seed, most=2**64 - 1),
         "camera": camera,
         "integrator": integrator,
-        "max_depth": max_depth,
-        "background": None if background is None else _vector("background", background),
-        "threads": threads,
+        "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_U32),
+        "background": None if background is None else _arrays.vector("background", background).tolist(),
+        "threads": _arguments.whole("threads", threads),
     }
+    is_file = isinstance(scene, (str, os.PathLike))
+    if not is_file and (up_axis, unit) != ("y", "m"):
+        raise ValueError("up_axis and unit are those of a file: meshes are taken as they are")
+    meshes = None if is_file else _meshes(scene)
+    wishes["view"] = _view(meshes, eye, look_at, up, fov)
     if meshes is not None:
         return _native.render_meshes(meshes, wishes, normals or "flat")
     path = os.fspath(scene)
@@ -116,32 +117,66 @@ def render(
     return picture
 
 
-def _meshes(scene: Any) -> Iterable[Any]:
-    """One mesh, or several."""
+def _view(meshes: list[_Mesh] | None, eye: Any, look_at: Any, up: Any, fov: Any) -> tuple[Any, ...] | None:
+    """Eye, target, up and field of view; None where the camera is the scene's. ``meshes`` are None for a file."""
+    fov = _arguments.real("fov", fov)
+    if not 0 < fov < 180:
+        raise ValueError(f"fov must be between 0 and 180, not {fov}")
+    if eye is None:
+        if look_at is not None:
+            raise ValueError("eye must be given with look_at")
+        return None
+    target = _centre(meshes) if look_at is None and meshes is not None else look_at
+    if target is None:
+        raise ValueError("look_at must be given with eye, for a file")
+    vectors = (_arrays.vector(name, value).tolist() for name, value in [("eye", eye), ("look_at", target), ("up", up)])
+    return (*vectors, fov)
+
+
+def _meshes(scene: Any) -> list[_Mesh]:
+    """One mesh, or several.
+
+    Raises
+    ------
+    ValueError
+        Where there is none.
+    """
+    meshes = [_mesh(mesh) for mesh in _parts(scene)]
+    if not meshes:
+        raise ValueError(f"scene must have a mesh; there is none in a {type(scene).__name__}")
+    return meshes
+
+
+def _parts(scene: Any) -> Iterable[Any]:
     if hasattr(scene, "vertices") and hasattr(scene, "faces"):
         return [scene]
     # trimesh's scenes: all meshes where they stand.
     if hasattr(scene, "geometry") and hasattr(scene, "dump"):
         return [mesh for mesh in scene.dump() if hasattr(mesh, "faces")]
-    if isinstance(scene, tuple) and len(scene) == 2:
+    if _is_pair(scene) and not any(_is_pair(part) or hasattr(part, "faces") for part in scene):
         return [scene]
     if isinstance(scene, Iterable):
         return scene
     raise TypeError(f"scene must be a path, a mesh or a list of meshes, not a {type(scene).__name__}")
 
 
-def _mesh(mesh: Any) -> tuple[np.ndarray, np.ndarray, tuple[float, float, float]]:
-    """Vertices, triangles and colour."""
-    if isinstance(mesh, tuple) and len(mesh) == 2:
+def _is_pair(value: Any) -> bool:
+    """Whether it may be vertices and triangles."""
+    return isinstance(value, tuple) and len(value) == 2
+
+
+def _mesh(mesh: Any) -> _Mesh:
+    if _is_pair(mesh):
         vertices, faces = mesh
     elif hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         vertices, faces = mesh.vertices, mesh.faces
     else:
         raise TypeError(f"scene: a mesh must have vertices and faces, or be a pair of these; found a {type(mesh).__name__}")
-    return _arrays.vectors("vertices", vertices), _arrays.indices("faces", faces), GREY
+    vertices = _arrays.vectors("vertices", vertices)
+    return vertices, _arrays.triangles("faces", faces, vertices), GREY
 
 
-def _centre(meshes: list[tuple[np.ndarray, np.ndarray, Any]]) -> np.ndarray | None:
+def _centre(meshes: list[_Mesh]) -> np.ndarray:
     corners = [vertices for vertices, _, _ in meshes if len(vertices)]
     if not corners:
         return np.zeros(3)
@@ -150,15 +185,11 @@ def _centre(meshes: list[tuple[np.ndarray, np.ndarray, Any]]) -> np.ndarray | No
     return (low + high) / 2
 
 
-def _vector(name: str, value: Sequence[float]) -> list[float]:
-    vector = _arrays.floats(name, value, 3)
-    if vector.shape != (3,):
-        raise ValueError(f"{name} must have the shape (3,), not {vector.shape}")
-    return [float(x) for x in vector]
-
-
-def _size(size: tuple[int, int]) -> tuple[int, int]:
-    width, height = size
-    if width < 1 or height < 1:
-        raise ValueError(f"size must be at least 1 x 1, not {width} x {height}")
-    return int(width), int(height)
+def _size(size: Any) -> tuple[int, int]:
+    try:
+        width, height = size
+    except TypeError:
+        raise TypeError(f"size must be (width, height), not {size!r}") from None
+    except ValueError:
+        raise ValueError(f"size must be (width, height), not {size!r}") from None
+    return _arguments.whole("size", width, least=1, most=_U32), _arguments.whole("size", height, least=1, most=_U32)
