@@ -14,6 +14,13 @@ class Mesh:
     vertices, faces = TRIANGLE
 
 
+class Short(Mesh):
+    vertices = TRIANGLE[0][:2]
+
+
+pinhole = twincast.RaycastingScene.create_rays_pinhole
+
+
 def scene():
     scene = twincast.RaycastingScene()
     scene.add_triangles(*TRIANGLE)
@@ -68,6 +75,58 @@ GOOD = np.zeros((2, 3))
         (ValueError, "camera", lambda: twincast.render(TRIANGLE, size=(4, 4), camera="none")),
         (ValueError, "eye", lambda: twincast.render(TRIANGLE, size=(4, 4), look_at=(0, 0, 0))),
         (ValueError, "line", lambda: twincast.render(TRIANGLE, size=(4, 4), eye=(0, 0, 0), look_at=(0, 0, 0))),
+        (ValueError, "threads", lambda: twincast.RayMeshIntersector(Mesh(), threads=-1)),
+        (TypeError, "threads", lambda: twincast.RayMeshIntersector(Mesh(), threads="2")),
+        (ValueError, "max_hits", lambda: twincast.RayMeshIntersector(Mesh()).intersects_id(GOOD, GOOD, max_hits=2**64)),
+        (TypeError, "max_hits", lambda: twincast.RayMeshIntersector(Mesh()).intersects_id(GOOD, GOOD, max_hits=2.5)),
+        (TypeError, "max_hits", lambda: twincast.RayMeshIntersector(Mesh()).intersects_id(GOOD, GOOD, max_hits="a")),
+        (ValueError, "mesh.faces", lambda: twincast.RayMeshIntersector(Short()).intersects_any(GOOD, GOOD)),
+        (TypeError, "nthreads", lambda: scene().cast_rays(np.zeros((2, 6)), nthreads="2")),
+        (TypeError, "nthreads", lambda: scene().cast_rays(np.zeros((2, 6)), nthreads=1.5)),
+        (ValueError, "nthreads", lambda: scene().cast_rays(np.zeros((2, 6)), nthreads=2**64)),
+        (TypeError, "nthreads", lambda: twincast.RaycastingScene(nthreads="2")),
+        (ValueError, "tnear", lambda: scene().test_occlusions(np.zeros((2, 6)), tnear=np.nan)),
+        (ValueError, "tfar", lambda: scene().test_occlusions(np.zeros((2, 6)), tfar=np.nan)),
+        (TypeError, "tnear", lambda: scene().test_occlusions(np.zeros((2, 6)), tnear="0.5")),
+        (TypeError, "tnear", lambda: scene().test_occlusions(np.zeros((2, 6)), tnear=None)),
+        (TypeError, "tfar", lambda: scene().test_occlusions(np.zeros((2, 6)), tfar=[0.5, 1])),
+        (TypeError, "tfar", lambda: scene().test_occlusions(np.zeros((2, 6)), tfar=1j)),
+        (TypeError, "nsamples", lambda: scene().compute_occupancy(GOOD, nsamples=None)),
+        (TypeError, "nsamples", lambda: scene().compute_occupancy(GOOD, nsamples=2.5)),
+        (TypeError, "mesh", lambda: scene().add_triangles()),
+        (TypeError, "mesh", lambda: scene().add_triangles(mesh=TRIANGLE[0])),
+        (TypeError, "mesh", lambda: scene().add_triangles(*TRIANGLE, mesh=Mesh())),
+        (ValueError, "intrinsic_matrix", lambda: pinhole(np.diag([1.0, 0, 1]), np.eye(4), 4, 4)),
+        (ValueError, "intrinsic_matrix", lambda: pinhole(np.diag([1.0, np.nan, 1]), np.eye(4), 4, 4)),
+        (ValueError, "extrinsic_matrix", lambda: pinhole(np.eye(3), np.full((4, 4), np.inf), 4, 4)),
+        (ValueError, "center", lambda: pinhole(60, [np.nan, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4)),
+        (ValueError, "fov_deg", lambda: pinhole(np.nan, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4)),
+        (TypeError, "fov_deg", lambda: pinhole("60", [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4)),
+        (TypeError, "width_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0])),
+        (TypeError, "width_px", lambda: pinhole(np.eye(3), np.eye(4))),
+        (TypeError, "width_px", lambda: pinhole(intrinsic_matrix=np.eye(3), extrinsic_matrix=np.eye(4))),
+        (TypeError, "height_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4.5)),
+        (TypeError, "indices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, 1.5]])),
+        (TypeError, "indices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, np.nan]])),
+        (ValueError, "spp", lambda: twincast.render(TRIANGLE, spp=-1)),
+        (TypeError, "spp", lambda: twincast.render(TRIANGLE, spp=1.5)),
+        (ValueError, "seed", lambda: twincast.render(TRIANGLE, seed=-1)),
+        (ValueError, "threads", lambda: twincast.render(TRIANGLE, threads=-1)),
+        (ValueError, "max_depth", lambda: twincast.render(TRIANGLE, max_depth=-1)),
+        (ValueError, "size", lambda: twincast.render(TRIANGLE, size=(2**32, 1))),
+        (TypeError, "size", lambda: twincast.render(TRIANGLE, size=5)),
+        (ValueError, "size", lambda: twincast.render(TRIANGLE, size=(1, 2, 3))),
+        (TypeError, "size", lambda: twincast.render(TRIANGLE, size=("a", 3))),
+        (TypeError, "size", lambda: twincast.render(TRIANGLE, size=(2.9, 3))),
+        (TypeError, "fov", lambda: twincast.render(TRIANGLE, fov="a")),
+        (ValueError, "fov", lambda: twincast.render(TRIANGLE, eye=(0, 0, 5), fov=180)),
+        (ValueError, "eye", lambda: twincast.render(TRIANGLE, eye=(0, 0, np.nan))),
+        (ValueError, "background", lambda: twincast.render(TRIANGLE, background=(0, np.nan, 0))),
+        (ValueError, "up_axis", lambda: twincast.render(TRIANGLE, up_axis="z")),
+        (ValueError, "unit", lambda: twincast.render(TRIANGLE, unit="mm")),
+        (ValueError, "scene", lambda: twincast.render({})),
+        (ValueError, "scene", lambda: twincast.render([])),
+        (ValueError, "faces", lambda: twincast.render((TRIANGLE[0][:2], TRIANGLE[1]))),
         (FileNotFoundError, "no-such", lambda: twincast.render("no-such.glb")),
     ],
 )

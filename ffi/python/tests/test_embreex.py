@@ -1,5 +1,7 @@
 """The stand-in for embreex; and embreex itself, where it is installed."""
 
+import copy
+import pickle
 import subprocess
 import sys
 
@@ -78,6 +80,40 @@ def test_meshes_that_come_later():
     late = ours.mesh_construction.TriangleMesh(scene, TRIANGLE[0] + np.float32([0, 0, 1]), TRIANGLE[1])
     assert scene.run(*ray, query="DISTANCE").tolist() == [2]
     assert late.geomID == 2
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_copies(duplicate):
+    scene = build(ours, two_meshes)
+    ray = np.float32([[0.25, 0.25, 3]]), np.float32([[0, 0, -1]])
+    for _ in range(2):
+        twin = duplicate(scene)
+        late = ours.mesh_construction.TriangleMesh(twin, TRIANGLE[0] + np.float32([0, 0, 1]), TRIANGLE[1])
+        assert late.geomID == 2
+        assert twin.run(*ray, query="DISTANCE").tolist() == [2]
+        assert scene.run(*ray, query="DISTANCE").tolist() == [3]
+
+
+def test_indices_may_be_floats_as_in_embreex():
+    ray = np.float32([[0.25, 0.25, 3]]), np.float32([[0, 0, -1]])
+    scene = ours.rtcore_scene.EmbreeScene()
+    ours.mesh_construction.TriangleMesh(scene, TRIANGLE[0], TRIANGLE[1].astype(np.float64))
+    ours.mesh_construction.ElementMesh(scene, HEXAHEDRON, np.arange(8.0).reshape(1, 8))
+    assert scene.run(*ray, query="DISTANCE").tolist() == [2.5]
+    assert scene.run(*ray, output=True)["geomID"].tolist() == [1]
+
+
+def test_distances_that_cannot_be_overwritten_are_told_before_the_work():
+    scene = build(ours, two_meshes)
+    ray = np.float32([[0.25, 0.25, 3]]), np.float32([[0, 0, -1]])
+    reach = np.float32([7])
+    reach.flags.writeable = False
+    with pytest.raises(ValueError, match="dists"):
+        scene.run(*ray, dists=reach, query="DISTANCE")
+    with pytest.raises(ValueError, match="dists"):
+        scene.run(*ray, dists=reach, output=True)
+    assert not scene.is_committed
+    assert scene.run(*ray, dists=reach).tolist() == [0], "only read"
 
 
 @pytest.mark.parametrize("make", [two_meshes, hexahedra, tetrahedra])

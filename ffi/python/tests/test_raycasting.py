@@ -1,5 +1,11 @@
 """Open3D's contract; and Open3D itself, where it is installed."""
 
+import copy
+import os
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from test_points import cube
@@ -40,6 +46,60 @@ def test_shapes_and_types(scene):
     assert one["t_hit"].shape == () and one["t_hit"].item() == 1
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_range_that_begins_behind_the_origin_begins_there(scene, dtype):
+    rays = np.array([[-3, 0.5, 0.25, 1, 0, 0], [9, 0.5, 0.25, 1, 0, 0], [0, 0.5, 0.25, 1, 0, 0]], dtype)
+    for near in (-1, -1e-300, -1e40, -np.inf, np.float32(-2)):
+        assert scene.test_occlusions(rays, tnear=near).tolist() == [True, False, True]
+        assert scene.test_occlusions(rays, tnear=near, tfar=1.5).tolist() == [False, False, True]
+    assert not scene.test_occlusions(rays, tnear=-3, tfar=-1).any()
+
+
+def test_results_answer_as_tensors_do(scene):
+    rays = np.float32([[-3, 2, 0, 1, 0, 0], [-3, 0.5, 0.25, 1, 0, 0]])
+    hits = scene.cast_rays(rays)
+    finite = hits["t_hit"].isfinite()
+    assert finite.tolist() == [False, True] and finite.numpy().dtype == bool
+    assert hits["t_hit"].cpu() is hits["t_hit"]
+    assert hits["geometry_ids"].isfinite().tolist() == [True, True]
+    one = scene.cast_rays(rays[1])["t_hit"]
+    assert one.numpy().shape == () and one.item() == 2 and one.isfinite().numpy().tolist() is True
+    # What is picked out is NumPy's: it can be hashed, and does not change with the array.
+    assert isinstance(hits["t_hit"][1], np.float32) and hits["t_hit"][1].item() == 2
+
+
+def test_no_memory_is_an_error():
+    """Of answers for each ray, in a process that may have little."""
+    if not os.path.exists("/proc/self/statm"):
+        pytest.skip("nobody says how much memory there is")
+    program = (
+        "import resource, numpy as np, twincast\n"
+        "scene = twincast.RaycastingScene()\n"
+        "scene.add_triangles(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])\n"
+        "rays = np.broadcast_to(np.float32([0.25, 0.25, 1, 0, 0, -1]), (2**31, 6))\n"
+        "origins, directions = rays[:, :3], rays[:, 3:]\n"
+        "scene.cast_rays(rays[:5000])\n"
+        "size = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (size + 2**30,) * 2)\n"
+        "for ask in (scene._scene.first, scene._scene.occluded, scene._scene.cast, scene._scene.closest, scene._scene.count):\n"
+        "    try: ask(origins, directions)\n"
+        "    except MemoryError: continue\n"
+        "    raise SystemExit(f'{ask} found room')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_mesh_may_be_named():
+    class Mesh:
+        vertices, faces = cube()
+
+    scene = twincast.RaycastingScene()
+    assert scene.add_triangles(mesh=Mesh()) == 0
+    assert scene.add_triangles(vertex_positions=Mesh.vertices, triangle_indices=Mesh.faces) == 1
+    assert scene.count_intersections(np.float32([-3, 0.5, 0.25, 1, 0, 0])) == 4
+
+
 def test_lists(scene):
     rays = np.float32([[-3, 2, 0, 1, 0, 0], [-3, 0.5, 0.25, 1, 0, 0], [2, 0.5, 0.25, -2, 0, 0]])
     crossings = scene.list_intersections(rays)
@@ -64,6 +124,20 @@ def test_meshes_that_come_later(scene):
     assert scene.add_triangles(corners + np.float32([0, 3, 0]), faces) == 2
     assert scene.cast_rays(ray)["t_hit"].tolist() == [5]
     assert scene.cast_rays(ray)["geometry_ids"].tolist() == [2]
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_copies(scene, duplicate):
+    """Before a query and after it; and what is added to one is not in the other."""
+    ray = np.float32([[0, 9, 0, 0, -1, 0]])
+    corners, faces = cube()
+    for _ in range(2):
+        twin = duplicate(scene)
+        assert isinstance(twin, twincast.RaycastingScene)
+        assert twin.add_triangles(corners + np.float32([0, 3, 0]), faces) == 2
+        assert twin.cast_rays(ray)["geometry_ids"].tolist() == [2]
+        assert scene.cast_rays(ray)["t_hit"].tolist() == [8]
+        assert duplicate(scene).cast_rays(ray)["t_hit"].tolist() == [8]
 
 
 def test_arrays_of_the_caller_stay_the_callers(scene):

@@ -7,22 +7,34 @@ from typing import Any, overload
 
 import numpy as np
 
-from . import _arrays, _native
+from . import _arguments, _arrays
+from ._meshes import Meshes
 
 
 class Result(np.ndarray):
-    """A NumPy array that answers :meth:`numpy`, as Open3D's tensors do."""
+    """A NumPy array that answers :meth:`numpy`, :meth:`cpu` and :meth:`isfinite`, as Open3D's tensors do.
+
+    A single number that is picked out of it is NumPy's scalar, which answers ``item()``.
+    """
 
     def numpy(self) -> np.ndarray:
         """The array itself, not copied."""
         return self.view(np.ndarray)
+
+    def cpu(self) -> Result:
+        """Itself: it is on the CPU."""
+        return self
+
+    def isfinite(self) -> Result:
+        """Whether each number is neither infinite nor NaN: bool, of the same shape."""
+        return np.asarray(np.isfinite(self)).view(Result)
 
 
 def _result(array: np.ndarray, *shape: int) -> Result:
     return array.reshape(shape).view(Result)
 
 
-class RaycastingScene:
+class RaycastingScene(Meshes):
     """Triangle meshes that rays and points are held against, as ``open3d.t.geometry.RaycastingScene`` has them.
 
     Arrays may be NumPy's, or anything that answers ``__dlpack__`` and is on the CPU (Open3D's and PyTorch's tensors). Numbers
@@ -41,44 +53,34 @@ class RaycastingScene:
     INVALID_ID = 0xFFFF_FFFF
 
     def __init__(self, nthreads: int = 0, device: Any = None) -> None:
-        self._nthreads = _threads(nthreads)
+        super().__init__(nthreads)
         if device is not None and "CPU" not in str(device).upper():
             raise ValueError(f"device must be the CPU, not {device}")
-        self._meshes: list[tuple[np.ndarray, np.ndarray]] = []
-        self._built: _native.Scene | None = None
 
-    def add_triangles(self, vertex_positions: Any, triangle_indices: Any = None) -> int:
+    def add_triangles(self, vertex_positions: Any = None, triangle_indices: Any = None, *, mesh: Any = None) -> int:
         """Adds a mesh; also after queries.
 
         Parameters
         ----------
         vertex_positions : (n, 3) float
-            Or an ``open3d.t.geometry.TriangleMesh``, or anything with ``vertices`` and ``faces``, without ``triangle_indices``.
+            Or a mesh, without ``triangle_indices``.
         triangle_indices : (m, 3) int
+        mesh : open3d.t.geometry.TriangleMesh, or anything with ``vertices`` and ``faces``
+            Instead of both.
 
         Returns
         -------
         int
             The mesh's id: they are numbered from 0.
         """
-        if triangle_indices is None:
-            vertex_positions, triangle_indices = _mesh(vertex_positions)
+        if mesh is not None:
+            if vertex_positions is not None or triangle_indices is not None:
+                raise TypeError("mesh must be given instead of vertex_positions and triangle_indices, not with them")
+            vertex_positions, triangle_indices = _mesh("mesh", mesh)
+        elif triangle_indices is None:
+            vertex_positions, triangle_indices = _mesh("vertex_positions", vertex_positions)
         vertices = _arrays.vectors("vertex_positions", vertex_positions)
-        triangles = _arrays.indices("triangle_indices", triangle_indices)
-        if triangles.size and triangles.max() >= len(vertices):
-            raise ValueError(
-                f"triangle_indices: vertex {triangles.max()} is named, but there are {len(vertices)} vertices"
-            )
-        self._meshes.append((vertices.copy(), triangles.copy()))
-        self._built = None
-        return len(self._meshes) - 1
-
-    @property
-    def _scene(self) -> _native.Scene:
-        built = self._built
-        if built is None:
-            built = self._built = _native.Scene(list(self._meshes), self._nthreads)
-        return built
+        return self._add(vertices, _arrays.triangles("triangle_indices", triangle_indices, vertices))
 
     def cast_rays(self, rays: Any, nthreads: int = 0) -> dict[str, Result]:
         """The first hit of each ray.
@@ -91,7 +93,7 @@ class RaycastingScene:
         Returns
         -------
         dict
-            t_hit (...): infinite for a miss. geometry_ids, primitive_ids (...) uint32: :attr:`INVALID_ID` for a miss. primitive_uvs
+            t_hit (...): infinite for a miss; what float32 cannot hold is its largest number. geometry_ids, primitive_ids (...) uint32: :attr:`INVALID_ID` for a miss. primitive_uvs
             (..., 2): the weights of a triangle's second and third corner. primitive_normals (..., 3): of unit length, by the
             right-hand rule.
         """
@@ -119,14 +121,18 @@ class RaycastingScene:
         ----------
         rays : (..., 6) float
         tnear, tfar : float
-            In units of the directions' lengths.
+            In units of the directions' lengths. A ray starts at its origin: ``tnear`` below 0 is 0. (Open3D then finds some of what
+            lies behind the origin, and not all of it.)
         """
         origins, directions, shape = _rays(rays)
-        ends = {"tmin": float(tnear), "tmax": float(tfar)}
+        ends = {"tmin": max(_arguments.real("tnear", tnear), 0.0), "tmax": _arguments.real("tfar", tfar)}
         return _result(self._scene.occluded(origins, directions, **ends, threads=_threads(nthreads)), *shape)
 
     def count_intersections(self, rays: Any, nthreads: int = 0) -> Result:
         """How often each ray crosses a triangle: (...) int32. A shared edge or corner is crossed once.
+
+        The border of an open mesh is crossed on half of its sides, by a rule that makes meshes that continue each other be crossed once
+        where they meet. A ray that hits it elsewhere crosses nothing, though it hits.
 
         Parameters
         ----------
@@ -136,7 +142,7 @@ class RaycastingScene:
         return _result(self._scene.count(origins, directions, threads=_threads(nthreads)), *shape)
 
     def list_intersections(self, rays: Any, nthreads: int = 0) -> dict[str, Result]:
-        """All crossings of each ray, from near to far.
+        """All crossings of each ray, from near to far: those of :meth:`count_intersections`.
 
         Parameters
         ----------
@@ -175,7 +181,8 @@ class RaycastingScene:
         -------
         dict
             points (..., 3); geometry_ids, primitive_ids (...) uint32; primitive_uvs (..., 2) and primitive_normals (..., 3) as in
-            :meth:`cast_rays`. NaN and :attr:`INVALID_ID` for a point that is not finite, or if there are no triangles.
+            :meth:`cast_rays`. For a point that is not finite, or if there are no triangles, ``points`` are NaN, ids
+            :attr:`INVALID_ID`, and the others 0.
         """
         points, shape = _points(query_points)
         nearest = self._scene.nearest(points, threads=_threads(nthreads))
@@ -189,7 +196,7 @@ class RaycastingScene:
         }
 
     def compute_distance(self, query_points: Any, nthreads: int = 0) -> Result:
-        """How far each point is from the nearest triangle: (...), NaN for a point that is not finite.
+        """How far each point is from the nearest triangle: (...), NaN for a point that is not finite, or if there are no triangles.
 
         Parameters
         ----------
@@ -259,7 +266,7 @@ class RaycastingScene:
         """
         from ._pinhole import rays_from_matrices, rays_looking_at
 
-        by_matrices = "intrinsic_matrix" in kwargs or len(args) + len(kwargs) == 4
+        by_matrices = bool({"intrinsic_matrix", "extrinsic_matrix"} & kwargs.keys()) or bool(args and np.ndim(args[0]))
         make = rays_from_matrices if by_matrices else rays_looking_at
         return make(*args, **kwargs).view(Result)
 
@@ -276,22 +283,21 @@ def _points(points: Any) -> tuple[np.ndarray, tuple[int, ...]]:
     return array.reshape(-1, 3), array.shape[:-1]
 
 
-def _threads(nthreads: int) -> int:
-    if nthreads < 0:
-        raise ValueError(f"nthreads must be at least 0, not {nthreads}")
-    return int(nthreads)
+def _threads(nthreads: Any) -> int:
+    return _arguments.whole("nthreads", nthreads)
 
 
-def _samples(nsamples: int) -> int:
-    if nsamples < 1 or nsamples % 2 == 0:
-        raise ValueError(f"nsamples must be an odd number from 1 on, not {nsamples}")
-    return int(nsamples)
+def _samples(nsamples: Any) -> int:
+    samples = _arguments.whole("nsamples", nsamples, least=1)
+    if samples % 2 == 0:
+        raise ValueError(f"nsamples must be an odd number, not {samples}")
+    return samples
 
 
-def _mesh(mesh: Any) -> tuple[Any, Any]:
+def _mesh(name: str, mesh: Any) -> tuple[Any, Any]:
     """Vertices and triangles of Open3D's mesh, or of trimesh's."""
     if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):
         return mesh.vertex["positions"], mesh.triangle["indices"]
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return mesh.vertices, mesh.faces
-    raise TypeError(f"vertex_positions must be a mesh, or come with triangle_indices; it is a {type(mesh).__name__}")
+    raise TypeError(f"{name} must be a mesh, or vertex_positions come with triangle_indices; it is a {type(mesh).__name__}")

@@ -33,6 +33,7 @@ class TriangleMesh:
     scene : EmbreeScene
     vertices : (v, 3) float, or (t, 3, 3) float without ``indices``
     indices : (t, 3) int, optional
+        Or floats that hold whole numbers, here and in :class:`ElementMesh`.
     """
 
     def __init__(self, scene: EmbreeScene, vertices: Any, indices: Any = None) -> None:
@@ -43,7 +44,7 @@ class TriangleMesh:
             triangles = np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
             _add(self, scene, corners.reshape(-1, 3), triangles)
         else:
-            _add(self, scene, _arrays.vectors("vertices", vertices), _arrays.indices("indices", indices))
+            _add(self, scene, _arrays.vectors("vertices", vertices), _arrays.whole("indices", indices))
 
 
 class ElementMesh:
@@ -57,6 +58,7 @@ class ElementMesh:
     """
 
     def __init__(self, scene: EmbreeScene, vertices: Any, indices: Any) -> None:
+        indices = _arrays.whole("indices", indices)
         shape = np.shape(indices)
         if len(shape) != 2 or shape[1] not in (4, 8):
             raise ValueError(f"indices must have the shape (e, 4) or (e, 8), not {shape}")
@@ -65,10 +67,7 @@ class ElementMesh:
         _add(self, scene, _arrays.vectors("vertices", vertices), elements[:, corners].reshape(-1, 3))
 
 
-def _add(mesh: Any, scene: EmbreeScene, vertices: np.ndarray, triangles: np.ndarray) -> None:
+def _add(mesh: Any, scene: EmbreeScene, vertices: np.ndarray, triangles: Any) -> None:
     if not isinstance(scene, EmbreeScene):
         raise TypeError(f"scene must be an EmbreeScene, not {type(scene).__name__}")
-    if triangles.size and triangles.max() >= len(vertices):
-        raise ValueError(f"indices: vertex {triangles.max()} is named, but there are {len(vertices)} vertices")
-    # Copied: what the caller does with its arrays afterwards does not concern the scene.
-    mesh.geomID = scene._add(vertices.copy(), triangles.copy())
+    mesh.geomID = scene._add(vertices, _arrays.triangles("indices", triangles, vertices))

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ... import _arrays, _native
+from ... import _arrays
+from ..._meshes import Meshes
 from .rtcore import EmbreeDevice
 
 #: How far rays reach if nobody says; in float32, as embreex has it.
@@ -16,7 +17,7 @@ _FARTHEST = float(np.float32(1e37))
 _QUERIES = ("INTERSECT", "OCCLUDED", "DISTANCE")
 
 
-class EmbreeScene:
+class EmbreeScene(Meshes):
     """Meshes that rays can be cast at; see :mod:`~twincast.compat.embreex.mesh_construction` for how they get in.
 
     Parameters
@@ -28,25 +29,13 @@ class EmbreeScene:
     """
 
     def __init__(self, device: EmbreeDevice | None = None, robust: bool = True) -> None:
+        super().__init__()
         self.device = EmbreeDevice() if device is None else device
-        self._meshes: list[tuple[np.ndarray, np.ndarray]] = []
-        self._scene: _native.Scene | None = None
 
     @property
     def is_committed(self) -> int:
         """1 if the tree over all meshes is built, else 0."""
-        return int(self._scene is not None)
-
-    def _add(self, vertices: np.ndarray, triangles: np.ndarray) -> int:
-        self._meshes.append((vertices, triangles))
-        self._scene = None
-        return len(self._meshes) - 1
-
-    def _committed(self) -> _native.Scene:
-        scene = self._scene
-        if scene is None:
-            scene = self._scene = _native.Scene(list(self._meshes))
-        return scene
+        return int(self._built is not None)
 
     def run(
         self,
@@ -88,7 +77,9 @@ class EmbreeScene:
         if len(directions) not in (1, len(origins)):
             raise ValueError(f"vec_directions: {len(directions)} of them, but {len(origins)} vec_origins")
         reach, overwrite = _reach(dists, len(origins))
-        scene = self._committed()
+        if overwrite is not None and (output or query == "DISTANCE") and not overwrite.flags.writeable:
+            raise ValueError("dists must be writeable: the hits' distances are written there")
+        scene = self._scene
         if output:
             t, uv, primitive, geometry, normal = scene.cast(origins, directions, tmax=reach, normalize=False)
             tfar = _distances(t, reach, overwrite)

@@ -1,0 +1,47 @@
+"""Meshes that are added one by one."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+
+from . import _arguments, _native
+
+
+class Meshes:
+    """Meshes in the order in which they came, and the tree over them, which is built at the first query after the last of them.
+
+    Copies share the arrays, which nobody changes, and the tree, but what is added to one is not in the other. The tree is not pickled:
+    it is built again at the first query.
+    """
+
+    def __init__(self, threads: Any = 0) -> None:
+        self._threads = _arguments.whole("nthreads", threads)
+        self._meshes: list[tuple[np.ndarray, np.ndarray]] = []
+        self._built: _native.Scene | None = None
+
+    def _add(self, vertices: np.ndarray, triangles: np.ndarray) -> int:
+        """The number of a new mesh: vertices (v, 3), triangles (t, 3) uint32. What the caller does with its arrays afterwards does not concern it."""
+        self._meshes.append((vertices.copy(), triangles.copy()))
+        self._built = None
+        return len(self._meshes) - 1
+
+    @property
+    def _scene(self) -> _native.Scene:
+        built = self._built
+        if built is None:
+            built = self._built = _native.Scene(list(self._meshes), self._threads)
+        return built
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_built": None}
+
+    def __copy__(self) -> Meshes:
+        twin = object.__new__(type(self))
+        twin.__dict__.update(self.__dict__, _meshes=list(self._meshes))
+        return twin
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Meshes:
+        return copy.copy(self)
