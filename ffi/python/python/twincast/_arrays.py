@@ -80,7 +80,13 @@ def whole(name: str, value: Any) -> np.ndarray:
 
 
 def triangles(name: str, value: Any, vertices: np.ndarray) -> np.ndarray:
-    """``value`` as an (n, 3) array of uint32, the numbers of ``vertices``; raises as :func:`indices` does, also where there are fewer vertices."""
+    """``value`` as an (n, 3) array of uint32, the numbers of ``vertices``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`indices` does; and where a vertex is named that is not there, with its name.
+    """
     array = indices(name, value)
     if array.size and array.max() >= len(vertices):
         raise ValueError(f"{name}: vertex {array.max()} is named, but there are {len(vertices)} vertices")

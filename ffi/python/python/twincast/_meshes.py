@@ -23,7 +23,7 @@ class Meshes:
         self._built: _native.Scene | None = None
 
     def _add(self, vertices: np.ndarray, triangles: np.ndarray) -> int:
-        """The number of a new mesh: vertices (v, 3), triangles (t, 3) uint32. What the caller does with its arrays afterwards does not concern it."""
+        """The number of a new mesh: vertices (v, 3), triangles (t, 3) uint32. What the caller does with them afterwards does not concern it."""
         self._meshes.append((vertices.copy(), triangles.copy()))
         self._built = None
         return len(self._meshes) - 1

@@ -15,8 +15,8 @@ class RayMeshIntersector:
     ``mesh.ray = twincast.RayMeshIntersector(mesh)`` swaps it in for one mesh, and ``mesh.contains`` and whatever else of trimesh asks
     ``mesh.ray`` follows. The tree is built at the first query, and again once the mesh has changed.
 
-    All of it is decided on the mesh's float64 vertices and float64 rays, for coordinates up to 1.8e18 and edges down to 1e-75 (below 1e-100 f64
-    is too narrow for products of three lengths): ``scale_to_box`` is there for trimesh's sake and changes nothing.
+    All of it is decided on the mesh's float64 vertices and float64 rays, for coordinates up to 1.8e18 and edges down to 1e-75 (somewhere
+    below, f64 is too narrow for products of three lengths): ``scale_to_box`` is there for trimesh's sake and changes nothing.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def render(
     ------
     FileNotFoundError
         Where there is no such file.
-    ValueError
+    TypeError, ValueError
         Where the scene or an argument is wrong, with what would be right.
 
     Warns

@@ -93,8 +93,8 @@ class RaycastingScene(Meshes):
         Returns
         -------
         dict
-            t_hit (...): infinite for a miss; what float32 cannot hold is its largest number. geometry_ids, primitive_ids (...) uint32: :attr:`INVALID_ID` for a miss. primitive_uvs
-            (..., 2): the weights of a triangle's second and third corner. primitive_normals (..., 3): of unit length, by the
+            t_hit (...): infinite for a miss; what float32 cannot hold is its largest number. geometry_ids, primitive_ids (...) uint32:
+            :attr:`INVALID_ID` for a miss. primitive_uvs (..., 2): the weights of a triangle's second and third corner. primitive_normals (..., 3): of unit length, by the
             right-hand rule.
         """
         origins, directions, shape = _rays(rays)
