@@ -131,44 +131,65 @@ impl Motion {
             return self.steps[0].matrix();
         }
         let (step, fraction) = super::surface::segment(self.steps.len(), self.range, time);
-        match (&self.steps[step], &self.steps[step + 1]) {
-            (Transform::Quaternion(a), Transform::Quaternion(b)) => between(a, b, fraction),
-            (a, b) => {
-                let (a, b) = (a.matrix(), b.matrix());
-                let mix = |a: Vec3, b: Vec3| a * (1.0 - fraction) + b * fraction;
-                let columns = |k: usize| mix(a.matrix3.col(k), b.matrix3.col(k));
-                let matrix3 = Mat3::from_cols(columns(0), columns(1), columns(2));
-                Affine3 { matrix3, translation: mix(a.translation, b.translation) }
+        mix(&self.steps[step], &self.steps[step + 1], fraction)
+    }
+
+    /// Times from 0 to 1 and where it is then, between which everything moves in straight lines, or nearly: by how much points within
+    /// `reach` of the origin may stray from these lines. None where it is not there in that time.
+    pub fn places(&self, reach: f32) -> (Vec<(f32, Affine3)>, f32) {
+        let (begin, end) = if self.is_still() { (0.0, 1.0) } else { self.range };
+        let (first, last) = (begin.max(0.0), end.min(1.0));
+        if first > last {
+            return (Vec::new(), 0.0);
+        }
+        let mut places = vec![(first, self.at(first))];
+        let mut stray: f32 = 0.0;
+        let segments = (self.steps.len() - 1) as f32;
+        for (step, pair) in self.steps.windows(2).enumerate() {
+            let mut count = 1;
+            if let [Transform::Quaternion(a), Transform::Quaternion(b)] = pair {
+                count = PLACES;
+                stray = stray.max(sagitta(a, b, reach));
+            }
+            for i in 0..=count {
+                let fraction = i as f32 / count as f32;
+                let time = begin + (end - begin) * ((step as f32 + fraction) / segments);
+                if first < time && time < last {
+                    places.push((time, mix(&pair[0], &pair[1], fraction)));
+                }
             }
         }
-    }
-
-    /// Places between which everything moves in straight lines, or nearly: by how much points within `reach` of the origin may stray
-    /// from these lines.
-    pub fn places(&self, reach: f32) -> (Vec<Affine3>, f32) {
-        let turns = self.steps.len() > 1 && self.steps.iter().any(|step| matches!(step, Transform::Quaternion(_)));
-        if !turns {
-            return (self.steps.iter().map(Transform::matrix).collect(), 0.0);
-        }
-        let count = (self.steps.len() - 1) * PLACES;
-        let (begin, end) = self.range;
-        let places: Vec<_> = (0..=count).map(|i| self.at(begin + (end - begin) * (i as f32 / count as f32))).collect();
-        // The sagitta of an arc of half a turn, divided into so many places, with as much again for the changing scale.
-        let angle = std::f32::consts::PI / PLACES as f32;
-        let size = places.iter().map(|place| place.matrix3.abs_row_sum()).fold(0.0, f32::max);
-        (places, reach * size * angle * angle / 4.0)
+        places.push((last, self.at(last)));
+        (places, stray)
     }
 }
 
-/// The largest sum of magnitudes in a row: by how much a coordinate can grow.
-trait RowSum {
-    fn abs_row_sum(&self) -> f32;
+/// The place between two steps.
+fn mix(a: &Transform, b: &Transform, fraction: f32) -> Affine3 {
+    if let (Transform::Quaternion(a), Transform::Quaternion(b)) = (a, b) {
+        return between(a, b, fraction);
+    }
+    let (a, b) = (a.matrix(), b.matrix());
+    let mix = |a: Vec3, b: Vec3| a * (1.0 - fraction) + b * fraction;
+    let columns = |k: usize| mix(a.matrix3.col(k), b.matrix3.col(k));
+    let matrix3 = Mat3::from_cols(columns(0), columns(1), columns(2));
+    Affine3 { matrix3, translation: mix(a.translation, b.translation) }
 }
 
-impl RowSum for Mat3 {
-    fn abs_row_sum(&self) -> f32 {
-        (self.x_axis.abs() + self.y_axis.abs() + self.z_axis.abs()).max_element()
-    }
+/// By how much a point within `reach` may stray from the line between two neighbouring places of a turn.
+///
+/// An eighth of the square of the step times the most that its acceleration may be: it turns by half a turn at most, while the arm that is turned
+/// changes evenly.
+fn sagitta(a: &RTCQuaternionDecomposition, b: &RTCQuaternionDecomposition, reach: f32) -> f32 {
+    const TURN: f32 = std::f32::consts::PI;
+    let length = |parts: &RTCQuaternionDecomposition, from: &RTCQuaternionDecomposition| {
+        let square = |a: &[f32; 3], b: &[f32; 3]| Vec3::from(*a).distance_squared(Vec3::from(*b));
+        (square(&parts.scale, &from.scale) + square(&parts.skew, &from.skew)).sqrt() * reach
+            + square(&parts.shift, &from.shift).sqrt()
+    };
+    let none = RTCQuaternionDecomposition { scale: [0.0; 3], skew: [0.0; 3], shift: [0.0; 3], ..*a };
+    let arm = length(a, &none).max(length(b, &none));
+    (TURN * TURN * arm + 2.0 * TURN * length(a, b)) / (8 * PLACES * PLACES) as f32
 }
 
 fn transform_of(view: Option<&View>, primitive: usize) -> Result<Transform> {

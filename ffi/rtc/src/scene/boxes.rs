@@ -1,9 +1,10 @@
 //! Boxes of what is no triangle that stands still: at all times, and at both ends of time.
 
-use twincast::math::{Aabb, Vec3};
+use twincast::math::{Aabb, Affine3, Vec3};
 use twincast::trace::Part;
 
 use super::committed::{Body, Instance, Item, Record};
+use super::path;
 
 /// Boxes of the second tree, and what is in them; and those of everything at both ends of time.
 #[derive(Default)]
@@ -11,6 +12,8 @@ pub struct Boxes {
     pub items: Vec<Item>,
     pub boxes: Vec<Aabb>,
     ends: Option<[Aabb; 2]>,
+    /// Those of one primitive at each step.
+    steps: Vec<Aabb>,
 }
 
 impl Boxes {
@@ -25,32 +28,17 @@ impl Boxes {
         self.ends = Some([a.union(start), b.union(end)]);
     }
 
-    /// Adds a primitive by its boxes at each time step; one that is nowhere is left out.
-    fn add(&mut self, item: Item, steps: impl Iterator<Item = Aabb> + Clone) {
-        if steps.clone().any(|bounds| !(bounds.min.cmple(bounds.max).all())) {
+    /// Adds a primitive by its boxes at each step of a range of time; one that is nowhere is left out.
+    fn add(&mut self, item: Item, steps: impl Iterator<Item = Aabb>, range: (f32, f32)) {
+        self.steps.clear();
+        self.steps.extend(steps);
+        if self.steps.iter().any(|bounds| !(bounds.min.cmple(bounds.max).all())) {
             return;
         }
-        self.surround(linear(steps.clone()));
+        self.surround(path::ends(&self.steps, range));
         self.items.push(item);
-        self.boxes.push(steps.fold(Aabb::EMPTY, Aabb::union));
+        self.boxes.push(self.steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
     }
-}
-
-/// Two boxes between which those of all steps are, if the steps are as far apart in time.
-fn linear(steps: impl Iterator<Item = Aabb> + Clone) -> [Aabb; 2] {
-    let count = steps.clone().count();
-    let (Some(mut first), Some(mut last)) = (steps.clone().next(), steps.clone().last()) else {
-        return [Aabb::EMPTY; 2];
-    };
-    let (a, b) = (first, last);
-    for (i, step) in steps.enumerate().skip(1).take(count.saturating_sub(2)) {
-        let at = i as f32 / (count - 1) as f32;
-        let below = (step.min - a.min.lerp(b.min, at)).min(Vec3::ZERO);
-        let above = (step.max - a.max.lerp(b.max, at)).max(Vec3::ZERO);
-        first = Aabb { min: first.min.min(a.min + below), max: first.max.max(a.max + above) };
-        last = Aabb { min: last.min.min(b.min + below), max: last.max.max(b.max + above) };
-    }
-    [first, last]
 }
 
 /// Boxes of everything that is not solid; and around all.
@@ -64,17 +52,17 @@ pub fn other_boxes(records: &[Option<Record>], parts: &[Part]) -> Boxes {
             Body::Surface(surface) if surface.is_still() => {}
             Body::Surface(surface) => {
                 for i in 0..surface.triangles.len() {
-                    boxes.add(item(i), (0..surface.steps.len()).map(|step| surface.bounds_at(i, step)));
+                    boxes.add(item(i), (0..surface.steps.len()).map(|step| surface.bounds_at(i, step)), surface.range());
                 }
             }
             Body::Linear(linear) => {
                 for i in 0..linear.count() {
-                    boxes.add(item(i), (0..linear.step_count()).map(|step| linear.bounds_at(i, step)));
+                    boxes.add(item(i), (0..linear.step_count()).map(|step| linear.bounds_at(i, step)), linear.range());
                 }
             }
             Body::User(user) => {
                 for i in 0..user.boxes[0].len() {
-                    boxes.add(item(i), user.boxes.iter().map(|step| step[i]));
+                    boxes.add(item(i), user.boxes.iter().map(|step| step[i]), user.range);
                 }
             }
             Body::Instances(instances) => {
@@ -102,24 +90,41 @@ pub fn instance_bounds(instance: &Instance) -> (Aabb, [Aabb; 2]) {
     if !all.min.cmple(all.max).all() {
         return (Aabb::EMPTY, [Aabb::EMPTY; 2]);
     }
-    let reach = all.min.abs().max(all.max.abs()).element_sum();
-    let (places, stray) = motion.places(reach);
-    let last = (places.len() - 1).max(1) as f32;
-    let placed = places.iter().enumerate().map(|(i, place)| {
-        let at = i as f32 / last;
-        // What is inside moves as well, somewhere between its boxes.
-        let (min, max) = (start.min.lerp(end.min, at), start.max.lerp(end.max, at));
-        let inside = if places.len() == 1 { all } else { Aabb { min, max } };
-        let corner = |k: usize| {
-            let pick = |bit: usize, axis: usize| if k >> bit & 1 == 0 { inside.min[axis] } else { inside.max[axis] };
-            place.transform_point3(Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2)))
-        };
-        let bounds = Aabb::around((0..8).map(corner));
-        // The rounding of the transform, here and when rays are taken through its inverse.
-        let slack = Vec3::splat(stray) + (bounds.min.abs().max(bounds.max.abs()) + Vec3::splat(reach * 1e-7)) * 1e-6;
-        Aabb { min: bounds.min - slack, max: bounds.max + slack }
-    });
-    let ends = linear(placed.clone());
-    // Products of two motions are not straight: the whole is of both boxes everywhere.
-    (placed.fold(ends[0].union(ends[1]), Aabb::union), ends)
+    let reach = all.min.abs().max(all.max.abs());
+    let (places, stray) = motion.places(reach.length());
+    let mut knots = Vec::with_capacity(2 * places.len());
+    for pair in places.windows(2) {
+        let inside = [pair[0].0, pair[1].0].map(|time| path::between(start, end, time));
+        let ends = product([&pair[0].1, &pair[1].1], inside, reach, stray);
+        knots.extend([(pair[0].0, ends[0]), (pair[1].0, ends[1])]);
+    }
+    let whole = knots.iter().fold(Aabb::EMPTY, |whole, (_, bounds)| whole.union(*bounds));
+    (whole, path::linear(knots.into_iter()))
+}
+
+/// Two boxes between which what is inside always is while it moves from the first of its boxes to the second and its place from the first
+/// transform to the second, both in straight lines.
+///
+/// The product is quadratic in time, with the control boxes M0 B0, (M0 B1 + M1 B0) / 2 and M1 B1. It strays from the line between the outer ones
+/// by 2 t (1 - t) of what the middle one does from their mean, so at most by half of that.
+fn product([from, to]: [&Affine3; 2], [start, end]: [Aabb; 2], reach: Vec3, stray: f32) -> [Aabb; 2] {
+    let [first, last] = [placed(from, start, reach), placed(to, end, reach)];
+    let [a, b] = [placed(from, end, reach), placed(to, start, reach)];
+    let below = (a.min + b.min - first.min - last.min).min(Vec3::ZERO) / 4.0 - Vec3::splat(stray);
+    let above = (a.max + b.max - first.max - last.max).max(Vec3::ZERO) / 4.0 + Vec3::splat(stray);
+    [first, last].map(|bounds| Aabb { min: bounds.min + below, max: bounds.max + above })
+}
+
+/// The box around a box in its place; what is inside goes no farther from the origin than `reach`.
+fn placed(place: &Affine3, bounds: Aabb, reach: Vec3) -> Aabb {
+    let corner = |k: usize| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+        place.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
+    };
+    let around = Aabb::around((0..8).map(corner));
+    let matrix = &place.matrix3;
+    let terms = matrix.x_axis.abs() * reach.x + matrix.y_axis.abs() * reach.y + matrix.z_axis.abs() * reach.z;
+    // The rounding of the transform, of what moves inside, and of rays that are taken through the inverse.
+    let slack = (terms + place.translation.abs()) * 1e-6;
+    Aabb { min: around.min - slack, max: around.max + slack }
 }

@@ -4,6 +4,7 @@ mod boxes;
 mod commit;
 mod committed;
 mod near;
+mod path;
 mod progress;
 
 use std::ffi::c_void;

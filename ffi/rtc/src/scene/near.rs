@@ -8,7 +8,8 @@ use twincast::math::{Aabb, Vec3};
 use twincast::trace::bvh::{BoxTree, Options, Search};
 
 use super::committed::{Body, Committed, Item};
-use crate::geometry::{Surface, segment};
+use super::path;
+use crate::geometry::Surface;
 
 /// Boxes of all primitives.
 pub struct Near {
@@ -35,9 +36,7 @@ impl Path {
         if !(self.range.0..=self.range.1).contains(&time) {
             return false;
         }
-        let (step, fraction) = segment(self.steps.len(), self.range, time);
-        let (a, b) = (self.steps[step], self.steps[step + 1]);
-        let (min, max) = (a.min.lerp(b.min, fraction), a.max.lerp(b.max, fraction));
+        let Aabb { min, max } = path::at(&self.steps, self.range, time);
         let slack = 8.0 * f32::EPSILON * (min.abs().max(max.abs()).max(point.abs()).max_element() + radius);
         // Not by "farther than": what is not a number is shown.
         let is_farther = (min - point).max(point - max).max(Vec3::ZERO).length() > radius + slack;

@@ -9,13 +9,15 @@ void callbacks();
 void rounds();
 void errors();
 void packets();
+void motions();
 
 int main() {
   const struct {
     const char* name;
     void (*run)();
   } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
-                {"rounds", rounds},     {"errors", errors},   {"packets", packets}};
+                {"rounds", rounds},     {"errors", errors},   {"packets", packets},
+                {"motions", motions}};
   int all = 0;
   for (const auto& group : groups) {
     checks = failures = 0;
