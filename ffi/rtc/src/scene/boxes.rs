@@ -52,7 +52,11 @@ pub fn other_boxes(records: &[Option<Record>], parts: &[Part]) -> Boxes {
             Body::Surface(surface) if surface.is_still() => {}
             Body::Surface(surface) => {
                 for i in 0..surface.triangles.len() {
-                    boxes.add(item(i), (0..surface.steps.len()).map(|step| surface.bounds_at(i, step)), surface.range());
+                    boxes.add(
+                        item(i),
+                        (0..surface.steps.len()).map(|step| surface.bounds_at(i, step)),
+                        surface.range(),
+                    );
                 }
             }
             Body::Linear(linear) => {

@@ -1,4 +1,4 @@
-//! Boxes of all primitives, for point queries.
+//! Boxes of the primitives that point queries show: all but points and curves.
 //!
 //! A query shows the caller each primitive near a point, triangles too. The tree of triangles knows triangles, but not quads, nor what stands
 //! beside them; scenes that are asked for points are few, and get one more tree over all boxes then. It holds what moves by where it ever is;
@@ -11,7 +11,7 @@ use super::committed::{Body, Committed, Item};
 use super::path;
 use crate::geometry::Surface;
 
-/// Boxes of all primitives.
+/// Boxes of primitives.
 pub struct Near {
     tree: BoxTree,
     items: Vec<Item>,
@@ -56,12 +56,8 @@ impl Near {
             };
             match &record.body {
                 Body::Surface(surface) => primitives(surface, &mut add),
-                Body::Linear(linear) => {
-                    for i in 0..linear.count() {
-                        let steps = (0..linear.step_count()).map(|step| linear.bounds_at(i, step));
-                        add(i, steps.collect(), linear.range());
-                    }
-                }
+                // Points and curves are not shown: the interface's rule.
+                Body::Linear(_) => {}
                 Body::User(user) => {
                     for i in 0..user.boxes[0].len() {
                         add(i, user.boxes.iter().map(|step| step[i]).collect(), user.range);

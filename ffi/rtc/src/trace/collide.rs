@@ -7,14 +7,22 @@ use twincast::trace::bvh::Search;
 
 use crate::abi::{RTCCollideFunc, RTCCollision};
 use crate::failure::{Failure, Result};
-use crate::scene::{Body, Committed};
+use crate::scene::{Body, Committed, Record};
 
 /// Collisions told at a time.
 const MOST: usize = 16;
 
-/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at time 0. Other geometry has no part in collisions, as in Embree.
+/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at time 0; in a scene with itself no primitive meets itself.
+///
+/// # Errors
+/// Where there is other geometry: its boxes would have to be those of the primitives that the caller knows, which only user geometry has.
 pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, user: *mut c_void) -> Result<()> {
     let function = function.ok_or_else(|| Failure::argument("invalid argument"))?;
+    let is_user = |record: &Record| matches!(record.body, Body::User(_));
+    if ![first, second].iter().all(|scene| scene.records.iter().flatten().all(is_user)) {
+        return Err(Failure::operation("scenes must only contain user geometries"));
+    }
+    let is_same = std::ptr::eq(first, second);
     let mut waiting: Vec<RTCCollision> = Vec::with_capacity(MOST);
     let tell = |waiting: &mut Vec<RTCCollision>| {
         if !waiting.is_empty() {
@@ -35,7 +43,10 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
             let radius = (bounds.max - centre).max(centre - bounds.min).length() * (1.0 + 1e-6);
             near.visit(centre, radius, None, &mut |item| {
                 let other = second.record(item.geometry).map(|record| &record.body);
-                if let Some(Body::User(other)) = other {
+                let is_itself = is_same && item.geometry == geometry0 as u32 && item.primitive == primitive0 as u32;
+                if let Some(Body::User(other)) = other
+                    && !is_itself
+                {
                     let box1 = &other.boxes[0][item.primitive as usize];
                     let overlaps = |a: Vec3, b: Vec3| a.cmple(b).all();
                     if overlaps(bounds.min, box1.max) && overlaps(box1.min, bounds.max) {

@@ -71,7 +71,7 @@ impl Search1 {
         changed
     }
 
-    /// Asks the geometry's function and that of the query.
+    /// Asks the query's function, then that of the geometry.
     fn show(&self, record: &Record, item: Item, space: &Space) -> bool {
         let mut arguments = RTCPointQueryFunctionArguments {
             query: self.query,
@@ -82,7 +82,7 @@ impl Search1 {
             similarity_scale: space.similarity,
         };
         let mut changed = false;
-        for function in [record.functions.point_query, self.function].into_iter().flatten() {
+        for function in [self.function, record.functions.point_query].into_iter().flatten() {
             // SAFETY: the caller promised a function of this type; the arguments live until it returns.
             changed |= unsafe { function(&raw mut arguments) };
         }
