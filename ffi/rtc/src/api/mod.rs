@@ -99,6 +99,15 @@ unsafe fn other<T>(handle: *const T) -> Result<Arc<T>> {
     unsafe { handle::share(handle) }
 }
 
+/// Two objects of a call must be of one device.
+fn same_device(a: &impl Owned, b: &impl Owned) -> Result<()> {
+    if std::ptr::eq(a.device(), b.device()) {
+        Ok(())
+    } else {
+        Err(Failure::argument("inputs are from different devices"))
+    }
+}
+
 /// A pointer that must not be null.
 fn present<T>(pointer: *mut T) -> Result<*mut T> {
     if pointer.is_null() { Err(Failure::argument("invalid argument")) } else { Ok(pointer) }

@@ -4,10 +4,10 @@ use std::ffi::c_void;
 use std::ptr::null;
 use std::sync::Arc;
 
-use super::{other, present, release, tell, with};
+use super::{other, present, release, same_device, tell, with};
 use crate::abi::{INVALID_ID, RTCBounds, RTCCollideFunc, RTCLinearBounds, RTCProgressMonitorFunction};
 use crate::device::Device;
-use crate::failure::{Failure, guard};
+use crate::failure::{Failure, Result, guard};
 use crate::geometry::Geometry;
 use crate::handle;
 use crate::scene::{Committed, Scene};
@@ -41,18 +41,29 @@ pub unsafe extern "C" fn rtcReleaseScene(scene: *const Scene) {
     unsafe { release(scene) };
 }
 
+/// A geometry of the scene's device.
+///
+/// # Safety
+/// As for [`handle::borrow`].
+unsafe fn own(scene: &Scene, geometry: *const Geometry) -> Result<Arc<Geometry>> {
+    // SAFETY: as the caller promises.
+    let geometry = unsafe { other(geometry)? };
+    same_device(scene, &*geometry)?;
+    Ok(geometry)
+}
+
 /// Adds a geometry.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcAttachGeometry(scene: *const Scene, geometry: *const Geometry) -> u32 {
     // SAFETY: the interface's rules.
-    unsafe { with(scene, INVALID_ID, |scene| scene.attach(other(geometry)?)) }
+    unsafe { with(scene, INVALID_ID, |scene| scene.attach(own(scene, geometry)?)) }
 }
 
 /// Adds a geometry under an id of the caller's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcAttachGeometryByID(scene: *const Scene, geometry: *const Geometry, id: u32) {
     // SAFETY: the interface's rules.
-    unsafe { with(scene, (), |scene| scene.attach_by_id(other(geometry)?, id)) }
+    unsafe { with(scene, (), |scene| scene.attach_by_id(own(scene, geometry)?, id)) }
 }
 
 /// Takes a geometry out.
@@ -137,7 +148,7 @@ pub unsafe extern "C" fn rtcGetSceneFlags(scene: *const Scene) -> u32 {
 pub unsafe extern "C" fn rtcGetSceneBounds(scene: *const Scene, bounds: *mut RTCBounds) {
     let get = |scene: &Scene| {
         // SAFETY: the interface's rules.
-        let committed = unsafe { scene.committed() }.ok_or_else(|| Failure::operation("scene not committed"))?;
+        let committed = unsafe { scene.unchanged() }?;
         // SAFETY: not null; the caller's, of this type.
         unsafe { present(bounds)?.write(committed.whole()) };
         Ok(())
@@ -151,7 +162,7 @@ pub unsafe extern "C" fn rtcGetSceneBounds(scene: *const Scene, bounds: *mut RTC
 pub unsafe extern "C" fn rtcGetSceneLinearBounds(scene: *const Scene, bounds: *mut RTCLinearBounds) {
     let get = |scene: &Scene| {
         // SAFETY: the interface's rules.
-        let committed = unsafe { scene.committed() }.ok_or_else(|| Failure::operation("scene not committed"))?;
+        let committed = unsafe { scene.unchanged() }?;
         // SAFETY: not null; the caller's, of this type.
         unsafe { present(bounds)?.write(RTCLinearBounds { bounds: committed.linear() }) };
         Ok(())

@@ -25,8 +25,12 @@ pub struct State {
     pub flags: u32,
     pub quality: u32,
     pub progress: Callback<RTCProgressMonitorFunction>,
+    /// No lower id is free.
+    lowest: usize,
     /// Of what the committed scene was made; none where it has to be made.
     made_of: Option<Vec<(usize, u64)>>,
+    /// Whether geometries were added or taken out since it was made, if it was.
+    is_changed: bool,
 }
 
 /// A scene.
@@ -46,7 +50,9 @@ impl Scene {
             flags: 0,
             quality: quality::MEDIUM,
             progress: Callback::default(),
+            lowest: 0,
             made_of: None,
+            is_changed: true,
         };
         Self { device, state: Mutex::new(state), committing: Mutex::new(()), committed: AtomicPtr::default() }
     }
@@ -63,6 +69,16 @@ impl Scene {
     pub unsafe fn committed(&self) -> Option<&Committed> {
         // SAFETY: it is null, or a box that `replace` made and only `replace` and `drop` free.
         unsafe { self.committed.load(Ordering::Acquire).as_ref() }
+    }
+
+    /// The same, unless geometries were added or taken out since.
+    ///
+    /// # Safety
+    /// As for [`Scene::committed`].
+    pub unsafe fn unchanged(&self) -> Result<&Committed> {
+        // SAFETY: as the caller promises.
+        let committed = unsafe { self.committed() }.filter(|_| !self.state().is_changed);
+        committed.ok_or_else(|| Failure::operation("scene not committed"))
     }
 
     /// Puts another committed scene in place.
@@ -83,12 +99,14 @@ impl Scene {
     /// Adds a geometry under the lowest id that is free.
     pub fn attach(&self, geometry: Arc<Geometry>) -> Result<u32> {
         let mut state = self.state();
-        let free = state.geometries.iter().position(Option::is_none);
-        let id = free.unwrap_or(state.geometries.len());
+        let lowest = state.lowest;
+        let free = state.geometries.iter().skip(lowest).position(Option::is_none);
+        let id = free.map_or(state.geometries.len(), |above| lowest + above);
         if id >= INVALID_ID as usize {
             return Err(Failure::operation("too many geometries"));
         }
         state.set(id, geometry);
+        state.lowest = id + 1;
         Ok(id as u32)
     }
 
@@ -96,6 +114,7 @@ impl Scene {
     pub fn attach_by_id(&self, geometry: Arc<Geometry>, id: u32) -> Result<()> {
         // Ids are places in a list; one of a thousand million would be a slip.
         const MOST: u32 = 1 << 28;
+        valid(id)?;
         if id >= MOST {
             return Err(Failure::operation("invalid geometry ID"));
         }
@@ -108,11 +127,13 @@ impl Scene {
     }
 
     pub fn detach(&self, id: u32) -> Result<()> {
+        valid(id)?;
         let mut state = self.state();
         let slot = state.geometries.get_mut(id as usize).filter(|slot| slot.is_some());
         let slot = slot.ok_or_else(|| Failure::operation("invalid geometry ID"))?;
         *slot = None;
-        state.made_of = None;
+        state.lowest = state.lowest.min(id as usize);
+        (state.made_of, state.is_changed) = (None, true);
         Ok(())
     }
 
@@ -153,16 +174,23 @@ impl Scene {
         match commit::commit(self, &plan) {
             Ok(committed) => {
                 self.replace(committed);
-                self.state().made_of = Some(made_of);
+                let mut state = self.state();
+                (state.made_of, state.is_changed) = (Some(made_of), false);
                 Ok(())
             }
             Err(failure) => {
                 self.replace(Committed::empty());
-                self.state().made_of = None;
+                let mut state = self.state();
+                (state.made_of, state.is_changed) = (None, true);
                 Err(failure)
             }
         }
     }
+}
+
+/// Whether it may be the id of a geometry.
+fn valid(id: u32) -> Result<()> {
+    if id == INVALID_ID { Err(Failure::argument("invalid argument")) } else { Ok(()) }
 }
 
 /// Which geometry it is, as it was committed last.
@@ -181,7 +209,7 @@ impl State {
             self.geometries.resize(id + 1, None);
         }
         self.geometries[id] = Some(geometry);
-        self.made_of = None;
+        (self.made_of, self.is_changed) = (None, true);
     }
 }
 
