@@ -25,8 +25,11 @@ unsafe impl Sync for Buffer {}
 const PADDING: usize = 16;
 
 impl Buffer {
-    /// Of `bytes` zeros.
+    /// Of `bytes` zeros; without memory where there are none.
     pub fn new(device: Arc<Device>, bytes: usize) -> Result<Self> {
+        if bytes == 0 {
+            return Ok(Self::shared(device, std::ptr::null_mut(), 0));
+        }
         let exhausted = || Failure { code: Code::OutOfMemory, message: format!("a buffer of {bytes} bytes") };
         let padded = bytes.checked_add(PADDING).ok_or_else(exhausted)?;
         let layout = Layout::from_size_align(padded, 64).map_err(|_| exhausted())?;
@@ -60,47 +63,72 @@ impl Drop for Buffer {
     }
 }
 
-/// Items in a buffer.
+/// Where items are in a buffer.
+#[derive(Clone, Copy, Debug)]
+pub struct Items {
+    pub format: u32,
+    pub offset: usize,
+    /// Bytes from one item to the next.
+    pub stride: usize,
+    pub count: usize,
+}
+
+impl Items {
+    /// Where the last item ends. What comes after it up to the next one's place, such as other data of an interleaved buffer, is not there.
+    pub fn end(&self) -> Result<usize> {
+        let Some(before) = self.count.checked_sub(1) else { return Ok(0) };
+        let last = self.stride.checked_mul(before).and_then(|bytes| bytes.checked_add(self.offset));
+        let end = last.and_then(|bytes| bytes.checked_add(format::bytes(self.format)));
+        end.ok_or_else(|| Failure::argument("buffer range out of bounds"))
+    }
+
+    /// Whether items of words are where words may be, in a buffer that begins at an address.
+    pub fn is_aligned(&self, address: usize) -> bool {
+        address.wrapping_add(self.offset).is_multiple_of(4) && self.stride.is_multiple_of(4)
+    }
+}
+
+/// A buffer and the items in it.
 #[derive(Clone)]
 pub struct View {
     buffer: Arc<Buffer>,
-    offset: usize,
-    stride: usize,
-    pub count: usize,
-    pub format: u32,
+    items: Items,
 }
 
 impl View {
-    /// `count` items, `stride` bytes apart, from `offset` on.
-    pub fn new(buffer: Arc<Buffer>, format: u32, offset: usize, stride: usize, count: usize) -> Result<Self> {
-        let end = stride.checked_mul(count).and_then(|bytes| bytes.checked_add(offset));
-        if end.is_none_or(|end| end > buffer.bytes) {
+    /// Items that lie in a buffer.
+    pub fn new(buffer: Arc<Buffer>, items: Items) -> Result<Self> {
+        if items.end()? > buffer.bytes {
             return Err(Failure::argument("buffer range out of bounds"));
         }
-        let is_of_words = format != format::UCHAR;
-        let is_aligned = (buffer.data as usize).wrapping_add(offset).is_multiple_of(4) && stride.is_multiple_of(4);
-        if is_of_words && !is_aligned {
-            return Err(Failure::operation("data must be 4 bytes aligned"));
-        }
-        Ok(Self { buffer, offset, stride, count, format })
+        Ok(Self { buffer, items })
     }
 
-    /// Where the first item is.
+    /// Where the first item is; null in a buffer without bytes.
     pub fn data(&self) -> *mut u8 {
-        self.buffer.data.wrapping_add(self.offset)
+        let data = self.buffer.data;
+        if data.is_null() { data } else { data.wrapping_add(self.items.offset) }
+    }
+
+    pub fn format(&self) -> u32 {
+        self.items.format
     }
 
     pub fn stride(&self) -> usize {
-        self.stride
+        self.items.stride
+    }
+
+    pub fn count(&self) -> usize {
+        self.items.count
     }
 
     /// Words of item `index`, which may not be there.
     #[inline]
     pub fn words<const N: usize>(&self, index: usize) -> Option<[u32; N]> {
-        if index >= self.count || self.buffer.data.is_null() {
+        if index >= self.count() || self.buffer.data.is_null() {
             return None;
         }
-        let item = self.data().wrapping_add(index * self.stride);
+        let item = self.data().wrapping_add(index * self.stride());
         // SAFETY: the format that was checked when the view was set has at least N words an item; the item lies in the buffer, which
         // the caller promised to be so large, and alive.
         Some(unsafe { item.cast::<[u32; N]>().read_unaligned() })
@@ -114,10 +142,10 @@ impl View {
 
     /// The byte with this index, of items of one byte.
     pub fn byte(&self, index: usize) -> Option<u8> {
-        if index >= self.count || self.buffer.data.is_null() {
+        if index >= self.count() || self.buffer.data.is_null() {
             return None;
         }
         // SAFETY: as in `words`.
-        Some(unsafe { self.data().wrapping_add(index * self.stride).read() })
+        Some(unsafe { self.data().wrapping_add(index * self.stride()).read() })
     }
 }

@@ -148,7 +148,8 @@ impl Device {
             // Packets are answered, ray by ray or in flight; callbacks are given one ray at a time.
             property::NATIVE_RAY4 | property::NATIVE_RAY8 | property::NATIVE_RAY16 => 0,
             property::RAY_STREAM if cfg!(feature = "v3") => 0,
-            property::BACKFACE_CULLING_SPHERES | property::BACKFACE_CULLING_CURVES | property::BACKFACE_CULLING => 0,
+            property::BACKFACE_CULLING_SPHERES if cfg!(feature = "v4") => 0,
+            property::BACKFACE_CULLING_CURVES | property::BACKFACE_CULLING => 0,
             property::COMPACT_POLYS | property::SUBDIVISION => 0,
             // Round linear curves alone are not what programs mean by it; they may be asked for all the same.
             property::CURVES => 0,

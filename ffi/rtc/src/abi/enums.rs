@@ -17,11 +17,22 @@ pub mod format {
     pub const FLOAT4: u32 = 0x9004;
     pub const FLOAT16: u32 = 0x9010;
     pub const FLOAT3X4_ROW_MAJOR: u32 = 0x9134;
-    pub const FLOAT4X4_ROW_MAJOR: u32 = 0x9144;
     pub const FLOAT3X4_COLUMN_MAJOR: u32 = 0x9234;
     pub const FLOAT4X4_COLUMN_MAJOR: u32 = 0x9244;
     pub const GRID: u32 = 0xA001;
     pub const QUATERNION_DECOMPOSITION: u32 = 0xB001;
+
+    /// Bytes of an item; 0 of formats of which no item is read.
+    pub fn bytes(format: u32) -> usize {
+        match format {
+            UCHAR => 1,
+            UINT..=UINT4 | FLOAT..=FLOAT16 => 4 * (format & 0xff) as usize,
+            GRID => size_of::<super::super::RTCGrid>(),
+            FLOAT3X4_ROW_MAJOR | FLOAT3X4_COLUMN_MAJOR => 48,
+            FLOAT4X4_COLUMN_MAJOR | QUATERNION_DECOMPOSITION => 64,
+            _ => 0,
+        }
+    }
 }
 
 /// What a buffer is for.

@@ -1,6 +1,7 @@
 //! Devices and buffers.
 
 use std::ffi::{CStr, c_char, c_void};
+use std::ops::Range;
 use std::ptr::null;
 use std::sync::Arc;
 
@@ -11,8 +12,11 @@ use crate::device::{Callback, Device};
 use crate::failure::{Failure, guard, take_homeless};
 use crate::handle;
 
-/// Numbers from here on are Embree's own, for its tests.
-const INTERNAL_PROPERTIES: u32 = 1_000_000;
+/// Embree's own, for its tests, which set them.
+const SWITCHES: Range<u32> = 1_000_000..1_000_004;
+
+/// The same, which ask for tests by number, up to the first that there is not.
+const TESTS: Range<u32> = 2_000_000..3_000_000;
 
 /// A new device.
 #[unsafe(no_mangle)]
@@ -49,7 +53,7 @@ pub unsafe extern "C" fn rtcReleaseDevice(device: *const Device) {
 /// What a device says of itself.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcGetDeviceProperty(device: *const Device, property: u32) -> isize {
-    if property >= INTERNAL_PROPERTIES {
+    if TESTS.contains(&property) {
         return 0;
     }
     // SAFETY: the interface's rules.
@@ -60,7 +64,7 @@ pub unsafe extern "C" fn rtcGetDeviceProperty(device: *const Device, property: u
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtcSetDeviceProperty(device: *const Device, property: u32, _value: isize) {
     let refuse = |_: &Device| {
-        if property >= INTERNAL_PROPERTIES { Ok(()) } else { Err(Failure::argument("unknown writable property")) }
+        if SWITCHES.contains(&property) { Ok(()) } else { Err(Failure::argument("unknown writable property")) }
     };
     // SAFETY: the interface's rules.
     unsafe { with(device, (), refuse) }

@@ -4,10 +4,10 @@ use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 use std::sync::Arc;
 
-use super::{other, release, tell, with};
+use super::{other, release, same_device, tell, with};
 use crate::abi::*;
-use crate::buffer::{Buffer, View};
-use crate::device::{Callback, Device};
+use crate::buffer::{Buffer, Items};
+use crate::device::Device;
 use crate::failure::{Failure, Result, guard};
 use crate::geometry::{Functions, Geometry, Kind, State};
 use crate::handle;
@@ -142,7 +142,8 @@ pub unsafe extern "C" fn rtcSetGeometryBuffer(
     let set = |geometry: &Geometry| {
         // SAFETY: the interface's rules.
         let buffer = unsafe { other(buffer)? };
-        geometry.set_buffer((kind, slot), View::new(buffer, format, offset, stride, count)?)
+        same_device(geometry, &*buffer)?;
+        geometry.set_buffer((kind, slot), buffer, Items { format, offset, stride, count })
     };
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -164,10 +165,9 @@ pub unsafe extern "C" fn rtcSetSharedGeometryBuffer(
         if data.is_null() && count > 0 {
             return Err(Failure::argument("invalid argument"));
         }
-        let bytes = stride.checked_mul(count).and_then(|bytes| bytes.checked_add(offset));
-        let bytes = bytes.ok_or_else(|| Failure::argument("buffer range out of bounds"))?;
-        let buffer = Buffer::shared(Arc::clone(&geometry.device), data.cast_mut().cast(), bytes);
-        geometry.set_buffer((kind, slot), View::new(Arc::new(buffer), format, offset, stride, count)?)
+        let items = Items { format, offset, stride, count };
+        let buffer = Buffer::shared(Arc::clone(&geometry.device), data.cast_mut().cast(), items.end()?);
+        geometry.set_buffer((kind, slot), Arc::new(buffer), items)
     };
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -183,7 +183,10 @@ pub unsafe extern "C" fn rtcSetNewGeometryBuffer(
     stride: usize,
     count: usize,
 ) -> *mut c_void {
-    let set = |geometry: &Geometry| Ok(geometry.new_buffer((kind, slot), format, stride, count)?.cast());
+    let set = |geometry: &Geometry| {
+        let items = Items { format, offset: 0, stride, count };
+        Ok(geometry.new_buffer((kind, slot), items)?.cast())
+    };
     // SAFETY: the interface's rules.
     unsafe { with(geometry, null_mut(), set) }
 }
@@ -253,6 +256,9 @@ pub unsafe extern "C" fn rtcSetGeometryPointQueryFunction(geometry: *const Geome
 pub unsafe extern "C" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geometry, count: u32) {
     let set = |geometry: &Geometry| {
         geometry.demand(geometry.kind == Kind::User)?;
+        if geometry.state().primitive_count == count {
+            return Ok(());
+        }
         geometry.modify(|state| {
             state.primitive_count = count;
             Ok(())
@@ -267,10 +273,11 @@ pub unsafe extern "C" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geome
 pub unsafe extern "C" fn rtcSetGeometryBoundsFunction(
     geometry: *const Geometry,
     function: RTCBoundsFunction,
-    user: *mut c_void,
+    // Callbacks are given the geometry's own, as the interface says; Embree has no use for this one either.
+    _user: *mut c_void,
 ) {
     // SAFETY: the interface's rules.
-    unsafe { set_function(geometry, |functions| functions.bounds = Callback { function, user }, true) }
+    unsafe { set_function(geometry, |functions| functions.bounds = function, true) }
 }
 
 /// Where user geometry is hit.

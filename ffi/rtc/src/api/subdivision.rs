@@ -4,7 +4,7 @@ use std::ffi::c_void;
 
 use super::with;
 use crate::failure::Failure;
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Kind, Shape};
 
 /// # Safety
 /// As for [`crate::handle::borrow`].
@@ -26,8 +26,16 @@ macro_rules! refused {
     (@default $result:ty) => { crate::abi::INVALID_ID };
 }
 
+/// Of curves, which are not divided here, and of what is never hit: passed over.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryTessellationRate(geometry: *const Geometry, _rate: f32) {
+    let set =
+        |geometry: &Geometry| geometry.demand(matches!(geometry.kind, Kind::Linear(Shape::RoundCurve) | Kind::Absent));
+    // SAFETY: the interface's rules.
+    unsafe { with(geometry, (), set) }
+}
+
 refused! {
-    rtcSetGeometryTessellationRate(f32);
     rtcSetGeometryTopologyCount(u32);
     rtcSetGeometrySubdivisionMode(u32, u32);
     rtcSetGeometryVertexAttributeTopology(u32, u32);

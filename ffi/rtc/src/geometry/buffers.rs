@@ -4,28 +4,32 @@ use std::sync::Arc;
 
 use super::{Geometry, Kind, Shape, State};
 use crate::abi::{buffer_type, format};
-use crate::buffer::{Buffer, View};
+use crate::buffer::{Buffer, Items, View};
 use crate::failure::{Failure, Result};
 
 impl Geometry {
-    /// Sets a buffer.
-    pub fn set_buffer(&self, name: (u32, u32), view: View) -> Result<()> {
-        self.check_format(name, view.format)?;
-        self.modify(|state| {
-            *slot(self.kind, state, name)? = Some(view);
-            Ok(())
-        })
+    /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree.
+    pub fn set_buffer(&self, name: (u32, u32), buffer: Arc<Buffer>, items: Items) -> Result<()> {
+        self.check(name, &items, buffer.data() as usize)?;
+        let view = View::new(buffer, items)?;
+        *slot(self.kind, &mut self.state(), name)? = Some(view);
+        Ok(())
     }
 
-    /// A new buffer of the library's own, set.
-    pub fn new_buffer(&self, name: (u32, u32), format: u32, stride: usize, count: usize) -> Result<*mut u8> {
+    /// A new buffer of the library's own, set; null where it has no bytes.
+    pub fn new_buffer(&self, name: (u32, u32), items: Items) -> Result<*mut u8> {
         // Before memory is taken.
-        slot(self.kind, &mut self.state(), name)?;
-        let bytes = stride.checked_mul(count).ok_or_else(|| Failure::argument("buffer range out of bounds"))?;
+        self.check(name, &items, 0)?;
+        let Items { stride, count, .. } = items;
+        // Callers may read a whole vector at the last vertex.
+        let is_wide = matches!(name.0, buffer_type::VERTEX | buffer_type::VERTEX_ATTRIBUTE);
+        let more = if is_wide { stride.wrapping_neg() % 16 } else { 0 };
+        let bytes = stride.checked_mul(count).and_then(|bytes| bytes.checked_add(more));
+        let bytes = bytes.ok_or_else(|| Failure::argument("buffer range out of bounds"))?;
+        let (bytes, count) = if bytes == 0 { (0, 0) } else { (bytes.max(items.end()?), count) };
         let buffer = Arc::new(Buffer::new(Arc::clone(&self.device), bytes)?);
-        let view = View::new(buffer, format, 0, stride, count)?;
-        let data = view.data();
-        self.set_buffer(name, view)?;
+        let data = buffer.data();
+        self.set_buffer(name, buffer, Items { count, ..items })?;
         Ok(data)
     }
 
@@ -40,6 +44,32 @@ impl Geometry {
         let has_buffers = self.kind.is_mesh() || self.kind == Kind::InstanceArray;
         // All of a geometry without buffers is new.
         self.modify(|state| if has_buffers { slot(self.kind, state, name).map(|_| ()) } else { Ok(()) })
+    }
+
+    /// Whether the geometry takes such a buffer, which begins at an address; looked at in Embree's order, which decides what is told.
+    fn check(&self, name: (u32, u32), items: &Items, address: usize) -> Result<()> {
+        if matches!(self.kind, Kind::User | Kind::Instance) {
+            return slot(self.kind, &mut self.state(), name).map(|_| ());
+        }
+        let is_of_words = match self.kind {
+            Kind::Absent => false,
+            Kind::Linear(_) => name.0 != buffer_type::FLAGS,
+            _ => true,
+        };
+        if is_of_words && !items.is_aligned(address) {
+            return Err(Failure::operation("data must be 4 bytes aligned"));
+        }
+        let found = slot(self.kind, &mut self.state(), name).map(|_| ());
+        let format = self.check_format(name, items.format);
+        let has_normals = self.kind == Kind::Linear(Shape::OrientedDisc);
+        match name.0 {
+            buffer_type::VERTEX => format.and(found),
+            buffer_type::NORMAL if !has_normals => found,
+            buffer_type::VERTEX_ATTRIBUTE | buffer_type::NORMAL => {
+                format.and(found).map_err(|failure| Failure::operation(failure.message))
+            }
+            _ => found.and(format),
+        }
     }
 
     fn check_format(&self, (buffer, _): (u32, u32), given: u32) -> Result<()> {

@@ -35,6 +35,7 @@ pub unsafe fn interpolate(
     count: u32,
     stride: usize,
 ) -> Result<()> {
+    geometry.demand(geometry.kind.is_surface() || geometry.kind == Kind::Linear(Shape::RoundCurve))?;
     let state = geometry.state();
     let view = match place.buffer_type {
         buffer_type::VERTEX => state.vertices.get(place.slot as usize),
@@ -65,7 +66,7 @@ pub unsafe fn interpolate(
 }
 
 fn component(view: &View, vertex: u32, k: usize) -> Option<f32> {
-    if vertex as usize >= view.count {
+    if vertex as usize >= view.count() {
         return None;
     }
     let at = view.data().wrapping_add(vertex as usize * view.stride() + 4 * k);
@@ -99,8 +100,7 @@ fn patch(kind: Kind, state: &State, place: &Place) -> Option<Patch> {
             let next = first.checked_add(1)?;
             Some(Patch { vertices: [first, next, first], u, v: 0.0, scale: [1.0, 0.0] })
         }
-        Kind::Linear(_) => Some(Patch { vertices: [place.primitive; 3], u: 0.0, v: 0.0, scale: [0.0; 2] }),
-        Kind::User | Kind::Instance | Kind::InstanceArray | Kind::Absent => None,
+        Kind::Linear(_) | Kind::User | Kind::Instance | Kind::InstanceArray | Kind::Absent => None,
     }
 }
 

@@ -52,12 +52,12 @@ impl Linear {
     pub fn new(shape: Shape, state: &State) -> Self {
         let balls = |view: &Option<View>| -> Vec<Ball> {
             let Some(view) = view else { return Vec::new() };
-            let balls = (0..view.count).filter_map(|i| view.floats::<4>(i));
+            let balls = (0..view.count()).filter_map(|i| view.floats::<4>(i));
             balls.map(|[x, y, z, radius]| Ball { centre: Vec3::new(x, y, z), radius }).collect()
         };
         let normals = |view: &Option<View>| -> Vec<Vec3> {
             let Some(view) = view else { return Vec::new() };
-            (0..view.count).filter_map(|i| view.floats::<3>(i)).map(Vec3::from).collect()
+            (0..view.count()).filter_map(|i| view.floats::<3>(i)).map(Vec3::from).collect()
         };
         let segments = if shape == Shape::RoundCurve { read_segments(state) } else { Vec::new() };
         Self {
@@ -159,7 +159,7 @@ impl Linear {
 /// First vertices, and neighbours: as flagged, or those that share a vertex.
 fn read_segments(state: &State) -> Vec<(u32, u8)> {
     let Some(index) = &state.index else { return Vec::new() };
-    let firsts: Vec<u32> = (0..index.count).filter_map(|i| index.words::<1>(i)).map(|[first]| first).collect();
+    let firsts: Vec<u32> = (0..index.count()).filter_map(|i| index.words::<1>(i)).map(|[first]| first).collect();
     let follows = |i: usize| firsts.get(i + 1).is_some_and(|&next| Some(next) == firsts[i].checked_add(1));
     let flags = |i: usize| match &state.flags {
         Some(flags) => flags.byte(i).unwrap_or(0),

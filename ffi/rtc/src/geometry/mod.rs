@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::abi::*;
 use crate::buffer::View;
-use crate::device::{Callback, Device};
+use crate::device::Device;
 use crate::failure::{Code, Failure, Result};
 use crate::scene::Scene;
 
@@ -58,21 +58,26 @@ impl Kind {
             geometry_type::CONE_LINEAR_CURVE | geometry_type::FLAT_LINEAR_CURVE => {
                 return Err(Failure::unsupported("cone and flat linear curves are"));
             }
-            24..=60 => return Err(Failure::unsupported("smooth curves are")),
+            24..=26 | 32..=34 | 40..=42 | 58..=60 => return Err(Failure::unsupported("smooth curves are")),
             _ => return Err(Failure::unknown("invalid geometry type")),
         })
     }
 
     /// Whether it has vertices.
     fn is_mesh(self) -> bool {
-        matches!(self, Self::Triangles | Self::Quads | Self::Grids | Self::Linear(_))
+        self.is_surface() || matches!(self, Self::Linear(_))
+    }
+
+    /// Whether it is made of triangles.
+    fn is_surface(self) -> bool {
+        matches!(self, Self::Triangles | Self::Quads | Self::Grids)
     }
 }
 
 /// Functions of the caller's for user geometry, and for filters.
 #[derive(Clone, Copy, Default)]
 pub struct Functions {
-    pub bounds: Callback<RTCBoundsFunction>,
+    pub bounds: RTCBoundsFunction,
     pub intersect: RTCIntersectFunctionN,
     pub occluded: RTCOccludedFunctionN,
     pub point_query: RTCPointQueryFunction,
@@ -102,6 +107,8 @@ pub struct State {
     pub scenes: Vec<Arc<Scene>>,
     /// One a time step.
     pub transforms: Vec<Transform>,
+    /// The same when the geometry was committed.
+    pub placed: Vec<Transform>,
     /// Of instance arrays: one a time step.
     pub transform_buffers: Vec<Option<View>>,
     /// Buffers of a geometry that this library does not have, by type and slot.
@@ -146,6 +153,7 @@ impl Geometry {
             primitive_count: 0,
             scenes: Vec::new(),
             transforms: vec![Transform::IDENTITY],
+            placed: vec![Transform::IDENTITY],
             transform_buffers: vec![None],
             absent: Vec::new(),
             is_enabled: true,
@@ -171,14 +179,15 @@ impl Geometry {
     /// Has scenes that it is in built again.
     pub fn commit(&self) -> Result<()> {
         let mut state = self.state();
-        if matches!(self.kind, Kind::Triangles | Kind::Quads | Kind::Grids) {
-            let mut strides = state.vertices.iter().flatten().map(View::stride);
-            let first = strides.next();
-            if strides.any(|stride| Some(stride) != first) {
-                let message = "stride of vertex buffers have to be identical for each time step";
-                return Err(Failure::operation(message));
-            }
+        // None where a step has no buffer, so that some steps without one are an error as well.
+        let is_even = |steps: &[Option<View>]| {
+            let stride = |step: &Option<View>| step.as_ref().map(View::stride);
+            steps.windows(2).all(|pair| stride(&pair[0]) == stride(&pair[1]))
+        };
+        if !is_even(&state.vertices) || !is_even(&state.normals) {
+            return Err(Failure::operation("stride of buffers have to be identical for each time step"));
         }
+        state.placed = state.transforms.clone();
         state.is_committed = true;
         state.version += 1;
         Ok(())
@@ -195,6 +204,9 @@ impl Geometry {
     pub fn set_time_steps(&self, steps: u32) -> Result<()> {
         if !(1..=MAX_TIME_STEPS).contains(&steps) {
             return Err(Failure::argument("number of time steps is out of range"));
+        }
+        if self.state().steps() == steps as usize {
+            return Ok(());
         }
         self.modify(|state| {
             state.vertices.resize(steps as usize, None);
@@ -243,20 +255,20 @@ impl Geometry {
         })
     }
 
+    /// Sets where an instance is at a step, from the next commit on; until then it stays where it was committed.
     pub fn set_transform(&self, step: u32, transform: Transform) -> Result<()> {
         self.demand(self.kind == Kind::Instance)?;
-        self.modify(|state| {
-            let slot = state.transforms.get_mut(step as usize);
-            *slot.ok_or_else(|| Failure::operation("invalid timestep"))? = transform;
-            Ok(())
-        })
+        let mut state = self.state();
+        let slot = state.transforms.get_mut(step as usize);
+        *slot.ok_or_else(|| Failure::operation("invalid timestep"))? = transform;
+        Ok(())
     }
 
-    /// The transform of one instance at a time.
+    /// The transform of one instance at a time, as it was set last.
     pub fn transform_at(&self, primitive: u32, time: f32) -> Result<twincast::math::Affine3> {
         self.demand(matches!(self.kind, Kind::Instance | Kind::InstanceArray))?;
-        let motion = Motion::of(self.kind, &self.state(), primitive as usize)?;
-        Ok(motion.at(time))
+        let state = self.state();
+        Ok(Motion::of(self.kind, &state, &state.transforms, primitive as usize)?.at(time))
     }
 }
 

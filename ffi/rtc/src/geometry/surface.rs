@@ -69,7 +69,7 @@ impl Surface {
         let pairs = match kind {
             Kind::Triangles => {
                 let index = state.index.as_ref();
-                let count = index.map_or(0, |index| index.count);
+                let count = index.map_or(0, |index| index.count());
                 triangles.reserve_exact(count);
                 let corners = |i| index.and_then(|index| index.words::<3>(i));
                 triangles.extend((0..count).filter_map(corners).map(|corners| reader.triangle(corners)));
@@ -77,7 +77,7 @@ impl Surface {
             }
             Kind::Quads => {
                 let index = state.index.as_ref();
-                let count = index.map_or(0, |index| index.count);
+                let count = index.map_or(0, |index| index.count());
                 triangles.reserve_exact(2 * count);
                 let corners = |i| index.and_then(|index| index.words::<4>(i));
                 triangles.extend((0..count).filter_map(corners).flat_map(|corners| reader.quad(corners)));
@@ -171,7 +171,7 @@ impl Surface {
 
 /// Vertices, and one that is not a number.
 fn read_vertices(view: Option<&View>) -> Vec<Vec3> {
-    let count = view.map_or(0, |view| view.count);
+    let count = view.map_or(0, |view| view.count());
     let mut vertices = Vec::with_capacity(count + 1);
     vertices.extend((0..count).filter_map(|i| view.and_then(|view| view.floats::<3>(i))).map(Vec3::from));
     vertices.resize(count + 1, Vec3::NAN);
@@ -198,7 +198,7 @@ impl Reader<'_> {
 
 fn read_grids(view: Option<&View>, reader: &Reader<'_>, triangles: &mut Vec<[u32; 3]>) -> Result<Vec<Cell>> {
     let mut cells = Vec::new();
-    let count = view.map_or(0, |view| view.count);
+    let count = view.map_or(0, |view| view.count());
     for (i, [start_vertex, stride, size]) in (0..count).filter_map(|i| Some((i, view?.words::<3>(i)?))) {
         let grid = RTCGrid { start_vertex, stride, width: size as u16, height: (size >> 16) as u16 };
         if grid.width < 2 || grid.height < 2 || grid.width > 32768 || grid.height > 32768 {

@@ -30,7 +30,7 @@ impl Transform {
 pub fn words(given: u32) -> Option<usize> {
     match given {
         format::FLOAT3X4_ROW_MAJOR | format::FLOAT3X4_COLUMN_MAJOR => Some(12),
-        format::FLOAT4X4_ROW_MAJOR | format::FLOAT4X4_COLUMN_MAJOR => Some(16),
+        format::FLOAT4X4_COLUMN_MAJOR => Some(16),
         format::QUATERNION_DECOMPOSITION => Some(16),
         _ => None,
     }
@@ -42,9 +42,7 @@ pub fn read(given: u32, m: &[f32]) -> Result<Affine3> {
     let [x, y, z, t] = match given {
         format::FLOAT3X4_COLUMN_MAJOR => [column(0, 1, 2), column(3, 4, 5), column(6, 7, 8), column(9, 10, 11)],
         format::FLOAT4X4_COLUMN_MAJOR => [column(0, 1, 2), column(4, 5, 6), column(8, 9, 10), column(12, 13, 14)],
-        format::FLOAT3X4_ROW_MAJOR | format::FLOAT4X4_ROW_MAJOR => {
-            [column(0, 4, 8), column(1, 5, 9), column(2, 6, 10), column(3, 7, 11)]
-        }
+        format::FLOAT3X4_ROW_MAJOR => [column(0, 4, 8), column(1, 5, 9), column(2, 6, 10), column(3, 7, 11)],
         _ => return Err(Failure::operation("invalid matrix format")),
     };
     Ok(Affine3 { matrix3: Mat3::from_cols(x, y, z), translation: t })
@@ -61,7 +59,6 @@ pub fn write(given: u32, matrix: &Affine3) -> Result<Vec<f32>> {
             columns.iter().zip(last).flat_map(|(column, w)| [column.x, column.y, column.z, w]).collect()
         }
         format::FLOAT3X4_ROW_MAJOR => [row(0), row(1), row(2)].concat(),
-        format::FLOAT4X4_ROW_MAJOR => [row(0), row(1), row(2), last].concat(),
         _ => return Err(Failure::operation("invalid matrix format")),
     })
 }
@@ -105,11 +102,11 @@ pub struct Motion {
 const PLACES: usize = 32;
 
 impl Motion {
-    /// Of one instance of a geometry.
-    pub fn of(kind: Kind, state: &State, primitive: usize) -> Result<Self> {
+    /// Of one instance of a geometry; `transforms` are those of a geometry that is one instance.
+    pub fn of(kind: Kind, state: &State, transforms: &[Transform], primitive: usize) -> Result<Self> {
         let range = state.time_range;
         if kind == Kind::Instance {
-            return Ok(Self { steps: state.transforms.clone(), range });
+            return Ok(Self { steps: transforms.to_vec(), range });
         }
         let steps = state.transform_buffers.iter().map(|view| transform_of(view.as_ref(), primitive));
         Ok(Self { steps: steps.collect::<Result<_>>()?, range })
@@ -195,7 +192,7 @@ fn sagitta(a: &RTCQuaternionDecomposition, b: &RTCQuaternionDecomposition, reach
 fn transform_of(view: Option<&View>, primitive: usize) -> Result<Transform> {
     let missing = || Failure::operation("an instance array without transforms");
     let view = view.ok_or_else(missing)?;
-    match view.format {
+    match view.format() {
         format::QUATERNION_DECOMPOSITION => {
             let [sx, sy, sz, xy, xz, yz, ax, ay, az, r, i, j, k, tx, ty, tz] =
                 view.floats::<16>(primitive).ok_or_else(missing)?;
@@ -208,8 +205,8 @@ fn transform_of(view: Option<&View>, primitive: usize) -> Result<Transform> {
             }))
         }
         format::FLOAT3X4_ROW_MAJOR | format::FLOAT3X4_COLUMN_MAJOR => {
-            read(view.format, &view.floats::<12>(primitive).ok_or_else(missing)?).map(Transform::Matrix)
+            read(view.format(), &view.floats::<12>(primitive).ok_or_else(missing)?).map(Transform::Matrix)
         }
-        _ => read(view.format, &view.floats::<16>(primitive).ok_or_else(missing)?).map(Transform::Matrix),
+        _ => read(view.format(), &view.floats::<16>(primitive).ok_or_else(missing)?).map(Transform::Matrix),
     }
 }

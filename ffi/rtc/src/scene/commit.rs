@@ -115,13 +115,11 @@ fn record(geometry: &Arc<Geometry>) -> Result<Option<Record>> {
 
 /// Asks the caller for the boxes.
 fn user_geometry(geometry: &Geometry, state: &geometry::State) -> UserGeometry {
-    let Callback { function, user } = state.functions.bounds;
+    let function = state.functions.bounds;
     let bounds_of = |primitive: u32, time_step: u32| {
         let mut bounds = RTCBounds { lower: [f32::INFINITY; 3], upper: [f32::NEG_INFINITY; 3], ..RTCBounds::default() };
         if let Some(function) = function {
-            // What was set with the function, unless the geometry has a pointer of its own.
-            let own = geometry.user();
-            let user = if own.is_null() { user } else { own };
+            let user = geometry.user();
             let arguments = RTCBoundsFunctionArguments { user, primitive, time_step, bounds: &raw mut bounds };
             // SAFETY: the caller promised a function of this type; the arguments live until it returns.
             unsafe { function(&raw const arguments) };
@@ -135,16 +133,16 @@ fn user_geometry(geometry: &Geometry, state: &geometry::State) -> UserGeometry {
 fn instances(kind: Kind, state: &geometry::State) -> Result<Vec<Instance>> {
     if kind == Kind::Instance {
         let scene = state.scenes.first().ok_or_else(|| Failure::operation("an instance without a scene"))?;
-        return Ok(vec![Instance::new(Arc::clone(scene), Motion::of(kind, state, 0)?)]);
+        return Ok(vec![Instance::new(Arc::clone(scene), Motion::of(kind, state, &state.placed, 0)?)]);
     }
-    let count = state.transform_buffers.first().and_then(Option::as_ref).map_or(0, |view| view.count);
+    let count = state.transform_buffers.first().and_then(Option::as_ref).map_or(0, |view| view.count());
     let place = |i: usize| {
         let scene = match &state.index {
             Some(index) => index.words::<1>(i).map_or(usize::MAX, |[scene]| scene as usize),
             None => 0,
         };
         let scene = state.scenes.get(scene).ok_or_else(|| Failure::operation("an instance without a scene"))?;
-        Ok(Instance::new(Arc::clone(scene), Motion::of(kind, state, i)?))
+        Ok(Instance::new(Arc::clone(scene), Motion::of(kind, state, &state.placed, i)?))
     };
     (0..count).map(place).collect()
 }

@@ -227,6 +227,90 @@ static void moving_points() {
     }
 }
 
+// The query's function is asked before the geometry's; points and curves are shown to neither.
+static std::vector<char> asked;
+static void query_functions() {
+  World w;
+  RTCGeometry g = w.floor(0);
+  rtcSetGeometryPointQueryFunction(g, [](RTCPointQueryFunctionArguments*) { return asked.push_back('g'), false; });
+  unsigned id = w.add(g);
+  for (RTCGeometryType type : {RTC_GEOMETRY_TYPE_SPHERE_POINT, RTC_GEOMETRY_TYPE_DISC_POINT}) {
+    g = rtcNewGeometry(w.device, type);
+    const float ball[4] = {0, 0, 0, 1};
+    std::memcpy(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, 1), ball, sizeof ball);
+    w.add(g);
+  }
+  rtcCommitScene(w.scene);
+  RTCPointQuery q;
+  q.x = q.y = q.z = q.time = 0, q.radius = 10;
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  asked.clear();
+  rtcPointQuery(
+      w.scene, &q, &context,
+      [](RTCPointQueryFunctionArguments* a) { return asked.push_back(a->geomID == *(unsigned*)a->userPtr ? 'q' : '?'), false; }, &id);
+  CHECK(asked == (std::vector<char>{'q', 'g'}));
+}
+
+// Boxes are asked for with the geometry's pointer.
+static void bounds_data() {
+  World w;
+  static int own, other;
+  static std::set<void*> given;
+  given.clear();
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 1);
+  auto bounds = [](const RTCBoundsFunctionArguments* a) { given.insert(a->geometryUserPtr), sphere_bounds(a); };
+  rtcSetGeometryBoundsFunction(g, bounds, &other);
+  rtcRetainGeometry(g);
+  w.add(g);
+  rtcCommitScene(w.scene);
+  CHECK(given == std::set<void*>{nullptr});
+  given.clear();
+  rtcSetGeometryUserData(g, &own);
+  rtcCommitGeometry(g);
+  rtcCommitScene(w.scene);
+  CHECK(given == std::set<void*>{&own});
+  // As many as before: nothing that would have to be committed.
+  rtcSetGeometryUserPrimitiveCount(g, 1);
+  rtcCommitScene(w.scene);
+  rtcReleaseGeometry(g);
+}
+
+// Overlapping boxes of user geometry, two of which are one primitive's in a scene that meets itself.
+static void collisions() {
+  World w;
+  RTCScene mixed = rtcNewScene(w.device);
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 3);
+  rtcSetGeometryBoundsFunction(
+      g,
+      [](const RTCBoundsFunctionArguments* a) {
+        auto* b = a->bounds_o;
+        b->lower_x = 0.75f * a->primID, b->upper_x = b->lower_x + 1;
+        b->lower_y = b->lower_z = 0, b->upper_y = b->upper_z = 1;
+      },
+      nullptr);
+  rtcRetainGeometry(g);
+  w.add(g);
+  rtcAttachGeometry(mixed, g);
+  w.add(w.floor(0), mixed);
+  rtcReleaseGeometry(g);
+  rtcCommitScene(w.scene);
+  rtcCommitScene(mixed);
+  using Pairs = std::set<std::pair<unsigned, unsigned>>;
+  auto note = [](void* user, RTCCollision* all, unsigned count) {
+    for (unsigned i = 0; i < count; i++) CHECK(((Pairs*)user)->insert({all[i].primID0, all[i].primID1}).second);
+  };
+  Pairs pairs;
+  rtcCollide(w.scene, w.scene, note, &pairs);
+  CHECK(pairs == (Pairs{{0, 1}, {1, 0}, {1, 2}, {2, 1}}));
+  pairs.clear();
+  rtcCollide(mixed, w.scene, note, &pairs);
+  CHECK(pairs.empty() && rtcGetDeviceError(w.device) == RTC_ERROR_INVALID_OPERATION);
+  rtcReleaseScene(mixed);
+}
+
 #ifdef EMBREE4
 // User geometry that sends rays on into another scene, 10 to the right.
 static RTCScene beyond;
@@ -278,4 +362,7 @@ void callbacks() {
   user_geometry();
   points();
   moving_points();
+  query_functions();
+  bounds_data();
+  collisions();
 }

@@ -2,6 +2,7 @@
 #include "check.h"
 
 #include <atomic>
+#include <set>
 #include <thread>
 
 static float height(RTCScene scene) {
@@ -59,6 +60,106 @@ static void ids() {
   rtcCommitScene(w.scene);
   RTCRayHit r = shoot(w.scene, {0.25f, 0.25f, 100}, {0, 0, -1});
   CHECK(r.hit.geomID == 17 && near(r.ray.tfar, 95) && rtcGetGeometryUserData(rtcGetGeometry(w.scene, 17)) == &w);
+}
+
+// The lowest id that is free, whatever was attached and taken out before.
+static void free_ids() {
+  World w;
+  RTCGeometry g = w.floor(1);
+  rtcCommitGeometry(g);
+  std::set<unsigned> used;
+  std::mt19937 random(5);
+  for (int i = 0; i < 2000; i++) {
+    const unsigned id = random() % 40;
+    const bool is_used = used.count(id);
+    if (is_used && random() % 2) {
+      rtcDetachGeometry(w.scene, id);
+      used.erase(id);
+    } else if (!is_used && random() % 4 == 0) {
+      rtcAttachGeometryByID(w.scene, g, id);
+      used.insert(id);
+    } else if (used.size() < 40) {
+      unsigned lowest = 0;
+      while (used.count(lowest)) lowest++;
+      CHECK(rtcAttachGeometry(w.scene, g) == lowest);
+      used.insert(lowest);
+    }
+  }
+  rtcReleaseGeometry(g);
+}
+
+// What was committed stands until the geometry is committed again.
+static void uncommitted() {
+  World w;
+  RTCScene base = rtcNewScene(w.device);
+  w.add(w.floor(0), base);
+  rtcCommitScene(base);
+  RTCGeometry in = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_INSTANCE), floor = w.floor(-5), other = w.floor(-6);
+  rtcSetGeometryInstancedScene(in, base);
+  rtcSetGeometryMask(in, ~0u);
+  rtcReleaseScene(base);
+  for (RTCGeometry g : {in, floor, other}) rtcCommitGeometry(g), rtcAttachGeometry(w.scene, g);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), 0));
+  // Moved away, but not yet.
+  const float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 100, 0, 0};
+  rtcSetGeometryTransform(in, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), 0));
+  float back[12];
+  rtcGetGeometryTransform(in, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, back);
+  CHECK(back[9] == 100);
+  rtcCommitGeometry(in);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), -5));
+  // A buffer that takes another's place.
+  const Vec higher[3] = {{0, 0, -4}, {1, 0, -4}, {0, 1, -4}};
+  rtcSetSharedGeometryBuffer(floor, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, higher, 0, 12, 3);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), -5));
+  rtcCommitGeometry(floor);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), -4));
+  // What is as it was.
+  rtcSetGeometryTimeStepCount(floor, 1);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(w.scene), -4));
+  // But a mask may be another one.
+  rtcSetGeometryMask(floor, ~0u);
+  rtcCommitScene(w.scene);
+  CHECK(rtcGetDeviceError(w.device) == RTC_ERROR_INVALID_OPERATION && std::isnan(height(w.scene)));
+  for (RTCGeometry g : {in, floor, other}) rtcReleaseGeometry(g);
+}
+
+// Bounds are those of what was committed, of which there is none any more once geometries came or went.
+static void bounds_of_changed() {
+  World w;
+  RTCGeometry g = w.floor(3);
+  rtcCommitGeometry(g);
+  auto told = [&] {
+    RTCBounds all;
+    RTCLinearBounds linear;
+    all.lower_x = linear.bounds0.lower_x = -77;
+    rtcGetSceneBounds(w.scene, &all);
+    const RTCError first = rtcGetDeviceError(w.device);
+    rtcGetSceneLinearBounds(w.scene, &linear);
+    CHECK(rtcGetDeviceError(w.device) == first);
+    CHECK((all.lower_x == -77) == (first != RTC_ERROR_NONE) && (linear.bounds0.lower_x == -77) == (first != RTC_ERROR_NONE));
+    return first;
+  };
+  CHECK(told() == RTC_ERROR_INVALID_OPERATION);
+  rtcCommitScene(w.scene);
+  CHECK(told() == RTC_ERROR_NONE);
+  rtcAttachGeometry(w.scene, g);
+  CHECK(told() == RTC_ERROR_INVALID_OPERATION);
+  rtcCommitScene(w.scene);
+  rtcCommitGeometry(g);
+  CHECK(told() == RTC_ERROR_NONE);
+  rtcDetachGeometry(w.scene, 0);
+  CHECK(told() == RTC_ERROR_INVALID_OPERATION);
+  rtcCommitScene(w.scene);
+  CHECK(told() == RTC_ERROR_NONE);
+  rtcReleaseGeometry(g);
 }
 
 static void masks() {
@@ -137,6 +238,9 @@ static void monitors() {
 void changes() {
   updates();
   ids();
+  free_ids();
+  uncommitted();
+  bounds_of_changed();
   masks();
   bounds();
   joins();
