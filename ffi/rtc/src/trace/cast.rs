@@ -16,7 +16,8 @@ pub fn native(ray: &RTCRay) -> Ray {
     Ray {
         origin: Vec3::from(ray.org),
         direction: Vec3::from(ray.dir),
-        tmin: ray.tnear.max(0.0),
+        // NaN stays, so that the ray is not valid.
+        tmin: if ray.tnear < 0.0 { 0.0 } else { ray.tnear },
         tmax: ray.tfar,
         time: ray.time,
     }

@@ -18,7 +18,7 @@ use crate::trace::bvh::woop::{Margin, SLACK};
 pub struct SingleRay {
     /// Where it starts.
     pub origin: Vec3,
-    /// Nearest valid t; what is below 0, or no number, counts as 0.
+    /// Nearest valid t; what is below 0 counts as 0.
     pub tmin: f32,
     /// Where it goes; not of unit length necessarily.
     pub direction: Vec3,
@@ -50,8 +50,8 @@ impl SingleRay {
 
     #[inline(always)]
     pub(super) fn begin(&self) -> f32 {
-        // Not of NaN.
-        if self.tmin > 0.0 { self.tmin } else { 0.0 }
+        // NaN stays, so that the ray is not valid.
+        if self.tmin < 0.0 { 0.0 } else { self.tmin }
     }
 
     /// Made ready for nodes, and what is left to be made ready for triangles; none where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not
