@@ -101,6 +101,9 @@ impl View {
         if items.end()? > buffer.bytes {
             return Err(Failure::argument("buffer range out of bounds"));
         }
+        if buffer.data.is_null() && items.count > 0 {
+            return Err(Failure::argument("invalid argument"));
+        }
         Ok(Self { buffer, items })
     }
 

@@ -162,9 +162,6 @@ pub unsafe extern "C" fn rtcSetSharedGeometryBuffer(
     count: usize,
 ) {
     let set = |geometry: &Geometry| {
-        if data.is_null() && count > 0 {
-            return Err(Failure::argument("invalid argument"));
-        }
         let items = Items { format, offset, stride, count };
         let buffer = Buffer::shared(Arc::clone(&geometry.device), data.cast_mut().cast(), items.end()?);
         geometry.set_buffer((kind, slot), Arc::new(buffer), items)
