@@ -132,9 +132,9 @@ impl Motion {
     }
 
     /// Times from 0 to 1 and where it is then, between which everything moves in straight lines, or nearly: by how much points within
-    /// `reach` of the origin may stray from these lines. None where it is not there in that time.
+    /// `reach` of the origin may stray from these lines. None where it is not there in that time. Of what moves.
     pub fn places(&self, reach: f32) -> (Vec<(f32, Affine3)>, f32) {
-        let (begin, end) = if self.is_still() { (0.0, 1.0) } else { self.range };
+        let (begin, end) = self.range;
         let (first, last) = (begin.max(0.0), end.min(1.0));
         if first > last {
             return (Vec::new(), 0.0);

@@ -95,6 +95,11 @@ pub fn instance_bounds(instance: &Instance) -> (Aabb, [Aabb; 2]) {
         return (Aabb::EMPTY, [Aabb::EMPTY; 2]);
     }
     let reach = all.min.abs().max(all.max.abs());
+    if motion.is_still() {
+        let place = motion.at(0.0);
+        let ends = [start, end].map(|bounds| placed(&place, bounds, reach));
+        return (ends[0].union(ends[1]), ends);
+    }
     let (places, stray) = motion.places(reach.length());
     let mut knots = Vec::with_capacity(2 * places.len());
     for pair in places.windows(2) {
