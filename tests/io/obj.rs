@@ -45,7 +45,7 @@ fn a_byte_order_mark_is_passed_over() {
     let (scene, warnings) = files.load("a.obj");
     assert_eq!((corners(meshes(&scene)[0]), warnings.len()), (vec![[Vec3::ZERO, Vec3::X, Vec3::Y]], 0));
     assert_eq!(scene.materials[meshes(&scene)[0].material as usize].diffuse, Vec3::X);
-    let nff = "s 0 0 0 1\n";
+    let nff = "f 1 0 0 1 0 1 0 1\ns 0 0 0 1\n";
     let scenes = [nff.to_owned(), marked(nff)].map(|text| Files::one("a.nff", text).scene("a.nff"));
     assert_eq!(scenes[0].primitive_count(), scenes[1].primitive_count());
 }
