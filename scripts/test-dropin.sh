@@ -15,4 +15,4 @@ g++ -O1 -g -std=c++17 -Wall "${define[@]}" ffi/rtc/tests/conformance/*.cpp -o "$
 echo "on Embree:"
 "$program"
 echo "on $folder:"
-LD_LIBRARY_PATH=$folder "$program"
+CONFORMANCE_OURS=1 LD_LIBRARY_PATH=$folder "$program"

@@ -507,6 +507,24 @@ fn frames_of_an_animation() {
     assert_eq!(render(&["--frames", "1-2", "--fps", "2", "--skip-existing", "-o", &numbered]).0, 0);
     assert_eq!(std::fs::read(path("f.01.exr")).expect("still there"), b"kept");
     assert!(files.path("f.02.exr").is_file());
+    // It shrinks to nothing: the last frame is empty, and made.
+    let mut maker = Maker::triangle();
+    let (input, output) = (maker.floats("SCALAR", &[0.0, 1.0]), maker.floats("VEC3", &[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
+    maker.json["animations"] = serde_json::json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}],
+        "samplers": [{"input": input, "output": output}],
+    }]);
+    let shrinking = maker.files();
+    let shrinking_path = |name: &str| shrinking.path(name).to_str().expect("UTF-8").to_owned();
+    let (scene, numbered) = (shrinking_path("a.gltf"), shrinking_path("s.%d.exr"));
+    let (code, said) =
+        fails(&[&["render", &scene], &view[..], &["--frames", "0-1", "--fps", "1", "-o", &numbered]].concat());
+    assert!(code == 0 && said.contains("scaled by zero"), "{said}");
+    let covered = |name| {
+        let picture = twincast::image::read(&shrinking.path(name)).expect("a picture");
+        picture.pixels.iter().filter(|pixel| pixel.w > 0.0).count()
+    };
+    assert!(covered("s.0.exr") > 0 && covered("s.1.exr") == 0);
     let (code, said) = render(&["--frames", "0-1", "-o", &path("one.exr")]);
     assert!(code == 2 && said.contains("put %04d into its name"), "{said}");
     let (code, said) = render(&["--animation", "none", "-o", &path("one.exr")]);

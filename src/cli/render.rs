@@ -248,7 +248,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             Ok((outcome, denoised))
         });
         warn(display.and_then(Display::finish).as_slice());
-        if let (Err(Error::Interrupted), Some(kept)) = (&outcome, &kept) {
+        if let (Err(Error::Interrupted), Some(kept), false) = (&outcome, &kept, args.quiet) {
             kept.tell()?;
         }
         let (outcome, denoised) = outcome?;

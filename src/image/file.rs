@@ -216,7 +216,8 @@ fn write_part(
 fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
     if EXR.contains(&suffix) {
         // What is more would come back as infinite.
-        let fits = || image.pixels.iter().all(|pixel| !pixel.is_finite() || pixel.abs().max_element() <= MOST_HALF);
+        let is_held = |value: f32| !value.is_finite() || value.abs() <= MOST_HALF;
+        let fits = || image.pixels.iter().all(|pixel| pixel.to_array().into_iter().all(is_held));
         let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
         Encoding { kind, alpha: true, tile: options.tile }
     } else if RADIANCE.contains(&suffix) {
@@ -300,9 +301,16 @@ mod tests {
 
     #[test]
     fn light_that_halves_do_not_hold_is_kept() {
-        for (light, kind) in [(65504.0, Type::Half), (65505.0, Type::Float), (f32::INFINITY, Type::Half)] {
+        let infinite = f32::INFINITY;
+        let cases = [
+            (0.0, 65504.0, Type::Half),
+            (0.0, 65505.0, Type::Float),
+            (0.0, infinite, Type::Half),
+            (infinite, 1e5, Type::Float),
+        ];
+        for (red, light, kind) in cases {
             let mut image = Image::new(2, 1);
-            image.pixels[1].y = light;
+            (image.pixels[1].x, image.pixels[1].y) = (red, light);
             assert_eq!(encoding("exr", &WriteOptions::default(), &image).kind, kind, "{light}");
         }
     }

@@ -179,7 +179,9 @@ pub fn load_watched(
     }
     let vague: usize = scene.geometries.iter_mut().map(make_finite).sum();
     if vague > 0 {
-        let message = format!("{vague} colours or texture coordinates are not finite; they count as 0");
+        let message = format!(
+            "{vague} colours or texture coordinates are not finite; what is not counts as 0, and as 1 where it is alpha"
+        );
         warnings.push(Warning::new(path, "", message));
     }
     let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
@@ -190,15 +192,21 @@ pub fn load_watched(
     Ok((scene, warnings))
 }
 
-/// Has colours and texture coordinates that are not finite be 0, and tells how many these are.
+/// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells of how many colours and coordinates.
 fn make_finite(geometry: &mut Geometry) -> usize {
-    fn each<T: Copy + Default + Send + Sync>(values: &mut [T], is_finite: impl Fn(&T) -> bool + Sync) -> usize {
-        let odd = values.par_iter_mut().with_min_len(1 << 14).filter(|value| !is_finite(value));
-        odd.map(|value| *value = T::default()).count()
+    fn each<T: Send, const N: usize>(values: &mut [T], instead: [f32; N]) -> usize
+    where
+        T: AsMut<[f32; N]>,
+    {
+        let mend = |value: &mut T| {
+            let components = value.as_mut().iter_mut().zip(instead).filter(|(component, _)| !component.is_finite());
+            components.map(|(component, instead)| *component = instead).count() > 0
+        };
+        values.par_iter_mut().with_min_len(1 << 14).map(mend).filter(|is_mended| *is_mended).count()
     }
     let Geometry::Mesh(mesh) = geometry else { return 0 };
-    let uvs = |uvs: &mut [Vec2]| each(uvs, |uv| uv.is_finite());
-    each(&mut mesh.colors, |color| color.is_finite()) + uvs(&mut mesh.uvs) + uvs(&mut mesh.second_uvs)
+    let uvs = |uvs: &mut [Vec2]| each(uvs, [0.0; 2]);
+    each(&mut mesh.colors, [0.0, 0.0, 0.0, 1.0]) + uvs(&mut mesh.uvs) + uvs(&mut mesh.second_uvs)
 }
 
 impl LoadOptions {

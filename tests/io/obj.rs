@@ -57,7 +57,8 @@ fn colours_and_texture_coordinates_that_are_no_numbers_count_as_nothing() {
     let (scene, warnings) = Files::one("a.obj", text).load("a.obj");
     let mesh = meshes(&scene)[0];
     assert!(mesh.colors.iter().all(|color| color.is_finite()) && mesh.uvs.iter().all(|uv| uv.is_finite()), "{mesh:?}");
-    assert_eq!((mesh.colors[1].truncate(), mesh.uvs[2]), (Vec3::ONE, Vec2::Y));
+    assert_eq!((mesh.colors[0], mesh.colors[1].truncate()), (Vec3::Z.extend(1.0), Vec3::ONE));
+    assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::ZERO, Vec2::Y]);
     assert!(warnings.len() == 1 && warnings[0].message.contains("2 colours or texture coordinates"), "{warnings:?}");
 }
 

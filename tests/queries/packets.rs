@@ -120,8 +120,7 @@ fn assert_packets(bvh: &Bvh, brute: &Brute, rays: &[Ray; 16], asked: u32, name: 
         let [occluded_by_itself] = bvh.occluded_packets(&asked);
         for i in 0..8 {
             let own = &rays[8 * half + i];
-            // A tmin that is no number counts as 0.
-            let ray = &Ray { tmin: own.tmin.max(0.0), ..*own };
+            let ray = &Ray { tmin: if own.tmin < 0.0 { 0.0 } else { own.tmin }, ..*own };
             let is_asked = lanes[half] >> i & 1 != 0;
             let single = closest_triangle(bvh, ray).filter(|_| is_asked);
             let expected = single.map(|found| (found.hit, found.normal.to_array().map(f32::to_bits)));

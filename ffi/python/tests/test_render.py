@@ -43,6 +43,10 @@ def test_several_meshes_and_kinds():
     both = twincast.render([TRIANGLE, beside], size=(32, 32))
     assert (both == twincast.render((TRIANGLE, beside), size=(32, 32))).all(), "two meshes, not vertices and faces"
     assert (both == twincast.render((Mesh(), beside), size=(32, 32))).all()
+    square = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces = [[0, 1, 2], [0, 2, 3]]
+    rows = twincast.render((square, tuple(map(tuple, faces))), size=(32, 32))
+    assert (rows == twincast.render((square, np.array(faces)), size=(32, 32))).all(), "one mesh, of two faces"
     trimesh = pytest.importorskip("trimesh")
     scene = trimesh.Scene([trimesh.creation.box()])
     assert (twincast.render(scene, size=(16, 16))[..., 3] > 0).any()

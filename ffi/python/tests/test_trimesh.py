@@ -84,8 +84,6 @@ def test_hits_are_cut_at_the_nearest(sphere):
     assert one_tri.tolist() == all_tri[:1].tolist() and one_ray.tolist() == [0]
     assert sphere.ray.intersects_first(*ray).tolist() == all_tri[:1].tolist()
     assert sphere.ray.intersects_id(*ray, multiple_hits=False)[0].tolist() == all_tri[:1].tolist()
-
-
     assert [len(part) for part in sphere.ray.intersects_id(*ray, multiple_hits=False, max_hits=1)] == [1, 1]
     for many in (True, False):
         nothing = sphere.ray.intersects_id(*ray, multiple_hits=many, max_hits=0, return_locations=True)

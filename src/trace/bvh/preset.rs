@@ -5,7 +5,7 @@ use super::isa::Isa;
 /// What a tree is built for. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// Built fastest, for few rays.
+    /// Built soon, for few rays: along a curve.
     Fast,
     /// Built by the surface area heuristic.
     #[default]

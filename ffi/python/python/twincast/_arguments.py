@@ -34,12 +34,15 @@ def real(name: str, value: Any) -> float:
     TypeError
         Where it is no real number, with its name.
     ValueError
-        Where it is NaN, with its name.
+        Where it is NaN, or an integer that is too large, with its name.
     """
     try:
-        # No string: float() would read the number in it. What float() takes can be added, too.
-        number = float(value + 0.0)
-    except (TypeError, ValueError, OverflowError):
+        if isinstance(value, (str, bytes, bytearray)):
+            raise TypeError  # float() would read the number in it.
+        number = float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be a number that a float can hold") from None
+    except (TypeError, ValueError):
         raise TypeError(f"{name} must be a real number, not {value!r}") from None
     if math.isnan(number):
         raise ValueError(f"{name} must be a number, not NaN")

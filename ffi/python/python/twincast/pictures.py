@@ -153,7 +153,7 @@ def _parts(scene: Any) -> Iterable[Any]:
     # trimesh's scenes: all meshes where they stand.
     if hasattr(scene, "geometry") and hasattr(scene, "dump"):
         return [mesh for mesh in scene.dump() if hasattr(mesh, "faces")]
-    if _is_pair(scene) and not any(_is_pair(part) or hasattr(part, "faces") for part in scene):
+    if _is_pair(scene) and not all(_is_pair(part) or hasattr(part, "faces") for part in scene):
         return [scene]
     if isinstance(scene, Iterable):
         return scene

@@ -94,7 +94,7 @@ pub struct Committed {
     pub heeded: Heeded,
     /// At time 0 and at time 1.
     pub bounds: [Aabb; 2],
-    /// Boxes of all primitives, made when the first point query asks for them.
+    /// Boxes of all primitives that point queries show, made when the first point query asks for them.
     pub near: OnceLock<Near>,
     /// Memory that was accounted for.
     pub bytes: usize,

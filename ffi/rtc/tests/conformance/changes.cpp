@@ -105,10 +105,11 @@ static void uncommitted() {
   const float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 100, 0, 0};
   rtcSetGeometryTransform(in, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
   rtcCommitScene(w.scene);
-#ifndef EMBREE4
+#ifdef EMBREE4
   // Embree 4 has rays go through the new transform at once.
-  CHECK(near(height(w.scene), 0));
+  if (is_ours())
 #endif
+  CHECK(near(height(w.scene), 0));
   float back[12];
   rtcGetGeometryTransform(in, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, back);
   CHECK(back[9] == 100);

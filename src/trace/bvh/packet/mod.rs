@@ -47,7 +47,7 @@ const MOST: usize = 2;
 pub struct Packet {
     /// Where they start: all x, all y, all z.
     pub origin: [[f32; Packet::RAYS]; 3],
-    /// Nearest valid t of each; what is below 0, or no number, counts as 0.
+    /// Nearest valid t of each; what is below 0 counts as 0.
     pub tmin: [f32; Packet::RAYS],
     /// Directions, as origins; not of unit length necessarily.
     pub direction: [[f32; Packet::RAYS]; 3],
@@ -96,8 +96,8 @@ impl Packet {
     #[inline]
     pub fn ray(&self, lane: usize) -> Ray {
         let at = |v: &[[f32; RAYS]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
-        // Not of NaN.
-        let tmin = if self.tmin[lane] > 0.0 { self.tmin[lane] } else { 0.0 };
+        // NaN stays, so that the ray is not valid.
+        let tmin = if self.tmin[lane] < 0.0 { 0.0 } else { self.tmin[lane] };
         Ray { origin: at(&self.origin), direction: at(&self.direction), tmin, tmax: self.tmax[lane], time: 0.0 }
     }
 
@@ -124,7 +124,8 @@ impl Packet {
         let ([x, y, z], [dx, dy, dz]) = (&self.origin, &self.direction);
         let (x, y, z) = (S::V8::load(x), S::V8::load(y), S::V8::load(z));
         let (dx, dy, dz) = (S::V8::load(dx), S::V8::load(dy), S::V8::load(dz));
-        [x, y, z, dx, dy, dz, S::V8::load(&self.tmin).max(S::V8::splat(0.0)), S::V8::load(&self.tmax)]
+        let (zero, tmin) = (S::V8::splat(0.0), S::V8::load(&self.tmin));
+        [x, y, z, dx, dy, dz, S::V8::select(tmin.less(zero), zero, tmin), S::V8::load(&self.tmax)]
     }
 
     /// The rays for walks by themselves.
