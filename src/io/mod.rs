@@ -194,10 +194,7 @@ pub fn load_watched(
 
 /// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells of how many colours and coordinates.
 fn make_finite(geometry: &mut Geometry) -> usize {
-    fn each<T: Send, const N: usize>(values: &mut [T], instead: [f32; N]) -> usize
-    where
-        T: AsMut<[f32; N]>,
-    {
+    fn each<T: AsMut<[f32; N]> + Send, const N: usize>(values: &mut [T], instead: [f32; N]) -> usize {
         let mend = |value: &mut T| {
             let components = value.as_mut().iter_mut().zip(instead).filter(|(component, _)| !component.is_finite());
             components.map(|(component, instead)| *component = instead).count() > 0

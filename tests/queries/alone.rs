@@ -85,7 +85,8 @@ fn a_ray_begins_at_its_origin_at_the_earliest() {
         }
         // What begins at no number begins nowhere.
         let never = SingleRay { tmin: f32::NAN, ..SingleRay::from(ray) };
-        assert!(!bvh.closest_triangle(&never, &mut TriangleFound::NONE) && !bvh.occludes(&never));
+        let mut nothing = TriangleFound::NONE;
+        assert!(!bvh.closest_triangle(&never, &mut nothing) && !bvh.occludes(&never));
     }
 }
 
