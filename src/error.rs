@@ -49,6 +49,11 @@ pub enum Error {
     Interrupted,
 }
 
+/// What a library says, in one line.
+pub(crate) fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 impl Error {
     /// An [`Error::Input`] about `path`, at `place` (may be empty).
     pub fn input(path: impl Into<PathBuf>, place: impl Into<String>, message: impl Into<String>) -> Self {

@@ -11,7 +11,7 @@ use super::pure as backend;
 use super::response::Response;
 use super::samples::{self, Type};
 use super::{Channel, Channels, Image, Metadata, channels};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::output;
 
 /// How an image is written.
@@ -173,7 +173,7 @@ pub fn read(path: &Path) -> Result<Image> {
     }
     prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
-    backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", message))
+    backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", one_line(&message)))
 }
 
 /// Reads every channel of an OpenEXR file, those of the colours as well; halves become floating values.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use image::error::ImageError;
 use image::{ImageReader, Limits};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::image::is_cut_short;
 use crate::io::Placeless;
 use crate::memory::Mapped;
@@ -79,6 +79,6 @@ fn limits() -> Limits {
 fn broken(error: &ImageError) -> String {
     match error {
         ImageError::Unsupported(_) => format!("is not a PNG, JPEG or WebP picture that can be read: {error}"),
-        _ => format!("is a broken picture: {error}"),
+        _ => format!("is a broken picture: {}", one_line(&error.to_string())),
     }
 }
