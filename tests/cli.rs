@@ -245,6 +245,12 @@ fn builds_never_change_a_picture_and_memory_is_kept() {
     let message = text(&output.stderr);
     assert_eq!((output.status.code(), message.lines().count()), (Some(3), 1), "{message}");
     assert!(message.contains("fast-compact build") && message.contains("give at least --max-memory"), "{message}");
+    // Channels beside the colours count: some ten gigabytes of them, beside half of one.
+    let large = ["--size", "4000x4000", "--max-memory", "4G"];
+    let (code, message) = fails(&[&["plan", &folder.path("scene.obj")], &large[..]].concat());
+    assert_eq!(code, 0, "{message}");
+    let output = folder.render("none.exr", &[&large[..], &["--aov", "all"]].concat());
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
     assert!(!std::fs::exists(folder.path("none.exr")).unwrap());
 }
 
@@ -481,14 +487,7 @@ fn scenes_are_made_by_rule() {
 #[test]
 fn frames_of_an_animation() {
     use crate::io::gltf_maker::Maker;
-    let mut maker = Maker::triangle();
-    let input = maker.floats("SCALAR", &[0.0, 2.0]);
-    let output = maker.floats("VEC3", &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
-    maker.json["animations"] = serde_json::json!([{
-        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
-        "samplers": [{"input": input, "output": output}],
-    }]);
-    let files = maker.files();
+    let files = Maker::animated("translation", "LINEAR", &[0.0, 2.0], "VEC3", &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]).files();
     let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
     let (scene, numbered) = (path("a.gltf"), path("f.%02d.exr"));
     let view = ["--eye", "1,0.5,4", "--look-at", "1,0.5,0", "--size", "32x16", "--spp", "1", "--backend", "native"];
@@ -508,13 +507,7 @@ fn frames_of_an_animation() {
     assert_eq!(std::fs::read(path("f.01.exr")).expect("still there"), b"kept");
     assert!(files.path("f.02.exr").is_file());
     // It shrinks to nothing: the last frame is empty, and made.
-    let mut maker = Maker::triangle();
-    let (input, output) = (maker.floats("SCALAR", &[0.0, 1.0]), maker.floats("VEC3", &[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
-    maker.json["animations"] = serde_json::json!([{
-        "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}],
-        "samplers": [{"input": input, "output": output}],
-    }]);
-    let shrinking = maker.files();
+    let shrinking = Maker::animated("scale", "LINEAR", &[0.0, 1.0], "VEC3", &[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).files();
     let shrinking_path = |name: &str| shrinking.path(name).to_str().expect("UTF-8").to_owned();
     let (scene, numbered) = (shrinking_path("a.gltf"), shrinking_path("s.%d.exr"));
     let (code, said) =

@@ -104,9 +104,10 @@ fn an_interrupted_render_leaves_a_checkpoint() {
         let child = command()
             .arg("render")
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml"))
-            .args(["--integrator", "path", "--size", "1600x1200", "--spp", "256", "--tile-size", "8", "-q", "-o"])
+            .args(["--integrator", "path", "--size", "1600x1200", "--spp", "256", "--tile-size", "8", "-o"])
             .arg(&output)
             .args(flags)
+            .stdout(std::fs::File::create(folder.path().join("said")).expect("a file"))
             .stderr(Stdio::piped())
             .spawn();
         let child = Running(Some(child.expect("the binary runs")));
@@ -124,6 +125,8 @@ fn an_interrupted_render_leaves_a_checkpoint() {
         let (code, said) = child.end();
         assert_eq!(code, Some(130), "{said}");
         assert_eq!((kept.exists(), output.exists()), (is_kept, false));
+        let told = std::fs::read_to_string(folder.path().join("said")).expect("text");
+        assert_eq!(told.contains("a.checkpoint.exr: --resume goes on from there"), is_kept, "{told}");
         if is_kept {
             std::fs::remove_file(&kept).unwrap();
         }

@@ -248,7 +248,9 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             Ok((outcome, denoised))
         });
         warn(display.and_then(Display::finish).as_slice());
-        if let (Err(Error::Interrupted), Some(kept), false) = (&outcome, &kept, args.quiet) {
+        if !args.quiet
+            && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &kept)
+        {
             kept.tell()?;
         }
         let (outcome, denoised) = outcome?;

@@ -12,6 +12,7 @@ use super::response::Response;
 use super::samples::{self, Type};
 use super::{Channel, Channels, Image, Metadata, channels};
 use crate::error::{Error, Result, one_line};
+use crate::memory::Mapped;
 use crate::output;
 
 /// How an image is written.
@@ -166,14 +167,14 @@ pub fn check_writable(path: &Path) -> Result<()> {
 pub fn read(path: &Path) -> Result<Image> {
     let bytes = file_size(path)?;
     if JPEG.contains(&suffix(path).as_str()) {
-        let whole = std::fs::read(path).map_err(|error| Error::input(path, "", error.to_string()))?;
-        if super::is_cut_short(&whole) {
+        let file = Mapped::open(path).map_err(|error| Error::input(path, "", error.to_string()))?;
+        if super::is_cut_short(&file) {
             return Err(Error::input(path, "", "is cut short"));
         }
     }
     prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
-    backend::read(path, &check).map(samples::decode).map_err(|message| Error::input(path, "", one_line(&message)))
+    backend::read(path, &check).map(samples::decode).map_err(|message| unreadable(path, &message))
 }
 
 /// Reads every channel of an OpenEXR file, those of the colours as well; halves become floating values.
@@ -184,7 +185,7 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
     let bytes = file_size(path)?;
     prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
-    backend::read_channels(path, &check).map_err(|message| Error::input(path, "", message))
+    backend::read_channels(path, &check).map_err(|message| unreadable(path, &message))
 }
 
 /// Reads what an OpenEXR file says about how it was made. Fields that it does not have are None, or empty.
@@ -194,7 +195,12 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
 pub fn read_metadata(path: &Path) -> Result<Metadata> {
     file_size(path)?;
     prepare()?;
-    backend::read_metadata(path).map_err(|message| Error::input(path, "", message))
+    backend::read_metadata(path).map_err(|message| unreadable(path, &message))
+}
+
+/// What a backend says of a file that it cannot read.
+fn unreadable(path: &Path, message: &str) -> Error {
+    Error::input(path, "", one_line(message))
 }
 
 fn write_part(

@@ -36,6 +36,18 @@ impl Maker {
         maker
     }
 
+    /// The triangle, whose node is animated: `path` by keys at `times`.
+    pub fn animated(path: &str, interpolation: &str, times: &[f32], kind: &str, values: &[f32]) -> Self {
+        let mut maker = Self::triangle();
+        let input = maker.floats("SCALAR", times);
+        let output = maker.floats(kind, values);
+        maker.json["animations"] = json!([{
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
+            "samplers": [{"input": input, "output": output, "interpolation": interpolation}],
+        }]);
+        maker
+    }
+
     /// An accessor of floats; gives its index.
     pub fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();

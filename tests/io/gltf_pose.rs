@@ -25,18 +25,6 @@ fn fault(files: &Files, animation: Animation, place: &str, words: &str) {
     assert!(error.contains(place) && error.contains(words), "{error} has no {place} {words}");
 }
 
-/// A triangle whose node is animated: `path` by keys at `times`.
-fn animated(path: &str, interpolation: &str, times: &[f32], kind: &str, values: &[f32]) -> Maker {
-    let mut maker = Maker::triangle();
-    let input = maker.floats("SCALAR", times);
-    let output = maker.floats(kind, values);
-    maker.json["animations"] = json!([{
-        "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
-        "samplers": [{"input": input, "output": output, "interpolation": interpolation}],
-    }]);
-    maker
-}
-
 fn origin(scene: &Scene) -> DVec3 {
     scene.instances[0].transform.translation
 }
@@ -44,7 +32,7 @@ fn origin(scene: &Scene) -> DVec3 {
 /// What shrinks to nothing is not there at that time, which is no fault of the file.
 #[test]
 fn at_some_time_there_may_be_nothing() {
-    let files = animated("scale", "LINEAR", &[0., 1.], "VEC3", &[1., 1., 1., 0., 0., 0.]).files();
+    let files = Maker::animated("scale", "LINEAR", &[0., 1.], "VEC3", &[1., 1., 1., 0., 0., 0.]).files();
     let count = |time| posed(&files, at(time)).primitive_count();
     assert_eq!((count(0.0), count(0.5), count(1.0)), (1, 1, 0));
 }
@@ -53,7 +41,7 @@ fn at_some_time_there_may_be_nothing() {
 fn values_between_keys() {
     let values = [0., 0., 0., 4., 2., 0., 4., 2., 8.];
     let times = [1., 3., 4.];
-    let linear = animated("translation", "LINEAR", &times, "VEC3", &values).files();
+    let linear = Maker::animated("translation", "LINEAR", &times, "VEC3", &values).files();
     for (time, expected) in [
         (0.0, [0., 0., 0.]),
         (1.0, [0., 0., 0.]),
@@ -65,7 +53,7 @@ fn values_between_keys() {
     ] {
         assert_eq!(origin(&posed(&linear, at(time))), DVec3::from(expected), "at {time}");
     }
-    let step = animated("translation", "STEP", &times, "VEC3", &values).files();
+    let step = Maker::animated("translation", "STEP", &times, "VEC3", &values).files();
     for (time, x) in [(0.0, 0.), (2.999, 0.), (3.0, 4.), (3.999, 4.)] {
         assert_eq!(origin(&posed(&step, at(time))).x, x, "at {time}");
     }
@@ -77,7 +65,7 @@ fn values_between_keys() {
 fn splines_are_exact_for_cubics() {
     let key = |t: f32| [3.0 * t * t, 0.0, 0.0, t * t * t, 0.0, 0.0, 3.0 * t * t, 0.0, 0.0];
     let values: Vec<f32> = [1.0, 3.0, 4.0].into_iter().flat_map(key).collect();
-    let files = animated("translation", "CUBICSPLINE", &[1., 3., 4.], "VEC3", &values).files();
+    let files = Maker::animated("translation", "CUBICSPLINE", &[1., 3., 4.], "VEC3", &values).files();
     for time in [1.0, 1.25, 2.0, 2.875, 3.0, 3.5, 4.0f64] {
         let got = origin(&posed(&files, at(time))).x;
         assert!((got - time.powi(3)).abs() < 1e-12, "{got} at {time}");
@@ -88,13 +76,13 @@ fn splines_are_exact_for_cubics() {
 fn rotations_turn_evenly_and_normalised() {
     let half = std::f32::consts::FRAC_PI_4;
     let turn = [0., 0., 0., 1., 0., 0., half.sin(), half.cos()];
-    let files = animated("rotation", "LINEAR", &[0., 1.], "VEC4", &turn).files();
+    let files = Maker::animated("rotation", "LINEAR", &[0., 1.], "VEC4", &turn).files();
     for time in [0.0, 0.25, 0.5, 1.0] {
         let matrix = posed(&files, at(time)).instances[0].transform.matrix3;
         assert!(matrix.abs_diff_eq(DMat3::from_rotation_z(FRAC_PI_2 * time), 1e-7), "{matrix} at {time}");
     }
     // Normalised shorts: (0, 0, 0, 1) and (0, 0, 1, 0), half a turn.
-    let mut maker = animated("rotation", "LINEAR", &[0., 1.], "VEC4", &turn);
+    let mut maker = Maker::animated("rotation", "LINEAR", &[0., 1.], "VEC4", &turn);
     let shorts: Vec<u8> = [0i16, 0, 0, 32767, 0, 0, 32767, 0].iter().flat_map(|x| x.to_le_bytes()).collect();
     let output = maker.accessor("VEC4", 5122, true, 8, &shorts);
     maker.json["animations"][0]["samplers"][0]["output"] = json!(output);
@@ -104,7 +92,7 @@ fn rotations_turn_evenly_and_normalised() {
 
 #[test]
 fn which_animation_is_meant() {
-    let mut maker = animated("translation", "STEP", &[0.], "VEC3", &[1., 0., 0.]);
+    let mut maker = Maker::animated("translation", "STEP", &[0.], "VEC3", &[1., 0., 0.]);
     let first = maker.json["animations"][0].clone();
     let moved = maker.floats("VEC3", &[2., 0., 0.]);
     let mut second = first.clone();
@@ -123,7 +111,7 @@ fn which_animation_is_meant() {
 #[test]
 fn faults_of_animations() {
     let broken = |pointer: &str, value: Value, place: &str, words: &str| {
-        let mut maker = animated("translation", "LINEAR", &[0., 1.], "VEC3", &[0.; 6]);
+        let mut maker = Maker::animated("translation", "LINEAR", &[0., 1.], "VEC3", &[0.; 6]);
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         maker.json.pointer_mut(parent).unwrap()[key] = value;
         fault(&maker.files(), at(0.5), place, words);
@@ -155,7 +143,7 @@ fn faults_of_animations() {
     broken("/animations", animation(channel(0, "scale"), odd), "/animations/0/samplers/0/interpolation", "BEZIER");
     let matrix = json!([{"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]);
     broken("/nodes", matrix, "/animations/0/channels/0/target/path", "has a matrix");
-    let falling = animated("translation", "LINEAR", &[0., 2., 1., 3.], "VEC3", &[0.; 12]).files();
+    let falling = Maker::animated("translation", "LINEAR", &[0., 2., 1., 3.], "VEC3", &[0.; 12]).files();
     fault(&falling, at(1.5), "/animations/0/samplers/0/input", "have to rise");
     let odd = Animation { time: Some(0.0), ..Animation::default() };
     let obj = Files::one("a.gltf", "").and("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -167,7 +155,7 @@ fn faults_of_animations() {
 /// A node that moves by 2 m a second, with a child: what hangs on it moves too, what stands beside it does not.
 #[test]
 fn things_move_while_the_shutter_is_open() {
-    let mut maker = animated("translation", "LINEAR", &[0., 1.], "VEC3", &[0., 0., 0., 2., 0., 0.]);
+    let mut maker = Maker::animated("translation", "LINEAR", &[0., 1.], "VEC3", &[0., 0., 0., 2., 0., 0.]);
     maker.json["nodes"] = json!([
         {"mesh": 0, "children": [1]}, {"mesh": 0, "translation": [0, 1, 0]}, {"mesh": 0},
         {"camera": 0, "translation": [0, 0, 5]},

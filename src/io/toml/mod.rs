@@ -31,7 +31,7 @@ use self::pieces::Cut;
 use self::table::{Fault, Read, Table, Value};
 use super::suggest::suggestion;
 use super::texture;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
 use crate::memory::Mapped;
 use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture, Unlit};
@@ -90,8 +90,8 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
 fn parse(text: &str) -> Read<Spanned<DeTable<'_>>> {
     DeTable::parse(text).map_err(|error| {
         // Its messages may span lines and quote the file.
-        let message: String = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-        Fault { at: error.span().map_or(0, |span| span.start), message: format!("not TOML: {message}") }
+        let message = format!("not TOML: {}", one_line(error.message()));
+        Fault { at: error.span().map_or(0, |span| span.start), message }
     })
 }
 

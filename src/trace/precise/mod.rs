@@ -164,8 +164,9 @@ impl Precise {
     }
 }
 
-/// What is in the cell, or comes to be: made outside of it, by each thread that finds it empty, of which the first one's stays. Within it, a thread that waits for its helpers might be given another query,
-/// which waits for the cell; and in a process that is forked meanwhile the cell would wait for ever for a thread that is not there.
+/// What is in the cell, or comes to be: made outside of it, by each thread that finds it empty, of which the first one's stays. Within it, a thread
+/// that waits for its helpers might be given another query, which waits for the cell; and in a process that is forked meanwhile the cell would
+/// wait for ever for a thread that is not there.
 fn made_outside<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     cell.get().unwrap_or_else(|| {
         let made = make();

@@ -1,7 +1,7 @@
 //! One ray: the triangles, then everything else.
 
 use twincast::math::{DVec3, Vec3, triangle_normal};
-use twincast::trace::bvh::{Bvh, Search, TriangleFound};
+use twincast::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
 use twincast::{Ray, TriangleMethod};
 
 use super::offer::Target;
@@ -13,14 +13,8 @@ use crate::scene::{Body, Committed, Instance, Item, Record};
 /// The ray as the native tracer knows it.
 #[inline(always)]
 pub fn native(ray: &RTCRay) -> Ray {
-    Ray {
-        origin: Vec3::from(ray.org),
-        direction: Vec3::from(ray.dir),
-        // NaN stays, so that the ray is not valid.
-        tmin: if ray.tnear < 0.0 { 0.0 } else { ray.tnear },
-        tmax: ray.tfar,
-        time: ray.time,
-    }
+    let (origin, direction) = (Vec3::from(ray.org), Vec3::from(ray.dir));
+    SingleRay { origin, tmin: ray.tnear, direction, time: ray.time, tmax: ray.tfar }.ray()
 }
 
 /// What a ray with a mask can meet of a scene.

@@ -96,9 +96,8 @@ impl Packet {
     #[inline]
     pub fn ray(&self, lane: usize) -> Ray {
         let at = |v: &[[f32; RAYS]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
-        // NaN stays, so that the ray is not valid.
-        let tmin = if self.tmin[lane] < 0.0 { 0.0 } else { self.tmin[lane] };
-        Ray { origin: at(&self.origin), direction: at(&self.direction), tmin, tmax: self.tmax[lane], time: 0.0 }
+        let (origin, direction) = (at(&self.origin), at(&self.direction));
+        SingleRay { origin, tmin: self.tmin[lane], direction, time: 0.0, tmax: self.tmax[lane] }.ray()
     }
 
     /// Sets the ray of a lane.
