@@ -147,7 +147,9 @@ impl fmt::Display for NotEnoughMemory {
         }
         write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
         match preset {
-            Some(Preset::FastCompact) => write!(f, "give at least --max-memory {needed}M, or a smaller mesh"),
+            Some(Preset::FastCompact) => {
+                write!(f, "give at least --max-memory {needed}M, or a smaller mesh or picture")
+            }
             Some(_) => {
                 write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
             }
