@@ -27,7 +27,7 @@ render: build ## render the README's scene to out/gallery.exr and out/gallery.pn
 	$(TWINCAST) render $(SCENE) -o out/gallery.exr -o out/gallery.png --size $(SIZE) --spp $(SPP)
 	@echo "rendered $(SCENE) at $(SIZE), $(SPP) samples a pixel: out/gallery.exr (linear) and out/gallery.png (sRGB)"
 
-test: packages ## run every test
+test: packages ## run the tests of library and program
 	$(CARGO) test --locked
 
 check: packages ## formatting, lints, documentation, and the program once more without default features

@@ -1,6 +1,6 @@
 //! Everything that can go wrong, and the exit code each kind ends the program with.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Result with this library's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
@@ -36,7 +36,7 @@ pub enum Error {
     /// A scene that a backend refuses, or a backend that failed (out of memory, say).
     #[error("{backend}: {message}")]
     Backend {
-        /// Which one: `embree` or `native`.
+        /// Which one: `embree` or `native`; `scene` where none could take it, `display server` for a viewer.
         backend: &'static str,
         /// Its own words, with the error code's name.
         message: String,
@@ -58,6 +58,16 @@ impl Error {
     /// An [`Error::Input`] about `path`, at `place` (may be empty).
     pub fn input(path: impl Into<PathBuf>, place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Input { path: path.into(), place: place.into(), message: message.into() }
+    }
+
+    /// The same where the file was opened because `path` names it, at `place`: which is where a mended name belongs.
+    pub(crate) fn named_in(self, path: &Path, place: &str) -> Self {
+        match self {
+            Self::Input { path: file, place: at, message } => {
+                Self::input(file, at, format!("{message} (named in {}, {place})", path.display()))
+            }
+            other => other,
+        }
     }
 
     /// An [`Error::Output`] about `path`.

@@ -21,6 +21,9 @@
 //! let settings = Settings { width: 64, height: 64, ..Settings::default() };
 //! let image = Renderer::new(&scene, &world, camera, settings)?.render(&bvh, Default::default())?;
 //! assert_eq!(image.pixels[32 * 64 + 32].w, 1.0, "the middle is covered");
+//! # let folder = tempfile::tempdir().expect("a folder");
+//! # let picture = folder.path().join("triangle.png");
+//! twincast::image::write(&picture, &image, &Default::default(), &Default::default())?;
 //! # Ok::<(), twincast::Error>(())
 //! ```
 #![deny(unsafe_code)]
@@ -46,7 +49,7 @@ pub mod trace;
 pub use error::{Error, Result, Warning};
 pub use image::Image;
 pub use ray::{Hit, Ray};
-pub use render::{Renderer, Settings};
+pub use render::{Control, Renderer, Settings};
 pub use scene::Scene;
 pub use shape::triangle::TriangleHit;
 pub use shape::{

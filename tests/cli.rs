@@ -95,6 +95,12 @@ fn bad_usage_ends_with_2() {
         &["render", "x.glb", "-o", "x.png", "--max-memory", "much"],
         &["render", "x.glb", "-o", "x.png", "-v", "-q"],
         &["bench", "--repeat", "0"],
+        &["bench", "terrain10", "--max", "100"],
+        &["bench", "terrain10", "--max-memory", "1G"],
+        &["compare", "x.glb", "--accel", "grid", "--seconds", "1"],
+        &["render", "x.glb", "-o", "x.png", "--explain"],
+        &["render", "x.glb", "-o", "x.png", "--max-spp", "4"],
+        &["render", "x.glb", "-o", "x.png", "--backend", "embree", "--build", "fast"],
         &["bench", "--size", "2"],
         &["bench", "--rays", "cosmic"],
         &["bench", "--modes", "default,slow"],
@@ -125,6 +131,36 @@ fn outputs_are_checked_before_the_scene_is_read() {
         let (code, message) = fails(&["render", "missing.glb", "-o", place]);
         assert!(code == 4 && message.contains(place), "{code} {message}");
     }
+}
+
+/// Names in a scene are not on the command line, where a slip of the finger is to be expected.
+#[test]
+fn what_a_scene_is_read_from_is_not_replaced() {
+    use crate::io::{Files, obj};
+    let mesh = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let files = Files::one("a.obj", mesh)
+        .and("a.mtl", "newmtl a\nmap_Kd a.png\n")
+        .and("a.png", obj::picture())
+        .and("b.png", obj::picture())
+        .and("a.toml", "[[file]]\npath = \"a.obj\"\n[material.b]\ntexture = \"b.png\"\n");
+    let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
+    let render = |scene: &str, outputs: &[&str]| {
+        fails(&[&["render", &path(scene), "--size", "8x8", "--backend", "native", "-q"][..], outputs].concat())
+    };
+    for (scene, outputs, file) in [
+        ("a.obj", &["-o", &path("a.png")][..], "a.png"),
+        ("a.obj", &["-o", &path("c.png"), "--stats", &path("a.mtl")], "a.mtl"),
+        ("a.toml", &["-o", &path("a.png")], "a.png"),
+        ("a.toml", &["-o", &path("c.png"), "-o", &path("b.png")], "b.png"),
+        ("a.toml", &["-o", &path("c.png"), "--stats", &path("a.obj")], "a.obj"),
+    ] {
+        let before = std::fs::read(files.path(file)).expect("it is there");
+        let (code, message) = render(scene, outputs);
+        assert!(code == 2 && message.contains(file) && message.contains("is read from"), "{code} {message}");
+        assert_eq!(std::fs::read(files.path(file)).expect("still there"), before);
+        assert!(!files.path("c.png").exists(), "nothing is written");
+    }
+    assert_eq!(render("a.toml", &["-o", &path("c.png")]), (0, String::new()));
 }
 
 #[cfg(not(feature = "embree"))]

@@ -171,6 +171,8 @@ fn impossible_outputs() {
     fs::create_dir(at("folder.exr")).unwrap();
     for (path, words) in [
         (at("a.xyz"), "unknown suffix .xyz; this build writes "),
+        // OpenImageIO would write colours into it.
+        (at("a.pgm"), "unknown suffix .pgm; this build writes "),
         (at("a"), "no suffix; this build writes "),
         (at("missing/a.exr"), "does not exist"),
         (at("folder.exr"), "is a folder"),

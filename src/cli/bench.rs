@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::accel::{AccelArg, AccelOptions};
-use super::common::{UpAxis, parse_bytes};
+use super::common::{UpAxis, needs, parse_bytes};
 use super::engine::BackendArg;
 use super::scaling;
 use crate::error::Result;
@@ -76,7 +76,7 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
 
-    /// Other accelerators to measure beside these modes: brute, groups, binary-bvh, grid, octree, kd-tree, bsp
+    /// Other accelerators to measure beside these modes: brute, groups, bvh, binary-bvh, grid, octree, kd-tree, bsp
     #[arg(long, value_name = "NAME,...", value_enum, value_delimiter = ',', hide_possible_values = true)]
     accel: Vec<AccelArg>,
 
@@ -88,9 +88,9 @@ pub(super) struct BenchArgs {
     #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid"])]
     scaling: bool,
 
-    /// Most triangles of --scaling
-    #[arg(long, value_name = "N", default_value_t = 1_000_000, requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
-    pub(super) max: u64,
+    /// Most triangles of --scaling (default: 1000000)
+    #[arg(long, value_name = "N", requires = "scaling", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
+    pub(super) max: Option<u64>,
 
     /// Most memory that --scaling may hold, as in 8G or 500M (powers of 1024): accelerators that would take more are not asked
     /// for more triangles (default: three quarters of what is free)
@@ -170,6 +170,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     if args.scaling {
         return scaling::run(args);
     }
+    needs(("--max", args.max.is_some()), ("--scaling", false))?;
+    needs(("--max-memory", args.max_memory.is_some()), ("--scaling", false))?;
     BackendArg::Both.check_available()?;
     bench(args)
 }

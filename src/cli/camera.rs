@@ -24,7 +24,7 @@ pub(crate) struct CameraArgs {
         "projection", "height"])]
     camera: Option<String>,
 
-    /// Position, in metres with +y up, as --unit and --up-axis leave the scene
+    /// Position, in metres with +y up, as --unit and --up-axis leave the scene; the flags from --look-at to --height go with it
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     eye: Option<DVec3>,
 
@@ -73,11 +73,11 @@ pub(crate) struct CameraArgs {
     aperture: Option<f64>,
 
     /// From the lens to the plane of focus, metres (default: the file's, else that of --look-at)
-    #[arg(long, value_name = "M", value_parser = parse_length, requires = "aperture")]
+    #[arg(long, value_name = "M", value_parser = parse_length)]
     focus: Option<f64>,
 
-    /// Blades of the lens's diaphragm, at least 3 (default: round)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=100), requires = "aperture")]
+    /// Blades of the lens's diaphragm, at least 3 (default: the file's, else round)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=100))]
     blades: Option<u32>,
 
     /// Distortion of the lens after Brown and Conrady, as OpenCV has it
@@ -110,14 +110,18 @@ impl CameraArgs {
     pub(crate) fn choose(&self, scene: &Scene, aspect: f64) -> Result<(Camera, String)> {
         let bounds = scene.bounds();
         let (mut camera, source) = self.without_lens(scene, &bounds, aspect)?;
-        if let Some(radius) = self.aperture {
+        if self.aperture.is_some() || self.focus.is_some() || self.blades.is_some() {
+            let radius = self.aperture.or(camera.lens.map(|lens| lens.radius)).ok_or_else(|| {
+                Error::Usage("--focus and --blades are about a lens, which the camera does not have: add --aperture".to_owned())
+            })?;
             let target = self.look_at.unwrap_or_else(|| bounds.centre());
             let to_target = (target - camera.eye).dot(-camera.frame.z_axis);
             let before = camera.lens.map(|lens| lens.focus);
             let focus = self.focus.or(before).or((to_target > 0.0).then_some(to_target)).ok_or_else(|| {
                 Error::Usage("--aperture needs --focus: what the camera should look at is not ahead of it".to_owned())
             })?;
-            camera.lens = Some(ThinLens { radius, focus, blades: self.blades.unwrap_or(0) });
+            let blades = self.blades.or(camera.lens.map(|lens| lens.blades)).unwrap_or(0);
+            camera.lens = Some(ThinLens { radius, focus, blades });
         }
         camera.distortion = self.distortion.or(camera.distortion);
         camera.shutter = self.shutter.unwrap_or(camera.shutter);
@@ -146,7 +150,24 @@ impl CameraArgs {
         })
     }
 
+    /// An error where a flag means nothing to the projection.
+    fn check_projection(&self) -> Result<()> {
+        let flags = [
+            ("--fov", self.fov.is_some(), ProjectionArg::Perspective),
+            ("--fov-x", self.fov_x.is_some(), ProjectionArg::Perspective),
+            ("--height", self.height.is_some(), ProjectionArg::Orthographic),
+        ];
+        let alien = flags.into_iter().find(|(_, is_given, projection)| *is_given && *projection != self.projection);
+        let Some((flag, _, projection)) = alien else { return Ok(()) };
+        let name = |projection: ProjectionArg| {
+            projection.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+        };
+        let (needed, chosen) = (name(projection), name(self.projection));
+        Err(Error::Usage(format!("{flag} is for --projection {needed}, and the projection is {chosen}")))
+    }
+
     fn flagged(&self, eye: DVec3, bounds: &DAabb) -> Result<Camera> {
+        self.check_projection()?;
         let target = self.look_at.unwrap_or_else(|| bounds.centre());
         let up = self.up.unwrap_or(DVec3::Y);
         let fov = match (self.fov_x, self.fov) {
@@ -355,6 +376,16 @@ mod tests {
             let error = args.flagged(args.eye.unwrap(), &bounds).unwrap_err();
             assert!(error.exit_code() == 2 && error.to_string().contains(word), "{error}");
         }
+        let parsed = |flags: &[&str]| Parsed::parse_from([&["test", "--eye", "1,2,3"], flags].concat()).camera;
+        for (flags, words) in [
+            (&["--height", "3"][..], "--height is for --projection orthographic, and the projection is perspective"),
+            (&["--projection", "orthographic", "--fov", "30"], "--fov is for --projection perspective"),
+            (&["--projection", "equirectangular", "--fov-x", "30"], "the projection is equirectangular"),
+        ] {
+            let error = parsed(flags).flagged(DVec3::X, &bounds).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");
+        }
+        assert!(parsed(&["--projection", "orthographic", "--height", "3"]).flagged(DVec3::X, &bounds).is_ok());
         let front = Camera { name: "front".to_owned(), ..Camera::framing(&bounds, 1.0) };
         let scene = Scene { cameras: vec![front], ..Scene::default() };
         let args = CameraArgs { camera: Some("back".to_owned()), ..CameraArgs::default() };

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 
 use super::progress;
-use crate::error::{Result, Warning};
+use crate::error::{Error, Result, Warning};
 use crate::io::{self, Animation, LoadOptions};
 use crate::math::DVec3;
 use crate::render::LARGEST_SIDE;
@@ -80,6 +80,15 @@ enum Normals {
     File,
     Flat,
     Smooth,
+}
+
+/// An error where a flag is given, but not the one that it goes with. The parser of the command line says so itself unless that one
+/// would be in the way of a third.
+pub(crate) fn needs((flag, is_given): (&str, bool), (other, is_there): (&str, bool)) -> Result<()> {
+    if is_given && !is_there {
+        return Err(Error::Usage(format!("{flag} goes with {other}; add that, or leave it out")));
+    }
+    Ok(())
 }
 
 impl SceneArgs {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::accel::AccelArgs;
 use super::cache::CacheArgs;
 use super::camera::CameraArgs;
-use super::common::{SceneArgs, Size};
+use super::common::{SceneArgs, Size, needs};
 use super::engine::BackendArg;
 use super::plan::PlanArgs;
 use super::{interrupt, say, warn};
@@ -65,9 +65,9 @@ pub(super) struct CompareArgs {
     #[arg(long, conflicts_with_all = ["accel", "diff", "folder", "spp"])]
     all: bool,
 
-    /// Most seconds that brute force takes with --all
-    #[arg(long, value_name = "SECONDS", default_value_t = 10, requires = "all")]
-    seconds: u64,
+    /// Most seconds that brute force takes with --all (default: 10)
+    #[arg(long, value_name = "SECONDS", requires = "all")]
+    seconds: Option<u64>,
 
     #[command(flatten)]
     cache: CacheArgs,
@@ -114,6 +114,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     if args.all {
         return compare_all(args);
     }
+    needs(("--seconds", args.seconds.is_some()), ("--all", false))?;
     BackendArg::Both.check_available()?;
     compare(args)
 }
@@ -142,6 +143,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let cache = args.cache.open(BackendArg::Both)?;
     let cancel = interrupt::install()?;
     let (scene, camera) = args.view()?;
+    outputs::spare(diff, &scene.files)?;
     let (accel, options) = args.accel.choose(scene.request.search, BackendArg::Both, None, &args.cache)?;
     let world = plan::world(&scene, args.plan.complete())?;
     let settings = Settings { spp: args.spp, ..args.settings(&scene) };
@@ -201,7 +203,7 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
         size: (width, height),
         random: args.random,
         seed: args.seed,
-        longest: std::time::Duration::from_secs(args.seconds),
+        longest: std::time::Duration::from_secs(args.seconds.unwrap_or(10)),
         options: &options,
     };
     let report =

@@ -24,7 +24,7 @@ pub(super) enum BackendArg {
     Native,
     /// Intel Embree
     Embree,
-    /// Each of them; fails if their pictures differ where no tie or boundary ray explains it
+    /// Each of them; of pictures, fails where they differ and no tie or boundary ray explains it
     Both,
 }
 

@@ -4,6 +4,7 @@ use std::fmt::{self, Write};
 
 use clap::Args;
 
+use super::common::needs;
 use super::engine::BackendArg;
 use super::say;
 use crate::error::{Error, Result};
@@ -24,12 +25,17 @@ pub(super) struct ExplainArgs {
     #[arg(long, requires = "pixel")]
     explain: bool,
 
-    /// Print it as JSON
+    /// Print it as JSON, with --explain
     #[arg(long, requires = "explain")]
     json: bool,
 }
 
 impl ExplainArgs {
+    /// An error where it is not said which pixel.
+    pub(super) fn check(&self) -> Result<()> {
+        needs(("--explain", self.explain), ("--pixel", self.is_wanted()))
+    }
+
     /// Whether a pixel is wanted in place of a picture.
     pub(super) const fn is_wanted(&self) -> bool {
         self.pixel.is_some()

@@ -22,6 +22,7 @@ mod frames;
 mod info;
 mod interrupt;
 mod leave;
+mod light;
 mod make;
 mod man;
 mod metadata;
@@ -100,9 +101,9 @@ Exit codes:
   0    done
   1    the check it ran did not hold
   2    bad usage
-  3    bad scene or input file
+  3    bad scene or input file, too little memory, or an engine that failed
   4    output could not be written
-  5    a backend or feature that is not in this build
+  5    a backend or feature that this build or this machine does not have
   130  interrupted";
 
 /// Runs the program on the process's own arguments, and ends the process with its exit code.

@@ -1,5 +1,6 @@
 //! The files a command writes: checked before the work, written whole after it.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -26,12 +27,6 @@ pub(super) fn check_places<'a>(
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<()> {
     let others: Vec<&PathBuf> = others.into_iter().collect();
-    // By where they really are; a file that does not exist yet has the place of its folder.
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let in_folder = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
-        path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
-    };
     let mut taken: Vec<PathBuf> = inputs.into_iter().map(|path| place(path)).collect();
     for path in pictures.iter().chain(others.iter().copied()) {
         let place = place(path);
@@ -49,6 +44,25 @@ pub(super) fn check_places<'a>(
     };
     pictures.iter().try_for_each(check)?;
     others.into_iter().try_for_each(|path| output::check_writable(path))
+}
+
+/// Whether the outputs leave alone the files that a scene was read from, textures and all, which are known once it is there.
+pub(super) fn spare<'a>(outputs: impl IntoIterator<Item = &'a PathBuf>, files: &[PathBuf]) -> Result<()> {
+    let files: HashSet<PathBuf> = files.iter().map(|file| place(file)).collect();
+    match outputs.into_iter().find(|path| files.contains(&place(path))) {
+        None => Ok(()),
+        Some(path) => Err(Error::Usage(format!(
+            "{}: the scene is read from this file, which an output must not replace; choose another name",
+            path.display()
+        ))),
+    }
+}
+
+/// Where a file really is; one that does not exist yet has the place of its folder.
+fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let in_folder = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
 }
 
 /// Whether pictures of these names can be made: that OpenImageIO is there, and a small picture finds room.

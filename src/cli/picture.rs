@@ -29,9 +29,9 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "X", value_parser = parse_noise)]
     noise: Option<f32>,
 
-    /// The most samples of a pixel, with --noise
-    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    max_spp: u32,
+    /// The most samples of a pixel, with --noise (default: 1024)
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    max_spp: Option<u32>,
 
     /// How far light is followed: ray-cast, whitted (mirrors and glass), path (all light), or auto, the cheapest that
     /// shows everything (default: the scene's, else auto)
@@ -58,7 +58,7 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_filter)]
     filter: Filter,
 
-    /// Rays traced together (default: 8 for embree, else 1); never changes a native picture
+    /// Rays that Embree traces together (default: 8, with --backend both 1); the native engine chooses by itself
     #[arg(long, value_name = "N")]
     packet: Option<Packet>,
 
@@ -134,11 +134,14 @@ impl PictureArgs {
             background: self.background,
             crop: self.crop,
             aovs: Vec::new(),
-            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp }),
+            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp.unwrap_or(MOST_SPP) }),
             complete: self.plan.complete(),
         }
     }
 }
+
+/// As many samples as a pixel has at most where nothing else is asked for.
+const MOST_SPP: u32 = 1024;
 
 /// An integrator, or none for the one that is chosen.
 #[derive(Clone, Copy, Debug)]

@@ -10,6 +10,7 @@ use super::cache::CacheArgs;
 use super::camera::CameraArgs;
 use super::common::SceneArgs;
 use super::engine::BackendArg;
+use super::light::LightArgs;
 use super::picture::PictureArgs;
 use super::render::parse_threads;
 use super::{interrupt, progress, say, warn};
@@ -79,6 +80,9 @@ pub(super) struct PlanCommand {
     #[command(flatten)]
     build: BuildArgs,
 
+    #[command(flatten)]
+    light: LightArgs,
+
     /// Measure what leaving each thing out saves, by the native BVH: renders with it and without, in turn, so often each
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     measure: Option<u32>,
@@ -110,8 +114,9 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
     args.accel.check(args.backend, Some(&args.build), &cache)?;
     args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;
-    let (scene, warnings) = args.scene.load(args.camera.has_shutter())?;
+    let (mut scene, warnings) = args.scene.load(args.camera.has_shutter())?;
     warn(&warnings);
+    args.light.apply(&mut scene)?;
     let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &cache)?.0;
     let settings = args.picture.settings(&scene.request, args.backend.best_width());
     let world = plan::world(&scene, settings.complete)?;

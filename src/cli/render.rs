@@ -13,12 +13,13 @@ use super::build::BuildArgs;
 use super::cache::CacheArgs;
 use super::camera::{CameraArgs, camera_flags};
 use super::checkpoint::{CheckpointArgs, Kept};
-use super::common::{SceneArgs, parse_vector};
+use super::common::SceneArgs;
 use super::denoise::{DenoiseArgs, Denoising};
 use super::display::{Display, parse_address};
 use super::engine::{BackendArg, Job, Outcome};
 use super::explain::ExplainArgs;
 use super::frames::{self, FrameArgs};
+use super::light::LightArgs;
 use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
@@ -29,11 +30,10 @@ use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{self, Image, Metadata, WriteOptions};
 use crate::io;
-use crate::math::{DVec3, Vec3};
 use crate::memory::process;
 use crate::plan;
 use crate::render::Renderer;
-use crate::scene::{Environment, Geometry, Light, Request, Scene};
+use crate::scene::{Geometry, Request, Scene};
 use crate::trace::accel::Accel;
 use crate::trace::bvh::Preset;
 
@@ -108,14 +108,8 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     cache: CacheArgs,
 
-    /// Light with hard shadows that comes from this direction, in place of the scene's lights
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
-    sun: Option<DVec3>,
-
-    /// Picture of all that is around the scene, equirectangular: light, and what is seen behind everything, in place of
-    /// the scene's
-    #[arg(long, value_name = "FILE")]
-    environment: Option<PathBuf>,
+    #[command(flatten)]
+    light: LightArgs,
 
     /// Viewer that shows the picture while it is made: where tev listens
     #[arg(long, value_name = "HOST:PORT", value_parser = parse_address)]
@@ -150,6 +144,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 /// Renders one picture.
 fn render(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
+    args.explain.check()?;
     args.accel.check(args.backend, Some(&args.build), &args.cache)?;
     args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;
@@ -179,12 +174,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         let start = Instant::now();
         let (mut scene, warnings) = args.scene.load_with_bar(args.camera.has_shutter(), args.quiet)?;
         warn(&warnings);
-        if let Some(sun) = args.sun {
-            scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];
-        }
-        if let Some(path) = &args.environment {
-            scene.environment = Some(Environment::new(image::read(path)?));
-        }
+        args.light.apply(&mut scene)?;
         let load_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
 
@@ -199,6 +189,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             ));
         }
         let pictures = args.pictures(&scene.request)?;
+        outputs::spare(pictures.iter().chain(&args.stats), &scene.files)?;
         args.aov.check(&pictures)?;
         let kept = args.checkpoint.open(&pictures, args.backend)?;
         let aspect = f64::from(settings.width) / f64::from(settings.height);
@@ -321,7 +312,7 @@ impl RenderArgs {
 
     /// The files it reads.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        [Some(&self.scene.scene), self.reference.as_ref(), self.environment.as_ref()].into_iter().flatten()
+        [Some(&self.scene.scene), self.reference.as_ref(), self.light.environment.as_ref()].into_iter().flatten()
     }
 
     fn check_reference(&self, reference: Option<&Image>, width: u32, height: u32) -> Result<()> {
@@ -377,8 +368,3 @@ pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
     text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
 }
 
-/// As a unit vector.
-fn parse_direction(text: &str) -> std::result::Result<DVec3, String> {
-    let direction = parse_vector(text)?.try_normalize();
-    direction.ok_or_else(|| "expected a direction, which is not zero".to_owned())
-}

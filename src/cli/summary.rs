@@ -18,11 +18,17 @@ pub(super) struct Rendered<'a> {
 impl Rendered<'_> {
     pub(super) fn summary(&self, verbose: bool) -> Summary {
         let mut summary = Summary::default();
-        let parts = [
-            counted(self.stats.triangles, "triangle", "triangles"),
-            counted(self.scene.materials.len() as u64, "material", "materials"),
-            counted(self.scene.lights.len() as u64, "light", "lights"),
-        ];
+        let triangles = self.stats.triangles;
+        let shapes = self.scene.primitive_count().saturating_sub(triangles);
+        let mut parts = Vec::new();
+        if triangles > 0 || shapes == 0 {
+            parts.push(counted(triangles, "triangle", "triangles"));
+        }
+        if shapes > 0 {
+            parts.push(counted(shapes, "other shape", "other shapes"));
+        }
+        parts.push(counted(self.scene.materials.len() as u64, "material", "materials"));
+        parts.push(counted(self.scene.lights.len() as u64, "light", "lights"));
         summary.line("scene", format_args!("{}: {}", self.stats.scene, parts.join(", ")));
         if verbose {
             summary.line("plan", self.renderer.plan());

@@ -5,7 +5,6 @@
 //! compared with what they point into before they reach a [`Scene`]. What all formats share is done once, afterwards:
 //! normals on request, axes and units, and a last check of the whole scene.
 
-mod check;
 mod compact;
 mod course;
 mod gltf;
@@ -149,7 +148,7 @@ pub fn load_watched(
     let is_gltf = matches!(suffix.as_str(), "glb" | "gltf");
     if !is_gltf && (options.animation != Animation::default() || options.variant.is_some()) {
         let message =
-            "animations and variants of materials are asked for, which only glTF and GLB have; leave them out";
+            "animations (--animation, --time, --frames) and variants of materials (--variant) are asked for, which only glTF and GLB have; leave them out";
         return Err(Error::input(path, "", message));
     }
     let mut warnings = Vec::new();
@@ -167,10 +166,15 @@ pub fn load_watched(
         }
     };
     drop(file);
+    scene.files.insert(0, path.to_owned());
     scene.transform(&options.transform());
     // At some time of an animation there may be nothing to see.
     let may_be_empty = options.animation.time.is_some();
-    check::check(&scene, may_be_empty).map_err(|message| Error::input(path, "", message))?;
+    scene.fault().map_err(|message| Error::input(path, "", message))?;
+    if scene.primitive_count() == 0 && !may_be_empty {
+        let message = "nothing to render: no ray could hit anything; give a file with at least one triangle or shape";
+        return Err(Error::input(path, "", message));
+    }
     scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {

@@ -70,7 +70,7 @@ impl Setup<'_> {
     }
 
     fn measure(&self, name: &'static str, complete: Complete) -> Result<Saving> {
-        let way = |complete| Ok(Way { complete, world: plan::world(self.scene, complete)? });
+        let way = |complete| -> Result<Way> { Ok(Way { complete, world: plan::world(self.scene, complete)? }) };
         let ways = [way(self.settings.complete)?, way(complete)?];
         let trees = [Bvh::build(&ways[0].world), Bvh::build(&ways[1].world)];
         let renderer = |way: usize| {

@@ -111,7 +111,8 @@ impl BuildRequest {
         let cheaper = |a: &Preset, b: &Preset| self.nanoseconds(*a).total_cmp(&self.nanoseconds(*b));
         let candidates = || Preset::ALL.into_iter().filter(allowed);
         let Some(preset) = candidates().filter(|preset| self.memory(*preset) <= limit).min_by(cheaper) else {
-            let least = candidates().min_by_key(|preset| self.memory(*preset)).unwrap_or(Preset::FastCompact);
+            let by_memory = |preset: &Preset| (self.memory(*preset), *preset != Preset::FastCompact);
+            let least = candidates().min_by_key(by_memory).unwrap_or(Preset::FastCompact);
             return Err(NotEnoughMemory { preset: Some(least), needed: self.memory(least), limit });
         };
         let unlimited = candidates().min_by(cheaper).unwrap_or(preset);
@@ -129,7 +130,7 @@ impl BuildRequest {
             if self.triangles > 0 {
                 format!("{rays:.1} rays a triangle are {judged}")
             } else {
-                "no triangles".to_owned()
+                "there are no triangles to build over".to_owned()
             }
         };
         Ok(BuildChoice { preset, memory: self.memory(preset), why })
@@ -140,20 +141,23 @@ impl fmt::Display for NotEnoughMemory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mega = |bytes: u64| bytes.div_ceil(1 << 20);
         let Self { preset, needed, limit } = self;
-        let (needed, limit) = (mega(*needed), limit >> 20);
+        // What is held moves a little from run to run; what is asked for should be enough in the next one.
+        let enough = mega(needed + needed / 32);
+        let needed = mega(*needed);
+        let limit = if *limit < 1 << 20 { format!("{} KiB", limit >> 10) } else { format!("{} MiB", limit >> 20) };
         match preset {
             Some(preset) => write!(f, "its {} build", preset.name())?,
             None => write!(f, "its build")?,
         }
-        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit} MiB; ")?;
+        write!(f, " needs about {needed} MiB of memory in all, above the limit of {limit}; ")?;
         match preset {
             Some(Preset::FastCompact) => {
-                write!(f, "give at least --max-memory {needed}M, or a smaller mesh or picture")
+                write!(f, "give at least --max-memory {enough}M, or a smaller mesh or picture")
             }
             Some(_) => {
-                write!(f, "give at least --max-memory {needed}M, or --build auto, which may choose a smaller one")
+                write!(f, "give at least --max-memory {enough}M, or --build auto, which may choose a smaller one")
             }
-            None => write!(f, "give at least --max-memory {needed}M, or use --backend native, which may need less"),
+            None => write!(f, "give at least --max-memory {enough}M, or use --backend native, which may need less"),
         }
     }
 }
@@ -217,8 +221,13 @@ mod tests {
         let error = BuildRequest { max_memory: Some(held - 1), ..MESH }.fits().unwrap_err();
         assert_eq!((error.needed, MESH.fits()), (held, Ok(())));
         // What the message asks for is enough.
-        assert!(text.contains("limit of 500 MiB") && text.contains("--max-memory 537M"), "{text}");
+        assert!(text.contains("about 537 MiB") && text.contains("limit of 500 MiB"), "{text}");
         assert!(preset(many, Some(537 << 20)).is_some() && preset(many, Some(536 << 20)).is_none());
+        // A thirty-second more.
+        assert!(text.contains("--max-memory 554M, or a smaller mesh"), "{text}");
+        // Where there is nothing to build, no other build would do.
+        let none = BuildRequest { triangles: 0, max_memory: Some(1000 << 10), ..MESH }.choose().unwrap_err().to_string();
+        assert!(none.contains("limit of 1000 KiB") && !none.contains("--build auto"), "{none}");
     }
 
     #[test]

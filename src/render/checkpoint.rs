@@ -103,9 +103,15 @@ fn same_render(path: &Path, identity: &[(&'static str, String)]) -> Result<u32> 
             // Of long entries only what differs.
             let differing = found.split("; ").zip(own.split("; ")).find(|(a, b)| a != b);
             let (found, own) = differing.unwrap_or((found, own.as_str()));
-            return Err(refuse(format!(
-                "is of another render, by its {key}: {found}, and here {own}; begin anew without --resume"
-            )));
+            // Digests and what has parts are for comparing, not for reading: there the name has to do.
+            let is_readable = *key != "scene" && ![found, own].iter().any(|entry| entry.contains(['(', '{']));
+            let name = own.split(|c: char| !c.is_ascii_lowercase() && c != ' ').next().unwrap_or_default().trim();
+            let difference = match is_readable {
+                true => format!("{key}: {found}, and here {own}"),
+                false if *key == "settings" => format!("{key}: another {name}"),
+                false => (*key).to_owned(),
+            };
+            return Err(refuse(format!("is of another render, by its {difference}; begin anew without --resume")));
         }
     }
     entry(ROUND)?.parse().map_err(|_| refuse("does not say how far it is".to_owned()))

@@ -92,6 +92,7 @@ fn scene(scene: &Scene) -> u128 {
         background,
         fog,
         request: _,
+        files: _,
     } = scene;
     let mut digest = Digest(XxHash3_128::new());
     for geometry in geometries {

@@ -97,8 +97,9 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], and a
-    /// camera that cannot be.
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], a camera that cannot be, and settings that do not go
+    /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
+    /// what is not there.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         settings.check()?;

@@ -126,7 +126,7 @@ impl fmt::Display for Fov {
 }
 
 impl Camera {
-    /// A camera at `eye` that looks at `target`, with a vertical angle of view. Where `up` is along the view, up in the
+    /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi. Where `up` is along the view, up in the
     /// picture is what it becomes for a camera that is tilted until it looks up or down: -z for one that looks along -z
     /// and is tilted down. None where `eye` and `target` coincide, where `up` is zero, and for what is not finite.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov: f64) -> Option<Self> {

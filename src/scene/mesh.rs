@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, is_traceable};
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, cofactor, is_traceable};
 
 /// Vertices or triangles that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -76,6 +76,26 @@ impl Mesh {
             return DAabb::EMPTY;
         }
         DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
+    }
+
+    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat.
+    pub(crate) fn placed(&self, transform: &DAffine3) -> Self {
+        let positions: Vec<DVec3> =
+            self.positions.par_iter().map(|&offset| transform.transform_point3(self.point(offset))).collect();
+        let turn = cofactor(&transform.matrix3);
+        let normals = self.normals.par_iter().map(|normal| (turn * normal.as_dvec3()).normalize_or_zero().as_vec3());
+        let mut placed = Self { normals: normals.collect(), ..self.clone() };
+        placed.set_positions(&positions);
+        placed
+    }
+
+    /// Whether any of its triangles has an area.
+    pub(crate) fn has_area(&self) -> bool {
+        let corner = |i: u32| self.positions[i as usize].as_dvec3();
+        self.triangles.par_iter().with_min_len(TASK).any(|&[a, b, c]| {
+            let a = corner(a);
+            (corner(b) - a).cross(corner(c) - a) != DVec3::ZERO
+        })
     }
 
     /// Turns positions and normals, in place where nothing else holds them.

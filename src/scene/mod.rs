@@ -5,6 +5,7 @@
 
 mod bounds;
 mod camera;
+mod check;
 mod environment;
 mod fog;
 mod instance;
@@ -36,6 +37,8 @@ pub use request::{Integrator, Request};
 pub use rocks::rocks;
 pub use search::{Accel, Resolution, Search};
 pub use texture::{Filter, Texture, Wrap};
+
+use std::path::PathBuf;
 
 use crate::math::{DAabb, DAffine3, DMat3, DVec3, Vec3};
 use crate::shape::Shape;
@@ -69,6 +72,8 @@ pub struct Scene {
     pub background: Option<Vec3>,
     /// What the file wants of a render.
     pub request: Request,
+    /// The files that it was read from: the one that was loaded, and those that are named there and were found.
+    pub files: Vec<PathBuf>,
 }
 
 /// Something rays can hit: triangles, or shapes of any other kind.

@@ -37,6 +37,7 @@ pub use sphere::Sphere;
 pub use sphere_methods::SphereMethod;
 pub use triangle_methods::TriangleMethod;
 
+use crate::error::Error;
 use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
 use distance::Support;
@@ -102,6 +103,31 @@ impl InvalidShape {
     fn unless_direction(name: &str, v: Vec3) -> Result<(), Self> {
         let holds = v.is_finite() && v.abs().max_element() >= f32::MIN_POSITIVE;
         Self::unless(holds, || format!("the {name} is {v}; it must be finite and not zero"))
+    }
+}
+
+impl From<InvalidShape> for Error {
+    fn from(wrong: InvalidShape) -> Self {
+        Self::Usage(wrong.0)
+    }
+}
+
+/// Each kind as the shape that it is.
+macro_rules! from_kinds {
+    ($($kind:ident),*) => {
+        $(impl From<$kind> for Shape {
+            fn from(shape: $kind) -> Self {
+                Self::$kind(shape)
+            }
+        })*
+    };
+}
+
+from_kinds!(Sphere, Plane, Disk, Cuboid, Cylinder, Cone, Ellipsoid);
+
+impl From<Polygon> for Shape {
+    fn from(polygon: Polygon) -> Self {
+        Self::Polygon(Arc::new(polygon))
     }
 }
 

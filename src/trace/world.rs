@@ -109,6 +109,9 @@ impl World {
     /// # Errors
     /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name; and for more
     /// primitives in one place than tracers can name.
+    ///
+    /// # Panics
+    /// Where the scene names a group, a geometry or a vertex that is not there, here or when a tracer is built; [`Scene::check`] finds those.
     pub fn new(scene: &Scene) -> Result<Self> {
         Self::with(scene, true)
     }

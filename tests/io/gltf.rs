@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Projection, Wrap};
 
+use super::gltf_maker::Maker;
 use super::{Files, corners, meshes, obj, refused};
 
 /// Three positions (36 bytes), three 16-bit indices and padding (8), three normals (36), three uvs (24).
@@ -265,7 +266,9 @@ fn a_webp_picture_comes_before_the_one_beside_it() {
 fn files_beside_it() {
     let uris = [("/buffers/0/uri", json!("my%20data.bin")), ("/images/0/uri", json!("pic%2Epng"))];
     let files = changed(&uris).and("my data.bin", triangle_bytes()).and("pic.png", obj::picture());
-    assert_eq!(files.scene("a.gltf").textures.len(), 1);
+    let scene = files.scene("a.gltf");
+    assert_eq!(scene.textures.len(), 1);
+    assert_eq!(scene.files, ["a.gltf", "my data.bin", "pic.png"].map(|name| files.path(name)));
     std::fs::remove_file(files.path("pic.png")).unwrap();
     let (scene, warnings) = files.load("a.gltf");
     assert_eq!((scene.materials[0].diffuse_texture, warnings.len()), (None, 1));
@@ -338,6 +341,23 @@ fn what_is_not_rendered_is_a_warning() {
 }
 
 #[test]
+fn a_scale_of_zero_along_one_axis_presses_flat() {
+    let mut maker = Maker::new();
+    let positions = maker.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 2.0]);
+    let normals = maker.floats("VEC3", &[0.0, 0.6, 0.8, 0.0, 0.6, 0.8, 0.0, 0.6, 0.8]);
+    maker.json["meshes"] = json!([{"primitives": [{"attributes": {"POSITION": positions, "NORMAL": normals}}]}]);
+    maker.json["scenes"] = json!([{"nodes": [0, 1]}]);
+    maker.json["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "scale": [2, 3, 0], "translation": [0, 0, 5]}]);
+    let scene = maker.files().scene("a.gltf");
+    let [slanted, flat] = meshes(&scene)[..] else { panic!("{:?}", scene.geometries) };
+    assert_eq!(corners(slanted), [[Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 2.0)]]);
+    let placed: Vec<_> = flat.positions.iter().map(|&offset| flat.point(offset)).collect();
+    assert_eq!(placed, [DVec3::Z * 5.0, DVec3::new(2.0, 0.0, 5.0), DVec3::new(0.0, 3.0, 5.0)]);
+    assert_eq!(flat.normals, [Vec3::Z; 3]);
+    assert_eq!(scene.group_geometries(scene.instances[1].group).map(|(index, _)| index).collect::<Vec<_>>(), [1]);
+}
+
+#[test]
 fn faults_are_told_with_their_pointer() {
     let fault = |pointer: &str, value: Value, place: &str, words: &str| {
         eprintln!("{pointer} = {value}");
@@ -345,6 +365,7 @@ fn faults_are_told_with_their_pointer() {
     };
     fault("/extensionsRequired", json!(["KHR_lights_punctual", "EXT_new"]), "/extensionsRequired/1", "\"EXT_new\"");
     fault("/asset/version", json!("1.0"), "/asset/version", "2.x");
+    fault("/asset/minVersion", json!("2.1"), "/asset/minVersion", "\"2.1\"");
     fault("/bufferViews/0/byteLength", json!(105), "/accessors/0/bufferView", "past its buffer's 104");
     fault("/bufferViews/0/byteOffset", json!(u64::MAX), "/accessors/0/bufferView", "past its buffer's 104");
     fault("/bufferViews/0/buffer", json!(1), "/accessors/0/bufferView", "buffer 1");

@@ -146,6 +146,29 @@ fn what_is_missing_is_a_warning() {
 }
 
 #[test]
+fn colours_in_xyz_and_options_without_effect() {
+    // D65's white, a red beyond the display's, and grey from one number.
+    let mtl = "newmtl a\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\n";
+    let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
+    let (scene, warnings) = Files::one("a.obj", &obj).and("a.mtl", mtl).and("a.png", picture()).load("a.obj");
+    let material = &scene.materials[0];
+    assert!(material.diffuse.abs_diff_eq(Vec3::ONE, 1e-3), "{material:?}");
+    // From Lindbloom's matrix for sRGB and D65.
+    let red = Vec3::new(3.2404542 * 0.5 - 1.5371385 * 0.2, 0.0, 0.0);
+    assert!(material.specular.abs_diff_eq(red, 1e-3) && material.emission == Vec3::ZERO, "{material:?}");
+    let said: Vec<_> = warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
+    assert!(said.len() == 1 && said[0].0 == "line 4" && said[0].1.contains("Ke spectral"), "{said:?}");
+    let plain = "newmtl a\nmap_Kd -mm 0 1 -t 0 a.png\nmap_Bump -bm 2 b.png\n";
+    let files = Files::one("a.obj", &obj).and("a.mtl", plain).and("a.png", picture()).and("b.png", picture());
+    let (scene, warnings) = files.load("a.obj");
+    assert!(warnings.len() == 1 && warnings[0].message.contains("map_Bump"), "{warnings:?}");
+    assert_eq!(scene.files, ["a.obj", "a.png", "b.png", "a.mtl"].map(|name| files.path(name)));
+    let (_, warnings) =
+        Files::one("a.obj", &obj).and("a.mtl", "newmtl a\nmap_Kd -mm 0.2 a.png\n").and("a.png", picture()).load("a.obj");
+    assert!(warnings.len() == 1 && warnings[0].message.contains("option \"-mm\""), "{warnings:?}");
+}
+
+#[test]
 fn vertex_colours_are_srgb() {
     let files = Files::one("a.obj", "v 0 0 0 1 0 0.5\nv 1 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
     let scene = files.scene("a.obj");
@@ -199,6 +222,7 @@ fn faults_in_what_it_refers_to_name_that() {
         let twincast::Error::Input { path, place: at, message } = &error else { panic!("{error}") };
         assert_eq!((path, at.as_str()), (&files.path(file), place), "{error}");
         assert!(message.contains(words), "{error}");
+        assert_eq!(message.contains("a.mtl, line 2)"), file == "a.png", "{error}");
     };
     check("newmtl a\nKd 1 x 1\n", b"x", "a.mtl", "line 2", "3 numbers");
     check("newmtl a\nKd 1 -1 1\n", b"x", "a.mtl", "line 2", "from 0 up");

@@ -211,6 +211,7 @@ fn files_are_included_once() {
     let Geometry::Mesh(turned) = &scene.geometries[groups[0].1 as usize] else { panic!() };
     assert_eq!(scene.materials[turned.material as usize].diffuse, Vec3::X);
     assert_eq!(super::corners(turned)[0][2], Vec3::Y, "z is up in the file");
+    assert!(scene.files[0].ends_with("a.toml") && scene.files[1].ends_with("mesh.obj"), "{:?}", scene.files);
 }
 
 #[test]
@@ -286,6 +287,11 @@ fn faults_are_told_with_line_and_remedy() {
             "perspective cameras alone",
         ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 0, focus = 1 }\n", 4, "a length above 0"),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 1, focus = 1, blades = 2 }\n",
+            4,
+            "3 or more",
+        ),
         ("[[file]]\npath = \"a.toml\"\n", 2, "no mesh file"),
         (
             "[[mesh]]\npositions = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]\n",
@@ -325,5 +331,5 @@ fn faults_are_told_with_line_and_remedy() {
     // What is wrong in an included file is told of that file.
     let files = Files::one("a.toml", "[[file]]\npath = \"b.obj\"\n").and("b.obj", "f 1 2 3\n");
     let error = twincast::io::load(&files.path("a.toml"), &Default::default()).unwrap_err().to_string();
-    assert!(error.contains("b.obj: line 1"), "{error}");
+    assert!(error.contains("b.obj: line 1") && error.ends_with("a.toml, line 2)"), "{error}");
 }

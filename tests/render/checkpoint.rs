@@ -96,8 +96,9 @@ fn a_checkpoint_shows_the_picture_so_far_and_is_refused_elsewhere() {
     let mut moved = scene.clone();
     moved.cameras[0].eye.x += 1e-9;
     for (scene, settings, words) in [
-        (&other_scene, settings.clone(), "by its scene"),
-        (&moved, settings.clone(), "by its camera"),
+        (&other_scene, settings.clone(), "by its scene; begin anew"),
+        (&moved, settings.clone(), "by its camera; begin anew"),
+        (&scene, Settings { max_depth: Some(3), ..settings.clone() }, "by its settings: another depth; begin anew"),
         (&scene, Settings { spp: 65, ..settings.clone() }, "by its settings: spp 64, and here spp 65"),
         (&scene, Settings { seed: 1, ..settings.clone() }, "seed 0, and here seed 1"),
         (&scene, Settings { aovs: vec![Aov::Depth], ..settings.clone() }, "aovs"),

@@ -31,6 +31,9 @@ pub(super) fn prepare() -> std::result::Result<(), Error> {
     functions().map(|_| ()).map_err(Error::Unavailable)
 }
 
+/// What OpenImageIO would write as colours, whatever the suffix says: grey and black-and-white pictures of netpbm.
+const MISNAMED: [&str; 2] = ["pbm", "pgm"];
+
 /// Suffixes that the installed OpenImageIO writes, in lower case, sorted.
 pub(super) fn writable_suffixes() -> Result<Vec<String>> {
     // To ask takes milliseconds, for each format makes a writer.
@@ -39,6 +42,7 @@ pub(super) fn writable_suffixes() -> Result<Vec<String>> {
         let mut suffixes: Vec<_> = functions()?.suffixes()?.split(',').map(str::to_owned).collect();
         suffixes.sort();
         suffixes.dedup();
+        suffixes.retain(|suffix| !MISNAMED.contains(&suffix.as_str()));
         Ok(suffixes)
     };
     SUFFIXES.get_or_init(ask).clone()

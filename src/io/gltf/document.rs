@@ -1,7 +1,7 @@
 //! A parsed file with its buffers, and what lies in them.
 
 use std::cell::{Cell, OnceCell};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::uri::{self, Target};
 use super::{meshopt, schema};
@@ -84,6 +84,18 @@ impl<'a> Document<'a> {
             document.buffers.push(buffer);
         }
         Ok(document)
+    }
+
+    /// The files that it names, used or not, as far as they are there.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let schema::Root { buffers, images, .. } = &self.root;
+        let uris = buffers.iter().filter_map(|buffer| buffer.uri.as_ref());
+        let uris = uris.chain(images.iter().filter_map(|image| image.uri.as_ref()));
+        let file = |uri: &String| match uri::resolve(self.path, uri) {
+            Ok(Target::File(file)) if file.is_file() => Some(file),
+            _ => None,
+        };
+        uris.filter(|uri| !uri.starts_with("data:")).filter_map(file).collect()
     }
 
     pub(super) fn error(&self, pointer: impl Into<String>, message: impl Into<String>) -> Error {

@@ -85,6 +85,7 @@ pub(super) fn load(
     let mut groups = mesh::Groups::new(&document, variant);
     node::place(&document, &hierarchy, &poses, &mut groups, &mut scene, warnings)?;
     groups.finish(&mut scene, warnings);
+    scene.files = document.files();
     Ok(scene)
 }
 
@@ -92,6 +93,11 @@ fn check_version(path: &Path, root: &schema::Root, warnings: &mut Vec<Warning>) 
     if !root.asset.version.starts_with("2.") {
         let message = format!("glTF version {:?}; only 2.x can be read", root.asset.version);
         return Err(Error::input(path, "/asset/version", message));
+    }
+    // The version counts for those alone that do not have it: what is left out below it may be read.
+    if let Some(least) = root.asset.min_version.as_ref().filter(|least| *least != "2.0") {
+        let message = format!("needs a reader of glTF {least:?}, and this one reads 2.0");
+        return Err(Error::input(path, "/asset/minVersion", message));
     }
     let is_unknown = |name: &&String| !SUPPORTED_EXTENSIONS.contains(&name.as_str());
     if let Some(index) = root.extensions_required.iter().position(|name| is_unknown(&name)) {

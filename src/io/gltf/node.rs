@@ -6,8 +6,11 @@ use super::pose::{Hierarchy, Poses};
 use super::schema::{Camera as CameraSource, Node};
 use super::{instancing, punctual};
 use crate::error::{Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec2, DVec3};
-use crate::scene::{Camera, Fov, Instance, Projection, Scene};
+use crate::math::{DAffine3, DMat3, DVec2, DVec3, cofactor};
+use crate::scene::{Camera, Fov, Geometry, Group, Instance, Projection, Scene};
+
+/// What a vertex takes in memory: position, normal, two sets of texture coordinates and a colour.
+const BYTES_OF_A_VERTEX: usize = 12 + 12 + 2 * 8 + 16;
 
 /// Where what nodes carry is put.
 struct Stage<'s, 'd> {
@@ -76,7 +79,13 @@ impl Stage<'_, '_> {
         for place in &places {
             let (start, end) = (transform * *place, end.map(|end| end * *place));
             if !is_invertible(&start) {
-                flat += 1;
+                match self.pressed(group, &start, pointer)? {
+                    Some(group) => {
+                        stopped += usize::from(end.is_some_and(|end| end != start));
+                        self.scene.instances.push(Instance { group, ..instance(DAffine3::IDENTITY, None) });
+                    }
+                    None => flat += 1,
+                }
                 continue;
             }
             let moves_to = end.filter(is_invertible);
@@ -90,9 +99,32 @@ impl Stage<'_, '_> {
             warn(format!("{flat} instances of node {:?} are scaled by zero, and left out", node.name));
         }
         if stopped > 0 {
-            warn(format!("node {:?} shrinks to nothing while the shutter is open; it stands still", node.name));
+            warn(format!("node {:?} is scaled by zero while the shutter is open; it stands still", node.name));
         }
         Ok(())
+    }
+
+    /// A copy of a group where `transform` presses it flat, by a scale of zero along one axis: rays cannot be taken back through
+    /// that. None where nothing is left that has an area.
+    fn pressed(&mut self, group: u32, transform: &DAffine3, pointer: &str) -> Result<Option<u32>> {
+        let Scene { geometries, groups, .. } = &mut *self.scene;
+        let begin = geometries.len() as u32;
+        let Group { name, geometries: range } = groups[group as usize].clone();
+        let keeps_areas = transform.is_finite() && cofactor(&transform.matrix3) != DMat3::ZERO;
+        for index in if keeps_areas { range } else { 0..0 } {
+            let Geometry::Mesh(mesh) = &geometries[index as usize] else { continue };
+            self.document.spend(pointer, (mesh.positions.len() * BYTES_OF_A_VERTEX) as u64)?;
+            let placed = mesh.placed(transform);
+            if placed.has_area() {
+                geometries.push(Geometry::Mesh(placed));
+            }
+        }
+        let end = geometries.len() as u32;
+        if begin == end {
+            return Ok(None);
+        }
+        groups.push(Group { name, geometries: begin..end });
+        Ok(Some(groups.len() as u32 - 1))
     }
 }
 

@@ -70,8 +70,9 @@ pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut 
         geometries.push(Geometry::Mesh(Mesh { name: section.name, material, ..mesh }));
         used.push(section.material);
     }
-    let (materials, textures) = library.resolve(path, used, !obj.colors.is_empty(), warnings)?;
-    Ok(Scene { textures, ..Scene::from_geometries(geometries, materials) })
+    let mut scene = Scene::from_geometries(geometries, Vec::new());
+    library.resolve(path, used, !obj.colors.is_empty(), &mut scene, warnings)?;
+    Ok(scene)
 }
 
 impl Piece {

@@ -10,13 +10,24 @@ use crate::error::{Error, Result, Warning};
 use crate::io::Placeless;
 use crate::io::text::{Lines, Words, name, number, quoted, without_mark};
 use crate::io::{system_message, texture};
-use crate::math::{Affine2, Vec2, Vec3};
+use crate::math::{Affine2, Mat3, Vec2, Vec3};
 use crate::memory::Mapped;
-use crate::scene::{Material, Texture, Wrap};
+use crate::scene::{Material, Scene, Texture, Wrap};
+
+/// From CIE 1931 XYZ to linear sRGB (IEC 61966-2-1, 1999), column by column.
+const XYZ_TO_RGB: Mat3 = Mat3::from_cols(
+    Vec3::new(3.240_625, -0.968_931, 0.055_710),
+    Vec3::new(-1.537_208, 1.875_756, -0.204_021),
+    Vec3::new(-0.498_629, 0.041_518, 1.056_996),
+);
 
 /// The materials of all MTL files that one OBJ file names; the first of a name counts.
 #[derive(Default)]
-pub(super) struct Library(HashMap<String, Entry>);
+pub(super) struct Library {
+    entries: HashMap<String, Entry>,
+    /// The libraries, and the textures that they name, used or not, as far as they are there.
+    files: Vec<PathBuf>,
+}
 
 #[derive(Default)]
 struct Entry {
@@ -46,17 +57,19 @@ impl Library {
     /// Reads the file (or, where no file has the whole name, the files) that `mtllib` on `line` of `obj` names.
     /// A missing one is a warning.
     pub(super) fn read(&mut self, obj: &Path, line: usize, names: &str, warnings: &mut Vec<Warning>) -> Result<()> {
-        let folder = obj.parent().unwrap_or(Path::new(""));
-        let whole = folder.join(portable(names));
+        let whole = beside(obj, names);
         // A name may contain spaces; the format also lets several names stand in a line.
         let files: Vec<PathBuf> = if whole.is_file() {
             vec![whole]
         } else {
-            names.split_whitespace().map(|n| folder.join(portable(n))).collect()
+            names.split_whitespace().map(|name| beside(obj, name)).collect()
         };
         for file in files {
             match Mapped::open(&file) {
-                Ok(bytes) => self.parse(&file, &bytes, warnings)?,
+                Ok(bytes) => {
+                    self.parse(&file, &bytes, warnings)?;
+                    self.files.push(file);
+                }
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                     let message = format!("material library {:?} is missing; its materials are grey", file.display());
                     warnings.push(Warning::new(obj, format!("line {line}"), message));
@@ -81,9 +94,16 @@ impl Library {
                 let Some((_, entry)) = &mut entry else {
                     return Err(fail(format!("{} comes before the first newmtl", quoted(keyword))));
                 };
-                if !entry.statement(keyword, line, &mut words).map_err(fail)? {
-                    ignored.get_or_insert_with(|| (line, quoted(keyword)));
+                // Options come before the name; of an option that is not known here, the last word is what is left.
+                let mut texture = text.rsplit(u8::is_ascii_whitespace).next().map(name);
+                if let Some(left_out) = entry.statement(keyword, line, &mut words).map_err(fail)? {
+                    ignored.get_or_insert((line, left_out));
                 }
+                if let Some(map) = entry.map.as_ref().filter(|map| map.line == line) {
+                    texture = Some(map.file.clone());
+                }
+                let texture = texture.map(|texture| beside(file, &texture));
+                self.files.extend(texture.filter(|texture| texture.is_file()));
             }
         }
         self.add(entry);
@@ -96,27 +116,28 @@ impl Library {
 
     fn add(&mut self, entry: Option<(String, Entry)>) {
         if let Some((name, entry)) = entry {
-            self.0.entry(name).or_insert(entry);
+            self.entries.entry(name).or_insert(entry);
         }
     }
 
-    /// The named materials, in that order, and their textures. `colored`: where the vertices have colours of their own,
+    /// Hands `scene` the named materials, in that order, and their textures. `colored`: where the vertices have colours of their own,
     /// a material that the library does not have is white.
     pub(super) fn resolve(
-        &self,
+        self,
         obj: &Path,
         names: Vec<String>,
         colored: bool,
+        scene: &mut Scene,
         warnings: &mut Vec<Warning>,
-    ) -> Result<(Vec<Material>, Vec<Texture>)> {
+    ) -> Result<()> {
         let mut textures = Textures::default();
         let mut materials = Vec::new();
         let plain = if colored { Vec3::ONE } else { Material::default().diffuse };
         let mut transparent: Option<(&Entry, usize)> = None;
         for name in names {
-            let Some(entry) = self.0.get(&name) else {
+            let Some(entry) = self.entries.get(&name) else {
                 // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
-                if !name.is_empty() && !self.0.is_empty() {
+                if !name.is_empty() && !self.entries.is_empty() {
                     let message = format!("material {} is in no material library; it is grey", quoted(name.as_bytes()));
                     warnings.push(Warning::new(obj, "", message));
                 }
@@ -134,14 +155,20 @@ impl Library {
             let message = "transparency (d, Tr) is not supported; everything is rendered opaque";
             warnings.push(Warning::new(&entry.file, format!("line {line}"), message));
         }
-        Ok((materials, textures.list))
+        scene.materials = materials;
+        scene.textures = textures.list;
+        scene.files = self.files;
+        Ok(())
     }
 }
 
 impl Entry {
-    /// Takes one statement; false for one that changes the look but is not supported.
-    fn statement(&mut self, keyword: &[u8], line: usize, words: &mut Words<'_>) -> Placeless<bool> {
+    /// Takes one statement. What of it changes the look but is not supported is given back.
+    fn statement(&mut self, keyword: &[u8], line: usize, words: &mut Words<'_>) -> Placeless<Option<String>> {
         match keyword {
+            b"Ka" | b"Kd" | b"Ks" | b"Ke" if words.rest().starts_with(b"spectral") => {
+                return Ok(Some(quoted(&[keyword, b" spectral"].concat())));
+            }
             b"Ka" => self.ambient = Some(color(keyword, words)?),
             b"Kd" => self.diffuse = Some(color(keyword, words)?),
             b"Ks" => self.specular = color(keyword, words)?,
@@ -157,12 +184,16 @@ impl Entry {
                 self.transparent = (opacity < 1.0).then_some(line);
             }
             b"illum" => self.illumination = Some(words.number().ok_or("illum needs a whole number")?),
-            b"map_Kd" => self.map = Some(Map::parse(line, words)?),
+            b"map_Kd" => {
+                let (map, left_out) = Map::parse(line, words)?;
+                self.map = Some(map);
+                return Ok(left_out);
+            }
             // Physical values that Phong's model has no use for.
             b"Ni" | b"Tf" | b"sharpness" | b"Pr" | b"Pm" | b"Ps" | b"Pc" | b"Pcr" | b"aniso" | b"anisor" => {}
-            _ => return Ok(false),
+            _ => return Ok(Some(quoted(keyword))),
         }
-        Ok(true)
+        Ok(None)
     }
 
     fn material(&self, name: String, diffuse_texture: Option<u32>) -> Material {
@@ -184,7 +215,9 @@ impl Entry {
 }
 
 impl Map {
-    fn parse(line: usize, words: &mut Words<'_>) -> Placeless<Self> {
+    /// The map, and the first of its options that changes the look but is not supported.
+    fn parse(line: usize, words: &mut Words<'_>) -> Placeless<(Self, Option<String>)> {
+        let mut left_out = None;
         let mut map = Self { line, file: String::new(), scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false };
         loop {
             let rest = words.rest();
@@ -198,11 +231,16 @@ impl Map {
                 | b"-type" => 1,
                 _ => {
                     map.file = name(rest);
-                    return Ok(map);
+                    return Ok((map, left_out));
                 }
             };
             words.next();
-            let mut values = [if option == b"-s" { 1.0 } else { 0.0 }; 3];
+            let neutral = match option {
+                b"-s" => [1.0; 3],
+                b"-mm" => [0.0, 1.0, 0.0],
+                _ => [0.0; 3],
+            };
+            let mut values = neutral;
             for (k, value) in values.iter_mut().enumerate().take(numbers) {
                 let next = Words::new(words.rest(), line).next();
                 let Some(word) = next else { break };
@@ -220,6 +258,9 @@ impl Map {
             match option {
                 b"-s" => map.scale = Vec2::new(values[0], values[1]),
                 b"-o" => map.offset = Vec2::new(values[0], values[1]),
+                b"-mm" | b"-t" if values != neutral => {
+                    left_out.get_or_insert_with(|| format!("option {}", quoted(option)));
+                }
                 _ => {}
             }
         }
@@ -235,16 +276,17 @@ struct Textures {
 
 impl Textures {
     fn get(&mut self, library: &Path, map: &Map, warnings: &mut Vec<Warning>) -> Result<Option<u32>> {
-        let file = library.parent().unwrap_or(Path::new("")).join(portable(&map.file));
+        let file = beside(library, &map.file);
         let settings = [map.scale.x, map.scale.y, map.offset.x, map.offset.y].map(f32::to_bits);
         let key = (file, settings, map.clamp);
         if let Some(known) = self.known.get(&key) {
             return Ok(*known);
         }
-        let texture = texture::open(&key.0)?;
+        let place = format!("line {}", map.line);
+        let texture = texture::open(&key.0).map_err(|error| error.named_in(library, &place))?;
         if texture.is_none() {
             let message = format!("texture {:?} is missing; the material is rendered without it", key.0.display());
-            warnings.push(Warning::new(library, format!("line {}", map.line), message));
+            warnings.push(Warning::new(library, place, message));
         }
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let transform = Affine2::from_scale_angle_translation(map.scale, 0.0, map.offset);
@@ -258,9 +300,9 @@ impl Textures {
     }
 }
 
-/// File names from Windows have backslashes.
-fn portable(file: &str) -> String {
-    file.replace('\\', "/")
+/// The file of a name that stands in `file`. Names from Windows have backslashes.
+fn beside(file: &Path, name: &str) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
 }
 
 fn scalar(keyword: &[u8], words: &mut Words<'_>) -> Placeless<f32> {
@@ -268,13 +310,22 @@ fn scalar(keyword: &[u8], words: &mut Words<'_>) -> Placeless<f32> {
     value.ok_or_else(|| format!("{} needs a finite number", quoted(keyword)))
 }
 
-/// One number for a grey, or three.
+/// One number for a grey, or three: r, g and b, or `xyz` and CIE 1931's X, Y and Z. What those name beyond the colours of a display is
+/// its nearest one.
 fn color(keyword: &[u8], words: &mut Words<'_>) -> Placeless<Vec3> {
-    let problem = || format!("{} needs 3 numbers from 0 up, r g b", quoted(keyword));
+    let is_xyz = words.rest().starts_with(b"xyz");
+    let names = if is_xyz { "x y z" } else { "r g b" };
+    let problem = || format!("{} needs 3 numbers from 0 up, {names}", quoted(keyword));
+    if is_xyz {
+        words.next();
+    }
     let r: f32 = words.number().ok_or_else(problem)?;
     let color = match words.next() {
         None => Vec3::splat(r),
         Some(g) => Vec3::new(r, number(g).ok_or_else(problem)?, words.number().ok_or_else(problem)?),
     };
-    if color.is_finite() && color.min_element() >= 0.0 { Ok(color) } else { Err(problem()) }
+    if !color.is_finite() || color.min_element() < 0.0 {
+        return Err(problem());
+    }
+    Ok(if is_xyz { (XYZ_TO_RGB * color).max(Vec3::ZERO) } else { color })
 }

@@ -92,6 +92,7 @@ impl Includes {
         for group in &mut file.groups {
             group.geometries = group.geometries.start + first..group.geometries.end + first;
         }
+        scene.files.append(&mut file.files);
         scene.geometries.append(&mut file.geometries);
         scene.groups.append(&mut file.groups);
         if include.material.is_none() {

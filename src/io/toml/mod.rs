@@ -40,7 +40,11 @@ use crate::shape::Shape;
 /// What stops the reading of a file: something in it, or in a file it names.
 enum Stop {
     Here(Fault),
-    Elsewhere(Error),
+    Elsewhere {
+        /// Where it is named: an offset into this file.
+        at: usize,
+        error: Error,
+    },
 }
 
 impl From<Fault> for Stop {
@@ -51,10 +55,8 @@ impl From<Fault> for Stop {
 
 /// Reads a scene file.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let fault = |at: usize, message: String| {
-        let line = 1 + memchr::memchr_iter(b'\n', &file[..at.min(file.len())]).count();
-        Error::input(path, format!("line {line}"), message)
-    };
+    let line = |at: usize| format!("line {}", 1 + memchr::memchr_iter(b'\n', &file[..at.min(file.len())]).count());
+    let fault = |at: usize, message: String| Error::input(path, line(at), message);
     let text = str::from_utf8(file).map_err(|e| fault(e.valid_up_to(), "bytes that are no UTF-8".to_owned()))?;
     let refused = |Fault { at, message }| fault(at, shortened(&message));
     let cut = Cut::new(text);
@@ -82,7 +84,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
             Ok(scene)
         }
         Err(Stop::Here(fault)) => Err(refused(fault)),
-        Err(Stop::Elsewhere(error)) => Err(error),
+        Err(Stop::Elsewhere { at, error }) => Err(error.named_in(path, &line(at))),
     }
 }
 
@@ -160,7 +162,7 @@ impl Reader<'_> {
             self.scene.lights.push(look::light(table)?);
         }
         if let Some(value) = top.get("environment") {
-            self.scene.environment = Some(environment::environment(value, self.folder)?);
+            self.scene.environment = Some(environment::environment(value, self.folder, &mut self.scene.files)?);
         }
         if let Some(value) = top.get("fog") {
             self.scene.fog = Some(fog::fog(value.table("[fog]".to_owned())?)?);
@@ -203,9 +205,10 @@ impl Reader<'_> {
     fn texture(&mut self, value: Option<Value<'_>>) -> std::result::Result<Option<u32>, Stop> {
         let Some(value) = value else { return Ok(None) };
         let path = self.folder.join(value.text()?);
-        let picture: Option<Texture> = texture::open(&path).map_err(Stop::Elsewhere)?;
+        let picture: Option<Texture> = texture::open(&path).map_err(|error| Stop::Elsewhere { at: value.at, error })?;
         let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
         self.scene.textures.push(picture);
+        self.scene.files.push(path);
         Ok(Some(self.scene.textures.len() as u32 - 1))
     }
 
@@ -234,7 +237,8 @@ impl Reader<'_> {
         let at = table.need("path")?.at;
         let name = table.optional("name", Value::text)?.unwrap_or_default().to_owned();
         let place = Place::read(table)?;
-        let placed = self.includes.add(include, &mut self.scene, self.warnings).map_err(Stop::Elsewhere)?;
+        let placed = self.includes.add(include, &mut self.scene, self.warnings);
+        let placed = placed.map_err(|error| Stop::Elsewhere { at, error })?;
         Ok(Child { name, place, target: Target::File(placed), at })
     }
 

@@ -46,7 +46,7 @@ def render(
     ----------
     scene : path or mesh or meshes
         A file (.glb, .gltf, .obj, .ply, .stl, .toml, .nff, .test); or a mesh: anything with ``vertices`` (v, 3) and ``faces`` (t, 3), a
-        pair of such arrays, or several of these. Meshes are lit from the camera.
+        pair of such arrays, or several of these. Meshes are grey, whatever colours and textures they have, and lit from the camera.
     size : (width, height), optional
         In pixels; the file's, else 1280 x 720.
     spp : int, optional
@@ -58,7 +58,7 @@ def render(
     fov : float
         Vertical field of view in degrees, with ``eye``.
     camera : str, optional
-        The name of one of the file's cameras.
+        The name of one of the file's cameras; not with ``eye``.
     integrator : str, optional
         ray-cast, whitted, path or auto; the file's, else the cheapest that shows all the scene contains.
     max_depth : int, optional
@@ -101,6 +101,8 @@ def render(
         "background": None if background is None else _arrays.vector("background", background).tolist(),
         "threads": _arguments.whole("threads", threads),
     }
+    if eye is not None and camera is not None:
+        raise ValueError("camera must be left out where eye is given: either says where the view is from")
     is_file = isinstance(scene, (str, os.PathLike))
     if not is_file and (up_axis, unit) != ("y", "m"):
         raise ValueError("up_axis and unit are those of a file: meshes are taken as they are")

@@ -56,8 +56,10 @@ pub(super) struct Root {
 }
 
 #[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct Asset {
     pub(super) version: String,
+    pub(super) min_version: Option<String>,
 }
 
 #[derive(Deserialize)]

@@ -1,25 +1,43 @@
-//! The last check of a loaded scene: what everything after the loaders relies on.
+//! The last check of a scene: what everything after the loaders relies on.
 //!
 //! Loaders check as they go, and can name the place in the file; this is the net beneath them, so that no index of any
-//! format, old or new, reaches a tracer unchecked.
+//! format, old or new, reaches a tracer unchecked. Whoever makes a scene by hand has nothing else.
 
 use rayon::prelude::*;
 
-use crate::io::Placeless;
+use super::{Geometry, Mesh, Scene};
+use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::scene::{Geometry, Mesh, Scene};
 
-/// Whether all indices are in range, attributes match, transforms are finite, and there is something to render, unless it `may_be_empty`.
-pub(super) fn check(scene: &Scene, may_be_empty: bool) -> Placeless<()> {
-    if scene.primitive_count_checked()? == 0 && !may_be_empty {
-        return Err("nothing to render: it has no triangles; give a file with at least one".into());
+impl Scene {
+    /// Whether all indices are in range, attributes match, and everything is finite. What [`io::load`](crate::io::load) gives has been checked;
+    /// what is made by hand should be, for the tracers rely on it.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] with the first thing that is wrong.
+    pub fn check(&self) -> Result<()> {
+        self.fault().map_err(|message| Error::Backend { backend: "scene", message })
+    }
+
+    /// The same with the message alone.
+    pub(crate) fn fault(&self) -> std::result::Result<(), String> {
+        fault(self)
+    }
+}
+
+fn fault(scene: &Scene) -> std::result::Result<(), String> {
+    if let Some(instance) = scene.instances.iter().find(|instance| !scene.has_group(instance.group)) {
+        return Err(format!("instance {:?} places a group that does not exist", instance.name));
     }
     for geometry in &scene.geometries {
         if geometry.material() as usize >= scene.materials.len() {
             return Err(format!("material {} of {} does not exist", geometry.material(), scene.materials.len()));
         }
-        if let Geometry::Mesh(mesh) = geometry {
-            check_mesh(mesh).map_err(|message| format!("mesh {:?}: {message}", mesh.name))?;
+        match geometry {
+            Geometry::Mesh(mesh) => check_mesh(mesh).map_err(|message| format!("mesh {:?}: {message}", mesh.name))?,
+            Geometry::Shapes { shapes, .. } => {
+                shapes.iter().try_for_each(|shape| shape.check().map_err(|wrong| format!("{}: {wrong}", shape.name())))?;
+            }
         }
     }
     for material in &scene.materials {
@@ -58,7 +76,7 @@ pub(super) fn check(scene: &Scene, may_be_empty: bool) -> Placeless<()> {
     }
 }
 
-fn check_mesh(mesh: &Mesh) -> Placeless<()> {
+fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
     let count = mesh.positions.len();
     let attributes = [
         ("normals", mesh.normals.len()),
@@ -85,18 +103,10 @@ fn check_mesh(mesh: &Mesh) -> Placeless<()> {
 }
 
 impl Scene {
-    /// [`Scene::primitive_count`], for a scene whose groups and ranges may not exist.
-    fn primitive_count_checked(&self) -> Placeless<u64> {
-        let mut sum = 0u64;
-        for instance in &self.instances {
-            let group = self.groups.get(instance.group as usize);
-            let range = group.map(|g| g.geometries.start as usize..g.geometries.end as usize);
-            let Some(geometries) = range.and_then(|range| self.geometries.get(range)) else {
-                return Err(format!("instance {:?} places a group that does not exist", instance.name));
-            };
-            sum += geometries.iter().map(|g| g.primitive_count() as u64).sum::<u64>();
-        }
-        Ok(sum)
+    /// Whether there is a group of this index, of geometries that are there.
+    fn has_group(&self, group: u32) -> bool {
+        let range = self.groups.get(group as usize).map(|group| &group.geometries);
+        range.is_some_and(|range| self.geometries.get(range.start as usize..range.end as usize).is_some())
     }
 }
 
@@ -105,6 +115,7 @@ mod tests {
     use super::*;
     use crate::math::DVec3;
     use crate::scene::{Material, Texture};
+    use crate::shape::{Shape, Sphere};
 
     fn good() -> Scene {
         let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
@@ -113,10 +124,13 @@ mod tests {
 
     #[test]
     fn finds_every_fault() {
-        assert_eq!(check(&good(), false), Ok(()));
+        assert_eq!(good().fault(), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
         let faults: [(&str, Breaks); 10] = [
-            ("nothing to render", |_, mesh| mesh.triangles = vec![].into()),
+            ("sphere: the radius is -1", |scene, _| {
+                let shapes = vec![Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: -1.0 })];
+                scene.geometries.push(Geometry::Shapes { shapes, material: 0 });
+            }),
             ("does not exist", |_, mesh| mesh.material = 1),
             ("past its 3 vertices", |_, mesh| mesh.triangles = vec![[0, 1, 3]].into()),
             ("2 normals for 3", |_, mesh| mesh.normals = vec![Vec3::X; 2]),
@@ -132,7 +146,7 @@ mod tests {
             let Geometry::Mesh(mut mesh) = scene.geometries.remove(0) else { unreachable!() };
             fault(&mut scene, &mut mesh);
             scene.geometries.push(Geometry::Mesh(mesh));
-            let message = check(&scene, false).unwrap_err();
+            let message = scene.check().unwrap_err().to_string();
             assert!(message.contains(expected), "{message} has no {expected}");
         }
     }
