@@ -112,7 +112,9 @@ impl CameraArgs {
         let (mut camera, source) = self.without_lens(scene, &bounds, aspect)?;
         if self.aperture.is_some() || self.focus.is_some() || self.blades.is_some() {
             let radius = self.aperture.or(camera.lens.map(|lens| lens.radius)).ok_or_else(|| {
-                Error::Usage("--focus and --blades are about a lens, which the camera does not have: add --aperture".to_owned())
+                Error::Usage(
+                    "--focus and --blades are about a lens, which the camera does not have: add --aperture".to_owned(),
+                )
             })?;
             let target = self.look_at.unwrap_or_else(|| bounds.centre());
             let to_target = (target - camera.eye).dot(-camera.frame.z_axis);

@@ -367,4 +367,3 @@ fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
 pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
     text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
 }
-

@@ -15,7 +15,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let bar = progress::spinner("measuring", args.json);
     let on_step = |what: &str| bar.set_message(what.to_owned());
     let max_memory = args.max_memory.or_else(|| process::available().map(|bytes| bytes / 4 * 3));
-    let scaling = Scaling { max: args.max.unwrap_or(MOST_TRIANGLES), max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
+    let scaling =
+        Scaling { max: args.max.unwrap_or(MOST_TRIANGLES), max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     let report = pool.install(|| scaling.run());

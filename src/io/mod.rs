@@ -147,8 +147,7 @@ pub fn load_watched(
     }
     let is_gltf = matches!(suffix.as_str(), "glb" | "gltf");
     if !is_gltf && (options.animation != Animation::default() || options.variant.is_some()) {
-        let message =
-            "animations (--animation, --time, --frames) and variants of materials (--variant) are asked for, which only glTF and GLB have; leave them out";
+        let message = "animations (--animation, --time, --frames) and variants of materials (--variant) are asked for, which only glTF and GLB have; leave them out";
         return Err(Error::input(path, "", message));
     }
     let mut warnings = Vec::new();

@@ -224,9 +224,10 @@ mod tests {
         assert!(text.contains("about 537 MiB") && text.contains("limit of 500 MiB"), "{text}");
         assert!(preset(many, Some(537 << 20)).is_some() && preset(many, Some(536 << 20)).is_none());
         // A thirty-second more.
-        assert!(text.contains("--max-memory 554M, or a smaller mesh"), "{text}");
+        assert!(text.contains("--max-memory 553M, or a smaller mesh"), "{text}");
         // Where there is nothing to build, no other build would do.
-        let none = BuildRequest { triangles: 0, max_memory: Some(1000 << 10), ..MESH }.choose().unwrap_err().to_string();
+        let none =
+            BuildRequest { triangles: 0, max_memory: Some(1000 << 10), ..MESH }.choose().unwrap_err().to_string();
         assert!(none.contains("limit of 1000 KiB") && !none.contains("--build auto"), "{none}");
     }
 

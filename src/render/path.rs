@@ -144,7 +144,7 @@ impl Renderer<'_> {
                     *pixel += worth.extend(0.0);
                 }
                 if let Some(tally) = &mut tally {
-                    let parts = Parts::new(route, worth, vertex.lobes.parts(arriving.to_light));
+                    let parts = Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found));
                     if chosen.source.casts_shadows {
                         shadow_parts.push(parts);
                     } else {
@@ -207,7 +207,7 @@ impl Renderer<'_> {
         let chosen = self.lights.choose(choice)?;
         let even = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
         let arriving = chosen.source.illuminate(vertex.point.position, even)?;
-        let value = vertex.lobes.evaluate(arriving.to_light);
+        let value = vertex.lobes.lit(arriving.to_light, chosen.can_be_found);
         let share = match arriving.density {
             // Where the path ends, nothing else finds the light.
             Some(density) if chosen.can_be_found && vertex.depth < self.plan.depth => {
@@ -233,7 +233,7 @@ impl Renderer<'_> {
         }
         // The other number of the pair says whether the path ends.
         let even = self.choice(vertex, Choice::End).y as f32;
-        tally.choose(route, vertex.lobes.parts(direction.normalize()), even)
+        tally.choose(route, vertex.lobes.parts(direction.normalize(), true), even)
     }
 
     /// The ray that goes on from a surface, if any does.

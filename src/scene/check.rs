@@ -36,7 +36,9 @@ fn fault(scene: &Scene) -> std::result::Result<(), String> {
         match geometry {
             Geometry::Mesh(mesh) => check_mesh(mesh).map_err(|message| format!("mesh {:?}: {message}", mesh.name))?,
             Geometry::Shapes { shapes, .. } => {
-                shapes.iter().try_for_each(|shape| shape.check().map_err(|wrong| format!("{}: {wrong}", shape.name())))?;
+                shapes
+                    .iter()
+                    .try_for_each(|shape| shape.check().map_err(|wrong| format!("{}: {wrong}", shape.name())))?;
             }
         }
     }

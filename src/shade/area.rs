@@ -1,7 +1,8 @@
-//! Points of a light's surface, chosen evenly: by area for flat ones, by the cone they fill for spheres (Shirley, Wang,
-//! Zimmerman 1996, *Monte Carlo techniques for direct lighting calculations*).
+//! Points of a light's surface, chosen evenly: by the cone they fill for spheres (Shirley, Wang, Zimmerman 1996, *Monte Carlo techniques
+//! for direct lighting calculations*), by the solid angle they fill for rectangles that are near, by area for other flat ones.
 
 use super::light::Illumination;
+use super::rectangle::SphericalRectangle;
 use crate::math::{DVec2, DVec3, Vec3, gamma, tangents};
 use crate::scene::AreaShape;
 
@@ -13,6 +14,15 @@ const ROUNDINGS: u32 = 32;
 pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: DVec2) -> Option<Illumination> {
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+            if let Some(seen) = near(point, centre, [a, b]) {
+                return (centre - point).dot(a.cross(b)).is_sign_negative().then(|| {
+                    let offset = seen.at(even);
+                    let (to_light, end) = (offset.normalize(), point + offset);
+                    let color = radiance * (seen.solid_angle / std::f64::consts::PI) as f32;
+                    let end = Some(short_of(end, to_light, point));
+                    Illumination { to_light, color, end, density: Some(1.0 / seen.solid_angle) }
+                });
+            }
             let at = even * 2.0 - 1.0;
             // The cross product of the halves is a quarter of the area.
             flat(point, centre + a * at.x + b * at.y, a.cross(b) * 4.0, radiance)
@@ -25,6 +35,13 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: 
         }
         AreaShape::Sphere { centre, radius } => sphere(point, centre, radius, radiance, even),
     }
+}
+
+/// The rectangle as the point sees it, where that is what directions are chosen by; none for other parallelograms.
+fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<SphericalRectangle> {
+    let [a, b] = half_edges;
+    let is_rectangle = a.dot(b).abs() <= 1e-9 * a.length() * b.length();
+    if is_rectangle { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
 }
 
 /// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
@@ -77,7 +94,12 @@ fn is_outside(distance: f64, radius: f64) -> bool {
 /// light turns its back.
 pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
     let area = match *shape {
-        AreaShape::Rectangle { half_edges: [a, b], .. } => a.cross(b) * 4.0,
+        AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+            if let Some(seen) = near(point, centre, [a, b]) {
+                return (centre - point).dot(a.cross(b)).is_sign_negative().then(|| 1.0 / seen.solid_angle);
+            }
+            a.cross(b) * 4.0
+        }
         AreaShape::Disk { normal, radius, .. } => normal * (std::f64::consts::PI * radius * radius),
         AreaShape::Sphere { centre, radius } => {
             return Some(1.0 / (std::f64::consts::TAU * opening((centre - point).length(), radius)));
@@ -133,6 +155,12 @@ mod tests {
         let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
         let expected = (x / p * (y / p).atan() + y / q * (x / q).atan()) / std::f64::consts::TAU;
         assert!((reflected(&corner, DVec3::ZERO, DVec3::Y) - expected).abs() < 1e-5, "X x Z is -Y: it shines down");
+        let turned = AreaShape::Rectangle {
+            centre: DVec3::new(a / 2.0, d, b / 2.0),
+            half_edges: [DVec3::Z * b / 2.0, DVec3::X * a / 2.0],
+        };
+        assert_eq!(reflected(&turned, DVec3::ZERO, DVec3::Y), 0.0, "and this one up");
+        assert_eq!(density(&turned, DVec3::ZERO, DVec3::Y * d), None);
         let back = AreaShape::Disk { centre: up, normal: DVec3::Y, radius: r };
         assert_eq!(reflected(&back, DVec3::ZERO, DVec3::Y), 0.0, "behind it is dark");
     }
@@ -146,6 +174,9 @@ mod tests {
             AreaShape::Sphere { centre, radius: 15.0 },
             AreaShape::Disk { centre, normal: DVec3::new(0.6, -0.8, 0.0), radius: 2.0 },
             AreaShape::Rectangle { centre, half_edges: [DVec3::X, DVec3::Z * 2.0] },
+            // By area: no rectangle, and far away.
+            AreaShape::Rectangle { centre, half_edges: [DVec3::X, DVec3::Z * 2.0 + DVec3::X * 0.1] },
+            AreaShape::Rectangle { centre, half_edges: [DVec3::X * 0.1, DVec3::Z * 0.2] },
         ] {
             let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, DVec2::new(0.3, 0.6)).unwrap();
             let (sampled, at) = (arriving.density.unwrap(), arriving.end.unwrap());

@@ -60,6 +60,19 @@ pub(super) enum Seat {
 }
 
 impl Seats {
+    /// Of the primitives, in their order.
+    fn by_turns(mut seats: impl Iterator<Item = Seat>) -> Self {
+        let Some(first) = seats.next() else { return Self::Each(Vec::new()) };
+        let mut alike = 1;
+        for seat in seats.by_ref() {
+            if seat != first {
+                return Self::Each(std::iter::repeat_n(first, alike).chain([seat]).chain(seats).collect());
+            }
+            alike += 1;
+        }
+        Self::All(first)
+    }
+
     pub(super) fn of(&self, primitive: u32) -> Seat {
         match self {
             Self::All(seat) => *seat,
@@ -98,11 +111,12 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
         let seats = match &part.primitives {
             Primitives::Triangles { positions, triangles } => {
                 let corners = |t: &[u32; 3]| t.map(|i| to_world.transform_point3(positions[i as usize].as_dvec3()));
-                let body = search.body(|light| triangles.iter().all(|t| bodies::has_triangle(light, corners(t))));
-                Seats::All(body.unwrap_or_else(|| {
-                    search.light(emission, |emission, Search { patches, .. }| {
-                        triangles.iter().for_each(|t| patches.add_triangle(corners(t), emission));
-                        Seat::Patch(brightness(emission))
+                Seats::by_turns(triangles.iter().map(|t| {
+                    search.body(|light| bodies::has_triangle(light, corners(t))).unwrap_or_else(|| {
+                        search.light(emission, |emission, Search { patches, .. }| {
+                            patches.add_triangle(corners(t), emission);
+                            Seat::Patch(brightness(emission))
+                        })
                     })
                 }))
             }
@@ -170,9 +184,15 @@ impl Search<'_> {
     fn seat(&mut self, shape: &Shape, to_world: &DAffine3, emission: Option<Vec3>) -> Seat {
         let at = |p: Vec3| to_world.transform_point3(p.as_dvec3());
         match shape {
-            Shape::Sphere(sphere) => {
-                let Some(scale) = similarity(&to_world.matrix3) else { return Seat::Alone };
-                let (centre, radius) = (at(sphere.centre), f64::from(sphere.radius) * scale);
+            Shape::Sphere(_) | Shape::Ellipsoid(_) => {
+                // What the unit sphere becomes.
+                let (centre, axes) = match shape {
+                    Shape::Ellipsoid(ellipsoid) => (ellipsoid.centre, ellipsoid.axes.as_dmat3()),
+                    Shape::Sphere(sphere) => (sphere.centre, DMat3::from_diagonal(DVec3::splat(sphere.radius.into()))),
+                    _ => return Seat::Alone,
+                };
+                let Some(radius) = similarity(&(to_world.matrix3 * axes)) else { return Seat::Alone };
+                let centre = at(centre);
                 self.body(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
                     self.light(emission, |radiance, Self { lights, .. }| {
                         let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
@@ -204,9 +224,11 @@ impl Search<'_> {
                 }
                 Seat::Patch(brightness(emission))
             }),
-            Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Ellipsoid(_) | Shape::Polygon(_) => {
-                Seat::Alone
+            Shape::Polygon(polygon) => {
+                let corners = || polygon.corners().iter().map(|&corner| at(corner));
+                self.body(|light| bodies::has_polygon(light, corners())).unwrap_or(Seat::Alone)
             }
+            Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) => Seat::Alone,
         }
     }
 }

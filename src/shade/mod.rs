@@ -14,6 +14,7 @@ pub mod fog;
 pub mod light;
 pub mod lights;
 pub mod normal_map;
+mod rectangle;
 pub mod scattering;
 pub mod surface;
 pub mod texture;

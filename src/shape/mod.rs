@@ -279,7 +279,7 @@ impl Shape {
     }
 
     /// Its parameters at `point` on the surface.
-    fn uv(&self, point: DVec3) -> Vec2 {
+    pub(crate) fn uv(&self, point: DVec3) -> Vec2 {
         match self {
             Self::Sphere(sphere) => sphere.uv(point),
             Self::Plane(plane) => plane.uv(point),

@@ -163,8 +163,10 @@ fn colours_in_xyz_and_options_without_effect() {
     let (scene, warnings) = files.load("a.obj");
     assert!(warnings.len() == 1 && warnings[0].message.contains("map_Bump"), "{warnings:?}");
     assert_eq!(scene.files, ["a.obj", "a.png", "b.png", "a.mtl"].map(|name| files.path(name)));
-    let (_, warnings) =
-        Files::one("a.obj", &obj).and("a.mtl", "newmtl a\nmap_Kd -mm 0.2 a.png\n").and("a.png", picture()).load("a.obj");
+    let (_, warnings) = Files::one("a.obj", &obj)
+        .and("a.mtl", "newmtl a\nmap_Kd -mm 0.2 a.png\n")
+        .and("a.png", picture())
+        .load("a.obj");
     assert!(warnings.len() == 1 && warnings[0].message.contains("option \"-mm\""), "{warnings:?}");
 }
 

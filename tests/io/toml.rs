@@ -1,6 +1,6 @@
 //! Twincast's own scene format.
 
-use twincast::math::{DVec2, DVec3, UVec3, Vec3};
+use twincast::math::{DVec2, DVec3, UVec3, Vec2, Vec3};
 use twincast::scene::{
     Absorption, Accel, Alpha, AreaShape, Distortion, Fov, Geometry, Interface, Light, Projection, Resolution, Scene,
     Search, Specular, ThinLens,
@@ -175,6 +175,23 @@ fn every_primitive_arrives() {
     assert_eq!(kinds, expected);
     let red = scene.materials.iter().position(|m| m.name == "red").unwrap() as u32;
     assert_eq!(scene.geometries.iter().filter(|g| g.material() == red).count(), 1);
+}
+
+/// Textures lie on single triangles by their parameters, on those of a mesh by what it says.
+#[test]
+fn triangles_have_parameters_where_something_reads_them() {
+    let wood = "[material.wood]\ntexture = \"wood.png\"\n";
+    let two = "[[triangle]]\ncorners = [[0, 0, 4], [1, 0, 4], [0, 1, 4]]\nmaterial = \"wood\"\n\
+        [[triangle]]\ncorners = [[1, 0, 4], [1, 1, 4], [0, 1, 4]]\n";
+    let read = |text: String| files(&text).and("wood.png", obj::picture()).scene("a.toml");
+    let textured = read(format!("{wood}{two}material = \"wood\"\n"));
+    let [Geometry::Mesh(mesh)] = &textured.geometries[..] else { panic!("{:?}", textured.geometries) };
+    assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ZERO, Vec2::X, Vec2::Y]);
+    let corners = super::corners(mesh);
+    assert_eq!((corners[0][1], corners[1][0]), (Vec3::new(1.0, 0.0, 4.0), Vec3::new(1.0, 0.0, 4.0)));
+    let one = read(format!("{wood}{two}"));
+    let uvs: Vec<usize> = super::meshes(&one).iter().map(|mesh| mesh.uvs.len()).collect();
+    assert_eq!(uvs, [3, 0], "the other is of the plain material");
 }
 
 #[test]

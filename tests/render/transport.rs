@@ -2,7 +2,9 @@
 
 use twincast::math::{DVec3, Mat3, Vec3, Vec4};
 use twincast::render::Control;
-use twincast::scene::{AreaShape, Camera, Environment, Geometry, Integrator, Interface, Light, Material, Specular};
+use twincast::scene::{
+    AreaShape, Camera, Environment, Geometry, Integrator, Interface, Light, Material, Mesh, Specular,
+};
 use twincast::{Disk, Image, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
 
 use super::{Engine, engines, floor, matte, render, settings};
@@ -42,6 +44,80 @@ fn means(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<(&'static s
     let world = World::new(scene).unwrap();
     let fast = |engine: &&Engine| ["native", "embree"].contains(&engine.name);
     engines(&world).iter().filter(fast).map(|e| (e.name, mean(&render(scene, camera, settings, e)))).collect()
+}
+
+/// Howell's B-3: what a square metre above an element, from the place over it to (a, b), at distance 1, sends it, as a share of all.
+fn over_corner(a: f64, b: f64) -> f64 {
+    let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+    (a / p * (b / p).atan() + b / q * (a / q).atan()) / std::f64::consts::TAU
+}
+
+/// Panels and a ball of light over a floor, each with what makes it visible.
+#[test]
+fn what_stands_in_a_lights_place_adds_nothing() {
+    let panel = |x: f64| Light::Area {
+        shape: AreaShape::Rectangle { centre: DVec3::new(x, 1.0, 0.0), half_edges: [DVec3::X * 0.5, DVec3::Z * 0.4] },
+        radiance: Vec3::splat(3.0),
+    };
+    let corners = |x: f32| {
+        [(-0.5, -0.4), (0.5, -0.4), (0.5, 0.4), (-0.5, 0.4)].map(|(dx, z): (f32, f32)| Vec3::new(x + dx, 1.0, z))
+    };
+    let polygon = |x| Shape::from(twincast::Polygon::new(corners(x).to_vec()).unwrap());
+    let both = Geometry::Mesh(Mesh {
+        material: 1,
+        ..Mesh::new([corners(0.5), corners(-1.5)].concat(), vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    });
+    let ground = Geometry::Shapes { shapes: vec![Plane::new(Vec3::ZERO, Vec3::Y).unwrap().into()], material: 0 };
+    let shapes = |shapes: Vec<Shape>| Geometry::Shapes { shapes, material: 1 };
+    // What the point (0.3, 0, 0.2) sees of each.
+    let sum = |xs: [f64; 2], zs: [f64; 2]| {
+        let over = |x: f64, z: f64| over_corner(x.abs(), z.abs()) * x.signum() * z.signum();
+        over(xs[1], zs[1]) - over(xs[0], zs[1]) - over(xs[1], zs[0]) + over(xs[0], zs[0])
+    };
+    let (first, second) = (sum([-0.3, 0.7], [-0.6, 0.2]), sum([-2.3, -1.3], [-0.6, 0.2]));
+    let centre = DVec3::new(0.3, 1.0, 0.2);
+    let ball = Light::Area { shape: AreaShape::Sphere { centre, radius: 0.3 }, radiance: Vec3::splat(3.0) };
+    let round = twincast::Ellipsoid::new(centre.as_vec3(), Mat3::from_diagonal(Vec3::splat(0.3))).unwrap();
+    let camera = Camera::look_at(DVec3::new(0.3, 0.5, 0.2), DVec3::new(0.3, 0.0, 0.2), DVec3::Z, 0.01).unwrap();
+    for (name, lights, body, expected) in [
+        ("polygon", vec![panel(0.5)], shapes(vec![polygon(0.5)]), first),
+        ("two polygons", vec![panel(0.5), panel(-1.5)], shapes(vec![polygon(-1.5), polygon(0.5)]), first + second),
+        ("two panels in a mesh", vec![panel(0.5), panel(-1.5)], both.clone(), first + second),
+        ("a panel with a light, and one without", vec![panel(0.5)], both, first + second),
+        ("ellipsoid", vec![ball], shapes(vec![round.into()]), 0.09),
+    ] {
+        let scene =
+            Scene { lights, ..Scene::from_geometries(vec![ground.clone(), body], vec![matte(1.0), glowing(3.0)]) };
+        for (engine, got) in means(&scene, &camera, &paths(16, 64)) {
+            let error = (f64::from(got.x) / (3.0 * expected) - 1.0).abs();
+            assert!(error < 0.02, "{name}, {engine}: {got} for {}", 3.0 * expected);
+        }
+    }
+}
+
+/// A light that cannot be seen is in no mirror, and as little in one that is nearly one.
+#[test]
+fn what_cannot_be_seen_is_not_mirrored() {
+    let floor = |gloss| Material { reflection: Vec3::splat(0.5), gloss, ..matte(0.2) };
+    let point = Light::Point {
+        position: DVec3::new(1.0, 1.0, 0.0),
+        color: Vec3::ONE,
+        attenuation: twincast::scene::Attenuation::NONE,
+        range: f64::INFINITY,
+        radius: 0.0,
+    };
+    let camera = Camera::look_at(DVec3::new(-0.8, 0.8, 0.0), DVec3::ZERO, DVec3::Y, 0.01).unwrap();
+    let whitted = |width, spp| Settings { integrator: Some(Integrator::Whitted), ..settings(width, width, spp) };
+    for gloss in [None, Some(10.0), Some(10_000.0)] {
+        let ground = Geometry::Shapes { shapes: vec![Plane::new(Vec3::ZERO, Vec3::Y).unwrap().into()], material: 0 };
+        let scene = Scene { lights: vec![point.clone()], ..Scene::from_geometries(vec![ground], vec![floor(gloss)]) };
+        // 0.2 of the light times the cosine of 45 degrees.
+        for settings in [whitted(8, 4), paths(8, 64)] {
+            for (engine, got) in means(&scene, &camera, &settings) {
+                assert!((got.x - 0.2 / 2f32.sqrt()).abs() < 2e-3, "{gloss:?}, {engine}: {got}");
+            }
+        }
+    }
 }
 
 /// Inside a closed surface that gives off e and sends on a of what arrives, radiance is e / (1 - a) everywhere.

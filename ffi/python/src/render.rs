@@ -79,7 +79,9 @@ impl Wishes {
             let [eye, target, up] = [eye, target, up].map(DVec3::from);
             let camera = Camera::look_at(eye, target, up, fov.to_radians());
             return camera.ok_or_else(|| {
-                PyValueError::new_err("eye, look_at and up: they must be finite, eye and look_at two points, and up not zero")
+                PyValueError::new_err(
+                    "eye, look_at and up: they must be finite, eye and look_at two points, and up not zero",
+                )
             });
         }
         if let Some(name) = &self.camera {

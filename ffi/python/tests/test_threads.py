@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 import time
+import types
 
 import numpy as np
 import pytest
 
 import twincast
+from twincast import _meshes
 
 TASKS = "/proc/self/task"
 
@@ -90,3 +92,19 @@ def test_a_fork_while_another_thread_asks_for_its_first_distance():
         child.kill()
         assert not hung, "the child waits for a thread that it has not"
         assert queue.get() == expected
+
+
+def test_a_mesh_that_comes_while_the_tree_is_built_counts_from_then_on(monkeypatch):
+    one = scene()
+    build = _meshes._native.Scene
+    late = [np.float32([[0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5]])]
+
+    def build_slowly(*arguments):
+        # As another thread would.
+        if late:
+            assert one.add_triangles(late.pop(), [[0, 1, 2]]) == 1
+        return build(*arguments)
+
+    monkeypatch.setattr(_meshes, "_native", types.SimpleNamespace(Scene=build_slowly))
+    assert one.cast_rays(RAY)["t_hit"].tolist() == [1]
+    assert one.cast_rays(RAY)["t_hit"].tolist() == [0.5]

@@ -1,7 +1,7 @@
 //! MTL, the materials of an OBJ file (Wavefront 1995).
 //!
-//! Kd, Ks, Ke and Ka are taken as linear. A highlight is Blinn-Phong's; `illum 0` and `illum 1` have none. What this
-//! renderer does not have yet (transparency, the other maps) is named in a warning.
+//! Kd, Ks, Ke and Ka are taken as linear. A highlight is Blinn-Phong's; `illum 0` and `illum 1` have none. What is not read
+//! (transparency, mirrors, the other maps) is named in a warning.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -183,7 +183,12 @@ impl Entry {
                 let opacity = if keyword == b"d" { value } else { 1.0 - value };
                 self.transparent = (opacity < 1.0).then_some(line);
             }
-            b"illum" => self.illumination = Some(words.number().ok_or("illum needs a whole number")?),
+            b"illum" => {
+                let model = words.number().ok_or("illum needs a whole number")?;
+                self.illumination = Some(model);
+                // From 3 on there are mirrors and glass.
+                return Ok((3..=9).contains(&model).then(|| quoted(format!("illum {model}").as_bytes())));
+            }
             b"map_Kd" => {
                 let (map, left_out) = Map::parse(line, words)?;
                 self.map = Some(map);

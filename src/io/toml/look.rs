@@ -291,7 +291,9 @@ fn lens(value: Value<'_>) -> Read<ThinLens> {
     let mut table = value.table("\"lens\"".to_owned())?;
     let (radius, focus) = (length(table.need("radius")?)?, length(table.need("focus")?)?);
     let blades = table.optional("blades", |value| match value.whole(0..=100)? {
-        blades @ (1 | 2) => Err(value.fault(format!("{blades} blades shut out all light; 3 or more, or 0 for a round opening"))),
+        blades @ (1 | 2) => {
+            Err(value.fault(format!("{blades} blades shut out all light; 3 or more, or 0 for a round opening")))
+        }
         blades => Ok(blades as u32),
     })?;
     let blades = blades.unwrap_or(0);

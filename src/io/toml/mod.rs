@@ -214,7 +214,15 @@ impl Reader<'_> {
 
     /// What stands in a group, or at the top of the file.
     fn body(&mut self, name: &str, table: &mut Table<'_>) -> std::result::Result<Body, Stop> {
-        let geometries = primitives::geometries(table, &mut |table| self.material_of(table))?;
+        let mut geometries = primitives::singles(table, &mut |table| self.material_of(table))?;
+        for geometry in &mut geometries {
+            if let Geometry::Mesh(mesh) = geometry
+                && self.scene.materials[mesh.material as usize].textures().next().is_some()
+            {
+                *mesh = primitives::with_parameters(mesh);
+            }
+        }
+        geometries.extend(primitives::meshes(table, &mut |table| self.material_of(table))?);
         let mut body = Body::default();
         for mut file in table.tables("file")? {
             body.children.push(self.file(&mut file)?);

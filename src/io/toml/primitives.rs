@@ -26,8 +26,8 @@ const SHAPES: [(&str, ReadShape); 8] = [
     ("polygon", polygon),
 ];
 
-/// All primitives of a body, sorted by material, then the meshes.
-pub(super) fn geometries(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
+/// Single primitives of a body, sorted by material.
+pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
     let mut parts = Parts::default();
     for (key, read) in SHAPES {
         for mut table in body.tables(key)? {
@@ -45,13 +45,31 @@ pub(super) fn geometries(body: &mut Table<'_>, material: &mut Materials<'_>) -> 
         parts.triangle(material, corners).map_err(|message| table.fault(message))?;
         table.finish()?;
     }
-    let mut geometries = parts.into_geometries();
+    Ok(parts.into_geometries())
+}
+
+/// The meshes of a body.
+pub(super) fn meshes(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
+    let mut geometries = Vec::new();
     for mut table in body.tables("mesh")? {
         let mesh = Mesh { material: material(&mut table)?, ..mesh(&mut table)? };
         table.finish()?;
         geometries.push(Geometry::Mesh(mesh));
     }
     Ok(geometries)
+}
+
+/// The mesh with the parameters of each triangle as texture coordinates: the weights of the second and the third corner, as shapes have their
+/// own.
+pub(super) fn with_parameters(mesh: &Mesh) -> Mesh {
+    let corners = mesh.triangles.as_flattened();
+    let triangles = (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh {
+        positions: Arc::new(corners.iter().map(|&i| mesh.positions[i as usize]).collect()),
+        uvs: [Vec2::ZERO, Vec2::X, Vec2::Y].repeat(mesh.triangles.len()),
+        triangles: Arc::new(triangles),
+        ..mesh.clone()
+    }
 }
 
 fn list<'t, T>(value: Value<'t>, read: impl Fn(Value<'t>) -> Read<T>) -> Read<Vec<T>> {

@@ -63,6 +63,15 @@ impl<'a> Lobes<'a> {
 
     /// For light along `to_light`.
     pub fn evaluate(&self, to_light: DVec3) -> Value {
+        self.value(to_light, true)
+    }
+
+    /// For a light along `to_light`. One that cannot be seen is seen in no mirror either, however blunt: highlights alone show it.
+    pub fn lit(&self, to_light: DVec3, can_be_seen: bool) -> Value {
+        self.value(to_light, can_be_seen)
+    }
+
+    fn value(&self, to_light: DVec3, has_ways: bool) -> Value {
         let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;
         let [diffuse, shiny, mirrored, refracted] = self.chances;
         let mut value = Value { share: Vec3::ZERO, density: 0.0 };
@@ -74,7 +83,7 @@ impl<'a> Lobes<'a> {
                 value.density += shiny * highlight.density(*normal, *to_viewer, to_light);
             }
         }
-        let Some(gloss) = self.gloss else { return value };
+        let Some(gloss) = self.gloss.filter(|_| has_ways) else { return value };
         let behind = normal.dot(to_light) < 0.0 && horizon.dot(to_light) < 0.0;
         for (way, chance, on_its_side) in
             [(&self.ways.mirrored, mirrored, front), (&self.ways.refracted, refracted, behind)]
@@ -88,9 +97,9 @@ impl<'a> Lobes<'a> {
         value
     }
 
-    /// The share of [`Lobes::evaluate`] by what it is: diffuse, reflected, transmitted.
-    pub fn parts(&self, to_light: DVec3) -> [Vec3; 3] {
-        let whole = self.evaluate(to_light).share;
+    /// The share of [`Lobes::lit`] by what it is: diffuse, reflected, transmitted.
+    pub fn parts(&self, to_light: DVec3, can_be_seen: bool) -> [Vec3; 3] {
+        let whole = self.lit(to_light, can_be_seen).share;
         if !self.shading.faces(to_light) {
             return [Vec3::ZERO, Vec3::ZERO, whole];
         }

@@ -20,20 +20,28 @@ class Meshes:
     def __init__(self, threads: Any = 0) -> None:
         self._threads = _arguments.whole("nthreads", threads)
         self._meshes: list[tuple[np.ndarray, np.ndarray]] = []
-        self._built: _native.Scene | None = None
+        # With how many meshes it was built: one may be added while another thread builds.
+        self._built: tuple[int, _native.Scene] | None = None
 
     def _add(self, vertices: np.ndarray, triangles: np.ndarray) -> int:
         """The number of a new mesh: vertices (v, 3), triangles (t, 3) uint32. What the caller does with them afterwards does not concern it."""
-        self._meshes.append((vertices.copy(), triangles.copy()))
-        self._built = None
-        return len(self._meshes) - 1
+        mesh = (vertices.copy(), triangles.copy())
+        self._meshes.append(mesh)
+        # Another thread may have added one since.
+        return next(number for number in reversed(range(len(self._meshes))) if self._meshes[number] is mesh)
+
+    @property
+    def _is_built(self) -> bool:
+        built = self._built
+        return built is not None and built[0] == len(self._meshes)
 
     @property
     def _scene(self) -> _native.Scene:
+        meshes = list(self._meshes)
         built = self._built
-        if built is None:
-            built = self._built = _native.Scene(list(self._meshes), self._threads)
-        return built
+        if built is None or built[0] != len(meshes):
+            built = self._built = (len(meshes), _native.Scene(meshes, self._threads))
+        return built[1]
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_built": None}

@@ -35,7 +35,7 @@ class EmbreeScene(Meshes):
     @property
     def is_committed(self) -> int:
         """1 if the tree over all meshes is built, else 0."""
-        return int(self._built is not None)
+        return int(self._is_built)
 
     def run(
         self,
