@@ -79,3 +79,23 @@ fn scenes_look_like_their_references() {
         }
     }
 }
+
+/// Files of the folder that a recipe made are made by it still, to the byte.
+#[test]
+fn scenes_by_rule_are_what_their_recipes_make() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let table = std::fs::read_to_string(scenes.join("README.md")).expect("a table");
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut made = 0;
+    for command in table.lines().filter_map(|line| line.split("`twincast make ").nth(1)?.split('`').next()) {
+        let (name, size) = command.split_once(" --size ").expect("a size");
+        let kept = ["toml", "nff"].map(|suffix| scenes.join(name).join(format!("{name}.{suffix}")));
+        let kept = kept.iter().find(|path| path.is_file()).expect("a scene");
+        let again = folder.path().join(kept.file_name().expect("a name"));
+        let args = ["make", name, "--size", size, "-q", "-o", again.to_str().expect("UTF-8")];
+        assert!(crate::program::twincast(&args).status.success(), "{command}");
+        assert!(std::fs::read(kept).expect("kept") == std::fs::read(&again).expect("made"), "{command}");
+        made += 1;
+    }
+    assert!(made >= 9, "{made}");
+}
