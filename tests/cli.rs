@@ -99,6 +99,8 @@ fn bad_usage_ends_with_2() {
         &["bench", "terrain10", "--max-memory", "1G"],
         &["compare", "x.glb", "--accel", "grid", "--seconds", "1"],
         &["render", "x.glb", "-o", "x.png", "--explain"],
+        &["render", "x.glb", "--pixel", "1,1", "--frames", "1-3", "--skip-existing"],
+        &["render", "x.glb", "--pixel", "1,1", "--threshold", "0.1"],
         &["render", "x.glb", "-o", "x.png", "--max-spp", "4"],
         &["render", "x.glb", "-o", "x.png", "--backend", "embree", "--build", "fast"],
         &["bench", "--size", "2"],

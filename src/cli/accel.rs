@@ -124,6 +124,7 @@ impl AccelArgs {
     /// # Errors
     /// Those of [`AccelArgs::choose`], where an accelerator is named.
     pub(super) fn check(&self, backend: BackendArg, build: Option<&BuildArgs>, cache: &CacheArgs) -> Result<()> {
+        build.map_or(Ok(()), |build| build.check(backend))?;
         match self.accel {
             Some(_) => self.choose(Search::default(), backend, build, cache).map(drop),
             None => Ok(()),

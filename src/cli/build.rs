@@ -67,15 +67,20 @@ impl BuildArgs {
         self.max_memory.is_some() || self.build.wanted().is_some()
     }
 
-    /// Whether what a file promises may fit at all, before it is read.
-    ///
-    /// # Errors
-    /// [`Error::Backend`] where it cannot; [`Error::Usage`] where nothing is built as is asked for.
-    pub(super) fn check_file(&self, backend: BackendArg, scene: &Path) -> Result<()> {
+    /// An error where nothing is built of what is asked for.
+    pub(super) fn check(&self, backend: BackendArg) -> Result<()> {
         if backend == BackendArg::Embree && self.build.wanted().is_some() {
             let problem = "--build is about native trees, of which --backend embree builds none; leave one of them out";
             return Err(Error::Usage(problem.to_owned()));
         }
+        Ok(())
+    }
+
+    /// Whether what a file promises may fit at all, before it is read.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] where it cannot.
+    pub(super) fn check_file(&self, backend: BackendArg, scene: &Path) -> Result<()> {
         let Some(promised) = self.max_memory.and_then(|_| io::promised(scene)) else { return Ok(()) };
         self.decide(backend, promised.triangles, Rays::default(), promised.bytes).map(drop)
     }

@@ -36,7 +36,7 @@ use self::weld::weld;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3, Vec2};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Mesh, Scene};
+use crate::scene::{Geometry, Mesh, Scene, fault};
 
 /// How a file is understood.
 #[derive(Clone, Debug, Default)]
@@ -169,7 +169,7 @@ pub fn load_watched(
     scene.transform(&options.transform());
     // At some time of an animation there may be nothing to see.
     let may_be_empty = options.animation.time.is_some();
-    scene.fault().map_err(|message| Error::input(path, "", message))?;
+    fault(&scene).map_err(|message| Error::input(path, "", message))?;
     if scene.primitive_count() == 0 && !may_be_empty {
         let message = "nothing to render: no ray could hit anything; give a file with at least one triangle or shape";
         return Err(Error::input(path, "", message));

@@ -10,22 +10,24 @@ use crate::error::{Error, Result};
 use crate::math::Vec3;
 
 impl Scene {
-    /// Whether all indices are in range, attributes match, and everything is finite. What [`io::load`](crate::io::load) gives has been checked;
-    /// what is made by hand should be, for the tracers rely on it.
+    /// Whether all indices are in range, attributes match, and materials, shapes and placements can be. What [`io::load`](crate::io::load) gives
+    /// has been checked; what is made by hand should be, for the tracers rely on it. Corners of triangles may be NaN or infinite: those are never hit.
     ///
     /// # Errors
     /// [`Error::Backend`] with the first thing that is wrong.
     pub fn check(&self) -> Result<()> {
-        self.fault().map_err(|message| Error::Backend { backend: "scene", message })
+        fault(self).map_err(|message| Error::Backend { backend: "scene", message })
     }
 
-    /// The same with the message alone.
-    pub(crate) fn fault(&self) -> std::result::Result<(), String> {
-        fault(self)
+    /// Whether there is a group of this index, of geometries that are there.
+    fn has_group(&self, group: u32) -> bool {
+        let range = self.groups.get(group as usize).map(|group| &group.geometries);
+        range.is_some_and(|range| self.geometries.get(range.start as usize..range.end as usize).is_some())
     }
 }
 
-fn fault(scene: &Scene) -> std::result::Result<(), String> {
+/// What [`Scene::check`] says, as a message alone.
+pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
     if let Some(instance) = scene.instances.iter().find(|instance| !scene.has_group(instance.group)) {
         return Err(format!("instance {:?} places a group that does not exist", instance.name));
     }
@@ -104,14 +106,6 @@ fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
     }
 }
 
-impl Scene {
-    /// Whether there is a group of this index, of geometries that are there.
-    fn has_group(&self, group: u32) -> bool {
-        let range = self.groups.get(group as usize).map(|group| &group.geometries);
-        range.is_some_and(|range| self.geometries.get(range.start as usize..range.end as usize).is_some())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,7 +120,7 @@ mod tests {
 
     #[test]
     fn finds_every_fault() {
-        assert_eq!(good().fault(), Ok(()));
+        assert_eq!(fault(&good()), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
         let faults: [(&str, Breaks); 10] = [
             ("sphere: the radius is -1", |scene, _| {

@@ -137,6 +137,15 @@ impl Light {
 }
 
 impl AreaShape {
+    /// Of a flat one.
+    pub(crate) fn area(&self) -> Option<f64> {
+        match *self {
+            Self::Rectangle { half_edges: [a, b], .. } => Some(4.0 * a.cross(b).length()),
+            Self::Disk { radius, .. } => Some(std::f64::consts::PI * radius * radius),
+            Self::Sphere { .. } => None,
+        }
+    }
+
     /// Moves it; `scale` is how much longer lengths become on average.
     fn transform(&mut self, transform: &DAffine3, scale: f64) {
         match self {

@@ -78,7 +78,8 @@ impl Mesh {
         DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
     }
 
-    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat.
+    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat, and a normal along which it
+    /// presses is zero, which shades as flat.
     pub(crate) fn placed(&self, transform: &DAffine3) -> Self {
         let positions: Vec<DVec3> =
             self.positions.par_iter().map(|&offset| transform.transform_point3(self.point(offset))).collect();

@@ -22,6 +22,7 @@ mod search;
 mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
+pub(crate) use check::fault;
 pub use environment::Environment;
 pub use fog::Fog;
 pub use instance::{Group, Instance};

@@ -18,10 +18,14 @@ pub(super) fn has_triangle(light: &Light, corners: [DVec3; 3]) -> bool {
     corners.iter().all(|&corner| has_point(light, corner, CORNER)) && has_point(light, middle, MIDDLE)
 }
 
-/// Whether a polygon lies on the surface of `light`. A ball has none.
-pub(super) fn has_polygon(light: &Light, mut corners: impl Iterator<Item = DVec3>) -> bool {
-    let is_flat = matches!(light, Light::Area { shape: AreaShape::Disk { .. } | AreaShape::Rectangle { .. }, .. });
-    is_flat && corners.all(|corner| has_point(light, corner, CORNER))
+/// Whether a light shines from a surface in one plane.
+pub(super) const fn is_flat(light: &Light) -> bool {
+    matches!(light, Light::Area { shape: AreaShape::Disk { .. } | AreaShape::Rectangle { .. }, .. })
+}
+
+/// Whether a polygon lies on the surface of `light`, which is flat.
+pub(super) fn has_polygon(light: &Light, corners: &[DVec3]) -> bool {
+    corners.iter().all(|&corner| has_point(light, corner, CORNER))
 }
 
 /// Whether a sphere is the surface of `light`.
@@ -76,8 +80,8 @@ mod tests {
         assert!(!has_triangle(&panel, [at(-2.0, 0.0, -1.0), at(2.5, 0.0, -1.0), at(2.0, 0.0, 1.0)]), "beyond the edge");
         assert!(!has_triangle(&panel, [at(-2.0, 0.1, -1.0), at(2.0, 0.1, -1.0), at(2.0, 0.1, 1.0)]), "below");
         let square = [at(-2.0, 0.0, -1.0), at(2.0, 0.0, -1.0), at(2.0, 0.0, 1.0), at(-2.0, 0.0, 1.0)];
-        assert!(has_polygon(&panel, square.into_iter()));
-        assert!(!has_polygon(&panel, square.map(|corner| centre + (corner - centre) * 1.1).into_iter()));
+        assert!(has_polygon(&panel, &square));
+        assert!(!has_polygon(&panel, &square.map(|corner| centre + (corner - centre) * 1.1)));
         let ball = area(AreaShape::Sphere { centre, radius: 2.0 });
         assert!(has_sphere(&ball, centre, 2.0) && !has_sphere(&ball, centre, 1.9) && !has_sphere(&panel, centre, 1.0));
         let cube = 2.0 / 3f64.sqrt();

@@ -1,7 +1,7 @@
 //! Surfaces that glow, as lights.
 //!
-//! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area. Spheres are lights of
-//! their own, sampled by the cone they fill. What stands in a light's place is that light's body. Of
+//! Triangles, disks and boxes are patches: one light, of which a patch is chosen by its power and a point by area. Spheres, and ellipsoids that are
+//! round, are lights of their own, sampled by the cone they fill. What stands in a light's place is that light's body. Of
 //! all other shapes, of what moves, and of what a texture lights or cuts out, no points are chosen: rays find them by chance, which is as right, and
 //! noisier.
 
@@ -16,6 +16,9 @@ use crate::ray::Hit;
 use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
 use crate::shape::Shape;
 use crate::trace::{Primitives, World};
+
+/// The share of a flat light's area that bodies have to take to cover it: files round.
+const COVERED: f64 = 0.99;
 
 /// Flat pieces of surfaces that glow to both sides, in world coordinates.
 #[derive(Clone, Debug, Default)]
@@ -63,12 +66,10 @@ impl Seats {
     /// Of the primitives, in their order.
     fn by_turns(mut seats: impl Iterator<Item = Seat>) -> Self {
         let Some(first) = seats.next() else { return Self::Each(Vec::new()) };
-        let mut alike = 1;
-        for seat in seats.by_ref() {
+        for (alike, seat) in (1..).zip(seats.by_ref()) {
             if seat != first {
                 return Self::Each(std::iter::repeat_n(first, alike).chain([seat]).chain(seats).collect());
             }
-            alike += 1;
         }
         Self::All(first)
     }
@@ -93,10 +94,18 @@ impl Seats {
     }
 }
 
+/// What glows.
+pub(super) struct Emitters {
+    pub(super) patches: Patches,
+    pub(super) glowing: Glowing,
+    /// For each light whether bodies cover it, so that whatever it shines on meets one on the way there.
+    pub(super) covered: Vec<bool>,
+}
+
 /// Finds what glows. Spheres are added to `lights`, which may have bodies among what is found.
-pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) -> (Patches, Glowing) {
+pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) -> Emitters {
     let own = lights.len();
-    let mut search = Search { own, lights, patches: Patches::default() };
+    let mut search = Search { own, covers: vec![0.0; own], lights, patches: Patches::default() };
     let mut glowing = Glowing::new();
     for (instance, geometry) in placed(scene, is_emitter) {
         let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
@@ -111,14 +120,8 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
         let seats = match &part.primitives {
             Primitives::Triangles { positions, triangles } => {
                 let corners = |t: &[u32; 3]| t.map(|i| to_world.transform_point3(positions[i as usize].as_dvec3()));
-                Seats::by_turns(triangles.iter().map(|t| {
-                    search.body(|light| bodies::has_triangle(light, corners(t))).unwrap_or_else(|| {
-                        search.light(emission, |emission, Search { patches, .. }| {
-                            patches.add_triangle(corners(t), emission);
-                            Seat::Patch(brightness(emission))
-                        })
-                    })
-                }))
+                let ball = search.ball(|light| triangles.iter().all(|t| bodies::has_triangle(light, corners(t))));
+                ball.map_or_else(|| Seats::by_turns(search.triangles(triangles, corners, emission)), Seats::All)
             }
             Primitives::Shapes(shapes) => {
                 Seats::Each(shapes.iter().map(|shape| search.seat(shape, &to_world, emission)).collect())
@@ -126,13 +129,21 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
         };
         glowing.insert((instance, geometry), seats);
     }
-    (search.patches, glowing)
+    let Search { lights, covers, patches, .. } = search;
+    let is_covered = |(i, light): (usize, &LightSource)| match (covers.get(i), light.light()) {
+        (Some(area), Some(Light::Area { shape, .. })) => shape.area().is_none_or(|whole| *area >= COVERED * whole),
+        // Spheres that glow, which are their own bodies.
+        (None, _) => true,
+        _ => false,
+    };
+    let covered = lights.iter().enumerate().map(is_covered).collect();
+    Emitters { patches, glowing, covered }
 }
 
 /// Whether anything glows that is no body of `lights`.
 pub(super) fn any(scene: &Scene, world: &World, lights: &[LightSource]) -> bool {
     let mut all = lights.to_vec();
-    let (patches, glowing) = find(scene, world, &mut all);
+    let Emitters { patches, glowing, .. } = find(scene, world, &mut all);
     let is_alone = |seats: &Seats| match seats {
         Seats::All(seat) => *seat == Seat::Alone,
         Seats::Each(seats) => seats.contains(&Seat::Alone),
@@ -165,14 +176,45 @@ struct Search<'a> {
     /// The scene's own lights, of which there are `own`, and those of spheres that glow.
     lights: &'a mut Vec<LightSource>,
     own: usize,
+    /// How much of the area of each of those flat bodies take.
+    covers: Vec<f64>,
     patches: Patches,
 }
 
 impl Search<'_> {
-    /// The scene's own light that something `is_body` of.
-    fn body(&self, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
-        let found = self.lights[..self.own].iter().position(|light| light.light().is_some_and(&is_body));
+    /// The scene's own light, of those that are balls, that something `is_body` of.
+    fn ball(&self, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
+        let is_ball = |light: &&Light| !bodies::is_flat(light) && is_body(light);
+        let found = self.lights[..self.own].iter().position(|light| light.light().as_ref().is_some_and(is_ball));
         found.map(|light| Seat::Body(light as u32))
+    }
+
+    /// The same of those that are flat, for something of this area.
+    fn panel(&mut self, area: f64, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
+        let is_panel = |light: &&Light| bodies::is_flat(light) && is_body(light);
+        let light = self.lights[..self.own].iter().position(|light| light.light().as_ref().is_some_and(is_panel))?;
+        self.covers[light] += area;
+        Some(Seat::Body(light as u32))
+    }
+
+    /// Of triangles that are no body of a ball, one after the other.
+    fn triangles(
+        &mut self,
+        triangles: &[[u32; 3]],
+        corners: impl Fn(&[u32; 3]) -> [DVec3; 3],
+        emission: Option<Vec3>,
+    ) -> impl Iterator<Item = Seat> {
+        triangles.iter().map(move |triangle| {
+            let corners = corners(triangle);
+            let [a, b, c] = corners;
+            let area = (b - a).cross(c - a).length() / 2.0;
+            self.panel(area, |light| bodies::has_triangle(light, corners)).unwrap_or_else(|| {
+                self.light(emission, |emission, Self { patches, .. }| {
+                    patches.add_triangle(corners, emission);
+                    Seat::Patch(brightness(emission))
+                })
+            })
+        })
     }
 
     /// What `add` makes a light of, where it is known what it sends.
@@ -193,7 +235,7 @@ impl Search<'_> {
                 };
                 let Some(radius) = similarity(&(to_world.matrix3 * axes)) else { return Seat::Alone };
                 let centre = at(centre);
-                self.body(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
+                self.ball(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
                     self.light(emission, |radiance, Self { lights, .. }| {
                         let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
                         lights.push(LightSource::new(&light, DVec3::ZERO));
@@ -208,7 +250,8 @@ impl Search<'_> {
                 let across = tangents(disk.normal.as_dvec3().normalize())
                     .map(|axis| to_world.matrix3 * axis * f64::from(disk.radius));
                 let centre = at(disk.centre);
-                self.body(|light| bodies::has_disk(light, centre, across)).unwrap_or_else(|| {
+                let area = PI * across[0].cross(across[1]).length();
+                self.panel(area, |light| bodies::has_disk(light, centre, across)).unwrap_or_else(|| {
                     self.light(emission, |emission, search| search.patches.add_disk(centre, across, emission))
                 })
             }
@@ -225,8 +268,10 @@ impl Search<'_> {
                 Seat::Patch(brightness(emission))
             }),
             Shape::Polygon(polygon) => {
-                let corners = || polygon.corners().iter().map(|&corner| at(corner));
-                self.body(|light| bodies::has_polygon(light, corners())).unwrap_or(Seat::Alone)
+                let corners: Vec<DVec3> = polygon.corners().iter().map(|&corner| at(corner)).collect();
+                let around = |i: usize| (corners[i] - corners[0]).cross(corners[(i + 1) % corners.len()] - corners[0]);
+                let area = (0..corners.len()).map(around).sum::<DVec3>().length() / 2.0;
+                self.panel(area, |light| bodies::has_polygon(light, &corners)).unwrap_or(Seat::Alone)
             }
             Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) => Seat::Alone,
         }

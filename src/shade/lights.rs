@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::emitters::{self, Glowing, Seat};
+use super::emitters::{self, Emitters, Glowing, Seat};
 use super::light::LightSource;
 use super::{EnvironmentLight, SurfacePoint, area};
 use crate::math::{Aabb, DVec2, DVec3, Vec3};
@@ -74,7 +74,7 @@ impl Lights {
         mut sources: Vec<LightSource>,
         environment: Option<&Arc<EnvironmentLight>>,
     ) -> Self {
-        let (patches, glowing) = emitters::find(scene, world, &mut sources);
+        let Emitters { patches, glowing, covered } = emitters::find(scene, world, &mut sources);
         let total = patches.total();
         let patches = (total > 0.0).then(|| {
             sources.push(LightSource::patches(patches));
@@ -86,7 +86,7 @@ impl Lights {
         });
         let cumulative = chances(&sources, &world.bounds());
         let mut can_be_found = vec![false; sources.len()];
-        let bodies = glowing.values().flat_map(emitters::Seats::bodies);
+        let bodies = glowing.values().flat_map(emitters::Seats::bodies).filter(|&light| covered[light as usize]);
         for index in bodies.chain(patches.map(|(index, _)| index)).chain(environment) {
             can_be_found[index as usize] = true;
         }
@@ -121,6 +121,8 @@ impl Lights {
                 Found::Shared { radiance: emission, density: density * self.chance(index) }
             }
             (Seat::Alone, _) | (Seat::Patch(_), None) => Found::Alone,
+            // Where bodies cover a part of a light, it is asked for all that it gives.
+            (Seat::Body(index), _) if !self.can_be_found[index as usize] => Found::Dark,
             (Seat::Body(index), _) => match self.sources[index as usize].light() {
                 Some(Light::Area { shape, radiance }) => match area::density(shape, from, point.position) {
                     Some(density) => Found::Shared { radiance: *radiance, density: density * self.chance(index) },

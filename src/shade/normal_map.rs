@@ -5,14 +5,14 @@
 //! turned or scaled on the surface, so is the frame: what it shows is bent as it is seen.
 
 use super::{SurfacePoint, texture};
-use crate::math::{DAffine3, DVec3, Vec2, tangents};
+use crate::math::{DAffine3, DVec3, Mat3, Vec2, tangents};
 use crate::ray::Hit;
 use crate::scene::{Geometry, Material, Scene, Texture};
 use crate::shape::Shape;
 use crate::trace::{Primitives, World};
 
-/// From a point to those where a shape's parameters are compared, as a share of its smallest extent: parameters are f32.
-const STEP: f64 = 1e-3;
+/// From a point to those where a shape's parameters are compared, as a share of its size.
+const STEP: f64 = 1e-5;
 
 /// Bends the shading normal of `point`, which `hit` names, as the material's texture has it. Meshes without texture
 /// coordinates keep theirs, and so do shapes where their parameters have no direction, as at poles.
@@ -35,7 +35,8 @@ pub fn bend(point: &mut SurfacePoint, scene: &Scene, world: &World, hit: &Hit, m
 /// The directions along a surface, where it is at the time of `point`, in which u and v of the map grow, of any length.
 fn directions(scene: &Scene, world: &World, hit: &Hit, map: &Texture, point: &SurfacePoint) -> Option<[DVec3; 2]> {
     let (part, placement) = world.locate(hit);
-    let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.at(point.time).to_world.as_daffine3());
+    let placement = placement.map(|placement| placement.at(point.time));
+    let to_world = placement.as_ref().map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
     match (&part.primitives, &scene.geometries[hit.geometry as usize]) {
         (Primitives::Triangles { positions, triangles }, Geometry::Mesh(mesh)) => {
             let corners = triangles[hit.primitive as usize].map(|i| i as usize);
@@ -43,7 +44,7 @@ fn directions(scene: &Scene, world: &World, hit: &Hit, map: &Texture, point: &Su
             along_triangle(corners.map(|i| to_world.transform_point3(positions[i].as_dvec3())), corners, uvs, map)
         }
         (Primitives::Shapes(shapes), _) => {
-            let at = to_world.inverse().transform_point3(point.position);
+            let at = placement.map_or(point.position, |p| p.to_object.transform_point3(point.position));
             let along = along_shape(&shapes[hit.primitive as usize], at, map)?;
             Some(along.map(|direction| to_world.transform_vector3(direction)))
         }
@@ -62,20 +63,26 @@ fn along_triangle([a, b, c]: [DVec3; 3], corners: [usize; 3], uvs: &[Vec2], map:
 
 /// The same along a shape at a point of it, in the shape's coordinates: by how its parameters change from one side of the point to the other.
 fn along_shape(shape: &Shape, at: DVec3, map: &Texture) -> Option<[DVec3; 2]> {
-    let step = match shape {
-        // Its parameters are lengths, from a point that may be far away.
-        Shape::Plane(_) => 1.0 + 1e-2 * at.abs().max_element(),
-        _ => {
-            let size = shape.bounds().size().as_dvec3();
-            let thin = size.min_element();
-            STEP * if thin > 0.0 { thin } else { size.max_element() }
-        }
-    };
+    // Steps over what is bent are small for how it is bent.
+    let size = || f64::from(shape.bounds().size().max_element());
+    let step = STEP
+        * match shape {
+            Shape::Plane(_) => 1.0,
+            Shape::Cuboid(_) | Shape::Polygon(_) => size(),
+            Shape::Sphere(sphere) => f64::from(sphere.radius),
+            Shape::Disk(disk) => f64::from(disk.radius),
+            Shape::Cylinder(cylinder) => f64::from(cylinder.radius),
+            Shape::Cone(cone) => f64::from(cone.base_radius.max(cone.apex_radius)),
+            Shape::Ellipsoid(ellipsoid) => {
+                let Mat3 { x_axis, y_axis, z_axis } = ellipsoid.axes;
+                f64::from(x_axis.length().min(y_axis.length()).min(z_axis.length()))
+            }
+        };
     // Where parameters run around, they begin again at 0.
     let runs_around = !matches!(shape, Shape::Plane(_) | Shape::Polygon(_) | Shape::Cuboid(_));
     let sides = tangents(shape.normal(at).try_normalize()?);
     let [p, q] = sides.map(|side| {
-        let [before, after] = [-step, step].map(|step| shape.uv(at + side * step).as_dvec2());
+        let [before, after] = [-step, step].map(|step| shape.uv(at + side * step));
         let difference = after - before;
         let difference = if runs_around { difference - difference.round() } else { difference };
         map.transform.matrix2.as_dmat2() * difference
@@ -89,7 +96,7 @@ fn along_shape(shape: &Shape, at: DVec3, map: &Texture) -> Option<[DVec3; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Mat3, Vec3};
+    use crate::math::Vec3;
     use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Sphere};
 
     /// A step in the direction of u leaves v as it is, and the other way round.
@@ -121,7 +128,7 @@ mod tests {
                     let [u, v] = along_shape(shape, at, &map).unwrap();
                     let change = |along: DVec3| {
                         let step = along.normalize() * 2e-3;
-                        (shape.uv(at + step) - shape.uv(at - step)).as_dvec2()
+                        shape.uv(at + step) - shape.uv(at - step)
                     };
                     let (by_u, by_v) = (change(u), change(v));
                     assert!(by_u.x > 0.0 && by_u.y.abs() < 0.01 * by_u.x, "{}: {by_u}", shape.name());
@@ -130,5 +137,26 @@ mod tests {
             }
             assert!(met >= 2, "{}: {met}", shape.name());
         }
+    }
+
+    /// Flat ones that lie along the axes, and wires: far away, what they are in one direction is next to nothing there.
+    #[test]
+    fn thin_shapes_have_directions() {
+        let map = Texture::default();
+        for (place, axis) in [(0.0, Vec3::Y), (100.0, Vec3::Y), (3.0, Vec3::Z)] {
+            let centre = Vec3::splat(place);
+            let disk = Shape::from(Disk::new(centre, axis, 1.0).unwrap());
+            let out = tangents(axis.as_dvec3())[0];
+            let [u, v] = along_shape(&disk, centre.as_dvec3() + out * 0.5, &map).expect("it is not the middle");
+            assert!(v.normalize().dot(out) > 1.0 - 1e-9 && u.normalize().dot(out).abs() < 1e-6, "{place}: {u} {v}");
+        }
+        let flat = Shape::from(Cuboid::new(Vec3::ZERO, Vec3::new(1.0, 1e-5, 1.0)).unwrap());
+        let [u, v] = along_shape(&flat, DVec3::new(0.3, 1e-5, 0.6), &map).expect("its upper side");
+        assert!(u.normalize().dot(DVec3::Z) > 1.0 - 1e-9 && v.normalize().dot(DVec3::X) > 1.0 - 1e-9, "{u} {v}");
+        let along = Vec3::new(1.0, 1.0, 1.0).normalize();
+        let wire = Shape::from(Cylinder::new(Vec3::ZERO, along * 100.0, 0.001, false).unwrap());
+        let side = tangents(along.as_dvec3())[0];
+        let [u, v] = along_shape(&wire, along.as_dvec3() * 40.0 + side * 0.001, &map).expect("its side");
+        assert!(v.normalize().dot(along.as_dvec3()) > 1.0 - 1e-6 && u.normalize().dot(side).abs() < 1e-4, "{u} {v}");
     }
 }

@@ -10,7 +10,7 @@ use super::quadric::Inside;
 use super::round::{disk_reach, outwards, turn};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Bounded, Formula, Number, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable, tangents};
+use crate::math::{Aabb, DVec2, DVec3, Vec3, is_traceable, tangents};
 
 /// A surface of revolution with a straight side.
 pub(super) struct Frustum {
@@ -76,7 +76,7 @@ impl Frustum {
 
     /// The outward unit normal, and the parameters: the angle over [0, 1], and the way from base to apex; on a cap the
     /// distance from the axis in radii.
-    pub fn at(&self, point: DVec3) -> (DVec3, Vec2) {
+    pub fn at(&self, point: DVec3) -> (DVec3, DVec2) {
         let axis = self.axis();
         let length = axis.length();
         let along = axis / length;
@@ -91,10 +91,10 @@ impl Frustum {
         if self.capped && height.abs().min((height - length).abs()) < away {
             let is_base = height.abs() < (height - length).abs();
             let (normal, radius) = if is_base { (-along, base) } else { (along, apex) };
-            (normal, Vec2::new(angle, (out.length() / radius.max(f64::MIN_POSITIVE)) as f32))
+            (normal, DVec2::new(angle, out.length() / radius.max(f64::MIN_POSITIVE)))
         } else {
             let normal = (out.normalize_or(x) - along * slope).normalize();
-            (normal, Vec2::new(angle, (height / length) as f32))
+            (normal, DVec2::new(angle, height / length))
         }
     }
 }

@@ -10,7 +10,7 @@ use super::distance::Support;
 use super::line::{Interval, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A box along the axes.
@@ -106,11 +106,11 @@ impl Cuboid {
     }
 
     /// Over [0, 1] on each face, along the two axes that follow the face's own.
-    pub(super) fn uv(&self, at: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let (axis, _) = self.face(at);
         let size = (self.max.as_dvec3() - self.min.as_dvec3()).max(DVec3::splat(f64::MIN_POSITIVE));
-        let share = ((at - self.min.as_dvec3()) / size).as_vec3();
-        Vec2::new(share[(axis + 1) % 3], share[(axis + 2) % 3])
+        let share = (at - self.min.as_dvec3()) / size;
+        DVec2::new(share[(axis + 1) % 3], share[(axis + 2) % 3])
     }
 }
 

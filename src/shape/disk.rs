@@ -9,7 +9,7 @@ use super::line::{Line, NO_ROOTS, Roots};
 use super::round::{disk_reach, outwards, turn};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable, tangents};
+use crate::math::{Aabb, DVec2, DVec3, Vec3, is_traceable, tangents};
 use crate::ray::Ray;
 
 /// A disk.
@@ -60,10 +60,10 @@ impl Disk {
     }
 
     /// The angle over [0, 1], and the distance from the centre in radii.
-    pub(super) fn uv(&self, at: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let from = at - self.centre.as_dvec3();
         let [x, y] = tangents(self.normal());
-        Vec2::new(turn(from.dot(y), from.dot(x)), (from.length() / f64::from(self.radius)) as f32)
+        DVec2::new(turn(from.dot(y), from.dot(x)), from.length() / f64::from(self.radius))
     }
 }
 

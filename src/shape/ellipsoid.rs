@@ -9,7 +9,7 @@ use super::quadric::{Inside, Quadric};
 use super::round::{outwards, spherical};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Mat3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, Mat3, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// An ellipsoid.
@@ -74,7 +74,7 @@ impl Ellipsoid {
     }
 
     /// Those of the unit sphere.
-    pub(super) fn uv(&self, point: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, point: DVec3) -> DVec2 {
         spherical(self.on_sphere(point))
     }
 }

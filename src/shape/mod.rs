@@ -38,7 +38,7 @@ pub use sphere_methods::SphereMethod;
 pub use triangle_methods::TriangleMethod;
 
 use crate::error::Error;
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
 use distance::Support;
 use line::{NO_ROOTS, Roots};
@@ -233,7 +233,7 @@ impl Shape {
 
     /// The hit at a known `t`.
     pub(crate) fn hit_at(&self, ray: &Ray, t: f64) -> ShapeHit {
-        ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t) }
+        ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t).as_vec2() }
     }
 
     /// What the `t` of one of its [`crossings`](Self::crossings) follows from.
@@ -278,8 +278,8 @@ impl Shape {
         }
     }
 
-    /// Its parameters at `point` on the surface.
-    pub(crate) fn uv(&self, point: DVec3) -> Vec2 {
+    /// Its parameters at `point` on the surface, before they are rounded.
+    pub(crate) fn uv(&self, point: DVec3) -> DVec2 {
         match self {
             Self::Sphere(sphere) => sphere.uv(point),
             Self::Plane(plane) => plane.uv(point),

@@ -3,7 +3,7 @@
 use super::flat::Flat;
 use super::line::{Line, Roots};
 use super::{InvalidShape, in_f32};
-use crate::math::{DVec3, Vec2, Vec3, is_traceable, tangents};
+use crate::math::{DVec2, DVec3, Vec3, is_traceable, tangents};
 use crate::ray::Ray;
 
 /// An unbounded plane.
@@ -45,9 +45,9 @@ impl Plane {
     }
 
     /// Coordinates in the plane, in units of length, from the point.
-    pub(super) fn uv(&self, at: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let from = at - self.point.as_dvec3();
         let [x, y] = tangents(self.normal());
-        Vec2::new(from.dot(x) as f32, from.dot(y) as f32)
+        DVec2::new(from.dot(x), from.dot(y))
     }
 }

@@ -18,7 +18,7 @@ use super::flat::Flat;
 use super::line::{Interval, Line, NO_ROOTS, Roots};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec3, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A polygon.
@@ -171,12 +171,12 @@ impl Polygon {
 
     /// Coordinates in the plane, in units of length: from the first corner, along the first edge that has a length and
     /// across.
-    pub(super) fn uv(&self, at: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let first = self.corners[0].as_dvec3();
         let edge = self.corners.iter().map(|p| p.as_dvec3() - first).find(|edge| *edge != DVec3::ZERO);
         let x = edge.and_then(|edge| (edge - self.normal * edge.dot(self.normal)).try_normalize()).unwrap_or(DVec3::X);
         let from = at - first;
-        Vec2::new(from.dot(x) as f32, from.dot(self.normal.cross(x)) as f32)
+        DVec2::new(from.dot(x), from.dot(self.normal.cross(x)))
     }
 }
 

@@ -1,6 +1,6 @@
 //! What round shapes share: boxes around disks and ellipsoids, and angles as parameters.
 
-use crate::math::{Aabb, DVec3, Vec2, Vec3, gamma64};
+use crate::math::{Aabb, DVec2, DVec3, Vec3, gamma64};
 
 /// The box around `centre` that reaches as far as `half` to each side, rounded outwards.
 pub(super) fn outwards(centre: DVec3, half: DVec3) -> Aabb {
@@ -18,13 +18,13 @@ pub(super) fn disk_reach(normal: DVec3, radius: f64) -> DVec3 {
 }
 
 /// Longitude from -z about +y, and latitude from the south pole, both over [0, 1], of a unit vector.
-pub(super) fn spherical(n: DVec3) -> Vec2 {
+pub(super) fn spherical(n: DVec3) -> DVec2 {
     let latitude = libm::asin(n.y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
-    Vec2::new(turn(n.x, -n.z), (latitude + 0.5) as f32)
+    DVec2::new(turn(n.x, -n.z), latitude + 0.5)
 }
 
 /// The angle from `x` towards `y`, over [0, 1].
-pub(super) fn turn(y: f64, x: f64) -> f32 {
+pub(super) fn turn(y: f64, x: f64) -> f64 {
     let turn = libm::atan2(y, x) / std::f64::consts::TAU;
-    (turn + if turn < 0.0 { 1.0 } else { 0.0 }) as f32
+    turn + if turn < 0.0 { 1.0 } else { 0.0 }
 }

@@ -5,7 +5,7 @@ use super::quadric::{Inside, Quadric};
 use super::round::{outwards, spherical};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Bounded, Formula, Number, cross, dot, exactly, minus, vector};
-use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF_64, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, UNIT_ROUNDOFF_64, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A sphere.
@@ -45,7 +45,7 @@ impl Sphere {
         (point - self.centre.as_dvec3()).normalize_or(DVec3::Y)
     }
 
-    pub(super) fn uv(&self, point: DVec3) -> Vec2 {
+    pub(super) fn uv(&self, point: DVec3) -> DVec2 {
         spherical(self.normal(point))
     }
 }

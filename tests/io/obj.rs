@@ -148,7 +148,7 @@ fn what_is_missing_is_a_warning() {
 #[test]
 fn colours_in_xyz_and_options_without_effect() {
     // D65's white, a red beyond the display's, and grey from one number.
-    let mtl = "newmtl a\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\n";
+    let mtl = "newmtl a\nKa xyz 0.5\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\n";
     let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
     let (scene, warnings) = Files::one("a.obj", &obj).and("a.mtl", mtl).and("a.png", picture()).load("a.obj");
     let material = &scene.materials[0];
@@ -157,12 +157,24 @@ fn colours_in_xyz_and_options_without_effect() {
     let red = Vec3::new(3.2404542 * 0.5 - 1.5371385 * 0.2, 0.0, 0.0);
     assert!(material.specular.abs_diff_eq(red, 1e-3) && material.emission == Vec3::ZERO, "{material:?}");
     let said: Vec<_> = warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
-    assert!(said.len() == 1 && said[0].0 == "line 4" && said[0].1.contains("Ke spectral"), "{said:?}");
-    let plain = "newmtl a\nmap_Kd -mm 0 1 -t 0 a.png\nmap_Bump -bm 2 b.png\n";
-    let files = Files::one("a.obj", &obj).and("a.mtl", plain).and("a.png", picture()).and("b.png", picture());
+    assert!(said.len() == 1 && said[0].0 == "line 5" && said[0].1.contains("Ke spectral"), "{said:?}");
+    // One number stands for all three.
+    let pink = Vec3::new(
+        3.2404542 - 1.5371385 - 0.4985314,
+        -0.969266 + 1.8760108 + 0.041556,
+        0.0556434 - 0.2040259 + 1.0572252,
+    );
+    assert!(material.ambient.abs_diff_eq(pink * 0.5, 1e-3), "{material:?}");
+    let plain = "newmtl a\nillum 3\nmap_Kd -mm 0 1 -t 0 a.png\nmap_Bump -bm 2 my b.png \nKd 1 1 1\n";
+    let files =
+        Files::one("a.obj", &obj).and("a.mtl", plain).and("a.png", picture()).and("my b.png", picture()).and("1", "");
     let (scene, warnings) = files.load("a.obj");
-    assert!(warnings.len() == 1 && warnings[0].message.contains("map_Bump"), "{warnings:?}");
-    assert_eq!(scene.files, ["a.obj", "a.png", "b.png", "a.mtl"].map(|name| files.path(name)));
+    let said: Vec<_> = warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
+    assert!(
+        said.len() == 2 && said[0].1.contains("map_Bump") && said[1].0 == "line 2" && said[1].1.contains("illum 3"),
+        "{said:?}"
+    );
+    assert_eq!(scene.files, ["a.obj", "a.png", "my b.png", "a.mtl"].map(|name| files.path(name)));
     let (_, warnings) = Files::one("a.obj", &obj)
         .and("a.mtl", "newmtl a\nmap_Kd -mm 0.2 a.png\n")
         .and("a.png", picture())
@@ -227,6 +239,7 @@ fn faults_in_what_it_refers_to_name_that() {
         assert_eq!(message.contains("a.mtl, line 2)"), file == "a.png", "{error}");
     };
     check("newmtl a\nKd 1 x 1\n", b"x", "a.mtl", "line 2", "3 numbers");
+    check("newmtl a\nKd xyzzy 1 2 3\n", b"x", "a.mtl", "line 2", "r g b");
     check("newmtl a\nKd 1 -1 1\n", b"x", "a.mtl", "line 2", "from 0 up");
     check("Kd 1 1 1\n", b"x", "a.mtl", "line 1", "newmtl");
     check("newmtl a\nmap_Kd\n", b"x", "a.mtl", "line 2", "file name");

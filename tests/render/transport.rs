@@ -63,6 +63,7 @@ fn what_stands_in_a_lights_place_adds_nothing() {
         [(-0.5, -0.4), (0.5, -0.4), (0.5, 0.4), (-0.5, 0.4)].map(|(dx, z): (f32, f32)| Vec3::new(x + dx, 1.0, z))
     };
     let polygon = |x| Shape::from(twincast::Polygon::new(corners(x).to_vec()).unwrap());
+    let half = twincast::Polygon::new(corners(0.5).map(|p| Vec3::new(p.x.min(0.5), p.y, p.z)).to_vec()).unwrap();
     let both = Geometry::Mesh(Mesh {
         material: 1,
         ..Mesh::new([corners(0.5), corners(-1.5)].concat(), vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
@@ -81,6 +82,8 @@ fn what_stands_in_a_lights_place_adds_nothing() {
     let camera = Camera::look_at(DVec3::new(0.3, 0.5, 0.2), DVec3::new(0.3, 0.0, 0.2), DVec3::Z, 0.01).unwrap();
     for (name, lights, body, expected) in [
         ("polygon", vec![panel(0.5)], shapes(vec![polygon(0.5)]), first),
+        // It is asked for all that it gives, and what covers a half of it adds nothing.
+        ("half a panel", vec![panel(0.5)], shapes(vec![half.into()]), first),
         ("two polygons", vec![panel(0.5), panel(-1.5)], shapes(vec![polygon(-1.5), polygon(0.5)]), first + second),
         ("two panels in a mesh", vec![panel(0.5), panel(-1.5)], both.clone(), first + second),
         ("a panel with a light, and one without", vec![panel(0.5)], both, first + second),

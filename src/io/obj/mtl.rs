@@ -40,6 +40,8 @@ struct Entry {
     illumination: Option<i32>,
     /// The line that makes it transparent.
     transparent: Option<usize>,
+    /// The line that makes it a mirror or glass.
+    mirror: Option<usize>,
     map: Option<Map>,
 }
 
@@ -94,16 +96,12 @@ impl Library {
                 let Some((_, entry)) = &mut entry else {
                     return Err(fail(format!("{} comes before the first newmtl", quoted(keyword))));
                 };
-                // Options come before the name; of an option that is not known here, the last word is what is left.
-                let mut texture = text.rsplit(u8::is_ascii_whitespace).next().map(name);
                 if let Some(left_out) = entry.statement(keyword, line, &mut words).map_err(fail)? {
                     ignored.get_or_insert((line, left_out));
                 }
-                if let Some(map) = entry.map.as_ref().filter(|map| map.line == line) {
-                    texture = Some(map.file.clone());
+                if is_map(keyword) {
+                    self.files.extend(named_file(file, &text));
                 }
-                let texture = texture.map(|texture| beside(file, &texture));
-                self.files.extend(texture.filter(|texture| texture.is_file()));
             }
         }
         self.add(entry);
@@ -133,7 +131,8 @@ impl Library {
         let mut textures = Textures::default();
         let mut materials = Vec::new();
         let plain = if colored { Vec3::ONE } else { Material::default().diffuse };
-        let mut transparent: Option<(&Entry, usize)> = None;
+        // Transparent, mirrors.
+        let mut first: [Option<(&Entry, usize)>; 2] = [None; 2];
         for name in names {
             let Some(entry) = self.entries.get(&name) else {
                 // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
@@ -144,16 +143,23 @@ impl Library {
                 materials.push(Material { name, ambient: plain, diffuse: plain, ..Material::default() });
                 continue;
             };
-            transparent = transparent.or(entry.transparent.map(|line| (entry, line)));
+            for (first, line) in first.iter_mut().zip([entry.transparent, entry.mirror]) {
+                *first = first.or(line.map(|line| (entry, line)));
+            }
             let texture = match &entry.map {
                 Some(map) => textures.get(&entry.file, map, warnings)?,
                 None => None,
             };
             materials.push(entry.material(name, texture));
         }
-        if let Some((entry, line)) = transparent {
-            let message = "transparency (d, Tr) is not supported; everything is rendered opaque";
-            warnings.push(Warning::new(&entry.file, format!("line {line}"), message));
+        let messages = [
+            "transparency (d, Tr) is not supported; everything is rendered opaque",
+            "mirrors and glass (illum 3 and up) are not supported; everything is rendered without",
+        ];
+        for (first, message) in first.into_iter().zip(messages) {
+            if let Some((entry, line)) = first {
+                warnings.push(Warning::new(&entry.file, format!("line {line}"), message));
+            }
         }
         scene.materials = materials;
         scene.textures = textures.list;
@@ -166,7 +172,7 @@ impl Entry {
     /// Takes one statement. What of it changes the look but is not supported is given back.
     fn statement(&mut self, keyword: &[u8], line: usize, words: &mut Words<'_>) -> Placeless<Option<String>> {
         match keyword {
-            b"Ka" | b"Kd" | b"Ks" | b"Ke" if words.rest().starts_with(b"spectral") => {
+            b"Ka" | b"Kd" | b"Ks" | b"Ke" if next_is(words, b"spectral") => {
                 return Ok(Some(quoted(&[keyword, b" spectral"].concat())));
             }
             b"Ka" => self.ambient = Some(color(keyword, words)?),
@@ -186,8 +192,7 @@ impl Entry {
             b"illum" => {
                 let model = words.number().ok_or("illum needs a whole number")?;
                 self.illumination = Some(model);
-                // From 3 on there are mirrors and glass.
-                return Ok((3..=9).contains(&model).then(|| quoted(format!("illum {model}").as_bytes())));
+                self.mirror = (3..=9).contains(&model).then_some(line);
             }
             b"map_Kd" => {
                 let (map, left_out) = Map::parse(line, words)?;
@@ -305,6 +310,18 @@ impl Textures {
     }
 }
 
+/// Whether a statement names a texture, read or not.
+fn is_map(keyword: &[u8]) -> bool {
+    keyword.starts_with(b"map_") || [&b"bump"[..], b"disp", b"decal", b"refl", b"norm"].contains(&keyword)
+}
+
+/// The file that a statement names at its end: after its options, of whatever kind, and with spaces within the name.
+fn named_file(file: &Path, statement: &[u8]) -> Option<PathBuf> {
+    let statement = statement.trim_ascii();
+    let begins = (1..statement.len()).filter(|&i| statement[i - 1].is_ascii_whitespace());
+    begins.map(|i| beside(file, &name(&statement[i..]))).find(|path| path.is_file())
+}
+
 /// The file of a name that stands in `file`. Names from Windows have backslashes.
 fn beside(file: &Path, name: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
@@ -315,10 +332,14 @@ fn scalar(keyword: &[u8], words: &mut Words<'_>) -> Placeless<f32> {
     value.ok_or_else(|| format!("{} needs a finite number", quoted(keyword)))
 }
 
+fn next_is(words: &Words<'_>, word: &[u8]) -> bool {
+    Words::new(words.rest(), words.line).next() == Some(word)
+}
+
 /// One number for a grey, or three: r, g and b, or `xyz` and CIE 1931's X, Y and Z. What those name beyond the colours of a display is
 /// its nearest one.
 fn color(keyword: &[u8], words: &mut Words<'_>) -> Placeless<Vec3> {
-    let is_xyz = words.rest().starts_with(b"xyz");
+    let is_xyz = next_is(words, b"xyz");
     let names = if is_xyz { "x y z" } else { "r g b" };
     let problem = || format!("{} needs 3 numbers from 0 up, {names}", quoted(keyword));
     if is_xyz {

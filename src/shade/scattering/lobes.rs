@@ -61,17 +61,9 @@ impl<'a> Lobes<'a> {
         self.chances.iter().filter(|&&chance| chance > 0.0).count() > 1
     }
 
-    /// For light along `to_light`.
-    pub fn evaluate(&self, to_light: DVec3) -> Value {
-        self.value(to_light, true)
-    }
-
-    /// For a light along `to_light`. One that cannot be seen is seen in no mirror either, however blunt: highlights alone show it.
+    /// For light along `to_light`. A light that cannot be seen is seen in no mirror either, however blunt: highlights alone show it, and its
+    /// density is that of directions among them.
     pub fn lit(&self, to_light: DVec3, can_be_seen: bool) -> Value {
-        self.value(to_light, can_be_seen)
-    }
-
-    fn value(&self, to_light: DVec3, has_ways: bool) -> Value {
         let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;
         let [diffuse, shiny, mirrored, refracted] = self.chances;
         let mut value = Value { share: Vec3::ZERO, density: 0.0 };
@@ -83,7 +75,7 @@ impl<'a> Lobes<'a> {
                 value.density += shiny * highlight.density(*normal, *to_viewer, to_light);
             }
         }
-        let Some(gloss) = self.gloss.filter(|_| has_ways) else { return value };
+        let Some(gloss) = self.gloss.filter(|_| can_be_seen) else { return value };
         let behind = normal.dot(to_light) < 0.0 && horizon.dot(to_light) < 0.0;
         for (way, chance, on_its_side) in
             [(&self.ways.mirrored, mirrored, front), (&self.ways.refracted, refracted, behind)]
@@ -131,7 +123,7 @@ impl<'a> Lobes<'a> {
                 (warp::power(way.direction, gloss, even), way.scale)
             }
         };
-        let Value { share, density } = self.evaluate(direction);
+        let Value { share, density } = self.lit(direction, true);
         if density <= 0.0 || share == Vec3::ZERO {
             return None;
         }

@@ -48,7 +48,9 @@ class Meshes:
 
     def __copy__(self) -> Meshes:
         twin = object.__new__(type(self))
-        twin.__dict__.update(self.__dict__, _meshes=list(self._meshes))
+        # The tree first: it may be too old for the list, never too new.
+        built = self._built
+        twin.__dict__.update(self.__dict__, _built=built, _meshes=list(self._meshes))
         return twin
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Meshes:
