@@ -7,7 +7,7 @@ use crate::math::{DVec2, DVec3};
 
 /// The part of the unit sphere around a point that a rectangle fills.
 pub(super) struct SphericalRectangle {
-    /// Unit vectors along the edges, and across, away from the point's side.
+    /// Unit vectors along the edges, and across, to the point's side.
     axes: [DVec3; 3],
     /// The rectangle in these axes, from the point: where it begins and ends along the first two, and where it lies on the third; below 0.
     low: DVec2,
@@ -22,9 +22,9 @@ pub(super) struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// What `point` sees of the rectangle around `centre` with half edges that are perpendicular, but for what f32 rounds. None where it is so far away, for its size, that its
-    /// points are nearly as far from each other as the directions to them are: there the angles would be small differences. None, too, for a
-    /// point in its plane.
+    /// What `point` sees of the rectangle around `centre` with half edges that are perpendicular, but for what f32 rounds. None where it is far
+    /// away for its size: there an even choice by area is nearly one by solid angle, and angles would be small differences. None, too,
+    /// for a point in its plane.
     pub(super) fn seen_from(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Self> {
         let x = half_edges[0].normalize();
         let second = half_edges[1] - x * half_edges[1].dot(x);
