@@ -98,7 +98,7 @@ impl Seats {
 pub(super) struct Emitters {
     pub(super) patches: Patches,
     pub(super) glowing: Glowing,
-    /// For each light whether bodies cover it, so that whatever it shines on meets one on the way there.
+    /// For each light whether its bodies, if it has any, cover it: whether every way to it ends on one.
     pub(super) covered: Vec<bool>,
 }
 
@@ -130,11 +130,10 @@ pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) 
         glowing.insert((instance, geometry), seats);
     }
     let Search { lights, covers, patches, .. } = search;
+    // What is round has a whole body or none.
     let is_covered = |(i, light): (usize, &LightSource)| match (covers.get(i), light.light()) {
         (Some(area), Some(Light::Area { shape, .. })) => shape.area().is_none_or(|whole| *area >= COVERED * whole),
-        // Spheres that glow, which are their own bodies.
-        (None, _) => true,
-        _ => false,
+        _ => true,
     };
     let covered = lights.iter().enumerate().map(is_covered).collect();
     Emitters { patches, glowing, covered }

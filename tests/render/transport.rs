@@ -121,6 +121,18 @@ fn what_cannot_be_seen_is_not_mirrored() {
             }
         }
     }
+    // With a lamp around it, it can be seen: half of it is mirrored, with the lobe's density where it is highest, pi 11 / (2 pi).
+    let Light::Point { position, color, attenuation, range, .. } = point else { unreachable!() };
+    let lamp = Light::Point { position, color, attenuation, range, radius: 0.1 };
+    let ground = Geometry::Shapes { shapes: vec![Plane::new(Vec3::ZERO, Vec3::Y).unwrap().into()], material: 0 };
+    let body = Geometry::Shapes { shapes: vec![sphere(position.as_vec3(), 0.1)], material: 1 };
+    let scene = Scene {
+        lights: vec![lamp],
+        ..Scene::from_geometries(vec![ground, body], vec![floor(Some(10.0)), glowing(1.0)])
+    };
+    for (engine, got) in means(&scene, &camera, &paths(8, 64)) {
+        assert!((got.x - 0.2 / 2f32.sqrt() - 0.5 * 5.5).abs() < 0.05, "{engine}: {got}");
+    }
 }
 
 /// Inside a closed surface that gives off e and sends on a of what arrives, radiance is e / (1 - a) everywhere.
