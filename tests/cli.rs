@@ -102,6 +102,7 @@ fn bad_usage_ends_with_2() {
         &["render", "x.glb", "--pixel", "1,1", "--frames", "1-3", "--skip-existing"],
         &["render", "x.glb", "--pixel", "1,1", "--threshold", "0.1"],
         &["render", "x.glb", "-o", "x.png", "--max-spp", "4"],
+        #[cfg(feature = "embree")]
         &["render", "x.glb", "-o", "x.png", "--backend", "embree", "--build", "fast"],
         &["bench", "--size", "2"],
         &["bench", "--rays", "cosmic"],
