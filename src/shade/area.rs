@@ -15,13 +15,11 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: 
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
-                return (centre - point).dot(a.cross(b)).is_sign_negative().then(|| {
-                    let offset = seen.at(even);
-                    let (to_light, end) = (offset.normalize(), point + offset);
-                    let color = radiance * (seen.solid_angle / std::f64::consts::PI) as f32;
-                    let end = Some(short_of(end, to_light, point));
-                    Illumination { to_light, color, end, density: Some(1.0 / seen.solid_angle) }
-                });
+                let offset = seen.at(even);
+                let to_light = offset.normalize();
+                let color = radiance * (seen.solid_angle / std::f64::consts::PI) as f32;
+                let (end, density) = (Some(short_of(point + offset, to_light, point)), Some(1.0 / seen.solid_angle));
+                return Some(Illumination { to_light, color, end, density });
             }
             let at = even * 2.0 - 1.0;
             // The cross product of the halves is a quarter of the area.
@@ -37,12 +35,13 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: 
     }
 }
 
-/// The rectangle as the point sees it, where that is what directions are chosen by; none for other parallelograms.
+/// The rectangle as the point sees it, where that is what directions are chosen by; none for other parallelograms, and where it turns its back.
 fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<SphericalRectangle> {
     let [a, b] = half_edges;
     // As far as files in f32 have it.
     let is_rectangle = a.dot(b).abs() <= 1e-5 * a.length() * b.length();
-    if is_rectangle { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
+    let shines = (point - centre).dot(a.cross(b)) > 0.0;
+    if is_rectangle && shines { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
 }
 
 /// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
@@ -97,7 +96,7 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
     let area = match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
-                return (centre - point).dot(a.cross(b)).is_sign_negative().then(|| 1.0 / seen.solid_angle);
+                return Some(1.0 / seen.solid_angle);
             }
             a.cross(b) * 4.0
         }

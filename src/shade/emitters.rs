@@ -104,8 +104,7 @@ pub(super) struct Emitters {
 
 /// Finds what glows. Spheres are added to `lights`, which may have bodies among what is found.
 pub(super) fn find(scene: &Scene, world: &World, lights: &mut Vec<LightSource>) -> Emitters {
-    let own = lights.len();
-    let mut search = Search { own, covers: vec![0.0; own], lights, patches: Patches::default() };
+    let mut search = Search { covers: vec![0.0; lights.len()], lights, patches: Patches::default() };
     let mut glowing = Glowing::new();
     for (instance, geometry) in placed(scene, is_emitter) {
         let material = &scene.materials[scene.geometries[geometry as usize].material() as usize];
@@ -172,26 +171,28 @@ fn placed(scene: &Scene, wanted: impl Fn(&Material) -> bool) -> Vec<(u32, u32)> 
 
 /// What was found so far.
 struct Search<'a> {
-    /// The scene's own lights, of which there are `own`, and those of spheres that glow.
+    /// The scene's own lights, and after them those of spheres that glow.
     lights: &'a mut Vec<LightSource>,
-    own: usize,
-    /// How much of the area of each of those flat bodies take.
+    /// How much of the area of each of the scene's own flat bodies take.
     covers: Vec<f64>,
     patches: Patches,
 }
 
 impl Search<'_> {
+    /// The first of the scene's own lights that this is true of.
+    fn own(&self, is_it: impl Fn(&Light) -> bool) -> Option<usize> {
+        self.lights[..self.covers.len()].iter().position(|light| light.light().is_some_and(&is_it))
+    }
+
     /// The scene's own light, of those that are balls, that something `is_body` of.
     fn ball(&self, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
-        let is_ball = |light: &&Light| !bodies::is_flat(light) && is_body(light);
-        let found = self.lights[..self.own].iter().position(|light| light.light().as_ref().is_some_and(is_ball));
-        found.map(|light| Seat::Body(light as u32))
+        let light = self.own(|light| !bodies::is_flat(light) && is_body(light))?;
+        Some(Seat::Body(light as u32))
     }
 
     /// The same of those that are flat, for something of this area.
     fn panel(&mut self, area: f64, is_body: impl Fn(&Light) -> bool) -> Option<Seat> {
-        let is_panel = |light: &&Light| bodies::is_flat(light) && is_body(light);
-        let light = self.lights[..self.own].iter().position(|light| light.light().as_ref().is_some_and(is_panel))?;
+        let light = self.own(|light| bodies::is_flat(light) && is_body(light))?;
         self.covers[light] += area;
         Some(Seat::Body(light as u32))
     }
@@ -205,9 +206,7 @@ impl Search<'_> {
     ) -> impl Iterator<Item = Seat> {
         triangles.iter().map(move |triangle| {
             let corners = corners(triangle);
-            let [a, b, c] = corners;
-            let area = (b - a).cross(c - a).length() / 2.0;
-            self.panel(area, |light| bodies::has_triangle(light, corners)).unwrap_or_else(|| {
+            self.panel(area(&corners), |light| bodies::has_triangle(light, corners)).unwrap_or_else(|| {
                 self.light(emission, |emission, Self { patches, .. }| {
                     patches.add_triangle(corners, emission);
                     Seat::Patch(brightness(emission))
@@ -221,26 +220,29 @@ impl Search<'_> {
         emission.map_or(Seat::Alone, |emission| add(emission, self))
     }
 
+    /// Makes a light of what the matrix `axes` makes of the unit sphere, if that is a ball and no body.
+    fn round(&mut self, centre: DVec3, axes: &DMat3, emission: Option<Vec3>) -> Seat {
+        let Some(radius) = similarity(axes) else { return Seat::Alone };
+        self.ball(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
+            self.light(emission, |radiance, Self { lights, .. }| {
+                let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
+                lights.push(LightSource::new(&light, DVec3::ZERO));
+                Seat::Body(lights.len() as u32 - 1)
+            })
+        })
+    }
+
     /// Makes a light or patches of a shape that is no body.
     fn seat(&mut self, shape: &Shape, to_world: &DAffine3, emission: Option<Vec3>) -> Seat {
         let at = |p: Vec3| to_world.transform_point3(p.as_dvec3());
         match shape {
-            Shape::Sphere(_) | Shape::Ellipsoid(_) => {
-                // What the unit sphere becomes.
-                let (centre, axes) = match shape {
-                    Shape::Ellipsoid(ellipsoid) => (ellipsoid.centre, ellipsoid.axes.as_dmat3()),
-                    Shape::Sphere(sphere) => (sphere.centre, DMat3::from_diagonal(DVec3::splat(sphere.radius.into()))),
-                    _ => return Seat::Alone,
-                };
-                let Some(radius) = similarity(&(to_world.matrix3 * axes)) else { return Seat::Alone };
-                let centre = at(centre);
-                self.ball(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
-                    self.light(emission, |radiance, Self { lights, .. }| {
-                        let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
-                        lights.push(LightSource::new(&light, DVec3::ZERO));
-                        Seat::Body(lights.len() as u32 - 1)
-                    })
-                })
+            Shape::Sphere(sphere) => {
+                let axes = to_world.matrix3 * f64::from(sphere.radius);
+                self.round(at(sphere.centre), &axes, emission)
+            }
+            Shape::Ellipsoid(ellipsoid) => {
+                let axes = to_world.matrix3 * ellipsoid.axes.as_dmat3();
+                self.round(at(ellipsoid.centre), &axes, emission)
             }
             Shape::Disk(disk) => {
                 if similarity(&to_world.matrix3).is_none() {
@@ -268,9 +270,7 @@ impl Search<'_> {
             }),
             Shape::Polygon(polygon) => {
                 let corners: Vec<DVec3> = polygon.corners().iter().map(|&corner| at(corner)).collect();
-                let around = |i: usize| (corners[i] - corners[0]).cross(corners[(i + 1) % corners.len()] - corners[0]);
-                let area = (0..corners.len()).map(around).sum::<DVec3>().length() / 2.0;
-                self.panel(area, |light| bodies::has_polygon(light, &corners)).unwrap_or(Seat::Alone)
+                self.panel(area(&corners), |light| bodies::has_polygon(light, &corners)).unwrap_or(Seat::Alone)
             }
             Shape::Plane(_) | Shape::Cylinder(_) | Shape::Cone(_) => Seat::Alone,
         }
@@ -278,9 +278,9 @@ impl Search<'_> {
 }
 
 impl Patches {
-    fn add_triangle(&mut self, [a, b, c]: [DVec3; 3], emission: Vec3) {
-        let area = (b - a).cross(c - a).length() / 2.0;
-        self.add(a, [b - a, c - a], area, false, emission);
+    fn add_triangle(&mut self, corners: [DVec3; 3], emission: Vec3) {
+        let [a, b, c] = corners;
+        self.add(a, [b - a, c - a], area(&corners), false, emission);
     }
 
     fn add_disk(&mut self, centre: DVec3, [x, y]: [DVec3; 2], emission: Vec3) -> Seat {
@@ -332,6 +332,12 @@ impl Patches {
             density: Some(density),
         })
     }
+}
+
+/// The area of a flat polygon.
+fn area(corners: &[DVec3]) -> f64 {
+    let sides = corners.windows(2).map(|pair| (pair[0] - corners[0]).cross(pair[1] - corners[0]));
+    sides.sum::<DVec3>().length() / 2.0
 }
 
 /// What patches are chosen by, beside their area.
