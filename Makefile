@@ -30,6 +30,9 @@ render: build ## render the README's scene to out/gallery.exr and out/gallery.pn
 test: packages ## run the tests of library and program
 	$(CARGO) test --locked
 
+# The longest tests of what no feature changes, the native tracer against brute force and exact arithmetic: `make test` has run them.
+FEATURELESS = parity:: stress::native stress::the_matrix render::adaptive:: render::determinism::
+
 check: packages ## formatting, lints, documentation, and the program once more without default features
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
@@ -37,7 +40,7 @@ check: packages ## formatting, lints, documentation, and the program once more w
 	$(CARGO) clippy --locked -p twincast-python -p twincast-rtc --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
-	$(CARGO) test --locked --no-default-features --test twincast
+	$(CARGO) test --locked --no-default-features --test twincast -- $(addprefix --skip ,$(FEATURELESS))
 	$(CARGO) test --locked --no-default-features --doc
 
 stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg

@@ -432,7 +432,7 @@ fn numbers_that_are_not_normal() {
         let triangles = (0..40).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
         let world = World::new(&scenes::of_mesh(Mesh::new(square.to_vec(), triangles))).expect("sound");
         let (mut random, centre) = (Random::new(8), world.centre.as_vec3());
-        let rays = (0..4000).map(|i| {
+        let rays = (0..2000).map(|i| {
             let beside = 1.0 + (random.unit() - 0.5) * [1e-7, 1e-6, 1e-3][i % 3];
             let origin = (Vec3::new(2.0, -1.25, 1.1) + random.vec3() * 0.2) * scale;
             let target = square[1].lerp(square[2], random.unit()) * Vec3::new(beside, 1.0, 1.0);
@@ -440,7 +440,7 @@ fn numbers_that_are_not_normal() {
         });
         let rays: Vec<Ray> = rays.collect();
         let hits = assert_parity_of(&world, &Brute::new(&world), &rays);
-        assert!(hits > 1000 && hits < 3000, "{hits} of {} hits", rays.len());
+        assert!(hits > 500 && hits < 1500, "{hits} of {} hits", rays.len());
     }
 
     // Corners as close as that to where rays start.
@@ -456,7 +456,7 @@ fn numbers_that_are_not_normal() {
     // Rays through the corner of a box, at t = 2^-104 and exactly: what is a share of such lengths vanishes.
     let (mut random, least) = (Random::new(12), f32::from_bits(1));
     let mut hits = 0;
-    for _ in 0..40 {
+    for _ in 0..12 {
         let mut number = || ((random.unit() - 0.5) * 8e5).round();
         let corner = Vec3::new(number(), number(), number());
         let [b, c] = [0.2, 0.7].map(|share| (corner * Vec3::new(share, 0.5, 1.0 - share)).round());
@@ -469,7 +469,7 @@ fn numbers_that_are_not_normal() {
         });
         hits += assert_parity(&scenes::of_mesh(mesh), &rays.collect::<Vec<_>>());
     }
-    assert_eq!(hits, 4000);
+    assert_eq!(hits, 1200);
 }
 
 /// A ray that is rounded in an object's coordinates may meet a shape which it passes in the world.
