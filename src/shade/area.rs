@@ -1,6 +1,7 @@
 //! Points of a light's surface, chosen evenly: by the cone they fill for spheres (Shirley, Wang, Zimmerman 1996, *Monte Carlo techniques
-//! for direct lighting calculations*), by the solid angle they fill for rectangles that are near, by area for other flat ones.
+//! for direct lighting calculations*), by the solid angle they fill for rectangles and disks that are near, by area for other flat ones.
 
+use super::ellipse::SphericalEllipse;
 use super::light::Illumination;
 use super::rectangle::SphericalRectangle;
 use crate::math::{DVec2, DVec3, Vec3, gamma, tangents};
@@ -15,17 +16,17 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: 
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
-                let offset = seen.at(even);
-                let to_light = offset.normalize();
-                let color = radiance * (seen.solid_angle / std::f64::consts::PI) as f32;
-                let (end, density) = (Some(short_of(point + offset, to_light, point)), Some(1.0 / seen.solid_angle));
-                return Some(Illumination { to_light, color, end, density });
+                return Some(towards(point, seen.at(even), 1.0 / seen.solid_angle, radiance));
             }
             let at = even * 2.0 - 1.0;
             // The cross product of the halves is a quarter of the area.
             flat(point, centre + a * at.x + b * at.y, a.cross(b) * 4.0, radiance)
         }
         AreaShape::Disk { centre, normal, radius } => {
+            if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
+                let (offset, density) = seen.at(even);
+                return Some(towards(point, offset, density, radiance));
+            }
             let [x, y] = tangents(normal);
             let (distance, angle) = (radius * even.x.sqrt(), even.y * std::f64::consts::TAU);
             let at = centre + (x * libm::cos(angle) + y * libm::sin(angle)) * distance;
@@ -42,6 +43,14 @@ fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Spherical
     let is_rectangle = a.dot(b).abs() <= 1e-5 * a.length() * b.length();
     let shines = (point - centre).dot(a.cross(b)) > 0.0;
     if is_rectangle && shines { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
+}
+
+/// From the light at `offset` from the point, in whose direction as many are chosen, per steradian.
+fn towards(point: DVec3, offset: DVec3, density: f64, radiance: Vec3) -> Illumination {
+    let to_light = offset.normalize();
+    let color = radiance * (1.0 / (std::f64::consts::PI * density)) as f32;
+    let end = Some(short_of(point + offset, to_light, point));
+    Illumination { to_light, color, end, density: Some(density) }
 }
 
 /// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
@@ -100,7 +109,12 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
             }
             a.cross(b) * 4.0
         }
-        AreaShape::Disk { normal, radius, .. } => normal * (std::f64::consts::PI * radius * radius),
+        AreaShape::Disk { centre, normal, radius } => {
+            if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
+                return Some(seen.density(at - point));
+            }
+            normal * (std::f64::consts::PI * radius * radius)
+        }
         AreaShape::Sphere { centre, radius } => {
             return Some(1.0 / (std::f64::consts::TAU * opening((centre - point).length(), radius)));
         }
@@ -123,7 +137,10 @@ mod tests {
 
     /// The mean over a grid, of colour times the cosine at a surface whose normal is `normal`.
     fn reflected(shape: &AreaShape, point: DVec3, normal: DVec3) -> f64 {
-        let side = 400;
+        mean(400, shape, point, normal)
+    }
+
+    fn mean(side: i32, shape: &AreaShape, point: DVec3, normal: DVec3) -> f64 {
         let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
         let each = (0..side * side).filter_map(|k| illuminate(shape, Vec3::ONE, point, even(k)));
         each.map(|light| f64::from(light.color.x) * light.to_light.dot(normal).max(0.0)).sum::<f64>()
@@ -177,12 +194,26 @@ mod tests {
             // By area: no rectangle, and far away.
             AreaShape::Rectangle { centre, half_edges: [DVec3::X, DVec3::Z * 2.0 + DVec3::X * 0.1] },
             AreaShape::Rectangle { centre, half_edges: [DVec3::X * 0.1, DVec3::Z * 0.2] },
+            AreaShape::Disk { centre, normal: DVec3::new(0.6, -0.8, 0.0), radius: 0.5 },
         ] {
             let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, DVec2::new(0.3, 0.6)).unwrap();
             let (sampled, at) = (arriving.density.unwrap(), arriving.end.unwrap());
             let told = density(&shape, DVec3::ZERO, at).unwrap();
             assert!((sampled / told - 1.0).abs() < 1e-4, "{shape:?}: {sampled} {told}");
             assert!((f64::from(arriving.color.x) * std::f64::consts::PI * sampled - 1.0).abs() < 1e-6);
+        }
+    }
+
+    /// A light a thousand times as large as it is away fills the half of all directions: 256 tell so. By area, few points of it would be near.
+    #[test]
+    fn few_directions_suffice_where_a_light_is_near() {
+        let (centre, wide) = (DVec3::new(150.0, 3.0, -200.0), 3000.0);
+        for shape in [
+            AreaShape::Disk { centre, normal: DVec3::NEG_Y, radius: wide },
+            AreaShape::Rectangle { centre, half_edges: [DVec3::X * wide, DVec3::Z * wide] },
+        ] {
+            let found = mean(16, &shape, DVec3::ZERO, DVec3::Y);
+            assert!((found - 1.0).abs() < 0.02, "{shape:?}: {found}");
         }
     }
 

@@ -8,6 +8,7 @@ pub mod appearance;
 mod area;
 mod bodies;
 pub mod coverage;
+mod ellipse;
 mod emitters;
 mod environment;
 pub mod fog;
