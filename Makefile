@@ -30,7 +30,7 @@ render: build ## render the README's scene to out/gallery.exr and out/gallery.pn
 test: packages ## run the tests of library and program
 	$(CARGO) test --locked
 
-# The longest tests of what no feature changes, the native tracer against brute force and exact arithmetic: `make test` has run them.
+# The longest tests of what no feature changes, the native tracer and how samples are spread: `make test` has run them.
 FEATURELESS = parity:: stress::native stress::the_matrix render::adaptive:: render::determinism::
 
 check: packages ## formatting, lints, documentation, and the program once more without default features
