@@ -19,6 +19,9 @@ pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
 #[track_caller]
 pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
     let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
+    for (ray, expected) in rays.iter().zip(&expected).take(100) {
+        assert_eq!(brute.occluded(ray), expected.is_some());
+    }
     let every = Preset::ALL.into_iter().flat_map(|preset| Isa::ALL.map(|isa| (preset, isa)));
     for (preset, isa) in every.filter(|(_, isa)| isa.is_available()) {
         let mut bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
@@ -50,7 +53,6 @@ pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> us
         for (ray, expected) in rays.iter().zip(&expected).take(100) {
             assert_eq!(bvh.closest(ray), *expected);
             assert_eq!(bvh.occluded(ray), expected.is_some());
-            assert_eq!(brute.occluded(ray), expected.is_some());
         }
     }
     assert_accelerators(world, rays, &expected);
@@ -429,7 +431,7 @@ fn shadow_rays_from_far_away() {
 fn numbers_that_are_not_normal() {
     for scale in [0.01, 1e-5] {
         let square = [Vec3::ZERO, Vec3::X, Vec3::ONE - Vec3::Z, Vec3::Y].map(|corner| corner * scale);
-        let triangles = (0..40).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
+        let triangles = (0..20).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
         let world = World::new(&scenes::of_mesh(Mesh::new(square.to_vec(), triangles))).expect("sound");
         let (mut random, centre) = (Random::new(8), world.centre.as_vec3());
         let rays = (0..2000).map(|i| {

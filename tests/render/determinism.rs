@@ -62,7 +62,7 @@ pub(super) fn busier_scene() -> Scene {
 
 #[test]
 fn threads_tile_orders_and_packets_do_not_show() {
-    let plain = Settings { tile_order: TileOrder::Scanline, seed: 5, ..settings(70, 45, 3) };
+    let plain = Settings { tile_order: TileOrder::Scanline, seed: 5, ..settings(50, 37, 3) };
     check_bits(&busy_scene(DVec3::ZERO), &plain);
     for integrator in Integrator::ALL {
         check_bits(&busier_scene(), &Settings { integrator: Some(integrator), spp: 2, ..plain.clone() });
