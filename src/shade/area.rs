@@ -36,13 +36,12 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: 
     }
 }
 
-/// The rectangle as the point sees it, where that is what directions are chosen by; none for other parallelograms, and where it turns its back.
+/// The rectangle as the point sees it, where that is what directions are chosen by; none for other parallelograms.
 fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<SphericalRectangle> {
     let [a, b] = half_edges;
     // As far as files in f32 have it.
     let is_rectangle = a.dot(b).abs() <= 1e-5 * a.length() * b.length();
-    let shines = (point - centre).dot(a.cross(b)) > 0.0;
-    if is_rectangle && shines { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
+    if is_rectangle { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
 }
 
 /// From the light at `offset` from the point, in whose direction as many are chosen, per steradian.

@@ -24,15 +24,14 @@ pub(super) struct SphericalRectangle {
 impl SphericalRectangle {
     /// What `point` sees of the rectangle around `centre` with half edges that are perpendicular, but for what f32 rounds. None where it is far
     /// away for its size: there an even choice by area is nearly one by solid angle, and angles would be small differences. None, too,
-    /// for a point in its plane.
+    /// where it turns its back, and for a point in its plane.
     pub(super) fn seen_from(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Self> {
         let x = half_edges[0].normalize();
         let second = half_edges[1] - x * half_edges[1].dot(x);
         let (halves, y) = ([half_edges[0].length(), second.length()], second.normalize());
         let z = x.cross(y);
         let offset = centre - point;
-        let middle = DVec2::new(offset.dot(x), offset.dot(y));
-        let (z, depth) = if offset.dot(z) > 0.0 { (-z, -offset.dot(z)) } else { (z, offset.dot(z)) };
+        let (middle, depth) = (DVec2::new(offset.dot(x), offset.dot(y)), offset.dot(z));
         let half = DVec2::from(halves);
         let (low, high) = (middle - half, middle + half);
         // From the point to the nearest one of the rectangle.
@@ -98,7 +97,7 @@ mod tests {
             let edges = edges(width, height);
             let across = edges[0].cross(edges[1]).normalize();
             for (right, up, away) in
-                [(0.0, 0.0, 1.0), (0.0, 0.0, -0.3), (1.5, 0.2, 0.4), (-0.9, 1.3, 1e-3), (0.99, 0.99, 0.01)]
+                [(0.0, 0.0, 1.0), (0.0, 0.0, 0.3), (1.5, 0.2, 0.4), (-0.9, 1.3, 1e-3), (0.99, 0.99, 0.01)]
             {
                 let point = CENTRE + edges[0] * right + edges[1] * up + across * away;
                 let seen = SphericalRectangle::seen_from(point, CENTRE, edges).expect("it is near");
@@ -138,10 +137,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_or_seen_from_the_side_is_left_to_others() {
+    fn what_is_far_or_seen_from_the_side_or_from_behind_is_left_to_others() {
         let edges = edges(1.0, 2.0);
         let across = edges[0].cross(edges[1]).normalize();
         assert!(SphericalRectangle::seen_from(CENTRE + across * 20.0, CENTRE, edges).is_none());
         assert!(SphericalRectangle::seen_from(CENTRE + edges[0] * 1.5, CENTRE, edges).is_none());
+        assert!(SphericalRectangle::seen_from(CENTRE - across, CENTRE, edges).is_none());
     }
 }
