@@ -56,12 +56,8 @@ stress-long: build ## a hundred million random rays and ten million difficult on
 	$(TWINCAST) stress --method native --in-turns --rays 400000 --seed 1 -o out/stress
 	$(TWINCAST) stress --search 3600 --seed 1 -o out/stress
 
-# The longest tests that ask neither Embree nor OpenImageIO anything, so that a Debian with others of these tells nothing new.
-NATIVE = parity::triangles_smaller_than_pixels parity::extreme_placements parity::bundles parity::numbers_that_are_not_normal \
-    stress::native render::adaptive::as_many render::adaptive::the_error
-
-test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5; BRIEF=1 without units and the longest of the native tracer
-	@scripts/test-embree4.sh $(if $(BRIEF),--test twincast -- $(addprefix --skip ,$(NATIVE)))
+test-embree4: ## run every test on Debian 13, with its Embree 4 and OpenImageIO 2.5
+	@scripts/test-embree4.sh
 
 install: build ## put binary, man pages and completions under PREFIX (/usr/local); honours DESTDIR
 	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'

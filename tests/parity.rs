@@ -431,7 +431,7 @@ fn shadow_rays_from_far_away() {
 fn numbers_that_are_not_normal() {
     for scale in [0.01, 1e-5] {
         let square = [Vec3::ZERO, Vec3::X, Vec3::ONE - Vec3::Z, Vec3::Y].map(|corner| corner * scale);
-        let triangles = (0..20).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
+        let triangles = (0..40).flat_map(|_| [[0, 1, 2], [0, 2, 3]]).collect();
         let world = World::new(&scenes::of_mesh(Mesh::new(square.to_vec(), triangles))).expect("sound");
         let (mut random, centre) = (Random::new(8), world.centre.as_vec3());
         let rays = (0..2000).map(|i| {

@@ -78,7 +78,7 @@ fn room() -> Scene {
 #[test]
 fn as_many_samples_buy_less_error() {
     let small = under_a_lamp(0.1, DVec3::new(0.4, 0.2, 0.0));
-    let scenes = [("penumbra", small, 48, 0.004, 2048, 0.5), ("room", room(), 72, 0.07, 512, 0.98)];
+    let scenes = [("penumbra", small, 48, 0.004, 8192, 0.5), ("room", room(), 72, 0.07, 512, 0.98)];
     for (name, scene, side, noise, many, share) in scenes {
         let integrator = (name == "room").then_some(Integrator::Path);
         let base = Settings { integrator, ..settings(side, side, 4) };
