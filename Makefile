@@ -32,6 +32,8 @@ test: packages ## run the tests of library and program
 
 # The longest tests of what no feature changes, the native tracer and how samples are spread: `make test` has run them.
 FEATURELESS = parity:: stress::native stress::the_matrix render::adaptive:: render::determinism::
+# With the Python package, so that one library serves both: who depends on a crate decides on its features.
+WITHOUT_FEATURES = --no-default-features -p twincast -p twincast-python
 
 check: packages ## formatting, lints, documentation, and the program once more without default features
 	$(CARGO) fmt --all --check
@@ -40,8 +42,8 @@ check: packages ## formatting, lints, documentation, and the program once more w
 	$(CARGO) clippy --locked -p twincast-python -p twincast-rtc --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
-	$(CARGO) test --locked --no-default-features --test twincast -- $(addprefix --skip ,$(FEATURELESS))
-	$(CARGO) test --locked --no-default-features --doc
+	$(CARGO) test --locked $(WITHOUT_FEATURES) --test twincast -- $(addprefix --skip ,$(FEATURELESS))
+	$(CARGO) test --locked $(WITHOUT_FEATURES) --doc
 
 stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg
 	@mkdir -p out/stress

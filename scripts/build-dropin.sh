@@ -2,7 +2,7 @@
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
 #
-# DROPIN_PROFILE=test builds slower libraries with every debug assertion, on what the tests without default features are compiled with:
+# DROPIN_PROFILE=dev builds slower libraries with every debug assertion, on what the tests without default features are compiled with:
 # after `make check` nothing but the interface is left to compile.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,11 +10,11 @@ cd "$(dirname "$0")/.."
 cargo=${CARGO:-cargo}
 profile=${DROPIN_PROFILE:-foreign}
 built=target/$profile
-# Beside the tests, since what they depend on may have features that the interface does without.
+# Beside all that the library is compiled for then, since what depends on a crate decides on its features.
 beside=()
-if [[ $profile == test ]]; then
+if [[ $profile == dev ]]; then
     built=target/debug
-    beside=(-p twincast --lib --test twincast)
+    beside=(-p twincast -p twincast-python --lib --test twincast)
 fi
 mkdir -p target/dropin
 

@@ -2,9 +2,15 @@
 # Builds the Python package's wheel into target/wheels, for CPython 3.9 and later: for any Linux as old as Debian 10 (manylinux_2_28), linked by
 # zig, which knows that system's symbols. `--local` builds for this machine's system instead, without zig. Another linker
 # has cargo compile everything once more.
+#
+# WHEEL_PROFILE=dev builds a slower package with every debug assertion, on what the tests without default features are compiled with:
+# after `make check` nothing but the package is left to compile.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 arguments=(build --manifest-path ffi/python/Cargo.toml --out target/wheels --strip)
+if [ "${WHEEL_PROFILE:-}" = dev ]; then
+    arguments+=(--profile dev --features beside-tests)
+fi
 if [ "${1:-}" = --local ]; then
     venv=$(scripts/python-environment.sh)
     arguments+=(--compatibility linux)

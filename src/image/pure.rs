@@ -1,7 +1,7 @@
 //! Image files without OpenImageIO: OpenEXR by the crate exr, PNG and JPEG by the crate image.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Cursor, Write};
 use std::path::Path;
 
 use exr::prelude::{self as openexr, ReadChannels, ReadLayers, WritableImage, f16};
@@ -149,7 +149,9 @@ fn openexr_magic(path: &Path) -> Result<bool> {
 }
 
 fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|e| e.to_string())?;
+    // From memory, as textures are: decoders are compiled once for what they read from.
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    let mut reader = ImageReader::new(Cursor::new(&bytes[..])).with_guessed_format().map_err(|e| e.to_string())?;
     reader.no_limits(); // ours follow, before anything is allocated
     let decoder = reader.into_decoder().map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions();
