@@ -8,6 +8,10 @@ use std::sync::LazyLock;
 /// Linear light for each of the 256 codes: [0, 1], rounded from f64.
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 / 255.0) as f32));
 
+/// The same for each of the 65,536 codes of 16 bits.
+static LINEAR16: LazyLock<Box<[f32]>> =
+    LazyLock::new(|| (0..=u16::MAX).map(|code| decode(f64::from(code) / 65535.0) as f32).collect());
+
 /// The linear light of an encoded value, both 0 to 1.
 pub(crate) fn decode(encoded: f64) -> f64 {
     if encoded <= 0.04045 { encoded / 12.92 } else { libm::pow((encoded + 0.055) / 1.055, 2.4) }
@@ -20,8 +24,21 @@ pub fn srgb_to_linear(code: u8) -> f32 {
 }
 
 /// The linear light, 0 to 1, that a 16-bit code stands for.
-pub(super) fn srgb16_to_linear(code: u16) -> f32 {
-    decode(f64::from(code) / 65535.0) as f32
+#[inline]
+pub(crate) fn srgb16_to_linear(code: u16) -> f32 {
+    LINEAR16[usize::from(code)]
+}
+
+/// The number, 0 to 1, that an 8-bit code stands for where nothing is encoded.
+#[inline]
+pub(crate) fn unit_from_8bit(code: u8) -> f32 {
+    f32::from(code) / 255.0
+}
+
+/// The number, 0 to 1, that a 16-bit code stands for where nothing is encoded.
+#[inline]
+pub(crate) fn unit_from_16bit(code: u16) -> f32 {
+    f32::from(code) / 65535.0
 }
 
 /// The encoded value, 0 to 1, of a linear one. Below 0 counts as 0, above 1 as 1, and NaN as 0.

@@ -2,7 +2,6 @@
 
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::Arc;
 
 use image::error::ImageError;
 use image::{ImageReader, Limits};
@@ -11,7 +10,7 @@ use crate::error::{Error, Result, one_line};
 use crate::image::is_cut_short;
 use crate::io::Placeless;
 use crate::memory::Mapped;
-use crate::scene::Texture;
+use crate::scene::{Pixels, Texture};
 
 /// Longest side, in pixels.
 const LONGEST_SIDE: u32 = 16_384;
@@ -57,15 +56,14 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     if is_cut_short(bytes) {
         return Err("is a broken picture: it is cut short".to_owned());
     }
-    let image = reader()?.decode().map_err(|e| broken(&e))?.into_rgba8();
-    let (width, height) = image.dimensions();
-    Ok(Texture {
-        name: name.to_string(),
-        width,
-        height,
-        pixels: Arc::new(bytemuck::cast_slice(image.as_raw()).to_vec()),
-        ..Texture::default()
-    })
+    let image = reader()?.decode().map_err(|e| broken(&e))?;
+    let is_deep = image.color().bytes_per_pixel() > image.color().channel_count();
+    let pixels = if is_deep {
+        Pixels::from(bytemuck::cast_slice::<_, [u16; 4]>(image.into_rgba16().as_raw()).to_vec())
+    } else {
+        Pixels::from(bytemuck::cast_slice::<_, [u8; 4]>(image.into_rgba8().as_raw()).to_vec())
+    };
+    Ok(Texture { name: name.to_string(), width, height, pixels, ..Texture::default() })
 }
 
 fn limits() -> Limits {

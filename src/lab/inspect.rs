@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -126,9 +125,9 @@ fn bytes(scene: &Scene) -> u64 {
     });
     // Textures may share a picture.
     let mut pictures: Vec<_> = scene.textures.iter().map(|texture| &texture.pixels).collect();
-    pictures.sort_by_key(|pixels| Arc::as_ptr(pixels));
-    pictures.dedup_by(|a, b| Arc::ptr_eq(a, b));
-    let textures = pictures.into_iter().map(|pixels| size_of_val(&pixels[..]));
+    pictures.sort_by_key(|pixels| pixels.address());
+    pictures.dedup_by_key(|pixels| pixels.address());
+    let textures = pictures.into_iter().map(|pixels| pixels.bytes().len());
     let instances = size_of_val(&scene.instances[..]);
     (geometries.sum::<usize>() + textures.sum::<usize>() + instances) as u64
 }

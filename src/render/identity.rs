@@ -119,7 +119,7 @@ fn scene(scene: &Scene) -> u128 {
     digest.add(&(materials, lights, unlit, ambient, background, fog));
     for Texture { name, width, height, pixels, wrap_u, wrap_v, filter, on_second_uvs, transform } in textures {
         digest.add(&(name, width, height, wrap_u, wrap_v, filter, on_second_uvs, transform));
-        digest.add_all(pixels);
+        digest.add_all(pixels.bytes());
     }
     if let Some(Environment { image, intensity, rotation }) = environment {
         let Image { width, height, pixels } = &**image;
@@ -143,7 +143,7 @@ mod tests {
                 textures: vec![Texture {
                     width: 1,
                     height: 1,
-                    pixels: vec![[1, 2, 3, 4]].into(),
+                    pixels: vec![[1u8, 2, 3, 4]].into(),
                     ..Texture::default()
                 }],
                 environment: Some(Environment::new(Image::new(2, 1))),
@@ -153,7 +153,7 @@ mod tests {
         let changes: [fn(&mut Scene); 9] = [
             |s| s.ambient = Vec3::X,
             |s| s.materials[0].ior = 1.25,
-            |s| s.textures[0].pixels = vec![[1, 2, 9, 4]].into(),
+            |s| s.textures[0].pixels = vec![[1u8, 2, 9, 4]].into(),
             |s| s.instances[0].transform = DAffine3::from_translation(DVec3::X * 1e-300),
             |s| s.instances[0].transform_end = Some(DAffine3::IDENTITY),
             |s| s.background = Some(Vec3::ZERO),

@@ -37,7 +37,7 @@ pub use recipes::{RECIPES, Recipe};
 pub use request::{Integrator, Request};
 pub use rocks::rocks;
 pub use search::{Accel, Resolution, Search};
-pub use texture::{Filter, Texture, Wrap};
+pub use texture::{Filter, Pixels, Texture, Wrap};
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! An image on a surface.
+//! Images on surfaces.
 
 use std::sync::Arc;
 
@@ -26,7 +26,66 @@ pub enum Filter {
     Linear,
 }
 
-/// An 8-bit sRGB image with alpha, first row at the top.
+/// What a picture shows, row by row, the first at the top: sRGB-encoded colour, or numbers, and linear alpha; in as many bits as its file has.
+/// Shared by textures that show the same picture in other places.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Pixels {
+    /// Channels of 8 bits.
+    Eight(Arc<Vec<[u8; 4]>>),
+    /// Channels of 16 bits.
+    Sixteen(Arc<Vec<[u16; 4]>>),
+}
+
+impl Default for Pixels {
+    fn default() -> Self {
+        Self::Eight(Arc::default())
+    }
+}
+
+impl From<Vec<[u8; 4]>> for Pixels {
+    fn from(pixels: Vec<[u8; 4]>) -> Self {
+        Self::Eight(pixels.into())
+    }
+}
+
+impl From<Vec<[u16; 4]>> for Pixels {
+    fn from(pixels: Vec<[u16; 4]>) -> Self {
+        Self::Sixteen(pixels.into())
+    }
+}
+
+impl Pixels {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Eight(pixels) => pixels.len(),
+            Self::Sixteen(pixels) => pixels.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// As they lie in memory.
+    pub fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Eight(pixels) => pixels.as_flattened(),
+            Self::Sixteen(pixels) => bytemuck::cast_slice(pixels),
+        }
+    }
+
+    /// A number that is the same for those that are shared, and for no others.
+    pub(crate) fn address(&self) -> usize {
+        match self {
+            Self::Eight(pixels) => Arc::as_ptr(pixels).addr(),
+            Self::Sixteen(pixels) => Arc::as_ptr(pixels).addr(),
+        }
+    }
+}
+
+/// An image on a surface.
 #[derive(Clone, Debug, Default)]
 pub struct Texture {
     /// File name or name in the file, for messages.
@@ -35,9 +94,8 @@ pub struct Texture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// sRGB-encoded colour, linear alpha; row by row; `width * height` of them.
-    /// Shared by textures that show the same picture in other places.
-    pub pixels: Arc<Vec<[u8; 4]>>,
+    /// `width * height` of them.
+    pub pixels: Pixels,
     /// Outside the unit square, along u.
     pub wrap_u: Wrap,
     /// Outside the unit square, along v.

@@ -3,35 +3,49 @@
 //! Texels are decoded to linear light before they are mixed: mixing sRGB codes would darken every edge between light
 //! and dark.
 
-use crate::image::srgb::srgb_to_linear;
+use crate::image::srgb::{srgb_to_linear, srgb16_to_linear, unit_from_8bit, unit_from_16bit};
 use crate::math::{Vec2, Vec4};
-use crate::scene::{Filter, Texture, Wrap};
+use crate::scene::{Filter, Pixels, Texture, Wrap};
 
 /// The linear RGBA colour at `uv` (v up). White for an image without pixels and for coordinates that are not finite.
 pub fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
-    interpolate(texture, uv, srgb_to_linear)
+    interpolate(texture, uv, srgb_to_linear, srgb16_to_linear)
 }
 
 /// The same of an image whose colours are numbers, from 0 to 1, that are not encoded.
 pub fn numbers(texture: &Texture, uv: Vec2) -> Vec4 {
-    interpolate(texture, uv, |code| f32::from(code) / 255.0)
+    interpolate(texture, uv, unit_from_8bit, unit_from_16bit)
 }
 
-fn interpolate(texture: &Texture, uv: Vec2, decode: impl Fn(u8) -> f32 + Copy) -> Vec4 {
+/// `of_8` and `of_16` are for colours; alpha is a number always.
+fn interpolate(texture: &Texture, uv: Vec2, of_8: impl Fn(u8) -> f32, of_16: impl Fn(u16) -> f32) -> Vec4 {
+    match &texture.pixels {
+        Pixels::Eight(pixels) => {
+            between(texture, pixels, uv, |[r, g, b, a]| Vec4::new(of_8(r), of_8(g), of_8(b), unit_from_8bit(a)))
+        }
+        Pixels::Sixteen(pixels) => {
+            between(texture, pixels, uv, |[r, g, b, a]| Vec4::new(of_16(r), of_16(g), of_16(b), unit_from_16bit(a)))
+        }
+    }
+}
+
+/// What is at `uv`, between texels.
+fn between<P: Copy>(texture: &Texture, pixels: &[P], uv: Vec2, decode: impl Fn(P) -> Vec4) -> Vec4 {
+    let texel = |x, y| decode(pixels[place(texture, x, y)]);
     let st = texture.transform.transform_point2(uv);
-    if texture.pixels.is_empty() || !st.is_finite() {
+    if pixels.is_empty() || !st.is_finite() {
         return Vec4::ONE;
     }
     // Texel centres lie at half-integers; the first row is at the top, v = 1.
     let x = st.x * texture.width as f32;
     let y = (1.0 - st.y) * texture.height as f32;
     match texture.filter {
-        Filter::Nearest => texel(texture, index(x), index(y), decode),
+        Filter::Nearest => texel(index(x), index(y)),
         Filter::Linear => {
             let (x, y) = (x - 0.5, y - 0.5);
             let (left, top) = (index(x), index(y));
             let (fx, fy) = (x - x.floor(), y - y.floor());
-            let row = |y| texel(texture, left, y, decode) * (1.0 - fx) + texel(texture, left + 1, y, decode) * fx;
+            let row = |y| texel(left, y) * (1.0 - fx) + texel(left + 1, y) * fx;
             row(top) * (1.0 - fy) + row(top + 1) * fy
         }
     }
@@ -42,11 +56,11 @@ fn index(x: f32) -> i64 {
     x.floor().clamp(-1e15, 1e15) as i64
 }
 
-fn texel(texture: &Texture, x: i64, y: i64, decode: impl Fn(u8) -> f32) -> Vec4 {
+/// Where a texel is among all.
+fn place(texture: &Texture, x: i64, y: i64) -> usize {
     let x = wrap(texture.wrap_u, x, i64::from(texture.width));
     let y = wrap(texture.wrap_v, y, i64::from(texture.height));
-    let [r, g, b, a] = texture.pixels[(y * i64::from(texture.width) + x) as usize];
-    Vec4::new(decode(r), decode(g), decode(b), f32::from(a) / 255.0)
+    (y * i64::from(texture.width) + x) as usize
 }
 
 /// Brings an index into `0..size`.
@@ -70,7 +84,7 @@ mod tests {
         Texture {
             width: 2,
             height: 2,
-            pixels: vec![[0, 0, 0, 255], [255; 4], [255, 0, 0, 255], [188, 188, 188, 51]].into(),
+            pixels: vec![[0u8, 0, 0, 255], [255; 4], [255, 0, 0, 255], [188, 188, 188, 51]].into(),
             wrap_u: wrap,
             wrap_v: wrap,
             filter,
@@ -96,6 +110,28 @@ mod tests {
     fn filtering_mixes_light_not_codes() {
         let texture = checker(Wrap::Clamp, Filter::Linear);
         assert_eq!(sample(&texture, Vec2::new(0.5, 0.75)), Vec4::new(0.5, 0.5, 0.5, 1.0));
+    }
+
+    #[test]
+    fn sixteen_bits_are_as_fine_as_they_are() {
+        for filter in [Filter::Nearest, Filter::Linear] {
+            let eight = checker(Wrap::Mirror, filter);
+            let Pixels::Eight(codes) = &eight.pixels else { unreachable!() };
+            let codes: Vec<_> = codes.iter().map(|pixel| pixel.map(|code| u16::from(code) * 257)).collect();
+            let sixteen = Texture { pixels: codes.into(), ..eight.clone() };
+            for uv in [Vec2::new(0.25, 0.25), Vec2::new(0.4, 0.7), Vec2::new(-3.1, 8.6)] {
+                assert_eq!(sample(&sixteen, uv), sample(&eight, uv), "{uv}: 0 is 0 and 65535 is 255");
+                assert_eq!(numbers(&sixteen, uv), numbers(&eight, uv), "{uv}");
+            }
+        }
+        let fine =
+            Texture { width: 1, height: 1, pixels: vec![[1u16, 32_768, 65_534, 100]].into(), ..Texture::default() };
+        let expected = Vec4::new(1.0 / 65535.0, 32_768.0 / 65535.0, 65_534.0 / 65535.0, 100.0 / 65535.0);
+        assert_eq!(numbers(&fine, Vec2::ZERO), expected);
+        let light = sample(&fine, Vec2::ZERO);
+        assert_eq!((light.x, light.w), ((1.0 / 65535.0 / 12.92) as f32, expected.w), "the straight part of the curve");
+        // By the slope at the end of the curve, 2.4 / 1.055.
+        assert!((light.z - (1.0 - 2.4 / 1.055 / 65535.0) as f32).abs() < 1e-7, "{light}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Projection, Wrap};
+use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Pixels, Projection, Wrap};
 
 use super::gltf_maker::Maker;
 use super::{Files, corners, meshes, obj, refused};
@@ -146,7 +146,10 @@ fn everything_is_where_it_belongs() {
         assert_eq!((gold.shininess, gold.emission), (30.0, Vec3::new(0.0, 2.0, 0.0)));
         let texture = &scene.textures[gold.diffuse_texture.unwrap() as usize];
         assert_eq!((texture.wrap_u, texture.wrap_v, texture.filter), (Wrap::Clamp, Wrap::Mirror, Filter::Nearest));
-        assert_eq!((texture.name.as_str(), &texture.pixels[..]), ("two", &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
+        assert_eq!(
+            (texture.name.as_str(), &texture.pixels),
+            ("two", &vec![[255u8, 0, 0, 255], [0, 0, 255, 128]].into())
+        );
 
         let eye = &scene.cameras[0];
         assert_eq!(
@@ -247,7 +250,8 @@ fn a_webp_picture_comes_before_the_one_beside_it() {
     let (scene, warnings) = changed(&changes).load("a.gltf");
     let texture = &scene.textures[0];
     assert_eq!((texture.width, texture.height, warnings.len()), (16, 8, 0));
-    for (i, pixel) in texture.pixels.iter().enumerate() {
+    let Pixels::Eight(pixels) = &texture.pixels else { panic!("{:?}", texture.pixels) };
+    for (i, pixel) in pixels.iter().enumerate() {
         // Away from the edge, along which colours run together.
         let expected = match i % 16 {
             0..6 => [230, 26, 51, 255],
@@ -260,6 +264,24 @@ fn a_webp_picture_comes_before_the_one_beside_it() {
     refused(&changed(&changes), "a.gltf", "/textures/0/extensions/EXT_texture_webp/source", "no image 7");
     changes[0].1 = json!([{"sampler": 0, "source": 0}]);
     assert_eq!(changed(&changes).scene("a.gltf").textures[0].width, 2, "the other one, where that is all there is");
+}
+
+#[test]
+fn sixteen_bits_of_a_picture_are_kept() {
+    let codes = [0u16, 1, 257, 65_535, 33_000, 32_999, 12_345, 40_000];
+    let picture = |format: fn(&[u16]) -> image::DynamicImage| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        format(&codes).write_to(&mut bytes, image::ImageFormat::Png).expect("a PNG");
+        let uri = data_uri("image/png", &bytes.into_inner());
+        let scene = changed(&[("/images", json!([{"uri": uri}]))]).scene("a.gltf");
+        scene.textures[0].pixels.clone()
+    };
+    let colors =
+        picture(|codes| image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(2, 1, codes.to_vec()).unwrap().into());
+    assert_eq!(colors, Pixels::from(vec![[0u16, 1, 257, 65_535], [33_000, 32_999, 12_345, 40_000]]));
+    let greys =
+        picture(|codes| image::ImageBuffer::<image::Luma<u16>, _>::from_raw(8, 1, codes.to_vec()).unwrap().into());
+    assert_eq!(greys, Pixels::from(codes.map(|c| [c, c, c, 65_535]).to_vec()));
 }
 
 #[test]

@@ -110,7 +110,10 @@ fn materials_and_textures() {
     assert_eq!((shiny.specular, shiny.shininess, shiny.model), (Vec3::splat(0.5), 100.0, Specular::BlinnPhong));
     assert_eq!((shiny.diffuse, shiny.diffuse_texture), (Vec3::ONE, Some(0)));
     let texture = &scene.textures[0];
-    assert_eq!((texture.width, texture.height, &texture.pixels[..]), (2, 1, &[[255, 0, 0, 255], [0, 0, 255, 128]][..]));
+    assert_eq!(
+        (texture.width, texture.height, &texture.pixels),
+        (2, 1, &vec![[255u8, 0, 0, 255], [0, 0, 255, 128]].into())
+    );
     assert_eq!(texture.transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 3.0), "scaled, then moved");
     assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::Clamp, Wrap::Clamp));
     let shapes: Vec<_> = meshes(&scene).iter().map(|m| (m.name.as_str(), m.material, m.triangles.len())).collect();

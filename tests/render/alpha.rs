@@ -67,7 +67,7 @@ fn masks_cut_out_and_so_do_their_shadows() {
     let texture = Texture {
         width: 2,
         height: 1,
-        pixels: vec![[255, 255, 255, 200], [255, 255, 255, 100]].into(),
+        pixels: vec![[255u8, 255, 255, 200], [255, 255, 255, 100]].into(),
         wrap_u: Wrap::Clamp,
         filter: Filter::Nearest,
         ..Texture::default()

@@ -5,7 +5,6 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::Arc;
 
 use serde::Deserialize;
 
@@ -155,7 +154,7 @@ impl<'a> Textures<'a> {
 
     fn mean(&mut self, index: Option<u32>, are_numbers: bool) -> Vec4 {
         let Some(texture) = index.and_then(|index| self.list.get(index as usize)) else { return Vec4::ONE };
-        *self.means.entry((Arc::as_ptr(&texture.pixels).addr(), are_numbers)).or_insert_with(|| match are_numbers {
+        *self.means.entry((texture.pixels.address(), are_numbers)).or_insert_with(|| match are_numbers {
             true => means::mean_number(texture),
             false => means::mean_color(texture).extend(1.0),
         })
