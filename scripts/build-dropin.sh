@@ -3,7 +3,7 @@
 # holds what they export to what Embree exports.
 #
 # DROPIN_PROFILE=dev builds slower libraries with every debug assertion, on what the tests without default features are compiled with:
-# after `make check` nothing but the interface is left to compile.
+# after `make check` nothing but the interface is left to compile, and the Python package, which cargo cannot leave out then.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,6 +15,10 @@ beside=()
 if [[ $profile == dev ]]; then
     built=target/debug
     beside=(-p twincast -p twincast-python --lib --test twincast)
+fi
+if [[ $profile == test ]]; then
+    echo "DROPIN_PROFILE=test: the profile of tests is dev" >&2
+    exit 2
 fi
 mkdir -p target/dropin
 

@@ -4,13 +4,18 @@
 # has cargo compile everything once more.
 #
 # WHEEL_PROFILE=dev builds a slower package with every debug assertion, on what the tests without default features are compiled with:
-# after `make check` nothing but the package is left to compile.
+# after `make check` nothing but the package is left to compile for this machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 arguments=(build --manifest-path ffi/python/Cargo.toml --out target/wheels --strip)
-if [ "${WHEEL_PROFILE:-}" = dev ]; then
-    arguments+=(--profile dev --features beside-tests)
-fi
+case "${WHEEL_PROFILE:-foreign}" in
+    foreign) ;;
+    dev) arguments+=(--profile dev --features beside-tests) ;;
+    *)
+        echo "WHEEL_PROFILE=$WHEEL_PROFILE: neither foreign nor dev" >&2
+        exit 2
+        ;;
+esac
 if [ "${1:-}" = --local ]; then
     venv=$(scripts/python-environment.sh)
     arguments+=(--compatibility linux)

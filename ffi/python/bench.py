@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 import twincast
+from twincast._native import DEBUG_ASSERTIONS
 from twincast.compat.embreex import mesh_construction as our_meshes
 from twincast.compat.embreex import rtcore_scene as our_scene
 
@@ -98,6 +99,8 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
+    if DEBUG_ASSERTIONS:
+        parser.error("the package in this environment was built for tests (WHEEL_PROFILE=dev); `make test-python` puts a fast one there")
     if arguments.mesh:
         vertices, faces = read_obj(arguments.mesh)
     else:

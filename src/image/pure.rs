@@ -13,6 +13,7 @@ use super::file::{COMMON, Encoding};
 use super::metadata::{Metadata, Window, is_text, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 use super::{Channel, pure_channels};
+use crate::memory::Mapped;
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -149,8 +150,8 @@ fn openexr_magic(path: &Path) -> Result<bool> {
 }
 
 fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    // From memory, as textures are: decoders are compiled once for what they read from.
-    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    // Mapped, as textures are, so that decoders are compiled once.
+    let bytes = Mapped::open(path).map_err(|e| e.to_string())?;
     let mut reader = ImageReader::new(Cursor::new(&bytes[..])).with_guessed_format().map_err(|e| e.to_string())?;
     reader.no_limits(); // ours follow, before anything is allocated
     let decoder = reader.into_decoder().map_err(|e| e.to_string())?;

@@ -3,6 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use bytemuck::{Pod, try_cast_vec};
 use image::error::ImageError;
 use image::{ImageReader, Limits};
 
@@ -59,11 +60,16 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     let image = reader()?.decode().map_err(|e| broken(&e))?;
     let is_deep = image.color().bytes_per_pixel() > image.color().channel_count();
     let pixels = if is_deep {
-        Pixels::from(bytemuck::cast_slice::<_, [u16; 4]>(image.into_rgba16().as_raw()).to_vec())
+        Pixels::from(in_fours(image.into_rgba16().into_raw()))
     } else {
-        Pixels::from(bytemuck::cast_slice::<_, [u8; 4]>(image.into_rgba8().as_raw()).to_vec())
+        Pixels::from(in_fours(image.into_rgba8().into_raw()))
     };
     Ok(Texture { name: name.to_string(), width, height, pixels, ..Texture::default() })
+}
+
+/// Without a copy, unless there is room for more values than whole pixels take.
+fn in_fours<T: Pod>(values: Vec<T>) -> Vec<[T; 4]> {
+    try_cast_vec(values).unwrap_or_else(|(_, values)| bytemuck::cast_slice(&values).to_vec())
 }
 
 fn limits() -> Limits {

@@ -9,7 +9,7 @@ use twox_hash::XxHash3_128;
 
 use super::{Renderer, Settings};
 use crate::image::{Image, Metadata};
-use crate::scene::{Environment, Geometry, Instance, Mesh, Scene, Texture};
+use crate::scene::{Environment, Geometry, Instance, Mesh, Pixels, Scene, Texture};
 
 /// What must be the same, each under a name that tells a reader what it is about.
 pub(super) fn identity(renderer: &Renderer<'_>, engine: &str) -> Vec<(&'static str, String)> {
@@ -119,7 +119,10 @@ fn scene(scene: &Scene) -> u128 {
     digest.add(&(materials, lights, unlit, ambient, background, fog));
     for Texture { name, width, height, pixels, wrap_u, wrap_v, filter, on_second_uvs, transform } in textures {
         digest.add(&(name, width, height, wrap_u, wrap_v, filter, on_second_uvs, transform));
-        digest.add_all(pixels.bytes());
+        match pixels {
+            Pixels::Eight(pixels) => digest.add_all(pixels),
+            Pixels::Sixteen(pixels) => digest.add_all(pixels),
+        }
     }
     if let Some(Environment { image, intensity, rotation }) = environment {
         let Image { width, height, pixels } = &**image;
@@ -150,10 +153,11 @@ mod tests {
                 ..Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()])
             }
         };
-        let changes: [fn(&mut Scene); 9] = [
+        let changes: [fn(&mut Scene); 10] = [
             |s| s.ambient = Vec3::X,
             |s| s.materials[0].ior = 1.25,
             |s| s.textures[0].pixels = vec![[1u8, 2, 9, 4]].into(),
+            |s| s.textures[0].pixels = vec![[1u16, 2, 3, 4]].into(),
             |s| s.instances[0].transform = DAffine3::from_translation(DVec3::X * 1e-300),
             |s| s.instances[0].transform_end = Some(DAffine3::IDENTITY),
             |s| s.background = Some(Vec3::ZERO),

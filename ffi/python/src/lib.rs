@@ -39,6 +39,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("DEBUG_ASSERTIONS", cfg!(debug_assertions))?;
         module.add("ISA", twincast::trace::bvh::Isa::detect().name())
     }
 }

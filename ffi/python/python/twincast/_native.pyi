@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
+DEBUG_ASSERTIONS: bool  # Whether it is a build for tests, which is slower.
 ISA: str  # The most that kernels may use of the processor's instructions.
 
 _Floats = NDArray[np.float32] | NDArray[np.float64]
