@@ -153,11 +153,12 @@ mod tests {
                 ..Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()])
             }
         };
-        let changes: [fn(&mut Scene); 10] = [
+        let changes: [fn(&mut Scene); 11] = [
             |s| s.ambient = Vec3::X,
             |s| s.materials[0].ior = 1.25,
             |s| s.textures[0].pixels = vec![[1u8, 2, 9, 4]].into(),
             |s| s.textures[0].pixels = vec![[1u16, 2, 3, 4]].into(),
+            |s| s.textures[0].pixels = vec![[1u16, 2, 9, 4]].into(),
             |s| s.instances[0].transform = DAffine3::from_translation(DVec3::X * 1e-300),
             |s| s.instances[0].transform_end = Some(DAffine3::IDENTITY),
             |s| s.background = Some(Vec3::ZERO),
