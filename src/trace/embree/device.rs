@@ -23,6 +23,8 @@ pub(super) struct Device {
 pub(super) struct State {
     /// The first error since the last check.
     error: Mutex<Option<String>>,
+    /// Whether there is one.
+    has_error: AtomicBool,
     /// A callback of ours panicked: answers since then cannot be trusted.
     panicked: AtomicBool,
     /// Allocated less freed.
@@ -74,13 +76,27 @@ impl Device {
 
     /// The first error since the last check, as having happened while `doing` something.
     pub(super) fn check(&self, doing: &str) -> Result<()> {
-        let error = self.state.error.lock().unwrap_or_else(PoisonError::into_inner).take();
+        // For the sake of millions of instances, after each of which there is none.
+        if !self.state.has_error.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let mut error = self.state.error.lock().unwrap_or_else(PoisonError::into_inner);
+        self.state.has_error.store(false, Ordering::Release);
+        let error = error.take();
         error.map_or(Ok(()), |error| Err(backend(format!("{doing}: {error}"))))
     }
 
     /// Bytes that Embree holds.
     pub(super) fn bytes(&self) -> usize {
         self.state.bytes.load(Ordering::Relaxed).max(0).unsigned_abs()
+    }
+
+    /// Does something in which Embree allocates, and tells how many more bytes it holds afterwards than it says by itself.
+    pub(super) fn untold_bytes<T>(&self, work: impl FnOnce() -> T) -> (T, usize) {
+        let before = (allocated(), self.bytes());
+        let done = work();
+        let (allocated, told) = (allocated().saturating_sub(before.0), self.bytes().saturating_sub(before.1));
+        (done, allocated.saturating_sub(told))
     }
 
     /// The version of the library that was loaded.
@@ -124,7 +140,9 @@ impl Drop for Device {
 
 impl State {
     fn report(&self, error: String) {
-        self.error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        first.get_or_insert(error);
+        self.has_error.store(true, Ordering::Release);
     }
 
     /// Notes that a callback of ours panicked.
@@ -138,6 +156,19 @@ impl State {
     pub(super) fn has_panicked(&self) -> bool {
         self.panicked.load(Ordering::Relaxed)
     }
+}
+
+/// Bytes that glibc's allocator has handed out to the whole process; 0 where another one is used.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn allocated() -> usize {
+    // SAFETY: only counts.
+    let counts = unsafe { libc::mallinfo2() };
+    counts.uordblks + counts.hblkhd
+}
+
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+fn allocated() -> usize {
+    0
 }
 
 /// `RTCErrorFunction`.
