@@ -9,6 +9,7 @@ mod compact;
 mod course;
 mod gltf;
 mod nff;
+mod number;
 mod obj;
 mod parts;
 mod ply;
@@ -118,6 +119,17 @@ fn suffix(path: &Path) -> String {
     path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
+/// Of a file without a primitive; with what was left out of it, which may be why.
+fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
+    let mut message =
+        "nothing to render: no ray could hit anything; give a file with at least one triangle or shape".to_owned();
+    if let Some(first) = warnings.first() {
+        let more = if warnings.len() > 1 { format!(" ({} more)", warnings.len() - 1) } else { String::new() };
+        message += &format!(". What was left out: {first}{more}");
+    }
+    Error::input(path, "", message)
+}
+
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
 /// What is odd but can be rendered comes back as warnings: a missing texture, triangles with corners that are not
@@ -171,8 +183,7 @@ pub fn load_watched(
     let may_be_empty = options.animation.time.is_some();
     fault(&scene).map_err(|message| Error::input(path, "", message))?;
     if scene.primitive_count() == 0 && !may_be_empty {
-        let message = "nothing to render: no ray could hit anything; give a file with at least one triangle or shape";
-        return Err(Error::input(path, "", message));
+        return Err(nothing_to_render(path, &warnings));
     }
     scene.bake_turns();
     for geometry in &mut scene.geometries {

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::Promised;
-use super::text::{Words, quoted};
+use super::text::{Words, quoted, without_mark};
 use super::weld::{Weld, weld};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
@@ -31,7 +31,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
 /// is wrong is told by the word that must follow in a text.
 fn is_text(bytes: &[u8]) -> bool {
     let fits = promised(bytes).is_some_and(|count| HEADER as u64 + count * FACET as u64 == bytes.len() as u64);
-    let head = &bytes[..bytes.len().min(1024)];
+    let head = without_mark(&bytes[..bytes.len().min(1024)]);
     let has = |word: &[u8]| head.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word));
     let begins = head.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
     !fits && begins && (has(b"facet") || has(b"endsolid"))
@@ -87,7 +87,7 @@ fn vectors(bits: Vec<[u32; 3]>) -> Vec<Vec3> {
 }
 
 fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
-    let bytes: &[u8] = file;
+    let bytes = without_mark(file);
     let mut told = 0;
     let mut words = Words::new(bytes, 1);
     let mut weld = Weld::new();
@@ -106,8 +106,9 @@ fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
             b"endsolid" => words.skip_line(),
             b"facet" => {
                 expect(path, &mut words, "normal")?;
+                // Not read: of a triangle without an area some programs write what is no number at all.
                 for _ in 0..3 {
-                    number(path, &mut words)?;
+                    words.next();
                 }
                 expect(path, &mut words, "outer")?;
                 expect(path, &mut words, "loop")?;
@@ -147,8 +148,7 @@ fn expect(path: &Path, words: &mut Words<'_>, wanted: &str) -> Result<()> {
 }
 
 fn number(path: &Path, words: &mut Words<'_>) -> Result<f64> {
-    let word = words.next();
-    word.and_then(super::text::number).ok_or_else(|| unexpected(path, words, word, "a number"))
+    words.number_or_word().map_err(|word| unexpected(path, words, word, "a number"))
 }
 
 fn unexpected(path: &Path, words: &Words<'_>, word: Option<&[u8]>, wanted: &str) -> Error {

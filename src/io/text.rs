@@ -4,7 +4,8 @@
 //! the words that are read as numbers are checked, which is also several times faster.
 
 use std::borrow::Cow;
-use std::str::FromStr;
+
+use super::number::Number;
 
 /// A text without the mark that some editors put before UTF-8 (U+FEFF).
 pub(super) fn without_mark(text: &[u8]) -> &[u8] {
@@ -96,8 +97,42 @@ impl<'a> Words<'a> {
 
     /// The next word as a number. None where there is no word, or it is not a number.
     #[inline]
-    pub(super) fn number<T: FromStr>(&mut self) -> Option<T> {
-        number(self.next()?)
+    pub(super) fn number<T: Number>(&mut self) -> Option<T> {
+        self.number_or_word().ok()
+    }
+
+    /// The next word as a number, or what stands there instead, if anything does.
+    #[inline]
+    pub(super) fn number_or_word<T: Number>(&mut self) -> Result<T, Option<&'a [u8]>> {
+        if let Some(number) = self.read(T::leading) {
+            return Ok(number);
+        }
+        let word = self.next().ok_or(None)?;
+        number(word).ok_or(Some(word))
+    }
+
+    /// What `read` makes of the next word, if it takes all of it; else the word stays where it is. `read` sees the text from there on, and says how many
+    /// bytes it takes: so each is read once, and not to find the word's end before.
+    #[inline]
+    pub(super) fn read<T>(&mut self, read: impl FnOnce(&'a [u8]) -> Option<(T, usize)>) -> Option<T> {
+        let (begin, line) = self.begin();
+        let (value, length) = read(&self.text[begin..])?;
+        let is_whole = self.text.get(begin + length).is_none_or(|b| is_space(*b));
+        is_whole.then(|| {
+            (self.at, self.line) = (begin + length, line);
+            value
+        })
+    }
+
+    /// Where the next word begins, and in which line; the end of the text, if there is none.
+    #[inline]
+    fn begin(&self) -> (usize, usize) {
+        let (mut at, mut line) = (self.at, self.line);
+        while let Some(b) = self.text.get(at).filter(|b| is_space(**b)) {
+            line += usize::from(*b == b'\n');
+            at += 1;
+        }
+        (at, line)
     }
 }
 
@@ -106,12 +141,8 @@ impl<'a> Iterator for Words<'a> {
 
     #[inline]
     fn next(&mut self) -> Option<&'a [u8]> {
-        let mut line = self.line;
-        while let Some(b) = self.text.get(self.at).filter(|b| is_space(**b)) {
-            line += usize::from(*b == b'\n');
-            self.at += 1;
-        }
-        let begin = self.at;
+        let (begin, line) = self.begin();
+        self.at = begin;
         while self.text.get(self.at).is_some_and(|b| !is_space(*b)) {
             self.at += 1;
         }
@@ -130,8 +161,11 @@ fn is_space(b: u8) -> bool {
 
 /// A word as a number; floats may be `nan` and `inf`.
 #[inline]
-pub(super) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
-    str::from_utf8(word).ok()?.parse().ok()
+pub(super) fn number<T: Number>(word: &[u8]) -> Option<T> {
+    match T::leading(word) {
+        Some((number, length)) if length == word.len() => Some(number),
+        _ => str::from_utf8(word).ok()?.parse().ok(),
+    }
 }
 
 /// Bytes for a message: as text, shortened to 40 characters.
@@ -144,9 +178,11 @@ pub(super) fn quoted(bytes: &[u8]) -> String {
     format!("{short:?}")
 }
 
-/// A name in a file, as text.
+/// A name in a file, as text. One that is not UTF-8 is taken for Latin-1, in which every byte is a letter: whatever it was written in, names that
+/// differ stay different.
 pub(super) fn name(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes.trim_ascii()).into_owned()
+    let bytes = bytes.trim_ascii();
+    str::from_utf8(bytes).map_or_else(|_| bytes.iter().copied().map(char::from).collect(), str::to_owned)
 }
 
 #[cfg(test)]
@@ -172,6 +208,25 @@ mod tests {
         assert_eq!((words.number::<f32>(), words.line), (None, 9));
         assert_eq!(words.next(), None);
         assert_eq!(words.remaining(), 0);
+    }
+
+    /// A number is one word, whichever way it is read.
+    #[test]
+    fn words_that_only_begin_as_numbers_are_none() {
+        let mut words = Words::new(b"1.5x\n-2e3 7/2 nan \n", 1);
+        assert_eq!(words.number_or_word::<f64>(), Err(Some(&b"1.5x"[..])));
+        assert_eq!((words.read(f64::leading), words.line), (Some(-2000.0), 2));
+        assert_eq!(words.read(f64::leading), None);
+        assert_eq!(words.next(), Some(&b"7/2"[..]));
+        assert!(words.number::<f32>().is_some_and(f32::is_nan));
+        assert_eq!((words.number_or_word::<f64>(), words.line), (Err(None), 2));
+    }
+
+    #[test]
+    fn names_that_differ_stay_different() {
+        assert_eq!((name(b" T\xfcr\t"), name("Tür".as_bytes())), ("Tür".to_owned(), "Tür".to_owned()));
+        // Red and green, in GBK.
+        assert_ne!(name(b"\xba\xec"), name(b"\xc2\xcc"));
     }
 
     #[test]

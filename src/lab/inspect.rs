@@ -1,5 +1,6 @@
 //! What a scene holds, and what about it looks like a mistake.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -188,13 +189,20 @@ impl fmt::Display for Inspection {
 /// How many, and the first few by name.
 fn list<S: AsRef<str>>(names: &[S]) -> String {
     const SHOWN: usize = 8;
-    let shown: Vec<&str> = names.iter().take(SHOWN).map(|name| or_unnamed(name.as_ref())).collect();
+    let shown: Vec<_> = names.iter().take(SHOWN).map(|name| or_unnamed(name.as_ref())).collect();
     let more = if names.len() > SHOWN { ", ..." } else { "" };
     if names.is_empty() { "0".to_owned() } else { format!("{}: {}{more}", names.len(), shown.join(", ")) }
 }
 
-fn or_unnamed(name: &str) -> &str {
-    if name.is_empty() { "(unnamed)" } else { name }
+/// A name as a terminal may be given it.
+fn or_unnamed(name: &str) -> Cow<'_, str> {
+    if name.is_empty() {
+        "(unnamed)".into()
+    } else if name.contains(char::is_control) {
+        name.escape_debug().to_string().into()
+    } else {
+        name.into()
+    }
 }
 
 #[cfg(test)]
@@ -210,6 +218,8 @@ mod tests {
         let info = Inspection::new(&scene);
         assert_eq!((info.triangles, info.vertices, info.placed_primitives, info.instances), (4, 4, 4, 1));
         assert_eq!(info.bounds, Some([[0.0; 3], [1.0; 3]]));
+        let beep = Inspection { materials: vec!["\u{1b}]0;x\u{7}".to_owned()], ..info.clone() };
+        assert!(!beep.to_string().contains(|c: char| c.is_control() && c != '\n'), "{beep}");
         assert!(info.bytes >= 4 * 12 * 2 && info.to_string().ends_with("nothing suspicious\n"));
         let empty = Inspection::new(&Scene::default());
         assert!(empty.bounds.is_none() && empty.to_string().contains("nothing can be hit"));

@@ -118,6 +118,8 @@ fn suffixes_are_known_in_any_case() {
 fn a_scene_without_triangles_is_refused() {
     refused_bytes("a.obj", "v 0 0 0\n", "", "nothing to render");
     refused_bytes("a.stl", "solid a\nendsolid a\n", "", "nothing to render");
+    // What was left out may be why.
+    refused_bytes("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\nfo 1\n", "", "line 3: 1 points or lines");
 }
 
 #[test]

@@ -195,6 +195,16 @@ fn vertex_colours_are_srgb() {
     assert_eq!(scene.materials[0].diffuse, Vec3::ONE);
 }
 
+/// Red and green, written in an encoding that is not UTF-8.
+#[test]
+fn names_in_any_encoding_are_told_apart() {
+    let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \xba\xec\nf 1 2 3\nusemtl \xc2\xcc\nf 3 2 1\n";
+    let mtl = b"newmtl \xba\xec\nKd 1 0 0\nnewmtl \xc2\xcc\nKd 0 1 0\n";
+    let scene = Files::one("a.obj", obj).and("a.mtl", mtl).scene("a.obj");
+    let colors = meshes(&scene).into_iter().map(|mesh| scene.materials[mesh.material as usize].diffuse);
+    assert_eq!(colors.collect::<Vec<_>>(), [Vec3::X, Vec3::Y]);
+}
+
 #[test]
 fn a_mesh_far_away_keeps_its_shape() {
     let obj = "v 10000000.001 5 0\nv 10000000.002 5 0\nv 10000000.001 5.001 0\nusemtl b\nf 1 2 3\nusemtl a\nf 3 2 1\n";

@@ -162,6 +162,23 @@ fn doubles_far_away_keep_the_shape() {
     assert!(((mesh.positions[1] - mesh.positions[0]).x - 0.001).abs() < 1e-8);
 }
 
+/// More than the header says is no reason to take less of it without a word.
+#[test]
+fn what_comes_after_the_last_element_is_told() {
+    let warned = |bytes: Vec<u8>| Files::one("a.ply", bytes).load("a.ply").1;
+    let more = |mut bytes: Vec<u8>, more: &[u8]| {
+        bytes.extend_from_slice(more);
+        bytes
+    };
+    for bytes in [more(ascii().into(), b"3 0 1 3\n"), more(binary(false), b"1234567"), more(binary(true), b"1234567")] {
+        let warnings = warned(bytes);
+        assert!(warnings.len() == 1 && warnings[0].message.starts_with("7 bytes after"), "{warnings:?}");
+    }
+    for bytes in [more(ascii().into(), b"\n \n"), binary(false)] {
+        assert!(warned(bytes).is_empty());
+    }
+}
+
 #[test]
 fn faults_are_told_with_their_place() {
     let fault = |bytes: Vec<u8>, place: &str, words: &str| refused_bytes("a.ply", bytes, place, words);
@@ -187,5 +204,6 @@ fn faults_are_told_with_their_place() {
     fault(ascii().replace("end_header", "end_heather").into(), "line 10", "end_heather");
     fault(b"ply\nformat ascii 1.0\n".to_vec(), "line 2", "end_header is missing");
     fault(ascii().replace("comment made by hand", "element face 0").into(), "line 8", "declared twice");
+    fault(ascii().replace("float z", "float y").into(), "line 4", "two properties \"y\"");
     fault(b"plywood".to_vec(), "line 1", "\"ply\" belongs");
 }

@@ -6,6 +6,7 @@ use super::stretch::Begin;
 use super::{NONE, Skipped};
 use crate::image::srgb;
 use crate::io::Placeless;
+use crate::io::number::whole;
 use crate::io::text::{Lines, Words, name, number, quoted};
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -208,11 +209,14 @@ impl Reader<'_> {
     fn face(&mut self, line: usize, words: &mut Words<'_>) -> Placeless<()> {
         let faces = &mut self.part.faces;
         let first = faces.positions.len();
-        for word in words {
-            if word.starts_with(b"#") {
-                break;
-            }
-            let corner = corner(word, self.counts)?;
+        loop {
+            let corner = match words.read(plain_corner) {
+                Some(corner) => corner,
+                None => match words.next() {
+                    Some(word) if !word.starts_with(b"#") => corner(word, self.counts)?,
+                    _ => break,
+                },
+            };
             for (highest, index) in self.part.highest.iter_mut().zip(corner) {
                 if index != NONE && highest.is_none_or(|(i, _)| index > i) {
                     *highest = Some((index, line));
@@ -260,13 +264,33 @@ fn corner(word: &[u8], counts: [usize; 3]) -> Placeless<[u32; 3]> {
     Ok(corner)
 }
 
-fn resolve(digits: &[u8], count: usize) -> Placeless<u32> {
-    // Nearly all are a few plain digits.
-    let plain = digits.len() < 10 && digits.iter().all(u8::is_ascii_digit);
-    let index: i64 = match plain {
-        true => digits.iter().fold(0, |value, digit| 10 * value + i64::from(digit - b'0')),
-        false => number(digits).ok_or("an index is not a whole number")?,
+/// The corner that a text begins with, and its length in bytes, where its indices are a few plain digits from 1 up, as nearly all are.
+#[inline]
+fn plain_corner(text: &[u8]) -> Option<([u32; 3], usize)> {
+    let index = |from: usize| match whole(&text[from..], 0) {
+        (index @ 1.., digits @ 1..=9) => Some((index as u32 - 1, from + digits)),
+        _ => None,
     };
+    let is_slash = |at: usize| text.get(at) == Some(&b'/');
+    let mut corner = [NONE; 3];
+    let mut end;
+    (corner[0], end) = index(0)?;
+    if is_slash(end) {
+        // None between two slashes.
+        if !is_slash(end + 1) {
+            (corner[1], end) = index(end + 1)?;
+        } else {
+            end += 1;
+        }
+        if is_slash(end) {
+            (corner[2], end) = index(end + 1)?;
+        }
+    }
+    Some((corner, end))
+}
+
+fn resolve(digits: &[u8], count: usize) -> Placeless<u32> {
+    let index: i64 = number(digits).ok_or("an index is not a whole number")?;
     let from_zero = match index {
         0 => return Err("index 0; OBJ counts from 1".into()),
         1.. => index - 1,

@@ -3,7 +3,7 @@
 use super::Items;
 use super::header::{Element, Scalar};
 use crate::io::Placeless;
-use crate::io::text::{Words, number, quoted};
+use crate::io::text::{Words, quoted};
 use crate::memory::Mapped;
 
 pub(super) struct Ascii<'a> {
@@ -30,6 +30,10 @@ impl Items for Ascii<'_> {
         self.words.remaining() + 1
     }
 
+    fn rest(&self) -> usize {
+        self.words.rest().len()
+    }
+
     fn tell(&mut self) {
         let read = self.file.len() - self.words.remaining();
         self.file.done(&self.file[self.told..read]);
@@ -41,8 +45,10 @@ impl Items for Ascii<'_> {
     }
 
     fn scalar(&mut self, scalar: Scalar) -> Placeless<f64> {
-        let word = self.words.next().ok_or("the file ends before its last element")?;
-        let value: f64 = number(word).ok_or_else(|| format!("{} is not a number", quoted(word)))?;
+        let value: f64 = self.words.number_or_word().map_err(|word| match word {
+            Some(word) => format!("{} is not a number", quoted(word)),
+            None => "the file ends before its last element".to_owned(),
+        })?;
         // As the binary file would hold it.
         Ok(if scalar == Scalar::F32 { f64::from(value as f32) } else { value })
     }

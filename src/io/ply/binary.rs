@@ -85,6 +85,10 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
         self.rest.len()
     }
 
+    fn rest(&self) -> usize {
+        self.rest.len()
+    }
+
     fn tell(&mut self) {
         let [from, to] = [self.untold, self.rest.len()].map(|left| self.file.len() - left);
         self.file.done(&self.file[from..to]);

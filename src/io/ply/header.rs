@@ -143,6 +143,13 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
                 if let Some(twice) = elements.iter().find(|element| !seen.insert(&element.name)) {
                     return Err(fail(twice.line, format!("element {:?} is declared twice", twice.name)));
                 }
+                for element in &elements {
+                    let mut seen = HashSet::new();
+                    if let Some(twice) = element.properties.iter().find(|property| !seen.insert(&property.name)) {
+                        let message = format!("element {:?} has two properties {:?}", element.name, twice.name);
+                        return Err(fail(element.line, message));
+                    }
+                }
                 return Ok(Header { encoding, elements, length, lines: line });
             }
             Some(word) => return Err(fail(line, format!("{} is no statement of a PLY header", quoted(word)))),

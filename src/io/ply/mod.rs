@@ -35,6 +35,8 @@ trait Items {
     fn place(&self) -> String;
     /// Bytes that are left.
     fn remaining(&self) -> usize;
+    /// Bytes after the last item, white space apart.
+    fn rest(&self) -> usize;
     /// The fewest bytes that an item of this element takes.
     fn least_size(&self, element: &Element) -> usize;
     /// Tells the file how far reading is; called every [`TELL`] items.
@@ -103,6 +105,10 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
             _ => (0..element.count).try_for_each(|_| read_item(element, &mut items, |_| false, |_, _| ())),
         };
         result.map_err(|message| Error::input(path, items.place(), message))?;
+    }
+    if items.rest() > 0 {
+        let message = format!("{} bytes after the last element that the header declares are ignored", items.rest());
+        warnings.push(Warning::new(path, items.place(), message));
     }
     if faces.small > 0 {
         let message = format!("{} faces with fewer than 3 corners are left out", faces.small);
