@@ -102,3 +102,61 @@ fn reading_and_writing_may_begin_together() {
         assert_eq!(run(&["-o", &picture, "--reference", &reference, "--threshold", "0.001"]), (Some(0), String::new()));
     }
 }
+
+/// A limit to the size of files stands for a disk that is full: what is cut off is an error, and the old picture stays.
+#[test]
+fn writers_that_do_not_tell_what_goes_wrong_are_found_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for suffix in ["bmp", "fits", "png"] {
+        let picture = folder.path().join("a").with_extension(suffix);
+        std::fs::write(&picture, "the old one").expect("written");
+        let program = env!("CARGO_BIN_EXE_twincast");
+        // 600 x 500 pixels are 900 kB, and OpenImageIO's own files are smaller than 400.
+        let line = format!(
+            "trap '' XFSZ; ulimit -f 800; exec '{program}' render '{SCENE}' -o '{}' --size 600x500 --spp 1 --sampler independent",
+            picture.display()
+        );
+        let output = std::process::Command::new("sh").args(["-c", &line]).output().expect("the shell runs");
+        let words = text(&output.stderr);
+        if suffix == "png" {
+            // It fits.
+            assert!(output.status.success(), "{words}");
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(4), "{suffix}: {words}");
+        assert!(words.contains("cannot") && words.contains(&picture.display().to_string()), "{words}");
+        assert_eq!(std::fs::read_to_string(&picture).expect("kept"), "the old one");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing is left beside it");
+        std::fs::remove_file(&picture).expect("removed");
+    }
+}
+
+/// What a format does not hold is an error, though OpenImageIO says that it has written it.
+#[test]
+fn sizes_that_a_format_does_not_hold_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (suffix, size, is_held) in [
+        ("jp2", "33x17", false),
+        ("jp2", "40x40", true),
+        ("gif", "65536x1", false),
+        ("gif", "40x40", true),
+        ("webp", "33x17", true),
+        ("tga", "33x17", true),
+        ("sgi", "33x17", true),
+        ("bmp", "1x1", true),
+    ] {
+        let picture = folder.path().join("a").with_extension(suffix).to_string_lossy().into_owned();
+        let output = command().args(["render", SCENE, "-o", &picture, "--size", size, "--spp", "1"]).output();
+        let output = output.expect("the program runs");
+        let words = text(&output.stderr);
+        if suffix == "webp" && words.contains("unknown suffix") || suffix == "jp2" && words.contains("unknown suffix") {
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(if is_held { 0 } else { 4 }), "{suffix} {size}: {words}");
+        assert!(is_held || words.contains("choose another format"), "{words}");
+        assert_eq!(Path::new(&picture).exists(), is_held);
+        if is_held {
+            std::fs::remove_file(&picture).expect("removed");
+        }
+    }
+}

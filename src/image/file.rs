@@ -153,7 +153,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     let suffix = writable_suffix(path)?;
     let options = WriteOptions::default();
     output::check_writable(path)?;
-    let (image, metadata) = (Image::new(16, 16), Metadata::default());
+    // Not smaller, for JPEG 2000's sake.
+    let (image, metadata) = (Image::new(32, 32), Metadata::default());
     let coding = (encoding(&suffix, &options, &image), &options.response);
     output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }

@@ -7,11 +7,15 @@
 #![allow(unsafe_code)] // One system call, which changes no byte.
 
 mod array;
+#[cfg(all(feature = "oiio", target_os = "linux"))]
+mod file;
 mod mapped;
 mod prefetch;
 pub(crate) mod process;
 
 pub(crate) use array::Array;
+#[cfg(all(feature = "oiio", target_os = "linux"))]
+pub(crate) use file::in_memory;
 pub(crate) use mapped::Mapped;
 pub(crate) use prefetch::prefetch;
 

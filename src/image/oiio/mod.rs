@@ -4,11 +4,13 @@
 //! | --- | --- |
 //! | `shim` | opens the shim, and OpenImageIO with it, when the first image file is read or written |
 //! | `bridge` | its functions and types |
+//! | `unheard` | formats whose writers do not tell what goes wrong |
 //!
 //! The crate `oiio` was rejected: it needs OpenImageIO 3.1, and Debian 12 and 13 have 2.4 and 2.5.
 
 mod bridge;
 mod shim;
+mod unheard;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -81,7 +83,8 @@ pub(super) fn write(
     let texts = metadata.texts.iter().map(|(name, value)| Text { name: name[..].into(), value: value[..].into() });
     let texts: Vec<_> = texts.collect();
     let attributes = Attributes {
-        software: metadata.software[..].into(),
+        // As OpenImageIO 2.4 writes it there, other programs find the whole file broken.
+        software: if unheard::has_no_exif(path) { "" } else { &metadata.software[..] }.into(),
         world_to_camera: matrix(&camera),
         world_to_screen: matrix(&screen),
         fovcot: fovcot.as_slice().into(),
@@ -90,10 +93,11 @@ pub(super) fn write(
         window: window.as_ref().map_or_else(Slice::default, |window| window[..].into()),
         texts: texts[..].into(),
     };
-    if channels.is_empty() {
-        return functions()?.write(path, &layout, &attributes, values);
+    if !channels.is_empty() {
+        return functions()?.write(path, &layout, &attributes, &interleaved(samples, values, channels));
     }
-    functions()?.write(path, &layout, &attributes, &interleaved(samples, values, channels))
+    let write = |path: &Path| functions()?.write(path, &layout, &attributes, values);
+    if unheard::are_written_to(path) { unheard::write(path, [layout.width, layout.height], write) } else { write(path) }
 }
 
 fn matrix(matrix: &Option<[f32; 16]>) -> Slice<'_, f32> {

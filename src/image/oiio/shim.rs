@@ -8,7 +8,7 @@
 //! classes with virtual functions, templates and data.
 #![allow(unsafe_code, reason = "opening a shared library, and saying of which type its function is")]
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Write};
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ use libloading::os::unix::RTLD_LAZY;
 
 use super::bridge::Functions;
 use crate::image::loading;
+#[cfg(target_os = "linux")]
+use crate::memory;
 
 /// The shim as `build/oiio.rs` has made it.
 static SHIM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/oiio-shim"));
@@ -58,19 +60,11 @@ fn open() -> Result<&'static Functions, String> {
 /// By a file that has no name, and is nowhere but in memory.
 #[cfg(target_os = "linux")]
 fn from_memory() -> Result<&'static Functions, String> {
-    use std::os::fd::{AsRawFd, FromRawFd};
-
-    // SAFETY: the name is a string that ends in 0, and lives as long as the program.
-    let descriptor = unsafe { libc::memfd_create(c"twincast-oiio".as_ptr(), libc::MFD_CLOEXEC) };
-    if descriptor < 0 {
-        return Err(io::Error::last_os_error().to_string());
-    }
-    // SAFETY: the descriptor was made above, and nobody else has it.
-    let mut file = unsafe { File::from_raw_fd(descriptor) };
+    let (mut file, path) = memory::in_memory(c"twincast-oiio").map_err(|error| error.to_string())?;
     file.write_all(SHIM).map_err(|error| error.to_string())?;
     // It stays open. The loader takes files of one name for one file, and another library must not get this number.
-    let file = ManuallyDrop::new(file);
-    load(&PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd())))
+    let _open = ManuallyDrop::new(file);
+    load(&path)
 }
 
 /// By a file in a new folder that nobody else may enter. Both are removed once it is open.

@@ -1,0 +1,90 @@
+//! Formats whose writers do not tell what goes wrong.
+//!
+//! OpenImageIO's writers of these take no notice of a disk that is full, nor of sizes that a format does not hold, and say that the file is
+//! written. So they write to memory, where there is room; what they wrote is read again, and copied to its place by ourselves.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+use super::bridge::Result;
+
+/// Suffixes of pictures that are written so.
+const UNHEARD: [&str; 22] = [
+    "avif", "bmp", "bw", "fits", "gif", "heic", "heics", "heif", "heifs", "hif", "int", "inta", "j2c", "j2k", "jp2",
+    "jpc", "rgb", "rgba", "sgi", "tga", "tpic", "webp",
+];
+
+/// In which tags that come with photographs are written wrongly.
+const NO_EXIF: [&str; 6] = ["avif", "heic", "heics", "heif", "heifs", "hif"];
+
+fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
+    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    suffixes.contains(&suffix.as_str())
+}
+
+/// Whether a file of this name is written so.
+pub(super) fn are_written_to(path: &Path) -> bool {
+    has_suffix(path, &UNHEARD)
+}
+
+/// Whether a file of this name is better off without such tags.
+pub(super) fn has_no_exif(path: &Path) -> bool {
+    has_suffix(path, &NO_EXIF)
+}
+
+/// Has `write` make a file of a picture of this size, and holds it against that.
+pub(super) fn write(path: &Path, size: [u32; 2], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
+    // A device or a pipe is what it is, and gets it at once.
+    if fs::symlink_metadata(path).is_ok() {
+        return write(path);
+    }
+    let cannot = |error: io::Error| format!("cannot write the file: {error}");
+    match memory(path).map_err(cannot)? {
+        Some(mut memory) => {
+            let written = write(path).and_then(|()| check(path, size));
+            // The name was that of the memory.
+            fs::remove_file(path).map_err(cannot)?;
+            written?;
+            let mut copy = || {
+                let mut file = File::create_new(path)?;
+                io::copy(&mut memory, &mut file)?;
+                // Some file systems tell only then.
+                file.sync_all()
+            };
+            copy().map_err(cannot)
+        }
+        None => write(path).and_then(|()| check(path, size)),
+    }
+}
+
+/// A file in memory, and `path` as a name of it; none where the system has no such files.
+#[cfg(target_os = "linux")]
+fn memory(path: &Path) -> io::Result<Option<File>> {
+    let (file, place) = crate::memory::in_memory(c"twincast-picture")?;
+    std::os::unix::fs::symlink(place, path)?;
+    Ok(Some(file))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn memory(_: &Path) -> io::Result<Option<File>> {
+    Ok(None)
+}
+
+/// Reads what was written.
+fn check(path: &Path, size: [u32; 2]) -> Result<()> {
+    let [width, height] = size;
+    let useless = |what: &str| {
+        format!(
+            "a picture of {width} x {height} pixels cannot be written in this format: {what}; choose another format, as .png, or another size"
+        )
+    };
+    if fs::metadata(path).is_ok_and(|file| file.len() == 0) {
+        return Err(useless("the file is empty"));
+    }
+    let is_right = |found_width: u64, found_height: u64| {
+        let is_right = [found_width, found_height] == size.map(u64::from);
+        is_right.then_some(()).ok_or_else(|| format!("the file says {found_width} x {found_height}"))
+    };
+    super::read(path, &is_right).map(drop).map_err(|message| useless(message.trim()))
+}
