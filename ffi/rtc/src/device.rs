@@ -2,9 +2,11 @@
 
 use std::collections::HashMap;
 use std::ffi::{CString, c_void};
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::process;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::abi::{RTCErrorFunction, RTCMemoryMonitorFunction, property};
 use crate::failure::{Code, Failure, NONE, Result};
@@ -42,9 +44,69 @@ struct Errors {
 pub struct Device {
     errors: Mutex<Errors>,
     memory: Mutex<Callback<RTCMemoryMonitorFunction>>,
-    /// Of its own, where it was asked for so many; otherwise those of the process.
-    threads: Option<rayon::ThreadPool>,
+    threads: Threads,
     verbose: bool,
+}
+
+/// The threads that build. A process that was forked from the one that made them has none of them, and to wait for these would be for ever: it gets its own.
+struct Threads {
+    /// The process in which the others are.
+    process: u32,
+    /// Of the device's own, where it was asked for so many; otherwise those of the process.
+    pool: Option<ThreadPool>,
+    /// Of a process that was forked.
+    forked: Mutex<Option<(u32, Arc<ThreadPool>)>>,
+}
+
+impl Default for Threads {
+    /// Those of the process, which are there from the first device on.
+    fn default() -> Self {
+        static HOME: OnceLock<u32> = OnceLock::new();
+        Self { process: *HOME.get_or_init(process::id), pool: None, forked: Mutex::default() }
+    }
+}
+
+impl Threads {
+    fn new(count: usize) -> Result<Self> {
+        Ok(Self { process: process::id(), pool: Some(pool(count)?), forked: Mutex::default() })
+    }
+
+    fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R> {
+        let process = process::id();
+        if process != self.process {
+            return Ok(self.forked(process)?.install(work));
+        }
+        Ok(match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        })
+    }
+
+    #[cold]
+    fn forked(&self, process: u32) -> Result<Arc<ThreadPool>> {
+        let mut forked = self.forked.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, pool)) = forked.as_ref().filter(|(owner, _)| *owner == process) {
+            return Ok(Arc::clone(pool));
+        }
+        let pool = Arc::new(pool(self.pool.as_ref().map_or(0, ThreadPool::current_num_threads))?);
+        // One of a process between is as far away as the first.
+        std::mem::forget(forked.replace((process, Arc::clone(&pool))));
+        Ok(pool)
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        if process::id() != self.process {
+            std::mem::forget(self.pool.take());
+        }
+    }
+}
+
+/// So many threads, 0 for one a processor.
+fn pool(count: usize) -> Result<ThreadPool> {
+    let failed = |error| Failure { code: Code::OutOfMemory, message: format!("threads: {error}") };
+    ThreadPoolBuilder::new().num_threads(count).build().map_err(failed)
 }
 
 impl Device {
@@ -58,9 +120,7 @@ impl Device {
                 "threads" => {
                     let threads: usize = value.trim().parse().unwrap_or(0);
                     if threads > 0 {
-                        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                        let failed = |error| Failure { code: Code::OutOfMemory, message: format!("threads: {error}") };
-                        device.threads = Some(pool.map_err(failed)?);
+                        device.threads = Threads::new(threads)?;
                     }
                 }
                 "verbose" => device.verbose = value.trim().parse().is_ok_and(|level: u32| level > 0),
@@ -71,11 +131,11 @@ impl Device {
     }
 
     /// Runs `work` on the device's threads.
-    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        match &self.threads {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
+    ///
+    /// # Errors
+    /// Where the system gives none to a process that was forked.
+    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R> {
+        self.threads.run(work)
     }
 
     /// Keeps an error, and tells the error function.
@@ -147,7 +207,7 @@ impl Device {
             property::VERSION_PATCH => patch,
             // Packets are answered, ray by ray or in flight; callbacks are given one ray at a time.
             property::NATIVE_RAY4 | property::NATIVE_RAY8 | property::NATIVE_RAY16 => 0,
-            property::RAY_STREAM if cfg!(feature = "v3") => 0,
+            property::RAY_STREAM if cfg!(feature = "v3") => 1,
             property::BACKFACE_CULLING_SPHERES if cfg!(feature = "v4") => 0,
             property::BACKFACE_CULLING_CURVES | property::BACKFACE_CULLING => 0,
             property::COMPACT_POLYS | property::SUBDIVISION => 0,

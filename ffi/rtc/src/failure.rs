@@ -65,7 +65,8 @@ pub fn take_homeless() -> u32 {
 }
 
 /// Runs what a function of the interface does. `device` is asked only after an error. A panic, which is a bug of this
-/// library, is told as an unknown error; it must not unwind into code that knows nothing of it.
+/// library, is told as an unknown error; it must not unwind into code that knows nothing of it. An exception that the error function throws is the
+/// caller's own, and goes through.
 #[inline(always)]
 pub fn guard<'a, T>(default: T, device: impl FnOnce() -> Option<&'a Device>, work: impl FnOnce() -> Result<T>) -> T {
     match catch_unwind(AssertUnwindSafe(work)) {

@@ -92,7 +92,8 @@ pub struct RTCBoundsFunctionArguments {
 
 pub type RTCBoundsFunction = Option<unsafe extern "C" fn(*const RTCBoundsFunctionArguments)>;
 
-pub type RTCErrorFunction = Option<unsafe extern "C" fn(*mut c_void, u32, *const std::ffi::c_char)>;
+/// It may throw what the caller catches: C++ programs do.
+pub type RTCErrorFunction = Option<unsafe extern "C-unwind" fn(*mut c_void, u32, *const std::ffi::c_char)>;
 pub type RTCMemoryMonitorFunction = Option<unsafe extern "C" fn(*mut c_void, isize, bool) -> bool>;
 pub type RTCProgressMonitorFunction = Option<unsafe extern "C" fn(*mut c_void, f64) -> bool>;
 pub type RTCCollideFunc = Option<unsafe extern "C" fn(*mut c_void, *mut super::RTCCollision, u32)>;

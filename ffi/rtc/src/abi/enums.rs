@@ -76,6 +76,7 @@ pub mod quality {
 /// Flags of a scene.
 pub mod scene_flag {
     pub const COMPACT: u32 = 1 << 1;
+    pub const ROBUST: u32 = 1 << 2;
     /// Of version 3: that of the context; of version 4: that of the arguments.
     pub const FILTER_IN_ARGUMENTS: u32 = 1 << 3;
 }

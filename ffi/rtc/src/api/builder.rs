@@ -9,7 +9,7 @@ use crate::failure::{Failure, guard};
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewBVH(device: *const Device) -> *mut c_void {
+pub unsafe extern "C-unwind" fn rtcNewBVH(device: *const Device) -> *mut c_void {
     // SAFETY: the interface's rules.
     unsafe { with(device, null_mut(), |_| Err(Failure::unsupported("building trees for the caller is"))) }
 }
@@ -20,30 +20,30 @@ fn refuse<R>(default: R) -> R {
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcBuildBVH(_: *const c_void) -> *mut c_void {
+pub extern "C-unwind" fn rtcBuildBVH(_: *const c_void) -> *mut c_void {
     refuse(null_mut())
 }
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcThreadLocalAlloc(_: *mut c_void, _: usize, _: usize) -> *mut c_void {
+pub extern "C-unwind" fn rtcThreadLocalAlloc(_: *mut c_void, _: usize, _: usize) -> *mut c_void {
     refuse(null_mut())
 }
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcMakeStaticBVH(_: *mut c_void) {
+pub extern "C-unwind" fn rtcMakeStaticBVH(_: *mut c_void) {
     refuse(());
 }
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcRetainBVH(_: *mut c_void) {
+pub extern "C-unwind" fn rtcRetainBVH(_: *mut c_void) {
     refuse(());
 }
 
 /// Not in this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcReleaseBVH(_: *mut c_void) {
+pub extern "C-unwind" fn rtcReleaseBVH(_: *mut c_void) {
     refuse(());
 }

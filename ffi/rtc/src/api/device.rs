@@ -20,7 +20,7 @@ const TESTS: Range<u32> = 2_000_000..3_000_000;
 
 /// A new device.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewDevice(configuration: *const c_char) -> *const Device {
+pub unsafe extern "C-unwind" fn rtcNewDevice(configuration: *const c_char) -> *const Device {
     guard(
         null(),
         || None,
@@ -38,21 +38,21 @@ pub unsafe extern "C" fn rtcNewDevice(configuration: *const c_char) -> *const De
 
 /// One reference more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainDevice(device: *const Device) {
+pub unsafe extern "C-unwind" fn rtcRetainDevice(device: *const Device) {
     // SAFETY: the interface's rules.
     guard((), || None, || unsafe { handle::retain(device) });
 }
 
 /// One reference fewer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseDevice(device: *const Device) {
+pub unsafe extern "C-unwind" fn rtcReleaseDevice(device: *const Device) {
     // SAFETY: the interface's rules.
     unsafe { release(device) };
 }
 
 /// What a device says of itself.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetDeviceProperty(device: *const Device, property: u32) -> isize {
+pub unsafe extern "C-unwind" fn rtcGetDeviceProperty(device: *const Device, property: u32) -> isize {
     if TESTS.contains(&property) {
         return 0;
     }
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn rtcGetDeviceProperty(device: *const Device, property: u
 
 /// Nothing can be set; what Embree keeps for its own tests is passed over.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetDeviceProperty(device: *const Device, property: u32, _value: isize) {
+pub unsafe extern "C-unwind" fn rtcSetDeviceProperty(device: *const Device, property: u32, _value: isize) {
     let refuse = |_: &Device| {
         if SWITCHES.contains(&property) { Ok(()) } else { Err(Failure::argument("unknown writable property")) }
     };
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn rtcSetDeviceProperty(device: *const Device, property: u
 
 /// The first error of this thread since it last asked.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetDeviceError(device: *const Device) -> u32 {
+pub unsafe extern "C-unwind" fn rtcGetDeviceError(device: *const Device) -> u32 {
     // SAFETY: the interface's rules; null asks for what went wrong without a device.
     match unsafe { device.as_ref() } {
         None => take_homeless(),
@@ -83,7 +83,7 @@ pub unsafe extern "C" fn rtcGetDeviceError(device: *const Device) -> u32 {
 /// The name of an error.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub extern "C" fn rtcGetErrorString(error: u32) -> *const c_char {
+pub extern "C-unwind" fn rtcGetErrorString(error: u32) -> *const c_char {
     let name = match error {
         0 => c"RTC_ERROR_NONE",
         1 => c"RTC_ERROR_UNKNOWN",
@@ -101,7 +101,7 @@ pub extern "C" fn rtcGetErrorString(error: u32) -> *const c_char {
 /// The last message of this thread.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetDeviceLastErrorMessage(device: *const Device) -> *const c_char {
+pub unsafe extern "C-unwind" fn rtcGetDeviceLastErrorMessage(device: *const Device) -> *const c_char {
     // SAFETY: the interface's rules.
     match unsafe { device.as_ref() } {
         None => c"".as_ptr(),
@@ -111,7 +111,7 @@ pub unsafe extern "C" fn rtcGetDeviceLastErrorMessage(device: *const Device) -> 
 
 /// Whom to tell of errors.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetDeviceErrorFunction(
+pub unsafe extern "C-unwind" fn rtcSetDeviceErrorFunction(
     device: *const Device,
     function: RTCErrorFunction,
     user: *mut c_void,
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn rtcSetDeviceErrorFunction(
 
 /// Whom to tell of memory.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetDeviceMemoryMonitorFunction(
+pub unsafe extern "C-unwind" fn rtcSetDeviceMemoryMonitorFunction(
     device: *const Device,
     function: RTCMemoryMonitorFunction,
     user: *mut c_void,
@@ -141,35 +141,39 @@ pub unsafe extern "C" fn rtcSetDeviceMemoryMonitorFunction(
 
 /// A new buffer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewBuffer(device: *const Device, bytes: usize) -> *const Buffer {
+pub unsafe extern "C-unwind" fn rtcNewBuffer(device: *const Device, bytes: usize) -> *const Buffer {
     // SAFETY: the interface's rules.
     unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Buffer::new(other(device)?, bytes)?)))) }
 }
 
 /// A new buffer over the caller's memory.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewSharedBuffer(device: *const Device, data: *mut c_void, bytes: usize) -> *const Buffer {
+pub unsafe extern "C-unwind" fn rtcNewSharedBuffer(
+    device: *const Device,
+    data: *mut c_void,
+    bytes: usize,
+) -> *const Buffer {
     // SAFETY: the interface's rules.
     unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Buffer::shared(other(device)?, data.cast(), bytes))))) }
 }
 
 /// Where a buffer is.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetBufferData(buffer: *const Buffer) -> *mut c_void {
+pub unsafe extern "C-unwind" fn rtcGetBufferData(buffer: *const Buffer) -> *mut c_void {
     // SAFETY: the interface's rules.
     unsafe { with(buffer, std::ptr::null_mut(), |buffer| Ok(buffer.data().cast())) }
 }
 
 /// One reference more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainBuffer(buffer: *const Buffer) {
+pub unsafe extern "C-unwind" fn rtcRetainBuffer(buffer: *const Buffer) {
     // SAFETY: the interface's rules.
     guard((), || None, || unsafe { handle::retain(buffer) });
 }
 
 /// One reference fewer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseBuffer(buffer: *const Buffer) {
+pub unsafe extern "C-unwind" fn rtcReleaseBuffer(buffer: *const Buffer) {
     // SAFETY: the interface's rules.
     unsafe { release(buffer) };
 }

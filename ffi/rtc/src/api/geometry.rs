@@ -14,56 +14,68 @@ use crate::handle;
 
 /// A new geometry.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewGeometry(device: *const Device, kind: u32) -> *const Geometry {
+pub unsafe extern "C-unwind" fn rtcNewGeometry(device: *const Device, kind: u32) -> *const Geometry {
+    let mut absent = None;
+    let make = |_: &Device| {
+        // SAFETY: the interface's rules.
+        let (geometry, failure) = Geometry::new(unsafe { other(device)? }, kind)?;
+        absent = failure;
+        Ok(handle::new(Arc::new(geometry)))
+    };
     // SAFETY: the interface's rules.
-    unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Geometry::new(other(device)?, kind)?)))) }
+    let geometry = unsafe { with(device, null(), make) };
+    if let Some(failure) = absent {
+        // SAFETY: the interface's rules; the error function may throw, so that there must be no wall around it.
+        unsafe { with(device, (), |_| Err(failure)) };
+    }
+    geometry
 }
 
 /// One reference more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainGeometry(geometry: *const Geometry) {
+pub unsafe extern "C-unwind" fn rtcRetainGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
     guard((), || None, || unsafe { handle::retain(geometry) });
 }
 
 /// One reference fewer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseGeometry(geometry: *const Geometry) {
+pub unsafe extern "C-unwind" fn rtcReleaseGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
     unsafe { release(geometry) };
 }
 
 /// Makes what was set count at the next commit of the scene.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcCommitGeometry(geometry: *const Geometry) {
+pub unsafe extern "C-unwind" fn rtcCommitGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), Geometry::commit) }
 }
 
 /// Shows the geometry.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcEnableGeometry(geometry: *const Geometry) {
+pub unsafe extern "C-unwind" fn rtcEnableGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
     unsafe { tell(geometry, |geometry| geometry.set_enabled(true)) }
 }
 
 /// Hides the geometry.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcDisableGeometry(geometry: *const Geometry) {
+pub unsafe extern "C-unwind" fn rtcDisableGeometry(geometry: *const Geometry) {
     // SAFETY: the interface's rules.
     unsafe { tell(geometry, |geometry| geometry.set_enabled(false)) }
 }
 
 /// How many time steps there are.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTimeStepCount(geometry: *const Geometry, count: u32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryTimeStepCount(geometry: *const Geometry, count: u32) {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), |geometry| geometry.set_time_steps(count)) }
 }
 
 /// When the first and the last time step are.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTimeRange(geometry: *const Geometry, start: f32, end: f32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryTimeRange(geometry: *const Geometry, start: f32, end: f32) {
     let set = |state: &mut State| {
         // Not a number neither.
         if start.partial_cmp(&end).is_none_or(|order| order.is_gt()) {
@@ -78,7 +90,7 @@ pub unsafe extern "C" fn rtcSetGeometryTimeRange(geometry: *const Geometry, star
 
 /// How many attributes there are.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geometry, count: u32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geometry, count: u32) {
     const MOST: u32 = 1 << 16;
     let set = |geometry: &Geometry| {
         let is_mesh = !matches!(geometry.kind, Kind::User | Kind::Instance | Kind::InstanceArray);
@@ -94,7 +106,7 @@ pub unsafe extern "C" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geo
 
 /// Which rays see the geometry.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32) {
     // SAFETY: the interface's rules.
     unsafe {
         modify(geometry, |state| {
@@ -106,7 +118,7 @@ pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32
 
 /// Trees are built for a scene, not for a geometry: only checked.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
     let set =
         |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
     // SAFETY: the interface's rules.
@@ -115,7 +127,7 @@ pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, q
 
 /// Curves of a minimal width on the screen are not built in, as in both Debians' Embree: nothing to scale.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, scale: f32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, scale: f32) {
     let set = |_: &mut State| {
         if scale >= 1.0 {
             Ok(())
@@ -129,7 +141,7 @@ pub unsafe extern "C" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry,
 
 /// Sets a buffer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryBuffer(
+pub unsafe extern "C-unwind" fn rtcSetGeometryBuffer(
     geometry: *const Geometry,
     kind: u32,
     slot: u32,
@@ -151,7 +163,7 @@ pub unsafe extern "C" fn rtcSetGeometryBuffer(
 
 /// Sets a buffer over the caller's memory.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetSharedGeometryBuffer(
+pub unsafe extern "C-unwind" fn rtcSetSharedGeometryBuffer(
     geometry: *const Geometry,
     kind: u32,
     slot: u32,
@@ -172,7 +184,7 @@ pub unsafe extern "C" fn rtcSetSharedGeometryBuffer(
 
 /// Sets a new buffer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetNewGeometryBuffer(
+pub unsafe extern "C-unwind" fn rtcSetNewGeometryBuffer(
     geometry: *const Geometry,
     kind: u32,
     slot: u32,
@@ -190,21 +202,28 @@ pub unsafe extern "C" fn rtcSetNewGeometryBuffer(
 
 /// Where a buffer's first item is.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryBufferData(geometry: *const Geometry, kind: u32, slot: u32) -> *mut c_void {
+pub unsafe extern "C-unwind" fn rtcGetGeometryBufferData(
+    geometry: *const Geometry,
+    kind: u32,
+    slot: u32,
+) -> *mut c_void {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, null_mut(), |geometry| Ok(geometry.buffer_data((kind, slot))?.cast())) }
 }
 
 /// A buffer has been written to.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcUpdateGeometryBuffer(geometry: *const Geometry, kind: u32, slot: u32) {
+pub unsafe extern "C-unwind" fn rtcUpdateGeometryBuffer(geometry: *const Geometry, kind: u32, slot: u32) {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), |geometry| geometry.update_buffer((kind, slot))) }
 }
 
 /// The filter of nearest hits.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryIntersectFilterFunction(geometry: *const Geometry, filter: RTCFilterFunctionN) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryIntersectFilterFunction(
+    geometry: *const Geometry,
+    filter: RTCFilterFunctionN,
+) {
     let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.intersect_filter = filter);
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -212,7 +231,10 @@ pub unsafe extern "C" fn rtcSetGeometryIntersectFilterFunction(geometry: *const 
 
 /// The filter of any hits.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryOccludedFilterFunction(geometry: *const Geometry, filter: RTCFilterFunctionN) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryOccludedFilterFunction(
+    geometry: *const Geometry,
+    filter: RTCFilterFunctionN,
+) {
     let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.occluded_filter = filter);
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -221,7 +243,10 @@ pub unsafe extern "C" fn rtcSetGeometryOccludedFilterFunction(geometry: *const G
 /// Whether filters that come with queries are run.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryEnableFilterFunctionFromArguments(geometry: *const Geometry, enable: bool) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryEnableFilterFunctionFromArguments(
+    geometry: *const Geometry,
+    enable: bool,
+) {
     let set = |geometry: &Geometry| geometry.set_filter(|functions| functions.heeds_argument_filter = enable);
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), set) }
@@ -229,28 +254,31 @@ pub unsafe extern "C" fn rtcSetGeometryEnableFilterFunctionFromArguments(geometr
 
 /// The pointer that callbacks are given.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryUserData(geometry: *const Geometry, user: *mut c_void) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryUserData(geometry: *const Geometry, user: *mut c_void) {
     // SAFETY: the interface's rules.
     unsafe { tell(geometry, |geometry| geometry.set_user(user)) }
 }
 
 /// The pointer that callbacks are given.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryUserData(geometry: *const Geometry) -> *mut c_void {
+pub unsafe extern "C-unwind" fn rtcGetGeometryUserData(geometry: *const Geometry) -> *mut c_void {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, null_mut(), |geometry| Ok(geometry.user())) }
 }
 
 /// The function of point queries.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryPointQueryFunction(geometry: *const Geometry, function: RTCPointQueryFunction) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryPointQueryFunction(
+    geometry: *const Geometry,
+    function: RTCPointQueryFunction,
+) {
     // SAFETY: the interface's rules.
     unsafe { set_function(geometry, |functions| functions.point_query = function, false) }
 }
 
 /// How many primitives user geometry has.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geometry, count: u32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geometry, count: u32) {
     let set = |geometry: &Geometry| {
         geometry.demand(geometry.kind == Kind::User)?;
         if geometry.state().primitive_count == count {
@@ -267,7 +295,7 @@ pub unsafe extern "C" fn rtcSetGeometryUserPrimitiveCount(geometry: *const Geome
 
 /// Where user geometry is.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryBoundsFunction(
+pub unsafe extern "C-unwind" fn rtcSetGeometryBoundsFunction(
     geometry: *const Geometry,
     function: RTCBoundsFunction,
     // Callbacks are given the geometry's own, as the interface says; Embree has no use for this one either.
@@ -279,14 +307,20 @@ pub unsafe extern "C" fn rtcSetGeometryBoundsFunction(
 
 /// Where user geometry is hit.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryIntersectFunction(geometry: *const Geometry, function: RTCIntersectFunctionN) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryIntersectFunction(
+    geometry: *const Geometry,
+    function: RTCIntersectFunctionN,
+) {
     // SAFETY: the interface's rules.
     unsafe { set_function(geometry, |functions| functions.intersect = function, true) }
 }
 
 /// Whether user geometry is hit.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryOccludedFunction(geometry: *const Geometry, function: RTCOccludedFunctionN) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryOccludedFunction(
+    geometry: *const Geometry,
+    function: RTCOccludedFunctionN,
+) {
     // SAFETY: the interface's rules.
     unsafe { set_function(geometry, |functions| functions.occluded = function, true) }
 }

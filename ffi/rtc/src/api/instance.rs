@@ -12,7 +12,7 @@ use crate::scene::Scene;
 
 /// The scene that is placed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryInstancedScene(geometry: *const Geometry, scene: *const Scene) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryInstancedScene(geometry: *const Geometry, scene: *const Scene) {
     // SAFETY: the interface's rules.
     unsafe { with(geometry, (), |geometry| geometry.set_scenes(vec![other(scene)?])) }
 }
@@ -20,7 +20,7 @@ pub unsafe extern "C" fn rtcSetGeometryInstancedScene(geometry: *const Geometry,
 /// The scenes of which an instance array places one or another.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryInstancedScenes(
+pub unsafe extern "C-unwind" fn rtcSetGeometryInstancedScenes(
     geometry: *const Geometry,
     scenes: *mut *const Scene,
     count: usize,
@@ -37,7 +37,7 @@ pub unsafe extern "C" fn rtcSetGeometryInstancedScenes(
 
 /// Where an instance is at a time step.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTransform(
+pub unsafe extern "C-unwind" fn rtcSetGeometryTransform(
     geometry: *const Geometry,
     step: u32,
     format: u32,
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn rtcSetGeometryTransform(
 
 /// Where an instance is at a time step, to be interpolated part by part.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTransformQuaternion(
+pub unsafe extern "C-unwind" fn rtcSetGeometryTransformQuaternion(
     geometry: *const Geometry,
     step: u32,
     parts: *const RTCQuaternionDecomposition,
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn rtcSetGeometryTransformQuaternion(
 
 /// Where an instance is at a time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryTransform(
+pub unsafe extern "C-unwind" fn rtcGetGeometryTransform(
     geometry: *const Geometry,
     time: f32,
     format: u32,
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn rtcGetGeometryTransform(
 /// Where one instance of an array is at a time.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryTransformEx(
+pub unsafe extern "C-unwind" fn rtcGetGeometryTransformEx(
     geometry: *const Geometry,
     primitive: u32,
     time: f32,
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn rtcGetGeometryTransformEx(
 /// Where an instance of a scene is at a time.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryTransformFromScene(
+pub unsafe extern "C-unwind" fn rtcGetGeometryTransformFromScene(
     scene: *const Scene,
     id: u32,
     time: f32,

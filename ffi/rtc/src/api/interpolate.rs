@@ -7,7 +7,7 @@ use crate::geometry::{Geometry, Place, interpolate};
 
 /// Values at a place.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcInterpolate(arguments: *const RTCInterpolateArguments) {
+pub unsafe extern "C-unwind" fn rtcInterpolate(arguments: *const RTCInterpolateArguments) {
     guard((), || None, || present(arguments.cast_mut()).map(|_| ()));
     // SAFETY: the interface's rules; null was reported.
     let Some(arguments) = (unsafe { arguments.as_ref() }) else { return };
@@ -21,7 +21,7 @@ pub unsafe extern "C" fn rtcInterpolate(arguments: *const RTCInterpolateArgument
 
 /// Values at several places.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcInterpolateN(arguments: *const RTCInterpolateNArguments) {
+pub unsafe extern "C-unwind" fn rtcInterpolateN(arguments: *const RTCInterpolateNArguments) {
     guard((), || None, || present(arguments.cast_mut()).map(|_| ()));
     // SAFETY: the interface's rules; null was reported.
     let Some(arguments) = (unsafe { arguments.as_ref() }) else { return };

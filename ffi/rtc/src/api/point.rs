@@ -9,7 +9,7 @@ use crate::trace::point_query;
 
 /// What is near a point.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcPointQuery(
+pub unsafe extern "C-unwind" fn rtcPointQuery(
     scene: *const Scene,
     query: *mut RTCPointQuery,
     context: *mut RTCPointQueryContext,
@@ -65,7 +65,7 @@ macro_rules! packets {
     ($($name:ident $count:literal)*) => {$(
         /// What is near each of some points.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
+        pub unsafe extern "C-unwind" fn $name(
             valid: *const i32,
             scene: *const Scene,
             queries: *mut c_void,

@@ -3,7 +3,9 @@
 use super::{present, with};
 use crate::abi::{RTCContext, RTCFilterFunctionNArguments, RTCRay, RTCRayHit, RTCRayHitNp, RTCUserFunctionNArguments};
 use crate::scene::{Committed, Scene};
-use crate::trace::{Packed, Pointers, Query, Target, UserCall, cast_one, intersect_lanes, occluded_lanes, run_filters};
+use crate::trace::{
+    Packed, Pointers, Query, Spare, Target, UserCall, cast_one, intersect_lanes, occluded_lanes, run_filters,
+};
 
 /// Asks a committed scene.
 ///
@@ -18,9 +20,7 @@ unsafe fn ask<T>(scene: *const Scene, context: *mut RTCContext, rays: *mut T, wo
         let RTCContext { filter, .. } = unsafe { context.read() };
         let query = Query { context, filter, filters_all: true, user: None };
         // SAFETY: the interface's rules.
-        if let Some(committed) = unsafe { scene.committed() } {
-            work(committed, &query);
-        }
+        work(unsafe { scene.traceable() }?, &query);
         Ok(())
     };
     // SAFETY: as the caller promises.
@@ -39,14 +39,14 @@ unsafe fn is_valid(valid: *const i32, lane: usize) -> bool {
 
 /// The nearest hit of a ray.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcIntersect1(scene: *const Scene, context: *mut RTCContext, ray: *mut RTCRayHit) {
+pub unsafe extern "C-unwind" fn rtcIntersect1(scene: *const Scene, context: *mut RTCContext, ray: *mut RTCRayHit) {
     // SAFETY: the interface's rules.
     unsafe { ask(scene, context, ray, |scene, query| cast_one::<false>(scene, query, &Target::closest(ray))) }
 }
 
 /// Whether a ray hits anything.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcOccluded1(scene: *const Scene, context: *mut RTCContext, ray: *mut RTCRay) {
+pub unsafe extern "C-unwind" fn rtcOccluded1(scene: *const Scene, context: *mut RTCContext, ray: *mut RTCRay) {
     // SAFETY: the interface's rules.
     unsafe { ask(scene, context, ray, |scene, query| cast_one::<true>(scene, query, &Target::any(ray))) }
 }
@@ -55,7 +55,7 @@ macro_rules! packets {
     ($($name:ident $count:literal $trace:ident)*) => {$(
         /// Several rays.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(valid: *const i32, scene: *const Scene, context: *mut RTCContext, rays: *mut u32) {
+        pub unsafe extern "C-unwind" fn $name(valid: *const i32, scene: *const Scene, context: *mut RTCContext, rays: *mut u32) {
             let work = |committed: &Committed, query: &Query| {
                 // SAFETY: the interface's rules.
                 let lanes = unsafe { Packed::new(rays, $count) };
@@ -84,7 +84,7 @@ packets! {
 
 /// The nearest hit of each ray of a stream.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcIntersect1M(
+pub unsafe extern "C-unwind" fn rtcIntersect1M(
     scene: *const Scene,
     context: *mut RTCContext,
     rays: *mut RTCRayHit,
@@ -104,7 +104,7 @@ pub unsafe extern "C" fn rtcIntersect1M(
 
 /// Whether each ray of a stream hits anything.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcOccluded1M(
+pub unsafe extern "C-unwind" fn rtcOccluded1M(
     scene: *const Scene,
     context: *mut RTCContext,
     rays: *mut RTCRay,
@@ -124,7 +124,7 @@ pub unsafe extern "C" fn rtcOccluded1M(
 
 /// The nearest hit of each ray of a list.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcIntersect1Mp(
+pub unsafe extern "C-unwind" fn rtcIntersect1Mp(
     scene: *const Scene,
     context: *mut RTCContext,
     rays: *mut *mut RTCRayHit,
@@ -143,7 +143,7 @@ pub unsafe extern "C" fn rtcIntersect1Mp(
 
 /// Whether each ray of a list hits anything.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcOccluded1Mp(
+pub unsafe extern "C-unwind" fn rtcOccluded1Mp(
     scene: *const Scene,
     context: *mut RTCContext,
     rays: *mut *mut RTCRay,
@@ -164,7 +164,7 @@ macro_rules! streams {
     ($($packets:ident $pointers:ident $trace:ident)*) => {$(
         /// A stream of packets.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $packets(
+        pub unsafe extern "C-unwind" fn $packets(
             scene: *const Scene,
             context: *mut RTCContext,
             rays: *mut u32,
@@ -185,15 +185,16 @@ macro_rules! streams {
 
         /// A stream in an array for each word.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $pointers(
+        pub unsafe extern "C-unwind" fn $pointers(
             scene: *const Scene,
             context: *mut RTCContext,
             rays: *const RTCRayHitNp,
             count: u32,
         ) {
             let work = |scene: &Committed, query: &Query| {
+                let spare = Spare::new();
                 // SAFETY: so many arrays, by the interface's rules.
-                let lanes = unsafe { Pointers::new(rays.cast()) };
+                let lanes = unsafe { Pointers::new(rays.cast(), &spare) };
                 $trace(scene, query, &lanes, count as usize, |_| true);
             };
             // SAFETY: the interface's rules.
@@ -211,7 +212,7 @@ macro_rules! filters {
     ($($name:ident $any:literal)*) => {$(
         /// Runs the filters that a hit of user geometry has to pass; within its callback.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
+        pub unsafe extern "C-unwind" fn $name(
             call: *const RTCUserFunctionNArguments,
             arguments: *const RTCFilterFunctionNArguments,
         ) {

@@ -36,9 +36,7 @@ unsafe fn ask<T>(
             query.user = arguments.user;
         }
         // SAFETY: the interface's rules.
-        if let Some(committed) = unsafe { scene.committed() } {
-            work(committed, &query);
-        }
+        work(unsafe { scene.traceable() }?, &query);
         Ok(())
     };
     // SAFETY: as the caller promises.
@@ -47,7 +45,7 @@ unsafe fn ask<T>(
 
 /// The nearest hit of a ray.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcIntersect1(
+pub unsafe extern "C-unwind" fn rtcIntersect1(
     scene: *const Scene,
     ray: *mut RTCRayHit,
     arguments: *const RTCIntersectArguments,
@@ -58,7 +56,11 @@ pub unsafe extern "C" fn rtcIntersect1(
 
 /// Whether a ray hits anything.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcOccluded1(scene: *const Scene, ray: *mut RTCRay, arguments: *const RTCOccludedArguments) {
+pub unsafe extern "C-unwind" fn rtcOccluded1(
+    scene: *const Scene,
+    ray: *mut RTCRay,
+    arguments: *const RTCOccludedArguments,
+) {
     // SAFETY: the interface's rules.
     unsafe { ask(scene, arguments, ray, |scene, query| cast_one::<true>(scene, query, &Target::any(ray))) }
 }
@@ -67,7 +69,7 @@ macro_rules! packets {
     ($($name:ident $count:literal $trace:ident)*) => {$(
         /// Several rays.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
+        pub unsafe extern "C-unwind" fn $name(
             valid: *const i32,
             scene: *const Scene,
             rays: *mut u32,
@@ -139,7 +141,7 @@ macro_rules! forwards {
     ($($plain:ident $extended:ident $any:literal)*) => {$(
         /// Sends a ray on.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $plain(
+        pub unsafe extern "C-unwind" fn $plain(
             call: *const RTCUserFunctionNArguments,
             scene: *const Scene,
             ray: *const RTCRay,
@@ -151,7 +153,7 @@ macro_rules! forwards {
 
         /// Sends a ray on, into one of an array.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $extended(
+        pub unsafe extern "C-unwind" fn $extended(
             call: *const RTCUserFunctionNArguments,
             scene: *const Scene,
             ray: *const RTCRay,
@@ -173,7 +175,7 @@ macro_rules! refused {
     ($($plain:ident $extended:ident)*) => {$(
         /// Callbacks of this library are given one ray at a time: there is no packet to send on.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $plain(
+        pub unsafe extern "C-unwind" fn $plain(
             _: *const i32,
             _: *const RTCUserFunctionNArguments,
             scene: *const Scene,
@@ -186,7 +188,7 @@ macro_rules! refused {
 
         /// The same.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $extended(
+        pub unsafe extern "C-unwind" fn $extended(
             _: *const i32,
             _: *const RTCUserFunctionNArguments,
             scene: *const Scene,
@@ -221,7 +223,7 @@ macro_rules! filters {
     ($($name:ident $any:literal)*) => {$(
         /// Runs the filters that a hit of user geometry has to pass; within its callback.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
+        pub unsafe extern "C-unwind" fn $name(
             call: *const RTCUserFunctionNArguments,
             arguments: *const RTCFilterFunctionNArguments,
         ) {

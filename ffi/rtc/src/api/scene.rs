@@ -15,28 +15,28 @@ use crate::trace::collide;
 
 /// A new scene.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewScene(device: *const Device) -> *const Scene {
+pub unsafe extern "C-unwind" fn rtcNewScene(device: *const Device) -> *const Scene {
     // SAFETY: the interface's rules.
     unsafe { with(device, null(), |_| Ok(handle::new(Arc::new(Scene::new(other(device)?))))) }
 }
 
 /// The device, with one reference more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetSceneDevice(scene: *const Scene) -> *const Device {
+pub unsafe extern "C-unwind" fn rtcGetSceneDevice(scene: *const Scene) -> *const Device {
     // SAFETY: the interface's rules.
     unsafe { with(scene, null(), |scene| Ok(handle::new(Arc::clone(&scene.device)))) }
 }
 
 /// One reference more.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainScene(scene: *const Scene) {
+pub unsafe extern "C-unwind" fn rtcRetainScene(scene: *const Scene) {
     // SAFETY: the interface's rules.
     guard((), || None, || unsafe { handle::retain(scene) });
 }
 
 /// One reference fewer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseScene(scene: *const Scene) {
+pub unsafe extern "C-unwind" fn rtcReleaseScene(scene: *const Scene) {
     // SAFETY: the interface's rules.
     unsafe { release(scene) };
 }
@@ -54,28 +54,28 @@ unsafe fn own(scene: &Scene, geometry: *const Geometry) -> Result<Arc<Geometry>>
 
 /// Adds a geometry.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcAttachGeometry(scene: *const Scene, geometry: *const Geometry) -> u32 {
+pub unsafe extern "C-unwind" fn rtcAttachGeometry(scene: *const Scene, geometry: *const Geometry) -> u32 {
     // SAFETY: the interface's rules.
     unsafe { with(scene, INVALID_ID, |scene| scene.attach(own(scene, geometry)?)) }
 }
 
 /// Adds a geometry under an id of the caller's.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcAttachGeometryByID(scene: *const Scene, geometry: *const Geometry, id: u32) {
+pub unsafe extern "C-unwind" fn rtcAttachGeometryByID(scene: *const Scene, geometry: *const Geometry, id: u32) {
     // SAFETY: the interface's rules.
     unsafe { with(scene, (), |scene| scene.attach_by_id(own(scene, geometry)?, id)) }
 }
 
 /// Takes a geometry out.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcDetachGeometry(scene: *const Scene, id: u32) {
+pub unsafe extern "C-unwind" fn rtcDetachGeometry(scene: *const Scene, id: u32) {
     // SAFETY: the interface's rules.
     unsafe { with(scene, (), |scene| scene.detach(id)) }
 }
 
 /// The geometry with an id; the reference stays the scene's.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometry(scene: *const Scene, id: u32) -> *const Geometry {
+pub unsafe extern "C-unwind" fn rtcGetGeometry(scene: *const Scene, id: u32) -> *const Geometry {
     let get = |scene: &Scene| Ok(scene.geometry(id).map_or(null(), |geometry| Arc::as_ptr(&geometry)));
     // SAFETY: the interface's rules.
     unsafe { with(scene, null(), get) }
@@ -83,7 +83,7 @@ pub unsafe extern "C" fn rtcGetGeometry(scene: *const Scene, id: u32) -> *const 
 
 /// The same.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryThreadSafe(scene: *const Scene, id: u32) -> *const Geometry {
+pub unsafe extern "C-unwind" fn rtcGetGeometryThreadSafe(scene: *const Scene, id: u32) -> *const Geometry {
     // SAFETY: the interface's rules.
     unsafe { rtcGetGeometry(scene, id) }
 }
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn rtcGetGeometryThreadSafe(scene: *const Scene, id: u32) 
 /// The user pointer of the geometry with an id.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetGeometryUserDataFromScene(scene: *const Scene, id: u32) -> *mut c_void {
+pub unsafe extern "C-unwind" fn rtcGetGeometryUserDataFromScene(scene: *const Scene, id: u32) -> *mut c_void {
     let get = |scene: &Scene| Ok(scene.geometry(id).map_or(std::ptr::null_mut(), |geometry| geometry.user()));
     // SAFETY: the interface's rules.
     unsafe { with(scene, std::ptr::null_mut(), get) }
@@ -99,21 +99,21 @@ pub unsafe extern "C" fn rtcGetGeometryUserDataFromScene(scene: *const Scene, id
 
 /// Makes what was set the scene that rays are traced in.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcCommitScene(scene: *const Scene) {
+pub unsafe extern "C-unwind" fn rtcCommitScene(scene: *const Scene) {
     // SAFETY: the interface's rules.
     unsafe { with(scene, (), Scene::commit) }
 }
 
 /// The same from several threads.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcJoinCommitScene(scene: *const Scene) {
+pub unsafe extern "C-unwind" fn rtcJoinCommitScene(scene: *const Scene) {
     // SAFETY: the interface's rules.
     unsafe { with(scene, (), Scene::commit) }
 }
 
 /// Whom to tell of progress.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetSceneProgressMonitorFunction(
+pub unsafe extern "C-unwind" fn rtcSetSceneProgressMonitorFunction(
     scene: *const Scene,
     function: RTCProgressMonitorFunction,
     user: *mut c_void,
@@ -124,28 +124,28 @@ pub unsafe extern "C" fn rtcSetSceneProgressMonitorFunction(
 
 /// How much work goes into trees.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetSceneBuildQuality(scene: *const Scene, quality: u32) {
+pub unsafe extern "C-unwind" fn rtcSetSceneBuildQuality(scene: *const Scene, quality: u32) {
     // SAFETY: the interface's rules.
     unsafe { with(scene, (), |scene| scene.set_quality(quality)) }
 }
 
 /// What the scene is for.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetSceneFlags(scene: *const Scene, flags: u32) {
+pub unsafe extern "C-unwind" fn rtcSetSceneFlags(scene: *const Scene, flags: u32) {
     // SAFETY: the interface's rules.
     unsafe { tell(scene, |scene| scene.set_flags(flags)) }
 }
 
 /// What the scene is for.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetSceneFlags(scene: *const Scene) -> u32 {
+pub unsafe extern "C-unwind" fn rtcGetSceneFlags(scene: *const Scene) -> u32 {
     // SAFETY: the interface's rules.
     unsafe { with(scene, 0, |scene| Ok(scene.state().flags)) }
 }
 
 /// The box around everything.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetSceneBounds(scene: *const Scene, bounds: *mut RTCBounds) {
+pub unsafe extern "C-unwind" fn rtcGetSceneBounds(scene: *const Scene, bounds: *mut RTCBounds) {
     let get = |scene: &Scene| {
         // SAFETY: the interface's rules.
         let committed = unsafe { scene.unchanged() }?;
@@ -159,7 +159,7 @@ pub unsafe extern "C" fn rtcGetSceneBounds(scene: *const Scene, bounds: *mut RTC
 
 /// The boxes around everything at both ends of time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetSceneLinearBounds(scene: *const Scene, bounds: *mut RTCLinearBounds) {
+pub unsafe extern "C-unwind" fn rtcGetSceneLinearBounds(scene: *const Scene, bounds: *mut RTCLinearBounds) {
     let get = |scene: &Scene| {
         // SAFETY: the interface's rules.
         let committed = unsafe { scene.unchanged() }?;
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn rtcGetSceneLinearBounds(scene: *const Scene, bounds: *m
 
 /// Which user primitives of two scenes may touch.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcCollide(
+pub unsafe extern "C-unwind" fn rtcCollide(
     first: *const Scene,
     second: *const Scene,
     function: RTCCollideFunc,

@@ -17,7 +17,7 @@ macro_rules! refused {
     ($($name:ident ($($argument:ty),*) $(-> $result:ty)?;)*) => {$(
         /// Not for any geometry of this library.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(geometry: *const Geometry $(, _: $argument)*) $(-> $result)? {
+        pub unsafe extern "C-unwind" fn $name(geometry: *const Geometry $(, _: $argument)*) $(-> $result)? {
             // SAFETY: the interface's rules.
             unsafe { refuse(geometry, refused!(@default $($result)?)) }
         }
@@ -28,7 +28,7 @@ macro_rules! refused {
 
 /// Of curves, which are not divided here, and of what is never hit: passed over.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTessellationRate(geometry: *const Geometry, _rate: f32) {
+pub unsafe extern "C-unwind" fn rtcSetGeometryTessellationRate(geometry: *const Geometry, _rate: f32) {
     let set =
         |geometry: &Geometry| geometry.demand(matches!(geometry.kind, Kind::Linear(Shape::RoundCurve) | Kind::Absent));
     // SAFETY: the interface's rules.

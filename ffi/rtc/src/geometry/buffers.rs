@@ -7,6 +7,9 @@ use crate::abi::{buffer_type, format};
 use crate::buffer::{Buffer, Items, View};
 use crate::failure::{Failure, Result};
 
+/// Embree's own limit.
+const MOST_VERTEX_BYTES: usize = 16 << 30;
+
 impl Geometry {
     /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree.
     pub fn set_buffer(&self, name: (u32, u32), buffer: Arc<Buffer>, items: Items) -> Result<()> {
@@ -48,6 +51,9 @@ impl Geometry {
 
     /// Whether the geometry takes such a buffer, which begins at an address; looked at in Embree's order, which decides what is told.
     fn check(&self, name: (u32, u32), items: &Items, address: usize) -> Result<()> {
+        if items.count > u32::MAX as usize {
+            return Err(Failure::argument("buffer too large"));
+        }
         if matches!(self.kind, Kind::User | Kind::Instance) {
             return slot(self.kind, &mut self.state(), name).map(|_| ());
         }
@@ -63,7 +69,12 @@ impl Geometry {
         let format = self.check_format(name, items.format);
         let has_normals = self.kind == Kind::Linear(Shape::OrientedDisc);
         match name.0 {
-            buffer_type::VERTEX => format.and(found),
+            buffer_type::VERTEX => {
+                format.and(found)?;
+                let is_small = items.stride.checked_mul(items.count).is_some_and(|bytes| bytes <= MOST_VERTEX_BYTES);
+                let too_large = || Failure::operation("vertex buffer can be at most 16GB large");
+                is_small.then_some(()).ok_or_else(too_large)
+            }
             buffer_type::NORMAL if !has_normals => found,
             buffer_type::VERTEX_ATTRIBUTE | buffer_type::NORMAL => {
                 format.and(found).map_err(|failure| Failure::operation(failure.message))

@@ -128,17 +128,14 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Of a kind by its number. A kind that this library does not have is reported, and [`Kind::Absent`].
+    /// Of a kind by its number. A kind that this library does not have is [`Kind::Absent`], and what is to be told of it comes with the geometry.
     ///
     /// # Errors
     /// Where there is no such kind in Embree.
-    pub fn new(device: Arc<Device>, number: u32) -> Result<Self> {
-        let kind = match Kind::new(number) {
-            Err(failure) if failure.code == Code::InvalidOperation => {
-                device.report(&failure);
-                Kind::Absent
-            }
-            kind => kind?,
+    pub fn new(device: Arc<Device>, number: u32) -> Result<(Self, Option<Failure>)> {
+        let (kind, absent) = match Kind::new(number) {
+            Err(failure) if failure.code == Code::InvalidOperation => (Kind::Absent, Some(failure)),
+            kind => (kind?, None),
         };
         let state = State {
             index: None,
@@ -160,7 +157,7 @@ impl Geometry {
             is_committed: false,
             version: 0,
         };
-        Ok(Self { device, kind, user: AtomicPtr::default(), state: Mutex::new(state) })
+        Ok((Self { device, kind, user: AtomicPtr::default(), state: Mutex::new(state) }, absent))
     }
 
     /// What is set.

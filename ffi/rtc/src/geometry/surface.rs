@@ -201,8 +201,12 @@ fn read_grids(view: Option<&View>, reader: &Reader<'_>, triangles: &mut Vec<[u32
     let count = view.map_or(0, |view| view.count());
     for (i, [start_vertex, stride, size]) in (0..count).filter_map(|i| Some((i, view?.words::<3>(i)?))) {
         let grid = RTCGrid { start_vertex, stride, width: size as u16, height: (size >> 16) as u16 };
-        if grid.width < 2 || grid.height < 2 || grid.width > 32768 || grid.height > 32768 {
+        if grid.width > 32768 || grid.height > 32768 {
             return Err(Failure::argument("grid size out of range"));
+        }
+        // One without a cell has nothing to hit.
+        if grid.width < 2 || grid.height < 2 {
+            continue;
         }
         let size = [grid.width - 1, grid.height - 1];
         for y in 0..size[1] {

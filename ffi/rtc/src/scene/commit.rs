@@ -69,10 +69,11 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
         let solid = (count > 0).then(|| Bvh::build_with(&world(parts), options));
         let others = (!boxes.boxes.is_empty()).then(|| BoxTree::build(&boxes.boxes, options));
         (solid, others)
-    });
+    })?;
     let bounds = boxes.ends();
     let bytes = solid.as_ref().map_or(0, Bvh::bytes) + others.as_ref().map_or(0, BoxTree::bytes);
     let committed = Committed {
+        device: Arc::clone(&scene.device),
         records,
         solid,
         is_plain,
@@ -80,6 +81,7 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
         items: boxes.items,
         heeded,
         bounds,
+        excludes_start: plan.flags & scene_flag::ROBUST == 0,
         near: std::sync::OnceLock::new(),
         bytes,
     };

@@ -6,6 +6,7 @@ use twincast::math::{Aabb, DAffine3};
 use twincast::trace::bvh::{BoxTree, Bvh};
 
 use crate::abi::RTCBounds;
+use crate::device::Device;
 use crate::geometry::{Functions, Geometry, Linear, Motion, Surface};
 
 use super::Scene;
@@ -81,6 +82,7 @@ pub struct Heeded {
 
 /// A committed scene.
 pub struct Committed {
+    pub device: Arc<Device>,
     /// By geometry id; none where nothing is attached or enabled.
     pub records: Vec<Option<Record>>,
     /// Triangles that stand still; none where there are none.
@@ -94,6 +96,8 @@ pub struct Committed {
     pub heeded: Heeded,
     /// At time 0 and at time 1.
     pub bounds: [Aabb; 2],
+    /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are robust.
+    pub excludes_start: bool,
     /// Boxes of all primitives that point queries show, made when the first point query asks for them.
     pub near: OnceLock<Near>,
     /// Memory that was accounted for.
@@ -102,8 +106,9 @@ pub struct Committed {
 
 impl Committed {
     /// A scene in which nothing is hit.
-    pub fn empty() -> Self {
+    pub fn empty(device: Arc<Device>) -> Self {
         Self {
+            device,
             records: Vec::new(),
             solid: None,
             is_plain: true,
@@ -111,6 +116,7 @@ impl Committed {
             items: Vec::new(),
             heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false, argument_filter: false },
             bounds: [Aabb::EMPTY; 2],
+            excludes_start: false,
             near: OnceLock::new(),
             bytes: 0,
         }
@@ -122,9 +128,13 @@ impl Committed {
         self.records.get(geometry as usize)?.as_ref()
     }
 
-    /// Boxes for point queries.
+    /// Boxes for point queries, made on the device's threads.
+    ///
+    /// # Panics
+    /// Where the system gives none to a process that was forked; it is told as an error.
     pub fn near(&self) -> &Near {
-        self.near.get_or_init(|| Near::new(self))
+        let make = || self.device.install(|| Near::new(self)).unwrap_or_else(|failure| panic!("{}", failure.message));
+        self.near.get_or_init(make)
     }
 }
 

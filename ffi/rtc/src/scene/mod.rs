@@ -71,6 +71,19 @@ impl Scene {
         unsafe { self.committed.load(Ordering::Acquire).as_ref() }
     }
 
+    /// The same.
+    ///
+    /// # Safety
+    /// As for [`Scene::committed`].
+    ///
+    /// # Errors
+    /// Where there is none.
+    #[inline(always)]
+    pub unsafe fn traceable(&self) -> Result<&Committed> {
+        // SAFETY: as the caller promises.
+        unsafe { self.committed() }.ok_or_else(not_committed)
+    }
+
     /// The same, unless geometries were added or taken out since.
     ///
     /// # Safety
@@ -78,7 +91,7 @@ impl Scene {
     pub unsafe fn unchanged(&self) -> Result<&Committed> {
         // SAFETY: as the caller promises.
         let committed = unsafe { self.committed() }.filter(|_| !self.state().is_changed);
-        committed.ok_or_else(|| Failure::operation("scene not committed"))
+        committed.ok_or_else(not_committed)
     }
 
     /// Puts another committed scene in place.
@@ -179,13 +192,18 @@ impl Scene {
                 Ok(())
             }
             Err(failure) => {
-                self.replace(Committed::empty());
+                self.replace(Committed::empty(Arc::clone(&self.device)));
                 let mut state = self.state();
                 (state.made_of, state.is_changed) = (None, true);
                 Err(failure)
             }
         }
     }
+}
+
+#[cold]
+fn not_committed() -> Failure {
+    Failure::operation("scene not committed")
 }
 
 /// Whether it may be the id of a geometry.

@@ -17,6 +17,19 @@ pub fn native(ray: &RTCRay) -> Ray {
     SingleRay { origin, tmin: ray.tnear, direction, time: ray.time, tmax: ray.tfar }.ray()
 }
 
+/// The same for triangles of a scene, which may not count where the ray begins.
+#[inline(always)]
+fn for_triangles(committed: &Committed, ray: &RTCRay) -> Ray {
+    let tmin = if committed.excludes_start { after(ray.tnear) } else { ray.tnear };
+    Ray { tmin, ..native(ray) }
+}
+
+/// The first number after where a ray begins; a normal one, since denormal ones may count as 0.
+#[inline(always)]
+pub fn after(tnear: f32) -> f32 {
+    if tnear.abs() < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { tnear.next_up() }
+}
+
 /// What a ray with a mask can meet of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
@@ -71,7 +84,13 @@ pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
 fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query, target: &Target) {
     if ANY {
         // SAFETY: nobody writes to the ray meanwhile.
-        if solid.occludes(unsafe { target.single() }) {
+        let single = unsafe { target.single() };
+        let occluded = if committed.excludes_start {
+            solid.occludes(&SingleRay { tmin: after(single.tmin), ..*single })
+        } else {
+            solid.occludes(single)
+        };
+        if occluded {
             let named = Named { primitive: 0, u: 0.0, v: 0.0, ng: Vec3::ZERO };
             target.take(query, 0, 0.0, &named);
         }
@@ -79,12 +98,23 @@ fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query
     }
     let mut found = TriangleFound::NONE;
     // SAFETY: as above.
-    if solid.closest_triangle(unsafe { target.single() }, &mut found) {
+    let single = unsafe { target.single() };
+    let mut is_hit = solid.closest_triangle(single, &mut found);
+    if committed.excludes_start && is_hit && found.hit.t == single.tmin {
+        is_hit = beyond_start(solid, single, &mut found);
+    }
+    if is_hit {
         let TriangleFound { hit, normal } = &found;
         if let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], *normal) {
             target.take(query, hit.geometry, hit.t, &named);
         }
     }
+}
+
+/// The nearest triangle that is not where the ray begins.
+#[cold]
+fn beyond_start(solid: &Bvh, single: &SingleRay, found: &mut TriangleFound) -> bool {
+    solid.closest_triangle(&SingleRay { tmin: after(single.tmin), ..*single }, found)
 }
 
 /// A hit with a triangle, whose normal is `ng`, in terms of its geometry.
@@ -101,7 +131,7 @@ pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: 
 #[inline(never)]
 fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target) {
     let ray = target.ray();
-    solid.visit_triangles(&native(&ray), &mut |found| {
+    solid.visit_triangles(&for_triangles(committed, &ray), &mut |found| {
         let hit = &found.hit;
         if let Some(record) = committed.record(hit.geometry)
             && record.mask & ray.mask != 0
@@ -132,19 +162,26 @@ fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Tar
         if let Some(record) = committed.record(geometry)
             && record.mask & ray.mask != 0
         {
-            cast_item::<ANY>(&query, &target, record, Item { geometry, primitive }, &ray);
+            cast_item::<ANY>(committed, &query, &target, record, Item { geometry, primitive }, &ray);
         }
         onwards(&target)
     });
 }
 
-fn cast_item<const ANY: bool>(query: &Query, target: &Target, record: &Record, item: Item, ray: &RTCRay) {
+fn cast_item<const ANY: bool>(
+    committed: &Committed,
+    query: &Query,
+    target: &Target,
+    record: &Record,
+    item: Item,
+    ray: &RTCRay,
+) {
     let Item { geometry, primitive } = item;
     match &record.body {
         Body::Surface(surface) => {
             if surface.is_at(ray.time) {
                 let corners = surface.corners_at(primitive as usize, ray.time);
-                let native = Ray { tmax: target.tfar(), ..native(ray) };
+                let native = Ray { tmax: target.tfar(), ..for_triangles(committed, ray) };
                 if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
                     let named = surface.name(primitive, hit.u as f32, hit.v as f32, triangle_normal(corners));
                     target.offer(query, record, geometry, hit.t as f32, &named);

@@ -77,8 +77,15 @@ pub trait Lanes {
     }
 }
 
+/// When it is sent.
+#[cfg(feature = "v3")]
+const TIME: usize = 7;
+
 /// Where a ray ends.
 pub const TFAR: usize = 8;
+
+/// What it sees.
+pub const MASK: usize = 9;
 
 const _: () = {
     use std::mem::offset_of;
@@ -89,7 +96,7 @@ const _: () = {
     assert!(offset_of!(Packet, time) == 8 * offset_of!(RTCRay, time));
     assert!(offset_of!(Packet, tmax) == 8 * offset_of!(RTCRay, tfar));
     assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);
-    assert!(std::mem::offset_of!(RTCRay, tfar) == 4 * TFAR);
+    assert!(offset_of!(RTCRay, tfar) == 4 * TFAR && offset_of!(RTCRay, mask) == 4 * MASK);
 };
 
 /// A packet: all first words, all second words and so on.
@@ -121,28 +128,54 @@ impl Lanes for Packed {
     }
 }
 
-/// An array for each word.
+/// An array for each word; null for one that the caller has no use for.
 #[cfg(feature = "v3")]
 #[derive(Clone, Copy)]
-pub struct Pointers {
+pub struct Pointers<'a> {
     words: *const *mut u32,
+    spare: &'a Spare,
+}
+
+/// What stands for arrays that are not there, of eight rays.
+#[cfg(feature = "v3")]
+pub struct Spare {
+    zero: [u32; 8],
+    ones: [u32; 8],
+    /// What nobody reads; written to through a shared reference.
+    sink: std::cell::UnsafeCell<[u32; 8]>,
 }
 
 #[cfg(feature = "v3")]
-impl Pointers {
-    /// # Safety
-    /// `words` are pointers to arrays of the words of rays, then of hits where these are asked for, each as long as there are rays; they are this
-    /// thread's as long as the lanes are used.
-    pub unsafe fn new(words: *const *mut u32) -> Self {
-        Self { words }
+impl Spare {
+    pub fn new() -> Self {
+        Self { zero: [0; 8], ones: [u32::MAX; 8], sink: [0; 8].into() }
     }
 }
 
 #[cfg(feature = "v3")]
-impl Lanes for Pointers {
+impl<'a> Pointers<'a> {
+    /// # Safety
+    /// `words` are pointers to arrays of the words of rays, then of hits where these are asked for, each null or as long as there are rays; they are this
+    /// thread's as long as the lanes are used.
+    pub unsafe fn new(words: *const *mut u32, spare: &'a Spare) -> Self {
+        Self { words, spare }
+    }
+}
+
+#[cfg(feature = "v3")]
+impl Lanes for Pointers<'_> {
     #[inline(always)]
     fn word(&self, word: usize, lane: usize) -> *mut u32 {
         // SAFETY: who made the lanes promised that there are so many pointers.
-        unsafe { self.words.add(word).read() }.wrapping_add(lane)
+        let array = unsafe { self.words.add(word).read() };
+        if array.is_null() {
+            return match word {
+                // Rays begin at 0 and at time 0, and see everything.
+                MASK => self.spare.ones.as_ptr().cast_mut(),
+                0..=TIME => self.spare.zero.as_ptr().cast_mut(),
+                _ => self.spare.sink.get().cast(),
+            };
+        }
+        array.wrapping_add(lane)
     }
 }

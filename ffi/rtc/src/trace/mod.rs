@@ -26,7 +26,7 @@ pub use cast::{cast, within};
 pub use collide::collide;
 pub use lanes::Packed;
 #[cfg(feature = "v3")]
-pub use lanes::Pointers;
+pub use lanes::{Pointers, Spare};
 pub use offer::Target;
 pub use packet::{intersect_lanes, occluded_lanes};
 pub use point::point_query;

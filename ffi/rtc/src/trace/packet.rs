@@ -7,8 +7,8 @@ use twincast::math::Vec3;
 use twincast::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
-use super::cast::{Sight, cast_one, name_solid, sight};
-use super::lanes::{Lanes, TFAR};
+use super::cast::{Sight, after, cast_one, name_solid, sight};
+use super::lanes::{Lanes, MASK, TFAR};
 use super::offer::{Target, hit_of};
 use crate::abi::{RAY_WORDS, RTCRayHit};
 use crate::scene::Committed;
@@ -20,6 +20,8 @@ const RAYS: usize = Packet::RAYS;
 struct Called<'a, L, V> {
     lanes: &'a L,
     count: usize,
+    /// Whether triangles do not count where rays begin.
+    excludes_start: bool,
     is_valid: V,
 }
 
@@ -49,7 +51,8 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         while first < self.count {
             let lanes = [self.seeing(first, mask)];
             // SAFETY: nobody writes to them before it is answered.
-            match unsafe { self.lanes.packet(first) } {
+            let in_place = unsafe { self.lanes.packet(first) };
+            match in_place.filter(|_| !self.excludes_start) {
                 Some(packet) => one(solid, &Asked { packets: [packet], lanes }, first),
                 None => one(solid, &Asked { packets: [&self.packet(first)], lanes }, first),
             }
@@ -60,6 +63,15 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     /// The rays from lane `first` on.
     #[inline(always)]
     fn packet(&self, first: usize) -> Packet {
+        let mut packet = self.as_it_is(first);
+        if self.excludes_start {
+            packet.tmin = packet.tmin.map(after);
+        }
+        packet
+    }
+
+    #[inline(always)]
+    fn as_it_is(&self, first: usize) -> Packet {
         let mut packet = Packet::NONE;
         if first + RAYS > self.count {
             for lane in first..self.count {
@@ -79,7 +91,7 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     /// A bit for each of these rays that is valid and has a bit in common with `mask`.
     #[inline(always)]
     fn seeing(&self, first: usize, mask: u32) -> u32 {
-        let Self { lanes, count, is_valid } = self;
+        let Self { lanes, count, is_valid, .. } = self;
         let mut seeing = 0;
         if first + RAYS > *count {
             for lane in first..*count {
@@ -97,7 +109,6 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
 /// Words of a ray.
 const TNEAR: usize = 3;
 const DIRECTION: usize = 4;
-const MASK: usize = 9;
 
 /// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in common to see all of them; the
 /// others see none.
@@ -117,17 +128,7 @@ pub fn intersect_lanes(
     count: usize,
     is_valid: impl Fn(usize) -> bool,
 ) {
-    let alone = |lane: usize| {
-        // Together, as user geometry wants them.
-        let mut own = RTCRayHit { ray: lanes.ray(lane), hit: lanes.hit(lane) };
-        let own = &raw mut own;
-        // SAFETY: it is ours, and used through this pointer alone.
-        let target = unsafe { Target::closest(own) };
-        cast_one::<false>(committed, query, &target);
-        lanes.set_tfar(lane, target.tfar());
-        // SAFETY: as above.
-        lanes.set_hit(lane, unsafe { &(*own).hit });
-    };
+    let alone = |lane: usize| intersect_lane(committed, query, lanes, lane);
     let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
         solid.closest_packets(asked, |[low, high]| {
             tell(committed, query, lanes, first, low);
@@ -137,7 +138,22 @@ pub fn intersect_lanes(
     let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
         solid.closest_packets(asked, |[hits]| tell(committed, query, lanes, first, hits));
     };
-    Called { lanes, count, is_valid }.each(committed, query, false, alone, two, one);
+    // Hits where rays begin are seen afterwards: there are none, nearly always.
+    Called { lanes, count, excludes_start: false, is_valid }.each(committed, query, false, alone, two, one);
+}
+
+/// The nearest hit of one ray.
+#[inline(always)]
+fn intersect_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane: usize) {
+    // Together, as user geometry wants them.
+    let mut own = RTCRayHit { ray: lanes.ray(lane), hit: lanes.hit(lane) };
+    let own = &raw mut own;
+    // SAFETY: it is ours, and used through this pointer alone.
+    let target = unsafe { Target::closest(own) };
+    cast_one::<false>(committed, query, &target);
+    lanes.set_tfar(lane, target.tfar());
+    // SAFETY: as above.
+    lanes.set_hit(lane, unsafe { &(*own).hit });
 }
 
 /// Writes the hits of the rays from lane `first` on.
@@ -146,8 +162,14 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     if hits.lanes == 0 {
         return;
     }
+    if committed.excludes_start {
+        let at_start = at_start(lanes, first, hits);
+        if at_start != 0 {
+            return tell_beyond_start(committed, query, lanes, first, hits, at_start);
+        }
+    }
     if !committed.is_plain || hits.lanes != 0xff {
-        return tell_some(committed, query, lanes, first, hits);
+        return tell_some(committed, query, lanes, first, hits, hits.lanes);
     }
     let PacketHits { t, u, v, normal, primitive, geometry, .. } = hits;
     let [nx, ny, nz] = normal;
@@ -164,11 +186,45 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     lanes.set_eight(RAY_WORDS + 8, first, [context.instance_primitive; RAYS]);
 }
 
-/// The same, lane by lane: where rays miss, and where triangles are parts of other primitives.
+/// A bit for each ray that was hit where it begins.
 #[inline(always)]
-fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits) {
-    let PacketHits { t, u, v, normal: [nx, ny, nz], primitive, geometry, .. } = hits;
+fn at_start(lanes: &impl Lanes, first: usize, hits: &PacketHits) -> u32 {
+    let mut at_start = 0;
+    if hits.lanes == 0xff {
+        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.eight(TNEAR, first)).enumerate() {
+            at_start |= u32::from(*t == f32::from_bits(tnear)) << lane;
+        }
+        return at_start;
+    }
     let mut open = hits.lanes;
+    while open != 0 {
+        let lane = open.trailing_zeros() as usize % RAYS;
+        open &= open - 1;
+        at_start |= u32::from(hits.t[lane] == lanes.ray(first + lane).tnear) << lane;
+    }
+    at_start
+}
+
+/// Has rays look farther that were hit where they begin.
+#[cold]
+fn tell_beyond_start(
+    committed: &Committed,
+    query: &Query,
+    lanes: &impl Lanes,
+    first: usize,
+    hits: &PacketHits,
+    at_start: u32,
+) {
+    tell_some(committed, query, lanes, first, hits, hits.lanes & !at_start);
+    (0..RAYS)
+        .filter(|lane| at_start >> lane & 1 != 0)
+        .for_each(|lane| intersect_lane(committed, query, lanes, first + lane));
+}
+
+/// The same, lane by lane, of those in `open`: where rays miss, and where triangles are parts of other primitives.
+#[inline(always)]
+fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits, mut open: u32) {
+    let PacketHits { t, u, v, normal: [nx, ny, nz], primitive, geometry, .. } = hits;
     while open != 0 {
         let i = open.trailing_zeros() as usize % RAYS;
         open &= open - 1;
@@ -210,5 +266,6 @@ pub fn occluded_lanes(
         let [occluded] = solid.occluded_packets(asked);
         end(first, occluded);
     };
-    Called { lanes, count, is_valid }.each(committed, query, true, alone, two, one);
+    Called { lanes, count, excludes_start: committed.excludes_start, is_valid }
+        .each(committed, query, true, alone, two, one);
 }

@@ -10,6 +10,7 @@ void rounds();
 void errors();
 void packets();
 void motions();
+void starts();
 
 int main() {
   const struct {
@@ -17,7 +18,7 @@ int main() {
     void (*run)();
   } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
                 {"rounds", rounds},     {"errors", errors},   {"packets", packets},
-                {"motions", motions}};
+                {"motions", motions},   {"starts", starts}};
   int all = 0;
   for (const auto& group : groups) {
     checks = failures = 0;
