@@ -190,8 +190,9 @@ impl Lights {
             Light::Point { range, .. } => range.is_finite(),
             Light::Spot { .. } | Light::Area { .. } => true,
         };
-        // Bounds take a look at every triangle.
-        let bounds = bright.iter().any(|&i| has_an_end(&scene.lights[i])).then(|| {
+        // A plane is everywhere. Bounds take a look at every triangle.
+        let may_miss = !world.is_unbounded() && bright.iter().any(|&i| has_an_end(&scene.lights[i]));
+        let bounds = may_miss.then(|| {
             let bounds = world.bounds();
             DAabb { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }
         });

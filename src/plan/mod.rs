@@ -185,9 +185,10 @@ impl Plan {
         let ambient = !is_path && census.ambient && materials.ambient > 0;
         let alpha = materials.alpha > 0;
         let surfaces = complete.has(Reduction::Surfaces);
+        let normal_maps = (lit || depth > 0) && materials.normal_mapped > 0 || surfaces;
         let attributes = Attributes {
             normals: (lit || depth > 0) && meshes.normals > 0 || surfaces,
-            uvs: (lit || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0 || surfaces,
+            uvs: (lit || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0 || normal_maps,
             colors: (lit || ambient || alpha || materials.unlit > 0) && meshes.colors > 0 || surfaces,
         };
         let casting = match &lighting {
@@ -207,7 +208,7 @@ impl Plan {
             depth,
             faint: if complete.has(Reduction::Faint) { 0.0 } else { FAINT },
             alpha: alpha || complete.has(Reduction::Alpha),
-            normal_maps: (lit || depth > 0) && materials.normal_mapped > 0 || surfaces,
+            normal_maps,
             environment,
             fog: scene.fog.filter(|_| census.fog),
             background: wishes.background.or(scene.background),
@@ -357,6 +358,23 @@ mod tests {
         let full = wished(&scene, &Wishes { complete, ..Wishes::default() });
         assert_eq!(full.lighting, Lighting::Lights(vec![0, 1]));
         assert_eq!((plan(&scene).work.shadow, full.work.shadow), (1.0, 2.0));
+        // A plane is within reach of whatever shines on it, though no box holds it.
+        let plane = crate::shape::Plane::new(Vec3::Y * -9.0, Vec3::Y).expect("a plane").into();
+        scene.geometries.push(Geometry::Shapes { shapes: vec![plane], material: 0 });
+        scene.groups[0].geometries = 0..2;
+        assert_eq!(plan(&scene).lighting, Lighting::Lights(vec![0, 1]));
+    }
+
+    /// Its map is read by uvs, whatever else there is.
+    #[test]
+    fn a_mirror_with_a_normal_map_keeps_its_uvs() {
+        let mut scene = scene();
+        scene.lights = vec![Light::Directional { direction: DVec3::X, color: Vec3::ZERO }];
+        scene.materials[0] = Material { diffuse: Vec3::ZERO, reflection: Vec3::ONE, ..Material::default() };
+        scene.materials[0].normal_texture = Some(0);
+        scene.textures = vec![crate::scene::Texture::default()];
+        let plan = plan(&scene);
+        assert!(plan.normal_maps && plan.attributes.uvs, "{plan:?}");
     }
 
     #[test]

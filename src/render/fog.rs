@@ -5,41 +5,40 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
-use crate::scene::{Interface, Material};
 use crate::shade::SurfacePoint;
 use crate::shade::fog::{Stretch, stretch, transmittance};
 use crate::shade::light::Illumination;
 
 use super::Renderer;
-use super::wavefront::{OUTSIDE, Path};
+use super::wavefront::Path;
 
 impl Renderer<'_> {
     /// What the fog does on a ray to `point`; none where there is none.
     #[inline]
     pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
-        self.is_in_fog(path, point).then(|| stretch(fog, point.t as f32 * ray.direction.length()))
+        self.came_from_outside(path, point).then(|| stretch(fog, point.t as f32 * ray.direction.length()))
     }
 
     /// The same for a ray that hits nothing.
     #[inline]
     pub(super) fn fog_beyond(&self, path: &Path) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
-        (path.medium == OUTSIDE).then(|| stretch(fog, fog.reach))
+        path.media.is_outside().then(|| stretch(fog, fog.reach))
     }
 
-    /// What is left of light that arrives at `point`, which the path has come to, on its way from a light; none for all of it.
+    /// What fog and absorption leave of light that arrives at `point`, which the path has come to, on its way from a light; none for all of it.
     #[inline]
-    pub(super) fn fog_to_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
+    pub(super) fn left_of_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
+        // Where there is fog nothing absorbs, and the other way round.
+        self.fog_to_light(path, point, arriving).or_else(|| self.transmittance_to_light(path, point, arriving))
+    }
+
+    fn fog_to_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
         let fog = self.plan.fog.as_ref()?;
         let way = |end: DVec3| (end - point.position).length() as f32;
         // Light arrives on the side that the path came from.
-        self.is_in_fog(path, point).then(|| transmittance(fog, arriving.end.map_or(fog.reach, way)))
-    }
-
-    /// Whether a path came to `point` through the fog, and not through something solid.
-    fn is_in_fog(&self, path: &Path, point: &SurfacePoint) -> bool {
-        path.medium == OUTSIDE && (point.front || !is_solid(self.material(point)))
+        self.came_from_outside(path, point).then(|| transmittance(fog, arriving.end.map_or(fog.reach, way)))
     }
 }
 
@@ -52,9 +51,4 @@ impl Path {
         self.weight *= left;
         added
     }
-}
-
-/// Whether rays go into it: what keeps the fog out.
-pub(super) fn is_solid(material: &Material) -> bool {
-    material.sends_on() && material.transmission != Vec3::ZERO && material.interface != Interface::Thin
 }

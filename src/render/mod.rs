@@ -16,6 +16,7 @@ mod filter;
 mod finished;
 mod fog;
 mod identity;
+mod media;
 mod path;
 mod rounds;
 pub(crate) mod sampler;
@@ -115,7 +116,7 @@ impl<'a> Renderer<'a> {
         let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
         let plan = Plan::new(scene, world, &settings.wishes());
         if plan.integrator == Integrator::Path && sampling == Sampling::Grid {
-            let why = "its numbers are the same for every choice of a path, which makes a wrong picture";
+            let why = "its numbers are the same for every pixel, and what one path misses all of them miss";
             return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));
         }
         // A headlight stays where the camera is half-way.

@@ -48,7 +48,7 @@ struct Asked<'a> {
     arriving: Illumination,
     value: Value,
     /// What is left of its light on the way; none for all of it.
-    fog: Option<Vec3>,
+    left: Option<Vec3>,
     /// What the answer counts, by the choice of this light and of this way to find it.
     share: f32,
     /// What the pixel gets if nothing is in between.
@@ -123,7 +123,7 @@ impl Renderer<'_> {
             let vertex = Vertex { path, point: &point, lobes, pattern, bounces, sample, depth };
             let is_choice = self.lights.is_choice() || vertex.lobes.is_choice();
             let DVec2 { x: light, y: lobe } = if is_choice { self.choice(&vertex, Choice::Which) } else { DVec2::ZERO };
-            if let Some(Asked { chosen, arriving, value, fog, share, worth }) = self.ask(&vertex, light) {
+            if let Some(Asked { chosen, arriving, value, left, share, worth }) = self.ask(&vertex, light) {
                 trail.light(&path, vertex.point, || {
                     let faces = shading.faces(arriving.to_light);
                     let [diffuse, highlight] = if faces { shading.lobes(arriving.to_light) } else { [Vec3::ZERO; 2] };
@@ -132,7 +132,7 @@ impl Renderer<'_> {
                         source: chosen.source,
                         arriving: &arriving,
                         lobes: [diffuse, highlight, value.share - diffuse - highlight],
-                        fog: fog.unwrap_or(Vec3::ONE),
+                        left: left.unwrap_or(Vec3::ONE),
                         share,
                         contribution: worth,
                     }
@@ -215,13 +215,13 @@ impl Renderer<'_> {
             }
             _ => 1.0,
         };
-        let fog = self.fog_to_light(&vertex.path, vertex.point, &arriving);
+        let left = self.left_of_light(&vertex.path, vertex.point, &arriving);
         let share = share / chosen.chance as f32;
         let mut worth = vertex.path.weight * value.share * arriving.color * share;
-        if let Some(left) = fog {
+        if let Some(left) = left {
             worth *= left;
         }
-        (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, fog, share, worth })
+        (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, left, share, worth })
     }
 
     /// How light comes to the eye that the ray finds which goes on.
@@ -251,10 +251,10 @@ impl Renderer<'_> {
             weight /= chance;
         }
         let goes_through = !point.is_above(scattered.direction);
-        let medium = if goes_through { self.medium_behind(point) } else { path.medium };
+        let media = if goes_through { self.media_behind(path, point) } else { path.media };
         let density = scattered.density.map_or(0.0, |density| density as f32);
         let ray = point.spawn(scattered.direction.as_vec3(), f32::INFINITY);
-        Some((ray, Path { weight, medium, density, scale, ..*path }))
+        Some((ray, Path { weight, media, density, scale, ..*path }))
     }
 }
 

@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::plan::Lighting;
 use crate::ray::{Hit, Ray};
-use crate::scene::{Absorption, Integrator, Interface, Material};
+use crate::scene::{Integrator, Material};
 use crate::shade::light::LightSource;
 use crate::shade::lights::Lights;
 use crate::shade::{SurfacePoint, appearance, normal_map};
@@ -20,7 +20,7 @@ use crate::trace::{Batch, Tracer};
 use super::aov::{Parts, Request, Route, Tally};
 use super::camera::View;
 use super::explain::Trail;
-use super::fog::is_solid;
+use super::media::Media;
 use super::sampler::{Bounces, Dimension, Pattern};
 use super::whitted::Lit;
 use super::{Renderer, tiles::Tile};
@@ -87,20 +87,18 @@ pub(super) struct Path {
     pub(super) weight: Vec3,
     /// Number of the ray in the sample's tree of rays: 0 for the camera's, 2 n + 1 and 2 n + 2 for those that n sends on.
     pub(super) branch: u32,
-    /// The material whose inside the ray entered last, or [`OUTSIDE`].
-    pub(super) medium: u32,
+    /// What the ray is inside of.
+    pub(super) media: Media,
     /// How densely its direction was chosen, per steradian; 0 where no other could have been.
     pub(super) density: f32,
     /// By how much radiance grew where it was refracted, all in all.
     pub(super) scale: f32,
 }
 
-/// No medium.
-pub(super) const OUTSIDE: u32 = u32::MAX;
-
 impl Path {
     /// A camera ray's.
-    const CAMERA: Self = Self { pixel: 0, weight: Vec3::ONE, branch: 0, medium: OUTSIDE, density: 0.0, scale: 1.0 };
+    const CAMERA: Self =
+        Self { pixel: 0, weight: Vec3::ONE, branch: 0, media: Media::OUTSIDE, density: 0.0, scale: 1.0 };
 }
 
 impl Renderer<'_> {
@@ -247,32 +245,6 @@ impl Renderer<'_> {
             (None, Some(color)) => color.extend(coverage),
             // Fog is opaque.
             (None, None) => Vec3::ZERO.extend(if self.plan.fog.is_some() { coverage } else { 0.0 }),
-        }
-    }
-
-    /// What is left of the light of a ray that ends at `point`, on its way there.
-    pub(super) fn transmittance(&self, path: &Path, direction: Vec3, point: &SurfacePoint) -> Vec3 {
-        if self.plan.depth == 0 {
-            return Vec3::ONE;
-        }
-        let medium = match self.absorbs(point) {
-            Some(absorption) if !point.front => Some(absorption),
-            _ => self.scene.materials.get(path.medium as usize).and_then(|material| material.absorption),
-        };
-        medium.map_or(Vec3::ONE, |medium| medium.transmittance(point.t as f32 * direction.length()))
-    }
-
-    /// The medium of a ray that goes through the surface at `point`.
-    pub(super) fn medium_behind(&self, point: &SurfacePoint) -> u32 {
-        let keeps_fog_out = || self.plan.fog.is_some() && is_solid(self.material(point));
-        if point.front && (self.absorbs(point).is_some() || keeps_fog_out()) { point.material } else { OUTSIDE }
-    }
-
-    fn absorbs(&self, point: &SurfacePoint) -> Option<Absorption> {
-        let material = self.material(point);
-        match material.interface {
-            Interface::Shares | Interface::Fresnel => material.absorption,
-            Interface::Thin => None,
         }
     }
 

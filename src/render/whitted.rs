@@ -145,8 +145,8 @@ impl Renderer<'_> {
                 };
                 let Some(direction) = direction else { continue };
                 wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
-                let medium = if which == 2 { self.medium_behind(point) } else { path.medium };
-                wave.paths.push(Path { weight, branch, medium, ..*path });
+                let media = if which == 2 { self.media_behind(path, point) } else { path.media };
+                wave.paths.push(Path { weight, branch, media, ..*path });
                 if let Some(tally) = tally {
                     wave.routes.push(tally.after(*route, event));
                 }
@@ -206,9 +206,9 @@ impl Renderer<'_> {
                 if !shading.faces(arriving.to_light) {
                     continue;
                 }
-                let fog = self.fog_to_light(path, point, &arriving);
+                let left = self.left_of_light(path, point, &arriving);
                 let mut reflected = weight * shading.reflect(&arriving);
-                if let Some(left) = fog {
+                if let Some(left) = left {
                     reflected *= left;
                 }
                 trail.light(path, point, || Answer {
@@ -216,7 +216,7 @@ impl Renderer<'_> {
                     source: light,
                     arriving: &arriving,
                     lobes: [shading.lobes(arriving.to_light)[0], shading.lobes(arriving.to_light)[1], Vec3::ZERO],
-                    fog: fog.unwrap_or(Vec3::ONE),
+                    left: left.unwrap_or(Vec3::ONE),
                     share: 1.0 / count as f32,
                     contribution: reflected,
                 });

@@ -19,6 +19,12 @@ impl Attenuation {
     /// As physics has it: 1 / d^2.
     pub const INVERSE_SQUARE: Self = Self { constant: 0.0, linear: 0.0, quadratic: 1.0 };
 
+    /// The same where lengths are `scale` times as long.
+    fn scale(&mut self, scale: f32) {
+        self.linear /= scale;
+        self.quadratic /= scale * scale;
+    }
+
     /// The factor at distance `d`.
     pub fn factor(&self, d: f32) -> f32 {
         1.0 / (self.constant + d * (self.linear + d * self.quadratic))
@@ -116,7 +122,7 @@ pub enum AreaShape {
 }
 
 impl Light {
-    /// Moves the light; colours stay.
+    /// Moves the light; colours stay, and so does what it gives at a distance that is scaled with it.
     pub(crate) fn transform(&mut self, transform: &DAffine3) {
         if let Self::Directional { direction, .. } | Self::Spot { direction, .. } = self {
             *direction = transform.transform_vector3(*direction).normalize();
@@ -125,8 +131,9 @@ impl Light {
             *position = transform.transform_point3(*position);
         }
         let scale = transform.matrix3.determinant().abs().cbrt();
-        if let Self::Point { range, .. } | Self::Spot { range, .. } = self {
+        if let Self::Point { range, attenuation, .. } | Self::Spot { range, attenuation, .. } = self {
             *range *= scale;
+            attenuation.scale(scale as f32);
         }
         match self {
             Self::Point { radius, .. } => *radius *= scale,
@@ -164,6 +171,38 @@ impl AreaShape {
             Self::Sphere { centre, radius } => {
                 *centre = transform.transform_point3(*centre);
                 *radius *= scale;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In whatever unit a scene is written, it looks the same.
+    #[test]
+    fn attenuation_scales_with_lengths() {
+        let light = Light::Spot {
+            position: DVec3::X,
+            direction: DVec3::Y,
+            color: Vec3::ONE,
+            attenuation: Attenuation { constant: 0.5, linear: 0.25, quadratic: 2.0 },
+            range: 6.0,
+            inner_angle: 0.1,
+            outer_angle: 0.2,
+        };
+        for scale in [0.01, 25.4, 1000.0] {
+            let mut scaled = light.clone();
+            scaled.transform(&DAffine3::from_scale(DVec3::splat(scale)));
+            let [(before, range), (after, range_after)] = [&light, &scaled].map(|light| match light {
+                Light::Spot { attenuation, range, .. } => (*attenuation, *range),
+                _ => unreachable!("it stays a spot"),
+            });
+            assert!((range_after / range / scale - 1.0).abs() < 1e-12);
+            for d in [0.1, 1.0, 30.0f32] {
+                let ratio = after.factor(d * scale as f32) / before.factor(d);
+                assert!((ratio - 1.0).abs() < 1e-5, "{ratio} at {d}, scaled by {scale}");
             }
         }
     }

@@ -184,11 +184,11 @@ impl MetallicRoughness {
             ior: self.ior.filter(|n| *n > 0.0).unwrap_or(Material::default().ior),
             ..shiny(diffuse, mirrored, roughness)
         };
-        let transmission = self.transmission * texels.transmission;
-        if transmission == 0.0 {
+        // Of what lets light through anywhere all is glass, also where its texture is black: it mirrors what it does not let in.
+        if self.transmission == 0.0 {
             return plain;
         }
-        let through = transmission * (1.0 - metal);
+        let through = self.transmission * texels.transmission * (1.0 - metal);
         Material {
             ambient: diffuse * (1.0 - through),
             diffuse: diffuse * (1.0 - through),
@@ -301,6 +301,8 @@ mod tests {
         let glass = MetallicRoughness { transmission: 1.0, ..values(0.0, 0.0) };
         let half = glass.phong(&Texels { transmission: 0.5, ..Texels::default() });
         assert_eq!((half.diffuse, half.transmission), (BASE * 0.5, BASE * 0.5));
+        let opaque = glass.phong(&Texels { transmission: 0.0, ..Texels::default() });
+        assert_eq!((opaque.diffuse, opaque.transmission, opaque.reflection), (BASE, Vec3::ZERO, Vec3::ONE));
         // KHR_materials_specular: 0.04 times the colour times the factor, of what is not metal.
         let coloured =
             MetallicRoughness { specular: 0.5, specular_color: Vec3::new(2.0, 1.0, 0.0), ..values(0.0, 0.5) };

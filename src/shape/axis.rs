@@ -91,7 +91,9 @@ impl Frustum {
         if self.capped && height.abs().min((height - length).abs()) < away {
             let is_base = height.abs() < (height - length).abs();
             let (normal, radius) = if is_base { (-along, base) } else { (along, apex) };
-            (normal, DVec2::new(angle, out.length() / radius.max(f64::MIN_POSITIVE)))
+            // Clockwise as seen from outside, as on disks.
+            let clockwise = if is_base { angle } else { 1.0 - angle };
+            (normal, DVec2::new(clockwise, out.length() / radius.max(f64::MIN_POSITIVE)))
         } else {
             let normal = (out.normalize_or(x) - along * slope).normalize();
             (normal, DVec2::new(angle, height / length))

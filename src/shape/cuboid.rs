@@ -105,12 +105,14 @@ impl Cuboid {
         DVec3::AXES[axis] * if is_upper { 1.0 } else { -1.0 }
     }
 
-    /// Over [0, 1] on each face, along the two axes that follow the face's own.
+    /// Over [0, 1] on each face, along the two axes that follow the face's own; on lower faces u runs the other way, so that a texture is
+    /// mirrored on none.
     pub(super) fn uv(&self, at: DVec3) -> DVec2 {
-        let (axis, _) = self.face(at);
+        let (axis, is_upper) = self.face(at);
         let size = (self.max.as_dvec3() - self.min.as_dvec3()).max(DVec3::splat(f64::MIN_POSITIVE));
         let share = (at - self.min.as_dvec3()) / size;
-        DVec2::new(share[(axis + 1) % 3], share[(axis + 2) % 3])
+        let u = share[(axis + 1) % 3];
+        DVec2::new(if is_upper { u } else { 1.0 - u }, share[(axis + 2) % 3])
     }
 }
 

@@ -59,11 +59,11 @@ impl Disk {
         self.normal.as_dvec3().normalize()
     }
 
-    /// The angle over [0, 1], and the distance from the centre in radii.
+    /// The angle over [0, 1], clockwise as seen from outside, and the distance from the centre in radii.
     pub(super) fn uv(&self, at: DVec3) -> DVec2 {
         let from = at - self.centre.as_dvec3();
         let [x, y] = tangents(self.normal());
-        DVec2::new(turn(from.dot(y), from.dot(x)), from.length() / f64::from(self.radius))
+        DVec2::new(turn(-from.dot(y), from.dot(x)), from.length() / f64::from(self.radius))
     }
 }
 

@@ -227,6 +227,39 @@ fn closed_forms() {
     assert_eq!(t_of(&floor, &at(0.0, -1.0, 0.0, Vec3::Y)), [0.0], "on it");
 }
 
+/// Seen from outside, v grows to the left of where u does, on all sides of everything.
+#[test]
+fn no_texture_is_mirrored() {
+    for kind in 0..12 {
+        let mut seen = 0;
+        for case in 0..200 {
+            let mut random = Random::new(kind as u64 + 300, case);
+            let (shape, targets) = sample(kind, &mut random);
+            let origin = random.vector() * 3.0;
+            let ray = Ray::new(origin, targets[0] + random.vector() * 0.3 - origin);
+            let Some(hit) = shape.intersect(&ray) else { continue };
+            let at = ray.origin.as_dvec3() + ray.direction.as_dvec3() * hit.t;
+            let normal = shape.normal(at);
+            let (right, up) = normal.any_orthonormal_pair();
+            let along = |way: DVec3| (shape.uv(at + way * 1e-6) - shape.uv(at - way * 1e-6)) / 2e-6;
+            let (mut p, mut q) = (along(right), along(up));
+            // At seams and rims parameters jump.
+            if p.abs().max_element().max(q.abs().max_element()) > 1e3 {
+                continue;
+            }
+            if let Shape::Ellipsoid(ellipsoid) = &shape
+                && ellipsoid.axes.determinant() < 0.0
+            {
+                // Its axes say that it is.
+                (p, q) = (q, p);
+            }
+            assert!(p.perp_dot(q) > 0.0, "{shape:?} at {at}: {p} {q}");
+            seen += 1;
+        }
+        assert!(seen > 20, "{kind}: {seen}");
+    }
+}
+
 /// The outward normal is the direction in which the distance from the inside grows, and uv stay in their range.
 #[test]
 fn normals_and_parameters() {

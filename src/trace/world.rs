@@ -101,6 +101,14 @@ impl World {
         });
         triangles.sum()
     }
+
+    /// Whether anything in it has no end, as planes have none.
+    pub fn is_unbounded(&self) -> bool {
+        self.parts.iter().any(|part| match &part.primitives {
+            Primitives::Triangles { .. } => false,
+            Primitives::Shapes(shapes) => shapes.iter().any(Shape::is_unbounded),
+        })
+    }
 }
 
 impl World {

@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 
 use twincast::image::{self, Channels, Metadata, Plane, WriteOptions};
-use twincast::math::{DVec3, Vec3, Vec4};
+use twincast::math::{DAffine3, DVec3, Vec3, Vec4};
 use twincast::render::{Aov, Control, Crop, Filter, Picture};
-use twincast::scene::{Alpha, Camera, Environment, Fog, Integrator, Light, Material, Specular};
-use twincast::{Image, Renderer, Scene, Settings, World};
+use twincast::scene::{
+    Alpha, Camera, Environment, Fog, Geometry, Integrator, Light, Material, MetallicRoughness, Physical,
+    PhysicalTextures, Pixels, Projection, Specular, Texels, Texture, Workflow,
+};
+use twincast::{Image, Renderer, Scene, Settings, Sphere, World};
 
 use super::determinism::{bits, busier_scene};
 use super::{engines, floor, from_above, matte, settings};
@@ -138,6 +141,54 @@ fn uv_normals_and_albedo_of_a_floor() {
         );
         assert!((normals[at] - if inside { Vec3::Y } else { Vec3::ZERO }).length() < 1e-6);
         assert!((albedo[at] - if inside { Vec3::splat(0.6) } else { Vec3::ZERO }).length() < 1e-6);
+    }
+}
+
+/// Where textures say what a surface is, its albedo is that of what it is there.
+#[test]
+fn albedo_is_as_varied_as_textures() {
+    let values = MetallicRoughness { base: Vec3::new(0.8, 0.2, 0.1), roughness: 0.5, ..MetallicRoughness::default() };
+    let textures = PhysicalTextures { metallic_roughness: Some(0), ..PhysicalTextures::default() };
+    let physical = Physical { workflow: Workflow::MetallicRoughness(values), textures };
+    let constant =
+        |metalness| Material { ambient: Vec3::ZERO, ..physical.phong(&Texels { metalness, ..Texels::default() }) };
+    let texture = Texture {
+        width: 2,
+        height: 1,
+        pixels: Pixels::from(vec![[255_u8, 255, 0, 255], [255, 255, 255, 255]]),
+        filter: twincast::scene::Filter::Nearest,
+        ..Texture::default()
+    };
+    let varied = Material { physical: Some(physical), ..constant(0.5) };
+    let albedo = |material: Material| {
+        let scene =
+            Scene { textures: vec![texture.clone()], ..Scene::from_geometries(vec![floor(0.5, 0)], vec![material]) };
+        let settings = Settings { aovs: aovs("albedo"), ..settings(8, 8, 1) };
+        light(&picture(&scene, &from_above(), &settings), "albedo")
+    };
+    let (got, [plastic, metal]) = (albedo(varied), [0.0, 1.0].map(|metalness| albedo(constant(metalness))));
+    let [left, right] = [3 * 8 + 2, 3 * 8 + 5];
+    assert!((plastic[left] - metal[left]).length() > 0.02);
+    assert_eq!((got[left], got[right]), (plastic[left], metal[right]));
+}
+
+/// A ball that comes four metres nearer is half-way there, whichever kind of camera looks.
+#[test]
+fn geometry_of_what_moves_is_that_of_the_middle_of_the_shutter() {
+    let ball = Sphere { centre: Vec3::ZERO, radius: 0.5 }.into();
+    let mut scene =
+        Scene::from_geometries(vec![Geometry::Shapes { shapes: vec![ball], material: 0 }], vec![matte(0.5)]);
+    scene.instances[0].transform_end = Some(DAffine3::from_translation(DVec3::Z * 4.0));
+    let still = Camera::look_at(DVec3::Z * 10.0, DVec3::ZERO, DVec3::Y, 0.02).unwrap();
+    let parallel = Camera { projection: Projection::Orthographic(0.02), ..still.clone() };
+    for (shutter, expected) in [([0.0, 1.0], 7.5), ([0.5, 1.0], 6.5)] {
+        for camera in [&still, &parallel] {
+            let camera = Camera { shutter, ..camera.clone() };
+            let settings = Settings { aovs: aovs("depth"), ..settings(1, 1, 16) };
+            let (channels, _) = through_a_file(&picture(&scene, &camera, &settings));
+            let depth = channels.floats("depth.Z").unwrap()[0];
+            assert!((depth - expected).abs() < 1e-3, "{depth} for {expected}: {camera:?}");
+        }
     }
 }
 

@@ -10,6 +10,7 @@ mod determinism;
 mod explain;
 mod fog;
 mod glass;
+mod media;
 mod shading;
 mod toy;
 mod transport;

@@ -180,7 +180,7 @@ impl Renderer<'_> {
 
     /// How much of the light that comes from everywhere a surface sends on, and what it shows unlit.
     fn albedo(&self, ray: &Ray, point: &SurfacePoint) -> Vec3 {
-        let material = self.material(point);
+        let material = &*self.appearance(point);
         let shading = Shading::new(point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
         let ways = Ways::new(material, point, ray.direction.as_dvec3().normalize());
         let sent_on = [ways.mirrored, ways.refracted].into_iter().flatten().map(|way| way.share).sum::<Vec3>();

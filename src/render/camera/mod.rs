@@ -74,7 +74,7 @@ impl View {
     /// The ray through a point of the film and through the middle of the lens, at a time.
     pub(super) fn middle_ray(&self, film: DVec2, time: f32) -> Ray {
         match self {
-            Self::Pinhole(pinhole) => pinhole.ray(film),
+            Self::Pinhole(pinhole) => Ray { time, ..pinhole.ray(film) },
             Self::General(view) => view.ray(film, view.middle_of_lens(), time),
         }
     }

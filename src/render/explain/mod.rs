@@ -121,7 +121,7 @@ pub struct LightTrail {
     pub highlight: [f32; 3],
     /// ... and by glossy mirroring and refraction.
     pub glossy: [f32; 3],
-    /// What fog leaves of the light on its way.
+    /// What fog, or absorption inside of something, leaves of the light on its way.
     pub fog: [f32; 3],
     /// What its answer counts: 1 / the number of questions, or what the choice of one light, and of this way to find it, makes of it.
     pub share: f32,

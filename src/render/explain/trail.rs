@@ -28,7 +28,7 @@ pub(in crate::render) struct Answer<'a> {
     pub(in crate::render) arriving: &'a Illumination,
     /// pi f cos of Lambert's lobe, the highlight, and glossy ways.
     pub(in crate::render) lobes: [Vec3; 3],
-    pub(in crate::render) fog: Vec3,
+    pub(in crate::render) left: Vec3,
     pub(in crate::render) share: f32,
     /// Where nothing is in between.
     pub(in crate::render) contribution: Vec3,
@@ -118,7 +118,7 @@ impl Notes {
 
     #[cold]
     fn add_light(&mut self, number: u32, point: &SurfacePoint, answer: &Answer<'_>) {
-        let Answer { light, source, arriving, lobes: [diffuse, highlight, glossy], fog, share, contribution } = answer;
+        let Answer { light, source, arriving, lobes: [diffuse, highlight, glossy], left, share, contribution } = answer;
         let rays = &mut self.samples[self.sample].rays;
         // The last of the number: a path's all have the same, and lights are asked before it goes on.
         let Some(at) = rays.iter().rposition(|ray| ray.number == number) else { return };
@@ -135,7 +135,7 @@ impl Notes {
             diffuse: diffuse.to_array(),
             highlight: highlight.to_array(),
             glossy: glossy.to_array(),
-            fog: fog.to_array(),
+            fog: left.to_array(),
             share: *share,
             visibility: 1.0,
             contribution: contribution.to_array(),

@@ -30,7 +30,7 @@ pub enum Sampling {
     Halton,
     /// One sample in each cell of a grid, with its rows and columns evenly filled.
     Stratified,
-    /// The middles of a grid's cells, the same for every pixel: shows bands where others show noise.
+    /// The middles of a grid's cells, the same for every pixel, in another order for each choice: shows bands where others show noise.
     Grid,
     /// Random numbers.
     Independent,
@@ -152,7 +152,10 @@ impl Sampler {
             Sampling::BlueNoise => blue_noise::point(place, sample, self.spp, self.key([0, 0], dimension)),
             Sampling::Halton => halton::point(sample, key),
             Sampling::Stratified => stratified::point(sample, self.spp, key, self.hash(place, sample, dimension)),
-            Sampling::Grid => stratified::grid(sample, self.spp),
+            Sampling::Grid => {
+                let order = (dimension != Dimension::FILM).then(|| self.key([0, 0], dimension)[0]);
+                stratified::grid(sample, self.spp, order)
+            }
             Sampling::Independent => {
                 let [x, y, ..] = self.hash(place, sample, dimension);
                 DVec2::new(unit(x), unit(y))
@@ -191,6 +194,26 @@ mod tests {
     /// All but the grid, which is the same for every pixel and every pair.
     fn scattered() -> impl Iterator<Item = Sampling> {
         Sampling::ALL.into_iter().filter(|&sampling| sampling != Sampling::Grid)
+    }
+
+    /// Where on the pixel a sample is says nothing of when it is taken, of whatever sampler: of each quarter of one half is in each of the other.
+    #[test]
+    fn choices_for_a_sample_are_not_alike() {
+        for sampling in Sampling::ALL {
+            let sampler = Sampler::new(sampling, 1024, 3);
+            let pixel = sampler.pattern(5, 9);
+            let mut counts = [[0; 2]; 2];
+            let mut places = Vec::new();
+            for sample in 0..1024 {
+                let (film, time) = (sampler.film(&pixel, sample), sampler.pair(&pixel, sample, Dimension::TIME));
+                counts[usize::from(film.x < 0.5)][usize::from(time.x < 0.5)] += 1;
+                places.push(time.to_array().map(f64::to_bits));
+            }
+            assert!(counts.as_flattened().iter().all(|n| (200..312).contains(n)), "{sampling}: {counts:?}");
+            places.sort_unstable();
+            places.dedup();
+            assert_eq!(places.len(), 1024, "{sampling}");
+        }
     }
 
     #[test]

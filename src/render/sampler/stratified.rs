@@ -17,10 +17,12 @@ pub(super) fn point(sample: u32, spp: u32, key: [u32; 4], jitter: [u32; 4]) -> D
     DVec2::new((column + (row + jx) / f64::from(n)) / f64::from(m), (f64::from(s) + jy) / f64::from(spp))
 }
 
-/// The middle of the `sample`th of at least `spp` cells.
-pub(super) fn grid(sample: u32, spp: u32) -> DVec2 {
+/// The middle of the `sample`th of at least `spp` cells, row by row or in the order that a key chooses: where on the pixel a sample is
+/// must not say when it is taken.
+pub(super) fn grid(sample: u32, spp: u32, order: Option<u32>) -> DVec2 {
     let m = spp.isqrt();
     let n = spp.div_ceil(m);
+    let sample = order.map_or(sample, |key| permute(sample, spp, key));
     DVec2::new((f64::from(sample % m) + 0.5) / f64::from(m), (f64::from(sample / m) + 0.5) / f64::from(n))
 }
 

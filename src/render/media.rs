@@ -1,0 +1,125 @@
+//! What a path is inside of, and what that leaves of light: absorption by Beer's law, and whether there is fog.
+//!
+//! A path knows what it has entered and not left, so that behind a bubble in water there is water again. What it crosses of something thin
+//! it is not inside of. Where it ends the side that is seen tells as well, which is all there is for a camera inside of glass.
+
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Absorption, Interface, Material};
+use crate::shade::SurfacePoint;
+use crate::shade::light::Illumination;
+
+use super::Renderer;
+use super::wavefront::Path;
+
+/// How many bodies a path is known to be inside of; of more, those that it entered first are forgotten.
+const MOST: usize = 4;
+
+/// The materials of the bodies that a path has entered and not left, the last one first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Media([u32; MOST]);
+
+/// No body.
+const NONE: u32 = u32::MAX;
+
+impl Media {
+    /// Inside of nothing.
+    pub const OUTSIDE: Self = Self([NONE; MOST]);
+
+    #[inline]
+    pub fn is_outside(&self) -> bool {
+        self.0[0] == NONE
+    }
+
+    /// That of the body that was entered last.
+    #[inline]
+    fn innermost(&self) -> u32 {
+        self.0[0]
+    }
+
+    fn enter(self, material: u32) -> Self {
+        let [a, b, c, _] = self.0;
+        Self([material, a, b, c])
+    }
+
+    /// Leaves the one of this material that was entered last, wherever it stands, for bodies may overlap; else, since a body may have several
+    /// materials, the one that was entered last.
+    fn leave(mut self, material: u32) -> Self {
+        let at = self.0.iter().position(|&known| known == material).unwrap_or(0);
+        self.0.copy_within(at + 1.., at);
+        self.0[MOST - 1] = NONE;
+        self
+    }
+}
+
+impl Renderer<'_> {
+    /// What a ray is inside of that goes on through the surface at `point`, to which a path has come.
+    pub(super) fn media_behind(&self, path: &Path, point: &SurfacePoint) -> Media {
+        match (is_solid(self.material(point)), point.front) {
+            (false, _) => path.media,
+            (true, true) => path.media.enter(point.material),
+            (true, false) => path.media.leave(point.material),
+        }
+    }
+
+    /// What is left of the light of a ray that ends at `point`, on its way there.
+    pub(super) fn transmittance(&self, path: &Path, direction: Vec3, point: &SurfacePoint) -> Vec3 {
+        let absorption = self.absorption_before(path, point);
+        absorption.map_or(Vec3::ONE, |medium| medium.transmittance(point.t as f32 * direction.length()))
+    }
+
+    /// The same of light that arrives at `point` from a light; none for all of it. What comes from infinitely far was inside of nothing for nearly all of its
+    /// way, and is left alone, as by rays that hit nothing.
+    pub(super) fn transmittance_to_light(
+        &self,
+        path: &Path,
+        point: &SurfacePoint,
+        arriving: &Illumination,
+    ) -> Option<Vec3> {
+        let way = |end: DVec3| (end - point.position).length() as f32;
+        // Light arrives on the side that the path came from.
+        Some(self.absorption_before(path, point)?.transmittance(way(arriving.end?)))
+    }
+
+    /// What absorbs light on its way to `point` on the side that a path came from; none where nothing does.
+    fn absorption_before(&self, path: &Path, point: &SurfacePoint) -> Option<Absorption> {
+        if self.plan.depth == 0 {
+            return None;
+        }
+        let material = self.material(point);
+        if !point.front && is_solid(material) {
+            return material.absorption;
+        }
+        self.scene.materials.get(path.media.innermost() as usize)?.absorption
+    }
+
+    /// Whether a path came to `point` through what is around everything, and not through something solid.
+    pub(super) fn came_from_outside(&self, path: &Path, point: &SurfacePoint) -> bool {
+        path.media.is_outside() && (point.front || !is_solid(self.material(point)))
+    }
+}
+
+/// Whether rays go into it: what keeps the fog out.
+fn is_solid(material: &Material) -> bool {
+    material.sends_on() && material.transmission != Vec3::ZERO && material.interface != Interface::Thin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_entered_is_left_in_any_order() {
+        let [water, glass] = [7, 3];
+        let within = Media::OUTSIDE.enter(water).enter(glass);
+        assert_eq!((within.innermost(), within.leave(glass)), (glass, Media::OUTSIDE.enter(water)));
+        assert_eq!(within.leave(water), Media::OUTSIDE.enter(glass), "they overlap");
+        assert_eq!(within.leave(5), Media::OUTSIDE.enter(water), "the same body's other side");
+        assert!(Media::OUTSIDE.leave(5).is_outside(), "the camera is inside");
+        assert!(within.leave(glass).leave(water).is_outside());
+        let twice = within.enter(glass);
+        assert_eq!(twice.leave(glass), within, "one body of two that are alike");
+        let many = (0..9).fold(Media::OUTSIDE, Media::enter);
+        assert_eq!(many.0, [8, 7, 6, 5]);
+        assert!([8, 7, 6, 5].into_iter().fold(many, Media::leave).is_outside());
+    }
+}
