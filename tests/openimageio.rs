@@ -107,19 +107,18 @@ fn reading_and_writing_may_begin_together() {
 #[test]
 fn writers_that_do_not_tell_what_goes_wrong_are_found_out() {
     let folder = tempfile::tempdir().expect("a folder");
-    for suffix in ["bmp", "fits", "png"] {
+    for (suffix, size, fits) in [("bmp", "600x500", false), ("fits", "600x500", false), ("bmp", "200x200", true)] {
         let picture = folder.path().join("a").with_extension(suffix);
         std::fs::write(&picture, "the old one").expect("written");
         let program = env!("CARGO_BIN_EXE_twincast");
         // 600 x 500 pixels are 900 kB, and OpenImageIO's own files are smaller than 400.
         let line = format!(
-            "trap '' XFSZ; ulimit -f 800; exec '{program}' render '{SCENE}' -o '{}' --size 600x500 --spp 1 --sampler independent",
+            "trap '' XFSZ; ulimit -f 800; exec '{program}' render '{SCENE}' -o '{}' --size {size} --spp 1",
             picture.display()
         );
         let output = std::process::Command::new("sh").args(["-c", &line]).output().expect("the shell runs");
         let words = text(&output.stderr);
-        if suffix == "png" {
-            // It fits.
+        if fits {
             assert!(output.status.success(), "{words}");
             continue;
         }
