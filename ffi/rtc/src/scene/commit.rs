@@ -55,7 +55,7 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
     let heeded = heeded(&records, plan.flags);
     let has_filters = heeded.intersect_filter || heeded.occluded_filter || heeded.argument_filter;
     let (parts, is_plain) = solid_parts(&records);
-    let boxes = other_boxes(&records, &parts);
+    let boxes = scene.device.install(|| other_boxes(&records, &parts))?;
     let count: usize = parts.iter().map(|part| part.primitives.len()).sum();
     if count + boxes.boxes.len() > BoxTree::MOST {
         return Err(Failure::operation("too many primitives in a scene"));
