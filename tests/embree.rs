@@ -511,15 +511,15 @@ fn every_option_traces_the_same_scene_and_compact_takes_less_memory() {
 /// A placement is a transform and its inverse at least, in f32, and a box in a tree of its own; of the first two Embree's memory monitor tells nothing.
 #[test]
 fn placements_take_memory() {
-    const PLACEMENTS: u32 = 20_000;
+    const PLACEMENTS: u32 = 100_000;
     let mut scene = Scene::from_geometries(vec![Geometry::Mesh(Random(9).soup(1, 0.2))], Vec::new());
-    let place = |i: u32| DAffine3::from_translation(DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0));
+    let place = |i: u32| DAffine3::from_translation(DVec3::new(f64::from(i % 300), f64::from(i / 300), 0.0));
     scene.instances = (0..PLACEMENTS).map(|i| Instance { transform: place(i), ..scene.instances[0].clone() }).collect();
     let world = World::placed(&scene).unwrap();
     // Other tests allocate and free meanwhile: the middle of several.
-    let mut bytes: Vec<_> = (0..5).map(|_| build(&world).bytes() as u32 / PLACEMENTS).collect();
+    let mut bytes: Vec<_> = (0..3).map(|_| build(&world).bytes() as u32 / PLACEMENTS).collect();
     bytes.sort_unstable();
-    assert!((200..1000).contains(&bytes[2]), "{bytes:?}");
+    assert!((200..1000).contains(&bytes[1]), "{bytes:?}");
 }
 
 #[test]

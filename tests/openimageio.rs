@@ -103,7 +103,31 @@ fn reading_and_writing_may_begin_together() {
     }
 }
 
-/// A limit to the size of files stands for a disk that is full: what is cut off is an error, and the old picture stays.
+/// On a disk that is full the old picture stays, and nothing else.
+#[test]
+fn a_full_disk_keeps_the_old_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (disk, program) = (folder.path().display(), env!("CARGO_BIN_EXE_twincast"));
+    for suffix in ["bmp", "tga", "sgi", "png"] {
+        // Of a megabyte 200 kB are left; the picture has 900.
+        let mounted = format!(
+            "mount -t tmpfs -o size=1m tmpfs {disk} && head -c 800000 /dev/zero >{disk}/full && echo old >{disk}/a.{suffix} || exit 99
+             {program} render {SCENE} -o {disk}/a.{suffix} --size 600x500 --spp 1; status=$?
+             cat {disk}/a.{suffix}; ls -A {disk}; exit $status"
+        );
+        let run = std::process::Command::new("unshare").args(["--mount", "sh", "-c", &mounted]).output();
+        let Ok(output) = run.map_err(|error| eprintln!("skipped: no unshare: {error}")) else { return };
+        let words = text(&output.stderr);
+        if output.status.code() == Some(99) || words.starts_with("unshare:") {
+            return eprintln!("skipped: no file system may be mounted: {words}");
+        }
+        assert_eq!(output.status.code(), Some(4), "{suffix}: {words}");
+        assert!(words.contains("write") && words.contains("No space left on device"), "{words}");
+        assert_eq!(text(&output.stdout), format!("old\na.{suffix}\nfull\n"));
+    }
+}
+
+/// A limit to the size of files holds in memory, too: what is cut off is found where it is read again, and the old picture stays.
 #[test]
 fn writers_that_do_not_tell_what_goes_wrong_are_found_out() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -123,7 +147,7 @@ fn writers_that_do_not_tell_what_goes_wrong_are_found_out() {
             continue;
         }
         assert_eq!(output.status.code(), Some(4), "{suffix}: {words}");
-        assert!(words.contains("cannot") && words.contains(&picture.display().to_string()), "{words}");
+        assert!(words.contains("cannot be read again") && words.contains(&picture.display().to_string()), "{words}");
         assert_eq!(std::fs::read_to_string(&picture).expect("kept"), "the old one");
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing is left beside it");
         std::fs::remove_file(&picture).expect("removed");

@@ -1,15 +1,15 @@
-//! Fog along the rays of a picture: from the camera, mirrored, refracted and scattered ones, and those to lights.
+//! Fog along the rays of a picture: from the camera, mirrored, refracted and scattered ones. On the way to lights [`media`](super::media) knows of it.
 //!
 //! A ray is in the fog unless it is inside of something that refracts; which of the two is known where it ends, from the side that is seen
 //! and from what the ray entered last. Scenes without fog pay one comparison for each of these.
 
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::shade::SurfacePoint;
-use crate::shade::fog::{Stretch, stretch, transmittance};
-use crate::shade::light::Illumination;
+use crate::shade::fog::{Stretch, stretch};
 
 use super::Renderer;
+use super::media::Surroundings;
 use super::wavefront::Path;
 
 impl Renderer<'_> {
@@ -17,7 +17,8 @@ impl Renderer<'_> {
     #[inline]
     pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
-        self.came_from_outside(path, point).then(|| stretch(fog, point.t as f32 * ray.direction.length()))
+        (self.surroundings(path, point, true) == Surroundings::Outside)
+            .then(|| stretch(fog, point.t as f32 * ray.direction.length()))
     }
 
     /// The same for a ray that hits nothing.
@@ -25,20 +26,6 @@ impl Renderer<'_> {
     pub(super) fn fog_beyond(&self, path: &Path) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
         path.media.is_outside().then(|| stretch(fog, fog.reach))
-    }
-
-    /// What fog and absorption leave of light that arrives at `point`, which the path has come to, on its way from a light; none for all of it.
-    #[inline]
-    pub(super) fn left_of_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
-        // Where there is fog nothing absorbs, and the other way round.
-        self.fog_to_light(path, point, arriving).or_else(|| self.transmittance_to_light(path, point, arriving))
-    }
-
-    fn fog_to_light(&self, path: &Path, point: &SurfacePoint, arriving: &Illumination) -> Option<Vec3> {
-        let fog = self.plan.fog.as_ref()?;
-        let way = |end: DVec3| (end - point.position).length() as f32;
-        // Light arrives on the side that the path came from.
-        self.came_from_outside(path, point).then(|| transmittance(fog, arriving.end.map_or(fog.reach, way)))
     }
 }
 

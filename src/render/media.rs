@@ -5,8 +5,8 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Absorption, Interface, Material};
-use crate::shade::SurfacePoint;
-use crate::shade::light::Illumination;
+use crate::shade::light::{Illumination, LightSource};
+use crate::shade::{SurfacePoint, fog};
 
 use super::Renderer;
 use super::wavefront::Path;
@@ -63,39 +63,65 @@ impl Renderer<'_> {
 
     /// What is left of the light of a ray that ends at `point`, on its way there.
     pub(super) fn transmittance(&self, path: &Path, direction: Vec3, point: &SurfacePoint) -> Vec3 {
-        let absorption = self.absorption_before(path, point);
-        absorption.map_or(Vec3::ONE, |medium| medium.transmittance(point.t as f32 * direction.length()))
+        match self.surroundings(path, point, true) {
+            Surroundings::Inside(Some(medium)) if self.plan.depth > 0 => {
+                medium.transmittance(point.t as f32 * direction.length())
+            }
+            _ => Vec3::ONE,
+        }
     }
 
-    /// The same of light that arrives at `point` from a light; none for all of it. What comes from infinitely far was inside of nothing for nearly all of its
-    /// way, and is left alone, as by rays that hit nothing.
-    pub(super) fn transmittance_to_light(
+    /// What fog and absorption leave of light that arrives at `point`, which the path has come to, from a light; none for all of it.
+    ///
+    /// Of what is absorbed only lights know that cast shadows: the surface of the body that they are outside of hides them. What comes from infinitely
+    /// far is absorbed by nothing, as where rays hit nothing.
+    pub(super) fn left_of_light(
         &self,
         path: &Path,
         point: &SurfacePoint,
+        source: &LightSource,
         arriving: &Illumination,
     ) -> Option<Vec3> {
         let way = |end: DVec3| (end - point.position).length() as f32;
-        // Light arrives on the side that the path came from.
-        Some(self.absorption_before(path, point)?.transmittance(way(arriving.end?)))
+        // Through what is rough it arrives from behind.
+        match self.surroundings(path, point, point.is_above(arriving.to_light)) {
+            Surroundings::Outside => {
+                let fog = self.plan.fog.as_ref()?;
+                Some(fog::transmittance(fog, arriving.end.map_or(fog.reach, way)))
+            }
+            Surroundings::Inside(Some(medium)) if self.plan.depth > 0 && source.casts_shadows => {
+                Some(medium.transmittance(way(arriving.end?)))
+            }
+            Surroundings::Inside(_) => None,
+        }
     }
 
-    /// What absorbs light on its way to `point` on the side that a path came from; none where nothing does.
-    fn absorption_before(&self, path: &Path, point: &SurfacePoint) -> Option<Absorption> {
-        if self.plan.depth == 0 {
-            return None;
+    /// What is at `point` on the side that a path came from, or on the other one.
+    pub(super) fn surroundings(&self, path: &Path, point: &SurfacePoint, came_from: bool) -> Surroundings {
+        let media = if came_from {
+            let material = self.material(point);
+            if !point.front && is_solid(material) {
+                return Surroundings::Inside(material.absorption);
+            }
+            path.media
+        } else {
+            self.media_behind(path, point)
+        };
+        if media.is_outside() {
+            return Surroundings::Outside;
         }
-        let material = self.material(point);
-        if !point.front && is_solid(material) {
-            return material.absorption;
-        }
-        self.scene.materials.get(path.media.innermost() as usize)?.absorption
+        let material = self.scene.materials.get(media.innermost() as usize);
+        Surroundings::Inside(material.and_then(|material| material.absorption))
     }
+}
 
-    /// Whether a path came to `point` through what is around everything, and not through something solid.
-    pub(super) fn came_from_outside(&self, path: &Path, point: &SurfacePoint) -> bool {
-        path.media.is_outside() && (point.front || !is_solid(self.material(point)))
-    }
+/// What is around a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Surroundings {
+    /// Fog, where there is any.
+    Outside,
+    /// Something solid, which may absorb light.
+    Inside(Option<Absorption>),
 }
 
 /// Whether rays go into it: what keeps the fog out.

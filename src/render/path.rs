@@ -215,7 +215,7 @@ impl Renderer<'_> {
             }
             _ => 1.0,
         };
-        let left = self.left_of_light(&vertex.path, vertex.point, &arriving);
+        let left = self.left_of_light(&vertex.path, vertex.point, chosen.source, &arriving);
         let share = share / chosen.chance as f32;
         let mut worth = vertex.path.weight * value.share * arriving.color * share;
         if let Some(left) = left {

@@ -206,7 +206,7 @@ impl Renderer<'_> {
                 if !shading.faces(arriving.to_light) {
                     continue;
                 }
-                let left = self.left_of_light(path, point, &arriving);
+                let left = self.left_of_light(path, point, light, &arriving);
                 let mut reflected = weight * shading.reflect(&arriving);
                 if let Some(left) = left {
                     reflected *= left;

@@ -71,6 +71,39 @@ fn light_from_lamps_in_water_is_absorbed() {
     assert!((asked / found - 1.0).abs() < 0.03, "{asked} asked, {found} found");
 }
 
+/// The headlight is where the eye is: how far away in the air is nothing to the water, whose way to the eye counts alone.
+#[test]
+fn the_headlight_is_not_absorbed() {
+    let white = Material { diffuse: Vec3::ONE, ambient: Vec3::ZERO, specular: Vec3::ZERO, ..Material::default() };
+    for integrator in [Integrator::Whitted, Integrator::Path] {
+        let [clear, absorbing] =
+            [false, true].map(|absorbs| seen(&in_water(white.clone(), absorbs, Vec::new(), Vec::new()), integrator, 1));
+        assert!(clear > 0.9 && (absorbing / clear - LEFT.powi(2)).abs() < 1e-3, "{integrator}: {absorbing} of {clear}");
+    }
+}
+
+/// Through frosted ink a lamp is seen that is in the air behind it, where nothing is absorbed; whether it is asked, or found.
+#[test]
+fn a_lamp_behind_frosted_ink_is_in_the_air() {
+    let glow = Material { emission: Vec3::ONE, diffuse: Vec3::ZERO, ambient: Vec3::ZERO, ..Material::default() };
+    let ink = Material {
+        gloss: Some(20.0),
+        absorption: Some(Absorption { color: Vec3::splat(LEFT), distance: 1.0 }),
+        ..Material::glass(1.0)
+    };
+    let slab = Cuboid::new(Vec3::new(-9.0, -0.25, -9.0), Vec3::new(9.0, 0.25, 9.0)).unwrap();
+    let centre = Vec3::new(0.5, -4.0, 0.0);
+    let axes = twincast::math::Mat3::from_diagonal(Vec3::new(1.0, 1.0, 1.001));
+    let lamps: [Shape; 2] = [Sphere { centre, radius: 1.0 }.into(), Ellipsoid::new(centre, axes).unwrap().into()];
+    let [asked, found] = lamps.map(|lamp| {
+        let geometries = [Shape::from(slab), lamp].into_iter().zip(0..);
+        let geometries = geometries.map(|(shape, material)| Geometry::Shapes { shapes: vec![shape], material });
+        let scene = Scene::from_geometries(geometries.collect(), vec![ink.clone(), glow.clone()]);
+        seen(&Scene { lights: dark(), ..scene }, Integrator::Path, 4096)
+    });
+    assert!(found > 0.05 && (asked / found - 1.0).abs() < 0.05, "{asked} asked, {found} found");
+}
+
 /// Behind a pane and behind a bubble there is water again.
 #[test]
 fn what_is_in_water_does_not_end_it() {

@@ -97,9 +97,12 @@ impl Threads {
 
 impl Drop for Threads {
     fn drop(&mut self) {
-        if process::id() != self.process {
+        let process = process::id();
+        if process != self.process {
             std::mem::forget(self.pool.take());
         }
+        let forked = self.forked.get_mut().unwrap_or_else(PoisonError::into_inner);
+        std::mem::forget(forked.take_if(|(owner, _)| *owner != process));
     }
 }
 

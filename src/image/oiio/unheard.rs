@@ -39,36 +39,35 @@ pub(super) fn write(path: &Path, size: [u32; 2], write: impl Fn(&Path) -> Result
     if fs::symlink_metadata(path).is_ok() {
         return write(path);
     }
+    let Some(mut memory) = memory(path) else {
+        return write(path).and_then(|()| check(path, size));
+    };
     let cannot = |error: io::Error| format!("cannot write the file: {error}");
-    match memory(path).map_err(cannot)? {
-        Some(mut memory) => {
-            let written = write(path).and_then(|()| check(path, size));
-            // The name was that of the memory.
-            fs::remove_file(path).map_err(cannot)?;
-            written?;
-            let mut copy = || {
-                let mut file = File::create_new(path)?;
-                io::copy(&mut memory, &mut file)?;
-                // Some file systems tell only then.
-                file.sync_all()
-            };
-            copy().map_err(cannot)
-        }
-        None => write(path).and_then(|()| check(path, size)),
-    }
+    let written = write(path).and_then(|()| check(path, size));
+    // The name was that of the memory.
+    fs::remove_file(path).map_err(cannot)?;
+    written?;
+    let mut copy = || {
+        let mut file = File::create_new(path)?;
+        io::copy(&mut memory, &mut file)?;
+        // Some file systems tell only then.
+        file.sync_all()
+    };
+    copy().map_err(cannot)
 }
 
-/// A file in memory, and `path` as a name of it; none where the system has no such files.
+/// A file in memory, and `path` as a name of it; none where there are no such files, or no links to them.
 #[cfg(target_os = "linux")]
-fn memory(path: &Path) -> io::Result<Option<File>> {
-    let (file, place) = crate::memory::in_memory(c"twincast-picture")?;
-    std::os::unix::fs::symlink(place, path)?;
-    Ok(Some(file))
+fn memory(path: &Path) -> Option<File> {
+    let (file, place) = crate::memory::in_memory(c"twincast-picture").ok()?;
+    fs::metadata(&place).ok()?;
+    std::os::unix::fs::symlink(place, path).ok()?;
+    Some(file)
 }
 
 #[cfg(not(target_os = "linux"))]
-fn memory(_: &Path) -> io::Result<Option<File>> {
-    Ok(None)
+fn memory(_: &Path) -> Option<File> {
+    None
 }
 
 /// Reads what was written.

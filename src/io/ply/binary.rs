@@ -86,7 +86,7 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
     }
 
     fn rest(&self) -> usize {
-        self.rest.len()
+        self.rest.trim_ascii().len()
     }
 
     fn tell(&mut self) {
