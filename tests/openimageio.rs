@@ -122,7 +122,7 @@ fn a_full_disk_keeps_the_old_picture() {
             return eprintln!("skipped: no file system may be mounted: {words}");
         }
         assert_eq!(output.status.code(), Some(4), "{suffix}: {words}");
-        assert!(words.contains("write") && words.contains("No space left on device"), "{words}");
+        assert!(words.contains("writ") && words.contains("No space left on device"), "{words}");
         assert_eq!(text(&output.stdout), format!("old\na.{suffix}\nfull\n"));
     }
 }

@@ -75,7 +75,7 @@ fn check(path: &Path, size: [u32; 2]) -> Result<()> {
     let [width, height] = size;
     let useless = |what: &str| {
         format!(
-            "a picture of {width} x {height} pixels cannot be written in this format: {what}; choose another format, as .png, or another size"
+            "what was written of {width} x {height} pixels cannot be read again: {what}; choose another format, as .png, or another size"
         )
     };
     if fs::metadata(path).is_ok_and(|file| file.len() == 0) {
