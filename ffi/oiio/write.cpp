@@ -78,8 +78,7 @@ void write(const std::string& name, const Layout& layout, const Attributes& attr
         spec.attribute("CompressionQuality", 95);  // JPEG, WebP; others take no notice
     spec.attribute("jpeg:subsampling", "4:4:4");
 
-    if (attributes.software.length)
-        spec.attribute("Software", text(attributes.software));
+    spec.attribute("Software", text(attributes.software));
     if (attributes.world_to_camera.length == 16)
         spec.attribute("worldtocamera", OIIO::TypeMatrix, attributes.world_to_camera.data);
     if (attributes.world_to_screen.length == 16)

@@ -83,8 +83,7 @@ pub(super) fn write(
     let texts = metadata.texts.iter().map(|(name, value)| Text { name: name[..].into(), value: value[..].into() });
     let texts: Vec<_> = texts.collect();
     let attributes = Attributes {
-        // As OpenImageIO 2.4 writes it there, other programs find the whole file broken.
-        software: if unheard::has_no_exif(path) { "" } else { &metadata.software[..] }.into(),
+        software: metadata.software[..].into(),
         world_to_camera: matrix(&camera),
         world_to_screen: matrix(&screen),
         fovcot: fovcot.as_slice().into(),

@@ -15,22 +15,10 @@ const UNHEARD: [&str; 22] = [
     "jpc", "rgb", "rgba", "sgi", "tga", "tpic", "webp",
 ];
 
-/// In which tags that come with photographs are written wrongly.
-const NO_EXIF: [&str; 6] = ["avif", "heic", "heics", "heif", "heifs", "hif"];
-
-fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
-    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    suffixes.contains(&suffix.as_str())
-}
-
 /// Whether a file of this name is written so.
 pub(super) fn are_written_to(path: &Path) -> bool {
-    has_suffix(path, &UNHEARD)
-}
-
-/// Whether a file of this name is better off without such tags.
-pub(super) fn has_no_exif(path: &Path) -> bool {
-    has_suffix(path, &NO_EXIF)
+    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    UNHEARD.contains(&suffix.as_str())
 }
 
 /// Has `write` make a file of a picture of this size, and holds it against that.
