@@ -172,7 +172,8 @@ fn sizes_that_a_format_does_not_hold_are_refused() {
         let output = command().args(["render", SCENE, "-o", &picture, "--size", size, "--spp", "1"]).output();
         let output = output.expect("the program runs");
         let words = text(&output.stderr);
-        if suffix == "webp" && words.contains("unknown suffix") || suffix == "jp2" && words.contains("unknown suffix") {
+        // Which formats there are is up to the OpenImageIO that is installed.
+        if ["webp", "jp2"].contains(&suffix) && words.contains("unknown suffix") {
             continue;
         }
         assert_eq!(output.status.code(), Some(if is_held { 0 } else { 4 }), "{suffix} {size}: {words}");

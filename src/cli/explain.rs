@@ -125,7 +125,7 @@ fn write_ray(f: &mut fmt::Formatter<'_>, ray: &RayTrail) -> fmt::Result {
             write!(words, "{name} {}, ", Row(value))?;
         }
         if *fog != [1.0; 3] {
-            write!(words, "fog leaves {}, ", Row(fog))?;
+            write!(words, "fog and absorption leave {}, ", Row(fog))?;
         }
         write!(f, "\n{indent}    gives {}: {words}counts {share}, free {visibility}", Row(contribution))?;
     }

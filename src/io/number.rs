@@ -20,31 +20,29 @@ impl Number for i64 {}
 impl Number for u32 {}
 impl Number for u64 {}
 
-impl Number for f32 {
-    #[inline]
-    fn leading(text: &[u8]) -> Option<(Self, usize)> {
-        const POWERS: [f32; 11] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10];
-        let decimal = Decimal::leading(text)?;
-        let digits = Some(decimal.digits).filter(|&digits| digits <= 1 << Self::MANTISSA_DIGITS)? as Self;
-        let power = *POWERS.get(decimal.exponent.unsigned_abs())?;
-        let size = if decimal.exponent < 0 { digits / power } else { digits * power };
-        Some((if decimal.is_negative { -size } else { size }, decimal.length))
-    }
+macro_rules! floats {
+    ($($float:ident $powers:expr)*) => {$(
+        impl Number for $float {
+            #[inline]
+            fn leading(text: &[u8]) -> Option<(Self, usize)> {
+                // Those that it holds without an error.
+                const POWERS: &[$float] = &$powers;
+                let decimal = Decimal::leading(text)?;
+                let digits = Some(decimal.digits).filter(|&digits| digits <= 1 << Self::MANTISSA_DIGITS)? as Self;
+                let power = *POWERS.get(decimal.exponent.unsigned_abs())?;
+                let size = if decimal.exponent < 0 { digits / power } else { digits * power };
+                Some((if decimal.is_negative { -size } else { size }, decimal.length))
+            }
+        }
+    )*};
 }
 
-impl Number for f64 {
-    #[inline]
-    fn leading(text: &[u8]) -> Option<(Self, usize)> {
-        const POWERS: [f64; 23] = [
-            1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
-            1e19, 1e20, 1e21, 1e22,
-        ];
-        let decimal = Decimal::leading(text)?;
-        let digits = Some(decimal.digits).filter(|&digits| digits <= 1 << Self::MANTISSA_DIGITS)? as Self;
-        let power = *POWERS.get(decimal.exponent.unsigned_abs())?;
-        let size = if decimal.exponent < 0 { digits / power } else { digits * power };
-        Some((if decimal.is_negative { -size } else { size }, decimal.length))
-    }
+floats! {
+    f32 [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10]
+    f64 [
+        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+        1e21, 1e22,
+    ]
 }
 
 /// `digits` times ten to the `exponent`.

@@ -22,7 +22,7 @@ pub(super) fn are_written_to(path: &Path) -> bool {
 }
 
 /// Has `write` make a file of a picture of this size, and holds it against that.
-pub(super) fn write(path: &Path, size: [u32; 2], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
+pub(super) fn write(path: &Path, size: [u32; 2], write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     // A device or a pipe is what it is, and gets it at once.
     if fs::symlink_metadata(path).is_ok() {
         return write(path);

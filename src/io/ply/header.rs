@@ -139,13 +139,11 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
                 if !elements.iter().any(|element| element.name == "vertex") {
                     return Err(fail(line, "the header has no element vertex".into()));
                 }
-                let mut seen = HashSet::new();
-                if let Some(twice) = elements.iter().find(|element| !seen.insert(&element.name)) {
+                if let Some(twice) = repeated(&elements, |element| &element.name) {
                     return Err(fail(twice.line, format!("element {:?} is declared twice", twice.name)));
                 }
                 for element in &elements {
-                    let mut seen = HashSet::new();
-                    if let Some(twice) = element.properties.iter().find(|property| !seen.insert(&property.name)) {
+                    if let Some(twice) = repeated(&element.properties, |property| &property.name) {
                         let message = format!("element {:?} has two properties {:?}", element.name, twice.name);
                         return Err(fail(element.line, message));
                     }
@@ -156,6 +154,12 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
         }
     }
     Err(fail(last, "the file ends within the header; end_header is missing".into()))
+}
+
+/// The first item whose name one before it has.
+fn repeated<T>(items: &[T], name: impl Fn(&T) -> &str) -> Option<&T> {
+    let mut seen = HashSet::new();
+    items.iter().find(|&item| !seen.insert(name(item)))
 }
 
 fn format(words: &mut Words<'_>) -> Placeless<Encoding> {
