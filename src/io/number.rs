@@ -164,6 +164,8 @@ mod tests {
             "1e23",
             "1e-23",
             "12345678901234567890",
+            // What is left of it in 64 bits is 1.
+            "18446744073709551617",
         ] {
             assert!(f64::leading(text.as_bytes()).is_none(), "{text}");
         }
