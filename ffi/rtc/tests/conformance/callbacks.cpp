@@ -1,6 +1,7 @@
 // Filters, user geometry and point queries: what callbacks are given, and what becomes of what they say.
 #include "check.h"
 
+#include <mutex>
 #include <set>
 
 static std::vector<float> seen;
@@ -300,6 +301,9 @@ static void collisions() {
   rtcCommitScene(mixed);
   using Pairs = std::set<std::pair<unsigned, unsigned>>;
   auto note = [](void* user, RTCCollision* all, unsigned count) {
+    // Embree calls it from several threads.
+    static std::mutex turn;
+    std::lock_guard<std::mutex> mine(turn);
     for (unsigned i = 0; i < count; i++) CHECK(((Pairs*)user)->insert({all[i].primID0, all[i].primID1}).second);
   };
   Pairs pairs;
