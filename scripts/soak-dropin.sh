@@ -6,4 +6,4 @@ cd "$(dirname "$0")/.."
 g++ -O2 -std=c++17 ffi/rtc/tests/soak.cpp -o target/dropin/soak -lembree3
 export LD_LIBRARY_PATH=$PWD/target/dropin
 target/dropin/soak "${CYCLES:-1000000}"
-valgrind --quiet --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite --error-exitcode=9 target/dropin/conformance3
+valgrind --quiet --child-silent-after-fork=yes --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite --error-exitcode=9 target/dropin/conformance3

@@ -135,10 +135,14 @@ static void forks() {
   }
   w.add(w.mesh(RTC_GEOMETRY_TYPE_TRIANGLE, {points}, indices));
   rtcCommitScene(w.scene);
+  // By a pipe: under valgrind the child's exit code says that it has lost what only threads held that it does not have.
+  int told[2];
+  CHECK(pipe(told) == 0);
+  std::fflush(stdout);
   const pid_t child = fork();
   if (child == 0) {
     alarm(20);
-    int good = 0;
+    char good = 0;
     for (const char* config : {"", "threads=2"}) {
       RTCDevice device = *config ? rtcNewDevice(config) : w.device;
       RTCScene scene = rtcNewScene(device);
@@ -156,11 +160,13 @@ static void forks() {
       rtcReleaseScene(scene);
       if (*config) rtcReleaseDevice(device);
     }
-    _exit(good == 2 ? 0 : 1);
+    _exit(write(told[1], &good, 1) == 1 ? 0 : 1);
   }
-  int status = -1;
-  waitpid(child, &status, 0);
-  CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  close(told[1]);
+  char good = 0;
+  CHECK(read(told[0], &good, 1) == 1 && good == 2);
+  close(told[0]);
+  waitpid(child, nullptr, 0);
 }
 
 // A grid without cells has nothing to hit, and does no harm.
