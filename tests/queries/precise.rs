@@ -165,7 +165,7 @@ fn names_are_those_of_hits_within_the_range() {
 #[test]
 fn indices_that_are_not_there_are_an_error() {
     let mesh = PreciseMesh { positions: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2], [0, 1, 3]] };
-    let error = Precise::new(vec![mesh]).err().expect("no fourth vertex");
+    let error = Precise::new(vec![mesh]).expect_err("no fourth vertex");
     assert!(error.to_string().contains("triangle 1 of mesh 0"), "{error}");
 }
 

@@ -8,7 +8,7 @@
 //! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
 //! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
 
-use super::{PreciseMesh, PreciseRay, is_traceable};
+use super::{PreciseMesh, PreciseRay};
 use crate::math::{DAabb, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
 use crate::ray::Ray;
 use crate::scene::choose_origin;
@@ -56,11 +56,10 @@ const RANGE: f64 = 1e-6;
 impl Frame {
     /// Of meshes with this box around all that can be traced of them.
     pub fn around(meshes: &[PreciseMesh], bounds: DAabb) -> Self {
-        let positions = || meshes.iter().flat_map(|mesh| &mesh.positions);
-        let is_f32 = |p: &DVec3| p.as_vec3().as_dvec3() == *p || p.is_nan();
+        let is_f32 = |p: DVec3| p.as_vec3().as_dvec3() == p || p.is_nan();
         let (centre, radius) = if bounds.is_empty() { (DVec3::ZERO, 0.0) } else { (bounds.centre(), bounds.radius()) };
         let is_handy = bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&radius);
-        if is_handy && positions().all(is_f32) {
+        if is_handy && meshes.iter().flat_map(PreciseMesh::corners).all(is_f32) {
             let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
             return Self { centre: DVec3::ZERO, scale: 1.0, reach, corner_error: 0.0, moving_error: 0.0 };
         }
@@ -75,9 +74,9 @@ impl Frame {
         self.corner_error == 0.0
     }
 
-    /// A corner; NaN for one that is too large to trace.
+    /// A corner that can be traced.
     pub fn point(&self, p: DVec3) -> Vec3 {
-        if is_traceable(p) { self.local(p).as_vec3() } else { Vec3::NAN }
+        self.local(p).as_vec3()
     }
 
     fn local(&self, p: DVec3) -> DVec3 {

@@ -16,6 +16,7 @@ mod frame;
 mod nearest_point;
 mod query;
 
+use std::fmt;
 use std::sync::OnceLock;
 
 use crate::error::{Error, Result};
@@ -108,6 +109,13 @@ pub struct PreciseMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl PreciseMesh {
+    /// Those of each triangle, so that what several share comes as often.
+    fn corners(&self) -> impl Iterator<Item = DVec3> {
+        self.triangles.iter().flatten().map(|&i| self.positions[i as usize])
+    }
+}
+
 /// Meshes in f64, ready to be asked.
 pub struct Precise {
     meshes: Vec<PreciseMesh>,
@@ -118,6 +126,19 @@ pub struct Precise {
     /// Found out when it is first asked.
     closed: OnceLock<bool>,
     frame: Frame,
+}
+
+impl fmt::Debug for Precise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { meshes, bvh, bounds, .. } = self;
+        let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+        f.debug_struct("Precise")
+            .field("meshes", &meshes.len())
+            .field("triangles", &triangles)
+            .field("bounds", bounds)
+            .field("bvh", bvh)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Precise {
@@ -131,8 +152,10 @@ impl Precise {
         }
         let bounds = traceable_bounds(&meshes);
         let frame = Frame::around(&meshes, bounds);
+        // What lies elsewhere is too large to trace, or no triangle's: it must not move the world, nor make it coarse.
+        let point = |&p: &DVec3| if bounds.contains(&DAabb { min: p, max: p }) { frame.point(p) } else { Vec3::NAN };
         let rounded = |mesh: &PreciseMesh| {
-            let positions: Vec<Vec3> = mesh.positions.iter().map(|&p| frame.point(p)).collect();
+            let positions: Vec<Vec3> = mesh.positions.iter().map(point).collect();
             Geometry::Mesh(Mesh::new(positions, mesh.triangles.clone()))
         };
         let scene = Scene::from_geometries(meshes.iter().map(rounded).collect(), vec![Material::default()]);
@@ -146,7 +169,7 @@ impl Precise {
         &self.meshes
     }
 
-    /// The box around all corners that are not NaN, infinite or too large; empty where there is none.
+    /// The box around all corners of triangles that are not NaN, infinite or too large; empty where there is none.
     pub fn bounds(&self) -> DAabb {
         self.bounds
     }
@@ -179,9 +202,9 @@ fn is_traceable(p: DVec3) -> bool {
     p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan()
 }
 
+/// Vertices that are no triangle's do not count: one that lies far away would leave f32 nothing of what is near.
 fn traceable_bounds(meshes: &[PreciseMesh]) -> DAabb {
-    let positions = meshes.iter().flat_map(|mesh| &mesh.positions).filter(|&&p| is_traceable(p));
-    positions.fold(DAabb::EMPTY, |all, &p| all.include(p))
+    meshes.iter().flat_map(PreciseMesh::corners).filter(|&p| is_traceable(p)).fold(DAabb::EMPTY, DAabb::include)
 }
 
 fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {
@@ -195,6 +218,33 @@ fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {
                 mesh.triangles[i]
             );
             Err(Error::Backend { backend: "scene", message })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Vertices that are no triangle's, far away or not numbers, neither make the tree coarse nor keep what is f32 from being traced so.
+    #[test]
+    fn vertices_of_no_triangle_change_nothing() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [0.0, 1.0, 0.25]].map(DVec3::from);
+        let strays = [1e9, -1e7, 0.1, f64::NAN, 1e300].map(DVec3::splat);
+        for scale in [1.0, 0.1] {
+            let mesh = |strays: &[DVec3]| {
+                let positions = corners.map(|p| p * scale).into_iter().chain(strays.iter().copied()).collect();
+                Precise::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a triangle")
+            };
+            let (plain, strewn) = (mesh(&[]), mesh(&strays));
+            assert_eq!(strewn.bounds(), plain.bounds());
+            assert_eq!((strewn.frame.scale(), strewn.frame.farthest()), (plain.frame.scale(), plain.frame.farthest()));
+            assert_eq!([strewn.exact().is_some(), plain.exact().is_some()], [scale == 1.0; 2]);
+            let ray = PreciseRay::new(DVec3::new(0.2, 0.3, 4.0) * scale, -DVec3::Z);
+            let [mut of_plain, mut of_strewn] = [[None]; 2];
+            plain.closest_batch(&[ray], &mut of_plain);
+            strewn.closest_batch(&[ray], &mut of_strewn);
+            assert!(of_plain[0].is_some() && of_strewn == of_plain, "{of_strewn:?}, not {of_plain:?}");
         }
     }
 }
