@@ -91,9 +91,9 @@ impl Command {
 
 const LONG_VERSION: &str = match (cfg!(feature = "embree"), cfg!(feature = "oiio")) {
     (true, true) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native, embree\nimage files: OpenImageIO"),
-    (true, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native, embree\nimage files: EXR, PNG"),
+    (true, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native, embree\nimage files: EXR, PNG, JPEG"),
     (false, true) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native\nimage files: OpenImageIO"),
-    (false, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native\nimage files: EXR, PNG"),
+    (false, false) => concat!(env!("CARGO_PKG_VERSION"), "\nengines: native\nimage files: EXR, PNG, JPEG"),
 };
 
 const EXIT_CODES: &str = "\

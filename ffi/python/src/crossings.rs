@@ -1,5 +1,7 @@
 //! All hits of many rays, and how many they are.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
@@ -40,12 +42,10 @@ impl Scene {
         let answers = zeros(py, rays.len())?;
         let mut counts = answers.readwrite();
         let counts = counts.as_slice_mut()?;
-        pool::run(py, threads, || {
-            counts.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, counts)| {
-                let mut found = [0; CHUNK];
-                self.precise.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
-                counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
-            });
+        pool::each(py, threads, counts.par_chunks_mut(CHUNK).enumerate(), |(chunk, counts)| {
+            let mut found = [0; CHUNK];
+            self.precise.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
+            counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
         })?;
         Ok(answers)
     }
@@ -67,9 +67,9 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Crossings<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let (ray, primitive, location) = pool::run(py, threads, || {
+        let (ray, primitive, location) = pool::interruptible(py, threads, |cancel| {
             let found = if locations {
-                self.found(&rays, Precise::all_hits_batch, |task| {
+                self.found(&rays, cancel, Precise::all_hits_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, hits) in task.by_ray() {
                         let PreciseRay { origin, direction, .. } = task.rays[i];
@@ -81,7 +81,7 @@ impl Scene {
                     columns
                 })
             } else {
-                self.found(&rays, Precise::all_names_batch, |task| {
+                self.found(&rays, cancel, Precise::all_names_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, names) in task.by_ray() {
                         for &(_, primitive) in &names[..names.len().min(most)] {
@@ -151,16 +151,17 @@ impl<H> Task<'_, H> {
 }
 
 impl Scene {
-    /// What `keep` keeps of all hits, as `ask` gives them, task by task.
+    /// What `keep` keeps of all hits, as `ask` gives them, task by task; of no rays once it is called off.
     fn found<H: Send, T: Send>(
         &self,
         rays: &Rays<'_>,
+        cancel: &AtomicBool,
         ask: fn(&Precise, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
         keep: impl Fn(&Task<'_, H>) -> T + Sync,
     ) -> Vec<T> {
         let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
         let found = chunks.map_init(<(Vec<usize>, Vec<H>)>::default, |(ends, hits), chunk| {
-            let rays = rays.some(rays.chunk(chunk));
+            let rays = if cancel.load(Ordering::Relaxed) { Vec::new() } else { rays.some(rays.chunk(chunk)) };
             ask(&self.precise, &rays, ends, hits);
             keep(&Task { first: chunk * CHUNK, rays: &rays, ends, hits })
         });
@@ -175,8 +176,8 @@ impl Scene {
         threads: usize,
         real: impl Fn(f64) -> F + Sync,
     ) -> PyResult<List<'py>> {
-        let (splits, [ray, primitive, geometry], t, uv) = pool::run(py, threads, || {
-            let found = self.found(rays, Precise::all_hits_batch, |task| {
+        let (splits, [ray, primitive, geometry], t, uv) = pool::interruptible(py, threads, |cancel| {
+            let found = self.found(rays, cancel, Precise::all_hits_batch, |task| {
                 let (mut ids, mut t, mut uv) = ([const { Vec::new() }; 3], Vec::new(), Vec::new());
                 for (i, hits) in task.by_ray() {
                     for hit in hits {

@@ -1,5 +1,7 @@
 //! What can be asked of points: the nearest point of the meshes, and whether they are inside.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twincast::math::DVec3;
@@ -20,12 +22,20 @@ type Nearest<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`.
-fn along<T: Copy + Send + Sync>(rows: &Rows<'_>, none: T, ask: impl Fn(&[DVec3], &mut [T]) + Sync) -> Vec<T> {
+/// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`, as all do once it
+/// is called off.
+fn along<T: Copy + Send + Sync>(
+    rows: &Rows<'_>,
+    cancel: &AtomicBool,
+    none: T,
+    ask: impl Fn(&[DVec3], &mut [T]) + Sync,
+) -> Vec<T> {
     let order = Order::of_points(rows);
     order::along(rows.len(), order.as_ref(), CHUNK, none, |which, answers| {
-        let points: Vec<DVec3> = which.iter().map(|&i| rows.at(i)).collect();
-        ask(&points, answers);
+        if !cancel.load(Ordering::Relaxed) {
+            let points: Vec<DVec3> = which.iter().map(|&i| rows.at(i)).collect();
+            ask(&points, answers);
+        }
     })
 }
 
@@ -36,9 +46,9 @@ impl Scene {
     fn nearest<'py>(&self, py: Python<'py>, points: Points<'py>, threads: usize) -> PyResult<Nearest<'py>> {
         let rows = points.rows("points")?;
         let count = rows.len();
-        let found: Vec<Option<NearestPoint>> = pool::run(py, threads, || {
+        let found: Vec<Option<NearestPoint>> = pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
-            along(&rows, None, |points, found| self.precise.nearest_point_batch(points, found))
+            along(&rows, cancel, None, |points, found| self.precise.nearest_point_batch(points, found))
         })?;
         let id = |id: fn(&NearestPoint) -> u32| -> Vec<u32> {
             found.iter().map(|found| found.as_ref().map_or(INVALID, id)).collect()
@@ -69,10 +79,10 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rows = points.rows("points")?;
-        let distances = pool::run(py, threads, || {
+        let distances = pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
             let is_closed = samples > 0 && self.precise.is_closed();
-            along(&rows, f64::NAN, |points, distances| {
+            along(&rows, cancel, f64::NAN, |points, distances| {
                 let mut inside = vec![false; points.len()];
                 self.precise.distance_squared_batch(points, distances);
                 if is_closed {
@@ -100,8 +110,8 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rows = points.rows("points")?;
-        let inside = pool::run(py, threads, || {
-            along(&rows, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
+        let inside = pool::interruptible(py, threads, |cancel| {
+            along(&rows, cancel, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
         })?;
         Ok(inside.into_pyarray(py))
     }

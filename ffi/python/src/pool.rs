@@ -5,10 +5,14 @@
 //! which the last few are kept.
 
 use std::process;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::iter::plumbing::{Producer, ProducerCallback};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 struct Entry {
@@ -25,6 +29,9 @@ const KEPT: usize = 4;
 
 /// More threads than this are a mistake.
 const MOST: usize = 1024;
+
+/// How often it is looked whether Ctrl-C was pressed.
+const BEAT: Duration = Duration::from_millis(20);
 
 fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -56,4 +63,95 @@ fn build(threads: usize) -> PyResult<ThreadPool> {
 pub fn run<T: Send>(py: Python<'_>, threads: usize, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = pool(threads)?;
     Ok(py.detach(|| pool.install(work)))
+}
+
+/// The same for work that may be called off: it is told so where Python has a signal to handle, whose exception is the result then.
+pub fn interruptible<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> PyResult<T> {
+    let pool = pool(threads)?;
+    let (cancel, end) = (AtomicBool::new(false), End::default());
+    let (mut answer, mut signal) = (None, None);
+    pool.in_place_scope(|scope| {
+        let (answer, cancel, end) = (&mut answer, &cancel, &end);
+        scope.spawn(move |_| {
+            let _told = Told(end);
+            *answer = Some(work(cancel));
+        });
+        while !py.detach(|| end.comes_within(BEAT)) {
+            if let Err(error) = py.check_signals() {
+                cancel.store(true, Ordering::Relaxed);
+                signal = Some(error);
+            }
+        }
+    });
+    match signal {
+        Some(signal) => Err(signal),
+        // Where the work panics, the scope does.
+        None => answer.ok_or_else(|| PyRuntimeError::new_err("the work ended without an answer")),
+    }
+}
+
+/// Does all tasks, on so many threads, without the interpreter's lock; one by itself here, since to hand it to another thread would take longer than
+/// a few rays do. What is left is not done once Python has a signal to handle, whose exception is the result.
+pub fn each<I: IndexedParallelIterator>(
+    py: Python<'_>,
+    threads: usize,
+    tasks: I,
+    work: impl Fn(I::Item) + Send + Sync,
+) -> PyResult<()> {
+    if tasks.len() <= 1 {
+        // Not by rayon's own `for_each`, which would start its global pool.
+        py.detach(|| tasks.with_producer(Here(work)));
+        return Ok(());
+    }
+    interruptible(py, threads, |cancel| {
+        tasks.for_each(|task| {
+            if !cancel.load(Ordering::Relaxed) {
+                work(task);
+            }
+        });
+    })
+}
+
+/// Does tasks one after the other.
+struct Here<F>(F);
+
+impl<T, F: Fn(T)> ProducerCallback<T> for Here<F> {
+    type Output = ();
+
+    fn callback<P: Producer<Item = T>>(self, tasks: P) {
+        tasks.into_iter().for_each(self.0);
+    }
+}
+
+/// That work has come to its end.
+#[derive(Default)]
+struct End {
+    is_there: Mutex<bool>,
+    comes: Condvar,
+}
+
+impl End {
+    /// Whether it has come, for which it waits so long.
+    fn comes_within(&self, time: Duration) -> bool {
+        let is_there = self.is_there.lock().unwrap_or_else(PoisonError::into_inner);
+        let (is_there, _) = self
+            .comes
+            .wait_timeout_while(is_there, time, |is_there| !*is_there)
+            .unwrap_or_else(PoisonError::into_inner);
+        *is_there
+    }
+}
+
+/// Tells of the end when dropped, so also where the work panics.
+struct Told<'a>(&'a End);
+
+impl Drop for Told<'_> {
+    fn drop(&mut self) {
+        *self.0.is_there.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.0.comes.notify_one();
+    }
 }

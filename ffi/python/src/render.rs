@@ -2,11 +2,9 @@
 
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use twincast::io::{self, LoadOptions, Normals, Unit, UpAxis};
 use twincast::math::{DVec3, Vec3};
@@ -18,9 +16,6 @@ use twincast::{Image, Renderer, Scene, Settings, World};
 
 use crate::arrays::Points;
 use crate::{pool, value_error};
-
-/// How often a render looks whether Ctrl-C was pressed.
-const BEAT: Duration = Duration::from_millis(5);
 
 /// Linear RGBA, rows from the top: (height, width, 4).
 type Picture<'py> = Bound<'py, PyArray3<f32>>;
@@ -97,42 +92,16 @@ impl Wishes {
     fn render<'py>(&self, py: Python<'py>, scene: &Scene) -> PyResult<Picture<'py>> {
         let settings = self.settings(scene)?;
         let camera = self.camera(scene, &settings)?;
-        let image = interruptible(py, self.threads, |cancel| {
+        let image = pool::interruptible(py, self.threads, |cancel| {
             let world = World::new(scene)?;
             let renderer = Renderer::new(scene, &world, camera, settings)?;
             renderer.render(&Bvh::build(&world), Control { cancel: Some(cancel), ..Control::default() })
         })?;
+        let image = image.map_err(value_error)?;
         let Image { width, height, pixels } = image;
         let flat: Vec<f32> = pixels.into_iter().flat_map(|pixel| pixel.to_array()).collect();
         flat.into_pyarray(py).reshape([height as usize, width as usize, 4])
     }
-}
-
-/// Runs `work` on other threads, and stops it when Python has a signal to handle.
-fn interruptible<T: Send>(
-    py: Python<'_>,
-    threads: usize,
-    work: impl FnOnce(&AtomicBool) -> twincast::Result<T> + Send,
-) -> PyResult<T> {
-    let cancel = &AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let worker = scope.spawn(move || Python::attach(|py| pool::run(py, threads, || work(cancel))));
-        let mut signal = None;
-        while !worker.is_finished() {
-            py.detach(|| std::thread::sleep(BEAT));
-            if let Err(error) = py.check_signals() {
-                cancel.store(true, Ordering::Relaxed);
-                signal = Some(error);
-            }
-        }
-        // Joined without the lock, which the worker needs to end.
-        let done = py.detach(|| worker.join());
-        match (signal, done) {
-            (Some(signal), _) => Err(signal),
-            (None, Ok(done)) => done?.map_err(value_error),
-            (None, Err(_)) => Err(PyRuntimeError::new_err("the render ended without a picture")),
-        }
-    })
 }
 
 fn by_name<T: Copy, const N: usize>(argument: &str, name: &str, known: [(&str, T); N]) -> PyResult<T> {

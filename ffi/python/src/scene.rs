@@ -82,20 +82,15 @@ impl Scene {
         let answers = zeros(py, rays.len())?;
         let mut first = answers.readwrite();
         let first = first.as_slice_mut()?;
-        pool::run(py, threads, || {
-            first.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, first)| {
-                let mut hits = [None; CHUNK];
-                if let Some(hits) = self.exact_hits(&rays, chunk, &mut hits) {
-                    first
-                        .iter_mut()
-                        .zip(hits)
-                        .for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
-                } else {
-                    let mut names = [None; CHUNK];
-                    self.precise.first_batch(&rays.some(rays.chunk(chunk)), &mut names[..first.len()]);
-                    first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
-                }
-            });
+        pool::each(py, threads, first.par_chunks_mut(CHUNK).enumerate(), |(chunk, first)| {
+            let mut hits = [None; CHUNK];
+            if let Some(hits) = self.exact_hits(&rays, chunk, &mut hits) {
+                first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
+            } else {
+                let mut names = [None; CHUNK];
+                self.precise.first_batch(&rays.some(rays.chunk(chunk)), &mut names[..first.len()]);
+                first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
+            }
         })?;
         Ok(answers)
     }
@@ -116,14 +111,12 @@ impl Scene {
         let answers = zeros(py, rays.len())?;
         let mut occluded = answers.readwrite();
         let occluded = occluded.as_slice_mut()?;
-        pool::run(py, threads, || {
-            occluded.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, occluded)| {
-                let which = rays.chunk(chunk);
-                match exact.and_then(|bvh| Some((bvh, rays.rounded(which.clone())?))) {
-                    Some((bvh, rays)) => bvh.occluded_batch(&rays, occluded, Batch::of(&rays)),
-                    None => self.precise.occluded_batch(&rays.some(which), occluded),
-                }
-            });
+        pool::each(py, threads, occluded.par_chunks_mut(CHUNK).enumerate(), |(chunk, occluded)| {
+            let which = rays.chunk(chunk);
+            match exact.and_then(|bvh| Some((bvh, rays.rounded(which.clone())?))) {
+                Some((bvh, rays)) => bvh.occluded_batch(&rays, occluded, Batch::of(&rays)),
+                None => self.precise.occluded_batch(&rays.some(which), occluded),
+            }
         })?;
         Ok(answers)
     }
@@ -150,23 +143,21 @@ impl Scene {
         let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
         let (t, uv, normal) = (t.as_slice_mut()?, uv.as_slice_mut()?, normal.as_slice_mut()?);
         let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
-        pool::run(py, threads, || {
-            let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
-            let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
-            let tasks = tasks.into_par_iter().zip(ids).enumerate();
-            tasks.for_each(|(chunk, ((t, uv, normal), (primitive, geometry)))| {
-                let mut hits = [None; CHUNK];
-                for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
-                    (t[i], primitive[i], geometry[i]) = (f32::INFINITY, INVALID, INVALID);
-                    if let Some(hit) = hit {
-                        // Of the two zeros the one without a sign.
-                        t[i] = hit.t + 0.0;
-                        uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
-                        (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
-                    }
+        let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
+        let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
+        let tasks = tasks.into_par_iter().zip(ids).enumerate();
+        pool::each(py, threads, tasks, |(chunk, ((t, uv, normal), (primitive, geometry)))| {
+            let mut hits = [None; CHUNK];
+            for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
+                (t[i], primitive[i], geometry[i]) = (f32::INFINITY, INVALID, INVALID);
+                if let Some(hit) = hit {
+                    // Of the two zeros the one without a sign.
+                    t[i] = hit.t + 0.0;
+                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                    (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
                 }
-                self.normals_of(primitive, geometry, normalize, normal);
-            });
+            }
+            self.normals_of(primitive, geometry, normalize, normal);
         })?;
         Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries, all_normals.reshape([count, 3])?))
     }
@@ -190,20 +181,18 @@ impl Scene {
         let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
         let (t, uv) = (t.as_slice_mut()?, uv.as_slice_mut()?);
         let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
-        pool::run(py, threads, || {
-            let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
-            let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
-            tasks.for_each(|(chunk, ((t, uv), (primitive, geometry)))| {
-                let mut hits = [None; CHUNK];
-                for (i, hit) in self.precise_hits(&rays, chunk, &mut hits).iter().enumerate() {
-                    (t[i], primitive[i], geometry[i]) = (f64::INFINITY, -1, -1);
-                    if let Some(hit) = hit {
-                        t[i] = hit.t;
-                        uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
-                        (primitive[i], geometry[i]) = (hit.primitive.into(), hit.geometry.into());
-                    }
+        let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
+        let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
+        pool::each(py, threads, tasks, |(chunk, ((t, uv), (primitive, geometry)))| {
+            let mut hits = [None; CHUNK];
+            for (i, hit) in self.precise_hits(&rays, chunk, &mut hits).iter().enumerate() {
+                (t[i], primitive[i], geometry[i]) = (f64::INFINITY, -1, -1);
+                if let Some(hit) = hit {
+                    t[i] = hit.t;
+                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                    (primitive[i], geometry[i]) = (hit.primitive.into(), hit.geometry.into());
                 }
-            });
+            }
         })?;
         Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries))
     }

@@ -1,5 +1,7 @@
 """What is wrong with arguments is told with their names; what can be read where it lies is not copied."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,22 @@ class Mesh:
 
 class Short(Mesh):
     vertices = TRIANGLE[0][:2]
+
+
+class Unwilling:
+    """As a tensor of which gradients are wanted."""
+
+    def __dlpack__(self, **_):
+        raise ValueError("not so")
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("call detach first")
+
+
+class Bare:
+    """As a mesh of Open3D that has nothing yet."""
+
+    vertex = triangle = {}
 
 
 pinhole = twincast.RaycastingScene.create_rays_pinhole
@@ -129,6 +147,18 @@ GOOD = np.zeros((2, 3))
         (ValueError, "scene", lambda: twincast.render([])),
         (ValueError, "faces", lambda: twincast.render((TRIANGLE[0][:2], TRIANGLE[1]))),
         (FileNotFoundError, "no-such", lambda: twincast.render("no-such.glb")),
+        (TypeError, "integrator", lambda: twincast.render(TRIANGLE, integrator=3)),
+        (TypeError, "camera", lambda: twincast.render(TRIANGLE, camera=3)),
+        (TypeError, "normals", lambda: twincast.render(TRIANGLE, normals=3)),
+        (TypeError, "unit", lambda: twincast.render(TRIANGLE, unit=3)),
+        (ValueError, r"background must have the shape \(3,\)", lambda: twincast.render(TRIANGLE, background=(0, 0))),
+        (ValueError, r"\(n, 3\)", lambda: twincast.RayMeshIntersector(Mesh()).intersects_any(np.zeros((2, 2)), GOOD)),
+        (TypeError, "create_rays_pinhole", lambda: pinhole(fov=60)),
+        (TypeError, "rays", lambda: scene().cast_rays(Unwilling())),
+        (TypeError, "rays", lambda: scene().cast_rays(np.array([["0", 0, 1, 0, 0, -1]], object))),
+        (ValueError, "rays", lambda: scene().cast_rays([[10**400, 0, 1, 0, 0, -1]])),
+        (ValueError, "mesh must have vertex positions", lambda: scene().add_triangles(mesh=Bare())),
+        (TypeError, "mesh must be a mesh of Open3D or trimesh; it is a ndarray", lambda: scene().add_triangles(mesh=TRIANGLE[0])),
     ],
 )
 def test_errors_name_the_argument(error, words, call):
@@ -155,6 +185,8 @@ def test_arrays_of_all_kinds():
         np.asfortranarray(np.float32(ray)),
         np.repeat(np.float64(ray), 2, axis=0)[::2],
         np.frombuffer(b"x" + np.float64(ray).tobytes(), np.float64, offset=1).reshape(1, 6),
+        np.array(ray, dtype=object),
+        [[Fraction(1, 4), 0.25, 1, 0, np.int8(0), -1]],
     ):
         assert scene().cast_rays(rays)["primitive_ids"].tolist() == [0]
 

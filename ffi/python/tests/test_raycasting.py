@@ -66,6 +66,10 @@ def test_results_answer_as_tensors_do(scene):
     assert one.numpy().shape == () and one.item() == 2 and one.isfinite().numpy().tolist() is True
     # What is picked out is NumPy's: it can be hashed, and does not change with the array.
     assert isinstance(hits["t_hit"][1], np.float32) and hits["t_hit"][1].item() == 2
+    # So is what all of it is brought down to.
+    assert isinstance(hits["t_hit"].min(), np.float32) and hash(hits["t_hit"].min()) == hash(2.0)
+    assert isinstance(finite.any(), np.bool_) and isinstance(hits["geometry_ids"].sum(), np.integer)
+    assert (hits["t_hit"] + 1).numpy().tolist() == [np.inf, 3] and (one + 1).numpy().shape == ()
 
 
 def test_no_memory_is_an_error():
@@ -94,6 +98,13 @@ def test_a_mesh_may_be_named():
     class Mesh:
         vertices, faces = cube()
 
+    class Legacy:
+        """As Open3D's older meshes are."""
+
+        vertices, triangles = map(np.ndarray.tolist, cube())
+
+    scene = twincast.RaycastingScene()
+    assert scene.add_triangles(Legacy()) == 0 and scene.count_intersections(np.float32([-3, 0.5, 0.25, 1, 0, 0])) == 2
     scene = twincast.RaycastingScene()
     assert scene.add_triangles(mesh=Mesh()) == 0
     assert scene.add_triangles(vertex_positions=Mesh.vertices, triangle_indices=Mesh.faces) == 1

@@ -33,6 +33,17 @@ def test_far_away_is_the_same_picture():
     assert np.abs(near - far).max() < 0.02
 
 
+def test_vertices_of_no_triangle_show_nothing():
+    for stray in ([1000.0, 0, 0], [np.nan] * 3):
+        strewn = (np.vstack([[stray], TRIANGLE[0], [stray]]), TRIANGLE[1] + 1)
+        for view in ({}, {"eye": (0.5, 0, 5)}):
+            options = dict(size=(32, 24), spp=1, **view)
+            assert np.array_equal(twincast.render(strewn, **options), twincast.render(TRIANGLE, **options))
+    # A triangle with such a vertex cannot be seen, but the others can.
+    broken = (np.vstack([TRIANGLE[0], [[np.nan] * 3]]), [[0, 1, 2], [0, 1, 3]])
+    assert np.array_equal(twincast.render(broken, size=(32, 24), eye=(0, 0, 5)), twincast.render(TRIANGLE, size=(32, 24), eye=(0, 0, 5)))
+
+
 def test_several_meshes_and_kinds():
     class Mesh:
         vertices, faces = TRIANGLE

@@ -24,13 +24,16 @@ def scene():
 
 RAY = np.float32([[0.25, 0.25, 1, 0, 0, -1]])
 
+#: More than one task: that is cast where it is asked for.
+RAYS = np.repeat(RAY, 3000, axis=0)
+
 
 @pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
 def test_few_pools_are_kept():
     one = scene()
     before = len(os.listdir(TASKS))
     for threads in range(3, 20):
-        assert one.cast_rays(RAY, nthreads=threads)["t_hit"].tolist() == [1]
+        assert (one.cast_rays(RAYS, nthreads=threads)["t_hit"] == 1).all()
     # Four at most; those of the others end when they notice.
     most = before + 19 + 18 + 17 + 16
     until = time.monotonic() + 20
@@ -40,10 +43,48 @@ def test_few_pools_are_kept():
 
 
 @pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
+def test_a_ray_by_itself_starts_no_thread():
+    """Each kind of query of rays."""
+    program = (
+        "import os, sys; sys.path.insert(0, sys.argv[1]); from test_threads import *\n"
+        "one = scene(); one.compute_distance(RAYS[:, :3])\n"
+        "before = len(os.listdir(TASKS))\n"
+        "for ask in (one._scene.first, one._scene.occluded, one._scene.cast, one._scene.closest, one._scene.count):\n"
+        "    for dtype in (np.float32, np.float64): ask(RAY[:, :3].astype(dtype), RAY[:, 3:].astype(dtype), threads=7)\n"
+        "assert len(os.listdir(TASKS)) == before, (len(os.listdir(TASKS)), before)\n"
+    )
+    subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)
+
+
+@pytest.mark.parametrize("ask", ["cast_rays", "test_occlusions", "count_intersections", "list_intersections", "compute_distance"])
+def test_a_query_can_be_interrupted(ask):
+    """One that would take minutes, of rays that pass by many triangles, and ends soon after the signal."""
+    program = (
+        "import sys, signal, threading, os, time\n"
+        "import numpy as np, twincast\n"
+        "rng = np.random.default_rng(1)\n"
+        "scene = twincast.RaycastingScene()\n"
+        "scene.add_triangles(np.float32(rng.random((3000, 3))), rng.permutation(3000).reshape(-1, 3))\n"
+        "few = np.float32(np.hstack([rng.random((1000, 3)), rng.normal(size=(1000, 3))]))\n"
+        "ask = getattr(scene, sys.argv[1])\n"
+        "few = few[:, :3] if 'distance' in sys.argv[1] else few\n"
+        "ask(few[:2])\n"
+        "many = np.broadcast_to(few, (40000, *few.shape))\n"
+        "threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "try: ask(many, nthreads=1)\n"
+        "except KeyboardInterrupt: raise SystemExit(7)\n"
+    )
+    start = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", program, ask], check=False)
+    assert done.returncode == 7
+    assert time.monotonic() - start < 60
+
+
+@pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
 def test_too_many_threads_are_the_same_pool():
     program = (
         "import os, sys; sys.path.insert(0, sys.argv[1]); from test_threads import *; one = scene()\n"
-        "for threads in (1100, 1200, 1300): one.cast_rays(RAY, nthreads=threads)\n"
+        "for threads in (1100, 1200, 1300): one.cast_rays(RAYS, nthreads=threads)\n"
         "assert len(os.listdir(TASKS)) < 1200, len(os.listdir(TASKS))\n"
     )
     subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)

@@ -11,9 +11,10 @@ Whether a ray hits a triangle is decided exactly for the numbers that were given
 triangles that share an edge, and each crossing counts once. Queries run on all cores without the interpreter's lock.
 """
 
+from . import compat
 from ._native import ISA, __version__
 from .intersector import RayMeshIntersector
 from .pictures import render
 from .raycasting import RaycastingScene
 
-__all__ = ["ISA", "RayMeshIntersector", "RaycastingScene", "__version__", "render"]
+__all__ = ["ISA", "RayMeshIntersector", "RaycastingScene", "__version__", "compat", "render"]

@@ -26,6 +26,19 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     return number
 
 
+def text(name: str, value: Any) -> str | None:
+    """``value``, a string or None.
+
+    Raises
+    ------
+    TypeError
+        Where it is neither, with its name.
+    """
+    if value is not None and not isinstance(value, str):
+        raise TypeError(f"{name} must be a string, not {value!r}")
+    return value
+
+
 def real(name: str, value: Any) -> float:
     """``value`` as a float, which may be infinite.
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import numbers
 from typing import Any
 
 import numpy as np
 
 
-def floats(name: str, value: Any, columns: int | None = None) -> np.ndarray:
-    """``value`` as an array of float32 or float64, of shape (..., columns).
+def floats(name: str, value: Any, columns: int | None = None, shape: str | None = None) -> np.ndarray:
+    """``value`` as an array of float32 or float64, of shape (..., columns), which is told as ``shape`` where it is another.
 
-    float32 and float64 stay what they are, and stay where they are; other real numbers become float64. Anything that
+    float32 and float64 stay what they are, and stay where they are; other real numbers become float64, also Python's in an array of objects. Anything that
     answers ``__dlpack__`` and is on the CPU, or ``__array__``, is an array.
 
     Raises
@@ -22,21 +23,27 @@ def floats(name: str, value: Any, columns: int | None = None) -> np.ndarray:
     """
     array = _array(name, value)
     if array.dtype not in (np.float32, np.float64):
-        if array.dtype.kind not in "fiub":
+        is_real = array.dtype.kind in "fiub"
+        if array.dtype.kind == "O":
+            is_real = all(isinstance(number, numbers.Real) for number in array.flat)
+        if not is_real:
             raise TypeError(f"{name} must hold real numbers, not {array.dtype}")
-        array = array.astype(np.float64)
+        try:
+            array = array.astype(np.float64)
+        except OverflowError:
+            raise ValueError(f"{name} must hold numbers that a float can hold") from None
     if columns is not None and (array.ndim == 0 or array.shape[-1] != columns):
         # An empty list has no columns to count.
         if array.size == 0 and array.ndim <= 1:
             return array.reshape(0, columns)
-        raise ValueError(f"{name} must have the shape (..., {columns}), not {array.shape}")
+        raise ValueError(f"{name} must have the shape {shape or f'(..., {columns})'}, not {array.shape}")
     # Numbers in the other byte order, and those that are not aligned, are copied.
     return np.require(array, dtype=array.dtype.newbyteorder("="), requirements="A")
 
 
 def vectors(name: str, value: Any) -> np.ndarray:
     """``value`` as an (n, 3) array of float32 or float64; raises as :func:`floats` does."""
-    array = floats(name, value, 3)
+    array = floats(name, value, 3, "(n, 3)")
     if array.ndim != 2:
         raise ValueError(f"{name} must have the shape (n, 3), not {array.shape}")
     return array
@@ -104,7 +111,7 @@ def matrix(name: str, value: Any, size: int) -> np.ndarray:
 
 
 def _finite(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    array = floats(name, value, shape[-1]).astype(np.float64)
+    array = floats(name, value, shape[-1], str(shape)).astype(np.float64)
     if array.shape != shape:
         raise ValueError(f"{name} must have the shape {shape}, not {array.shape}")
     if not np.isfinite(array).all():
@@ -119,10 +126,10 @@ def _array(name: str, value: Any) -> np.ndarray:
     if hasattr(value, "__dlpack__") and hasattr(np, "from_dlpack"):
         try:
             return np.from_dlpack(value)
-        except (BufferError, RuntimeError, TypeError):
+        except (BufferError, RuntimeError, TypeError, ValueError):
             # Not on the CPU, or of a kind that NumPy has not: it may still turn itself into an array.
             pass
     try:
         return np.asarray(value)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RuntimeError) as error:
         raise TypeError(f"{name} must be an array of numbers: {error}") from error

@@ -51,3 +51,8 @@ def rays_from_matrices(
     rays[..., :3] = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
     rays[..., 3:] = np.stack([x, y, np.ones_like(x)], axis=-1) @ to_world.T
     return rays
+
+
+# What Python says of an argument that neither has is said of the method.
+for _rays in (rays_looking_at, rays_from_matrices):
+    _rays.__qualname__ = "create_rays_pinhole"

@@ -95,14 +95,16 @@ def render(
         "size": None if size is None else _size(size),
         "spp": None if spp is None else _arguments.whole("spp", spp, least=1, most=_U32),
         "seed": None if seed is None else _arguments.whole("seed", seed, most=2**64 - 1),
-        "camera": camera,
-        "integrator": integrator,
+        "camera": _arguments.text("camera", camera),
+        "integrator": _arguments.text("integrator", integrator),
         "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_U32),
         "background": None if background is None else _arrays.vector("background", background).tolist(),
         "threads": _arguments.whole("threads", threads),
     }
     if eye is not None and camera is not None:
         raise ValueError("camera must be left out where eye is given: either says where the view is from")
+    for name, value in [("up_axis", up_axis), ("unit", unit), ("normals", normals)]:
+        _arguments.text(name, value)
     is_file = isinstance(scene, (str, os.PathLike))
     if not is_file and (up_axis, unit) != ("y", "m"):
         raise ValueError("up_axis and unit are those of a file: meshes are taken as they are")
@@ -175,16 +177,19 @@ def _mesh(mesh: Any) -> _Mesh:
     else:
         raise TypeError(f"scene: a mesh must have vertices and faces, or be a pair of these; found a {type(mesh).__name__}")
     vertices = _arrays.vectors("vertices", vertices)
-    return vertices, _arrays.triangles("faces", faces, vertices), GREY
+    faces = _arrays.triangles("faces", faces, vertices)
+    # Vertices that belong to no triangle show nothing, so they must not count for what the camera shows.
+    is_used = np.zeros(len(vertices), dtype=bool)
+    is_used[faces] = True
+    if not is_used.all():
+        vertices, faces = vertices[is_used], (np.cumsum(is_used, dtype=np.uint32) - np.uint32(1))[faces]
+    return vertices, faces, GREY
 
 
 def _centre(meshes: list[_Mesh]) -> np.ndarray:
-    corners = [vertices for vertices, _, _ in meshes if len(vertices)]
-    if not corners:
-        return np.zeros(3)
-    low = np.min([vertices.min(axis=0) for vertices in corners], axis=0)
-    high = np.max([vertices.max(axis=0) for vertices in corners], axis=0)
-    return (low + high) / 2
+    corners = np.concatenate([vertices for vertices, _, _ in meshes])
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    return (corners.min(axis=0) + corners.max(axis=0)) / 2 if len(corners) else np.zeros(3)
 
 
 def _size(size: Any) -> tuple[int, int]:

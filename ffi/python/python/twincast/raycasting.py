@@ -17,6 +17,10 @@ class Result(np.ndarray):
     A single number that is picked out of it is NumPy's scalar, which answers ``item()``.
     """
 
+    def __array_wrap__(self, array: np.ndarray, context: Any = None, return_scalar: bool = False) -> Any:
+        # So is what all of it is brought down to, a sum or the largest, for which there is no context.
+        return array[()] if array.ndim == 0 and context is None else array.view(Result)
+
     def numpy(self) -> np.ndarray:
         """The array itself, not copied."""
         return self.view(np.ndarray)
@@ -44,7 +48,7 @@ class RaycastingScene(Meshes):
     Parameters
     ----------
     nthreads : int
-        Threads to build the scene on; 0 is one for each core.
+        Threads to build the scene on; 0 is one for each core. So of every query, which takes ``nthreads`` of its own.
     device
         Ignored but for its type: the scene is on the CPU.
     """
@@ -295,9 +299,15 @@ def _samples(nsamples: Any) -> int:
 
 
 def _mesh(name: str, mesh: Any) -> tuple[Any, Any]:
-    """Vertices and triangles of Open3D's mesh, or of trimesh's."""
+    """Vertices and triangles of Open3D's mesh, of either kind, or of trimesh's."""
     if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):
-        return mesh.vertex["positions"], mesh.triangle["indices"]
+        try:
+            return mesh.vertex["positions"], mesh.triangle["indices"]
+        except KeyError as error:
+            raise ValueError(f"{name} must have vertex positions and triangle indices: {error}") from None
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return mesh.vertices, mesh.faces
-    raise TypeError(f"{name} must be a mesh, or vertex_positions come with triangle_indices; it is a {type(mesh).__name__}")
+    if hasattr(mesh, "vertices") and hasattr(mesh, "triangles"):
+        return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    or_else = ", or come with triangle_indices" if name == "vertex_positions" else ""
+    raise TypeError(f"{name} must be a mesh of Open3D or trimesh{or_else}; it is a {type(mesh).__name__}")

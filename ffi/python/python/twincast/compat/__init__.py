@@ -1,1 +1,5 @@
 """Stand-ins for other packages."""
+
+from . import embreex
+
+__all__ = ["embreex"]
