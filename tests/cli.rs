@@ -437,6 +437,23 @@ fn a_reference_that_differs_ends_with_1_and_the_picture_is_written() {
     assert_eq!(missing.status.code(), Some(3));
 }
 
+/// Whatever its format leaves out: light above 1, bits, alpha.
+#[test]
+fn a_picture_is_its_own_reference() {
+    let folder = Folder::new();
+    for (name, limit) in [("r.exr", "0"), ("r.png", "0"), ("r.jpg", "0.02")] {
+        let bright = ["--exposure", "3", "--response", "filmic"];
+        assert!(folder.render(name, &bright).status.success());
+        let reference = folder.path(name);
+        let check = ["--reference", &reference, "--threshold", limit];
+        let same = folder.render("same.exr", &[&bright[..], &check].concat());
+        assert!(same.status.success(), "{name}: {}", text(&same.stderr));
+        let darker = folder.render("darker.exr", &check);
+        let is_code = name != "r.exr";
+        assert_eq!(darker.status.code(), Some(i32::from(is_code)), "{name}: {}", text(&darker.stderr));
+    }
+}
+
 #[test]
 fn cameras_that_do_not_exist_are_named() {
     let folder = Folder::new();

@@ -28,7 +28,7 @@ use super::summary::Rendered;
 use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
-use crate::image::{self, Image, Metadata, WriteOptions};
+use crate::image::{Metadata, Reference, Response, WriteOptions};
 use crate::io;
 use crate::memory::process;
 use crate::plan;
@@ -83,7 +83,7 @@ pub(super) struct RenderArgs {
     #[arg(long)]
     print_camera: bool,
 
-    /// Picture of the same size to compare with; exit code 1 if it differs by more than --threshold
+    /// Picture of the same size to compare with, as its format would hold this one; exit code 1 if they differ by more than --threshold
     #[arg(long, value_name = "FILE", requires = "output")]
     pub(super) reference: Option<PathBuf>,
 
@@ -166,7 +166,7 @@ fn render(args: &RenderArgs) -> Result<()> {
 fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<()> {
     let denoising = args.denoise.open(&args.aov.aovs())?;
     let cache = args.cache.open(args.backend)?;
-    let reference = args.reference.as_deref().map(image::read).transpose()?;
+    let reference = args.reference.as_deref().map(Reference::read).transpose()?;
     let title = || args.scene.scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let display = args.display_server.as_deref().map(|address| Display::connect(address, title())).transpose()?;
 
@@ -290,7 +290,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
             say(summary)?;
         }
-        args.judge(&outcome, reference.as_ref())
+        args.judge(&outcome, reference.as_ref(), &options.response)
     })
 }
 
@@ -315,8 +315,8 @@ impl RenderArgs {
         [Some(&self.scene.scene), self.reference.as_ref(), self.light.environment.as_ref()].into_iter().flatten()
     }
 
-    fn check_reference(&self, reference: Option<&Image>, width: u32, height: u32) -> Result<()> {
-        let (Some(picture), Some(path)) = (reference, &self.reference) else { return Ok(()) };
+    fn check_reference(&self, reference: Option<&Reference>, width: u32, height: u32) -> Result<()> {
+        let (Some(Reference { image: picture, .. }), Some(path)) = (reference, &self.reference) else { return Ok(()) };
         if (picture.width, picture.height) == (width, height) {
             return Ok(());
         }
@@ -326,11 +326,11 @@ impl RenderArgs {
     }
 
     /// Says how the checks that were asked for went; an error where one did not hold.
-    fn judge(&self, outcome: &Outcome, reference: Option<&Image>) -> Result<()> {
+    fn judge(&self, outcome: &Outcome, reference: Option<&Reference>, response: &Response) -> Result<()> {
         let mut checks = Vec::new();
         checks.extend(outcome.verdict.clone());
         if let (Some(reference), Some(path)) = (reference, &self.reference) {
-            let rmse = outcome.passes[0].picture.image.difference(reference)?.rmse;
+            let rmse = reference.difference(&outcome.passes[0].picture.image, response)?.rmse;
             let (path, limit) = (path.display(), self.threshold);
             let above = if rmse <= limit { "within" } else { "above" };
             checks.push((format!("{path}: root mean square difference {rmse:.3e}, {above} {limit}"), rmse <= limit));

@@ -9,7 +9,7 @@ use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
 use super::pure as backend;
 use super::response::Response;
-use super::samples::{self, Type};
+use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Image, Metadata, channels};
 use crate::error::{Error, Result, one_line};
 use crate::memory::Mapped;
@@ -166,6 +166,11 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// [`Error::Input`] for a file that is missing, broken or in a format that this build does not read, and for one that
 /// claims more than 2^28 pixels, or more than its size makes plausible.
 pub fn read(path: &Path) -> Result<Image> {
+    read_samples(path).map(samples::decode)
+}
+
+/// What [`read`] decodes.
+pub(super) fn read_samples(path: &Path) -> Result<Samples> {
     let bytes = file_size(path)?;
     if JPEG.contains(&suffix(path).as_str()) {
         let file = Mapped::open(path).map_err(|error| Error::input(path, "", error.to_string()))?;
@@ -175,7 +180,7 @@ pub fn read(path: &Path) -> Result<Image> {
     }
     prepare()?;
     let check = |width: u64, height: u64| check_size(width, height, bytes);
-    backend::read(path, &check).map(samples::decode).map_err(|message| unreadable(path, &message))
+    backend::read(path, &check).map_err(|message| unreadable(path, &message))
 }
 
 /// Reads every channel of an OpenEXR file, those of the colours as well; halves become floating values.

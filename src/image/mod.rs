@@ -22,6 +22,7 @@ mod parity;
 mod pure;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure_channels;
+mod reference;
 mod response;
 mod samples;
 pub mod srgb;
@@ -34,6 +35,7 @@ pub use file::{
 pub(crate) use file::{has_common_suffix, prepare};
 pub(crate) use jpeg::is_cut_short;
 pub use metadata::{Metadata, Window};
+pub use reference::Reference;
 pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
 
 use crate::math::Vec4;
