@@ -6,16 +6,22 @@
 //! ```
 //! use twincast::math::{DVec3, Vec3};
 //! use twincast::scene::{Camera, Geometry, Material, Mesh};
+//! use twincast::shade::{Attributes, SurfacePoint};
 //! use twincast::trace::bvh::Bvh;
-//! use twincast::{Ray, Renderer, Scene, Settings, Tracer, World};
+//! use twincast::{Renderer, Scene, Settings, Tracer, World};
 //!
 //! let triangle = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
 //! let scene = Scene::from_geometries(vec![Geometry::Mesh(triangle)], vec![Material::default()]);
 //! let world = World::new(&scene)?;
 //! let bvh = Bvh::build(&world);
 //!
-//! let hit = bvh.closest(&Ray::new(Vec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z)).expect("it passes inside");
+//! // Tracers know the scene recentred, so rays are made by the world, not by `Ray::new` alone.
+//! let ray = world.ray(DVec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z);
+//! let hit = bvh.closest(&ray).expect("it passes inside");
 //! assert_eq!((hit.t, hit.u, hit.v), (2.0, 0.25, 0.5));
+//! // The rest is computed for who wants it: position, normals, uvs, colour.
+//! let surface = SurfacePoint::new(&scene, &world, &ray, &hit, Attributes::ALL);
+//! assert_eq!(world.to_scene(surface.position), DVec3::new(0.25, 0.5, 0.0));
 //!
 //! let camera = Camera::look_at(DVec3::new(0.3, 0.3, 2.0), DVec3::new(0.3, 0.3, 0.0), DVec3::Y, 1.0).expect("not upwards");
 //! let settings = Settings { width: 64, height: 64, ..Settings::default() };

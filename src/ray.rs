@@ -8,7 +8,7 @@ use crate::math::Vec3;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Ray {
-    /// Start, in world coordinates (recentred scene units).
+    /// Start, in world coordinates (recentred scene units): [`World::ray`](crate::World::ray) makes rays of the scene's.
     pub origin: Vec3,
     /// Direction; need not be a unit vector.
     pub direction: Vec3,
@@ -46,7 +46,7 @@ impl Ray {
     }
 }
 
-/// Where a ray met the scene: ids and parameters, nothing else. `surface` computes the rest.
+/// Where a ray met the scene: ids and parameters, nothing else. [`SurfacePoint::new`](crate::shade::SurfacePoint::new) computes the rest.
 ///
 /// Six words in the order of the fields, so that the hits of a packet can be written as vectors.
 #[repr(C)]

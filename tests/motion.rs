@@ -168,7 +168,7 @@ fn what_passes_is_as_bright_as_it_stays() {
     }
     assert_eq!(bright([0.5, 0.5]), 1.0, "an instant");
     let refused = Renderer::new(&scene, &world, Camera { shutter: [0.6, 0.4], ..camera }, Settings::default());
-    assert!(refused.err().expect("it closes before it opens").to_string().contains("shutter from 0.6 to 0.4"));
+    assert!(refused.expect_err("it closes before it opens").to_string().contains("shutter from 0.6 to 0.4"));
 }
 
 /// Bumps turn along with what they are on: at one instant all is as if it stood still.

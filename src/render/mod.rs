@@ -25,6 +25,7 @@ mod tiles;
 mod wavefront;
 mod whitted;
 
+use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -92,6 +93,17 @@ pub struct Renderer<'a> {
     fallback: Material,
     /// What is told of each pixel beside its colour; none where nothing is asked for.
     request: Option<Request>,
+}
+
+impl fmt::Debug for Renderer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { camera, settings, plan, .. } = self;
+        f.debug_struct("Renderer")
+            .field("camera", camera)
+            .field("settings", settings)
+            .field("plan", plan)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<'a> Renderer<'a> {

@@ -133,6 +133,9 @@ impl Settings {
                 return Err(Error::Usage(message));
             }
         }
+        if self.background.is_some_and(|color| !color.is_finite()) {
+            return Err(Error::Usage("a background that is not finite".to_owned()));
+        }
         if spp == 0 {
             return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
         }

@@ -3,14 +3,16 @@
 //! Loaders check as they go, and can name the place in the file; this is the net beneath them, so that no index of any
 //! format, old or new, reaches a tracer unchecked. Whoever makes a scene by hand has nothing else.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::{Geometry, Mesh, Scene};
+use super::{AreaShape, Attenuation, Environment, Fog, Geometry, Group, Light, Mesh, Scene};
 use crate::error::{Error, Result};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 impl Scene {
-    /// Whether all indices are in range, attributes match, and materials, shapes and placements can be. What [`io::load`](crate::io::load) gives
+    /// Whether all indices are in range, attributes match, and materials, shapes, placements and lights can be. What [`io::load`](crate::io::load) gives
     /// has been checked; what is made by hand should be, for the tracers rely on it. Corners of triangles may be NaN or infinite: those are never hit.
     ///
     /// # Errors
@@ -19,16 +21,19 @@ impl Scene {
         fault(self).map_err(|message| Error::Backend { backend: "scene", message })
     }
 
-    /// Whether there is a group of this index, of geometries that are there.
-    fn has_group(&self, group: u32) -> bool {
-        let range = self.groups.get(group as usize).map(|group| &group.geometries);
-        range.is_some_and(|range| self.geometries.get(range.start as usize..range.end as usize).is_some())
+    /// Whether its geometries are there.
+    fn has_geometries(&self, group: &Group) -> bool {
+        let Range { start, end } = group.geometries;
+        self.geometries.get(start as usize..end as usize).is_some()
     }
 }
 
 /// What [`Scene::check`] says, as a message alone.
 pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
-    if let Some(instance) = scene.instances.iter().find(|instance| !scene.has_group(instance.group)) {
+    if let Some(group) = scene.groups.iter().find(|group| !scene.has_geometries(group)) {
+        return Err(format!("group {:?} has geometries that do not exist", group.name));
+    }
+    if let Some(instance) = scene.instances.iter().find(|instance| instance.group as usize >= scene.groups.len()) {
         return Err(format!("instance {:?} places a group that does not exist", instance.name));
     }
     for geometry in &scene.geometries {
@@ -70,14 +75,97 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
             return Err(format!("texture {:?} has {} of {pixels} pixels", texture.name, texture.pixels.len()));
         }
     }
-    match scene
-        .instances
-        .iter()
-        .find(|instance| !instance.transform.is_finite() || instance.transform_end.is_some_and(|end| !end.is_finite()))
-    {
-        Some(instance) => Err(format!("instance {:?} has a transform that is not finite", instance.name)),
-        None => Ok(()),
+    for instance in &scene.instances {
+        let transforms = [Some(instance.transform), instance.transform_end];
+        if transforms.into_iter().flatten().any(|transform| !transform.is_finite()) {
+            return Err(format!("instance {:?} has a transform that is not finite", instance.name));
+        }
     }
+    for (number, light) in scene.lights.iter().enumerate() {
+        check_light(light).map_err(|message| format!("light {number}: {message}"))?;
+    }
+    for (what, light) in [("ambient light", Some(scene.ambient)), ("the background", scene.background)] {
+        if let Some(color) = light.filter(|&color| !is_light(color)) {
+            return Err(format!("{what} is {color}"));
+        }
+    }
+    if let Some(Fog { absorption, color, reach }) = scene.fog
+        && !(is_light(absorption) && is_light(color) && reach >= 0.0)
+    {
+        return Err(format!("fog has the absorption {absorption}, the color {color} and the reach {reach}"));
+    }
+    if let Some(Environment { image, intensity, rotation }) = &scene.environment {
+        let pixels = u64::from(image.width) * u64::from(image.height);
+        if pixels == 0 || pixels != image.pixels.len() as u64 {
+            return Err(format!("the environment has {} of {pixels} pixels", image.pixels.len()));
+        }
+        if !(intensity.is_finite() && *intensity >= 0.0 && rotation.is_finite()) {
+            return Err(format!("the environment has the intensity {intensity} and the rotation {rotation}"));
+        }
+    }
+    Ok(())
+}
+
+/// Whether light can have this color.
+fn is_light(color: Vec3) -> bool {
+    color.is_finite() && color.min_element() >= 0.0
+}
+
+fn check_light(light: &Light) -> std::result::Result<(), String> {
+    let (Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. }) = light else {
+        let Light::Area { shape, radiance } = light else { unreachable!("all others have a color") };
+        return check_area(shape, *radiance);
+    };
+    if !is_light(*color) {
+        return Err(format!("its color is {color}"));
+    }
+    if let Light::Directional { direction, .. } | Light::Spot { direction, .. } = light
+        && !is_direction(*direction)
+    {
+        return Err(format!("its direction is {direction}"));
+    }
+    if let Light::Point { position, attenuation, range, .. } | Light::Spot { position, attenuation, range, .. } = light
+    {
+        let Attenuation { constant, linear, quadratic } = *attenuation;
+        let terms = [constant, linear, quadratic];
+        if !position.is_finite() {
+            return Err(format!("its position is {position}"));
+        }
+        if !terms.into_iter().all(|term| term.is_finite() && term >= 0.0) || terms == [0.0; 3] {
+            return Err(format!("its attenuation is {constant}, {linear}, {quadratic}"));
+        }
+        if range.is_nan() || *range < 0.0 {
+            return Err(format!("its range is {range}"));
+        }
+    }
+    match *light {
+        Light::Point { radius, .. } if !(radius.is_finite() && radius >= 0.0) => Err(format!("its radius is {radius}")),
+        Light::Spot { inner_angle, outer_angle, .. } if !(0.0 <= inner_angle && inner_angle <= outer_angle) => {
+            Err(format!("its cone has the half-angles {inner_angle}, inside, and {outer_angle}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_area(shape: &AreaShape, radiance: Vec3) -> std::result::Result<(), String> {
+    if !is_light(radiance) {
+        return Err(format!("its radiance is {radiance}"));
+    }
+    let (centre, is_sound) = match *shape {
+        AreaShape::Rectangle { centre, half_edges } => (centre, half_edges.into_iter().all(is_direction)),
+        AreaShape::Disk { centre, normal, radius } => (centre, is_direction(normal) && is_radius(radius)),
+        AreaShape::Sphere { centre, radius } => (centre, is_radius(radius)),
+    };
+    if centre.is_finite() && is_sound { Ok(()) } else { Err(format!("it shines from {shape:?}")) }
+}
+
+/// Whether a vector is finite and not zero.
+fn is_direction(vector: DVec3) -> bool {
+    vector.is_finite() && vector != DVec3::ZERO
+}
+
+fn is_radius(radius: f64) -> bool {
+    radius.is_finite() && radius > 0.0
 }
 
 fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
@@ -109,7 +197,7 @@ fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DVec3;
+    use crate::image::Image;
     use crate::scene::{Material, Texture};
     use crate::shape::{Shape, Sphere};
 
@@ -122,7 +210,7 @@ mod tests {
     fn finds_every_fault() {
         assert_eq!(fault(&good()), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
-        let faults: [(&str, Breaks); 10] = [
+        let faults: [(&str, Breaks); 22] = [
             ("sphere: the radius is -1", |scene, _| {
                 let shapes = vec![Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: -1.0 })];
                 scene.geometries.push(Geometry::Shapes { shapes, material: 0 });
@@ -133,7 +221,50 @@ mod tests {
             ("1 uvs for 3", |_, mesh| mesh.uvs = vec![Default::default()]),
             ("not finite", |_, mesh| mesh.origin = DVec3::NAN),
             ("does not exist", |scene, _| scene.instances[0].group = 1),
-            ("does not exist", |scene, _| scene.groups[0].geometries = 0..2),
+            ("do not exist", |scene, _| scene.groups[0].geometries = 0..2),
+            ("group \"unused\" has geometries that do not exist", |scene, _| {
+                scene.groups.push(Group { name: "unused".into(), geometries: 5..9 });
+            }),
+            ("transform that is not finite", |scene, _| scene.instances[0].transform.translation.x = f64::NAN),
+            ("ambient light is", |scene, _| scene.ambient = Vec3::NAN),
+            ("the background is", |scene, _| scene.background = Some(Vec3::NEG_ONE)),
+            ("the reach -1", |scene, _| {
+                scene.fog = Some(Fog { absorption: Vec3::ONE, color: Vec3::ONE, reach: -1.0 });
+            }),
+            ("environment has 0 of 2 pixels", |scene, _| {
+                let image = Image { pixels: Vec::new(), ..Image::new(2, 1) };
+                scene.environment = Some(Environment::new(image));
+            }),
+            ("the intensity -1", |scene, _| {
+                scene.environment = Some(Environment { intensity: -1.0, ..Environment::new(Image::new(2, 1)) });
+            }),
+            ("light 0: its color is", |scene, _| {
+                scene.lights.push(Light::Directional { direction: DVec3::X, color: Vec3::new(0.0, -1.0, 0.0) });
+            }),
+            ("light 1: its direction is", |scene, _| {
+                scene.lights =
+                    [DVec3::X, DVec3::ZERO].map(|direction| Light::Directional { direction, color: Vec3::ONE }).into();
+            }),
+            ("its attenuation is 0, 0, 0", |scene, _| {
+                let attenuation = Attenuation { constant: 0.0, ..Attenuation::NONE };
+                let (position, color, range, radius) = (DVec3::ZERO, Vec3::ONE, f64::INFINITY, 0.0);
+                scene.lights.push(Light::Point { position, color, attenuation, range, radius });
+            }),
+            ("its cone has the half-angles 0.5", |scene, _| {
+                scene.lights.push(Light::Spot {
+                    position: DVec3::ZERO,
+                    direction: DVec3::X,
+                    color: Vec3::ONE,
+                    attenuation: Attenuation::NONE,
+                    range: f64::INFINITY,
+                    inner_angle: 0.5,
+                    outer_angle: 0.25,
+                });
+            }),
+            ("it shines from Sphere", |scene, _| {
+                let shape = AreaShape::Sphere { centre: DVec3::ZERO, radius: -1.0 };
+                scene.lights.push(Light::Area { shape, radiance: Vec3::ONE });
+            }),
             ("negative or not finite", |scene, _| scene.materials[0].diffuse = Vec3::NEG_ONE),
             ("0 of 1 pixels", |scene, _| scene.textures.push(Texture { width: 1, height: 1, ..Texture::default() })),
         ];

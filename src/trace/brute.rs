@@ -3,6 +3,7 @@
 //! Nothing is skipped but by a plain f64 sign test, eight triangles at a time, that leaves anything doubtful to
 //! `triangle::intersect`.
 
+use std::fmt;
 use std::sync::Arc;
 
 use super::leaf::{offer_shape, offer_triangle};
@@ -19,6 +20,12 @@ pub struct Brute {
     parts: Vec<Prepared>,
     /// Of each placement, for each part of its object: the triangles where they stand; nothing of what moves.
     placed: Vec<Vec<Option<Vec<Lanes>>>>,
+}
+
+impl fmt::Debug for Brute {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Brute").field("parts", &self.parts.len()).finish_non_exhaustive()
+    }
 }
 
 /// A part's primitives, laid out for a linear scan.

@@ -35,7 +35,10 @@ pub trait Tracer: Sync {
     /// Whether there is any hit.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// The nearest hit of each ray, into `hits` of the same length.
+    /// The nearest hit of each ray, into `hits` of the same length. All by the thread that calls: who has many rays hands parts of them to several.
+    ///
+    /// # Panics
+    /// Where lengths differ.
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], _batch: Batch) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
         for (ray, hit) in rays.iter().zip(hits) {
@@ -43,7 +46,10 @@ pub trait Tracer: Sync {
         }
     }
 
-    /// Whether each ray has any hit, into `occluded` of the same length.
+    /// Whether each ray has any hit, into `occluded` of the same length; by the thread that calls.
+    ///
+    /// # Panics
+    /// Where lengths differ.
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], _batch: Batch) {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
         for (ray, answer) in rays.iter().zip(occluded) {

@@ -112,6 +112,18 @@ impl World {
 }
 
 impl World {
+    /// A ray over [0, infinity] as tracers of this world take it: they know the scene recentred by [`World::centre`]. `origin` is in the scene's coordinates.
+    pub fn ray(&self, origin: DVec3, direction: Vec3) -> Ray {
+        Ray::new((origin - self.centre).as_vec3(), direction)
+    }
+
+    /// Where a point of a ray, or [of what it meets](crate::shade::SurfacePoint), is in the scene's coordinates.
+    pub fn to_scene(&self, point: DVec3) -> DVec3 {
+        self.centre + point
+    }
+}
+
+impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
@@ -338,5 +350,29 @@ fn singular(index: usize, instance: &Instance) -> Error {
     Error::Backend {
         backend: "scene",
         message: format!("instance {index} ({name:?}) has a singular transform; give it a scale that is not zero"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Material;
+    use crate::trace::Tracer;
+    use crate::trace::bvh::Bvh;
+
+    /// Wherever the scene lies, and so wherever zero is for tracers.
+    #[test]
+    fn rays_of_a_world_are_those_of_the_scene() {
+        for away in [0.0, 6.0, 1e3, 1e6] {
+            let corners = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::X * away);
+            let geometry = Geometry::Mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2]]));
+            let world =
+                World::new(&Scene::from_geometries(vec![geometry], vec![Material::default()])).expect("a world");
+            assert_eq!(world.centre == DVec3::ZERO, away == 0.0);
+            let origin = DVec3::new(f64::from(away) + 0.25, 0.25, 5.0);
+            let ray = world.ray(origin, Vec3::NEG_Z);
+            assert_eq!(Bvh::build(&world).closest(&ray).map(|hit| hit.t), Some(5.0), "{away}");
+            assert_eq!(world.to_scene(ray.origin.as_dvec3()), origin);
+        }
     }
 }

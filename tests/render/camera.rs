@@ -1,7 +1,7 @@
 //! Camera rays, against the three ways in which lectures derive them.
 
 use twincast::math::{DMat3, DVec2, DVec3};
-use twincast::scene::{Camera, Distortion, Fov, Projection, ThinLens};
+use twincast::scene::{Camera, Distortion, Fov, Pose, Projection, ThinLens};
 use twincast::{Error, Renderer, Scene, World};
 
 use super::settings;
@@ -223,9 +223,18 @@ fn cameras_that_cannot_be_are_bad_usage() {
         (Camera { projection: Projection::Orthographic(0.0), ..base.clone() }, "height 0"),
         (Camera { projection: Projection::Equirectangular, lens: lens(0.1, 1.0), ..base.clone() }, "whole sphere"),
         (Camera { projection: narrow, ..base.clone() }, "neighbouring pixels"),
+        (Camera { eye: DVec3::NAN, ..base.clone() }, "its place must be finite"),
+        (Camera { frame: DMat3::ZERO, ..base.clone() }, "unit vectors"),
+        (Camera { frame: DMat3::from_cols(DVec3::X, DVec3::NAN, DVec3::Z), ..base.clone() }, "unit vectors"),
+        (Camera { end: Some(Pose { eye: DVec3::INFINITY, frame: base.frame }), ..base.clone() }, "its place"),
+        (Camera { shift: DVec2::NAN, ..base.clone() }, "lens shift"),
+        (
+            Camera { distortion: Some(Distortion { k1: f64::NAN, ..Distortion::default() }), ..base.clone() },
+            "distortion",
+        ),
     ] {
         let (scene, world) = (Scene::default(), World::default());
-        let error = Renderer::new(&scene, &world, camera, settings(400, 300, 1)).err().expect("refused");
+        let error = Renderer::new(&scene, &world, camera, settings(400, 300, 1)).expect_err("refused");
         assert!(matches!(error, Error::Usage(_)) && error.to_string().contains(words), "{error}");
     }
     // The smallest that the message names does work.

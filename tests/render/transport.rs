@@ -373,7 +373,7 @@ fn a_grid_of_samples_is_no_choice_for_paths() {
     let world = World::new(&scene).unwrap();
     let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 0.5).unwrap();
     let settings = Settings { sampling: twincast::render::Sampling::Grid, ..paths(4, 4) };
-    let error = Renderer::new(&scene, &world, camera, settings).err().expect("refused");
+    let error = Renderer::new(&scene, &world, camera, settings).expect_err("refused");
     assert!(error.exit_code() == 2 && error.to_string().contains("grid"), "{error}");
 }
 

@@ -8,7 +8,7 @@ mod pinhole;
 use crate::error::{Error, Result};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::ray::Ray;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, Distortion, Projection};
 
 use general::General;
 pub(super) use pinhole::Pinhole;
@@ -26,9 +26,10 @@ impl View {
     /// `centre` is [`World::centre`](crate::World).
     ///
     /// # Errors
-    /// [`Error::Usage`] for angles, heights and lenses that cannot be, for parts that do not go together, and for a view
+    /// [`Error::Usage`] for places, angles, heights and lenses that cannot be, for parts that do not go together, and for a view
     /// so narrow that neighbouring pixels would have the same ray.
     pub(super) fn new(camera: &Camera, centre: DVec3, width: u32, height: u32) -> Result<Self> {
+        check_numbers(camera)?;
         let size = DVec2::new(f64::from(width), f64::from(height));
         let half = camera.projection.half_extent(size.x / size.y).ok_or_else(|| {
             Error::Usage(match camera.projection {
@@ -78,6 +79,28 @@ impl View {
             Self::General(view) => view.ray(film, view.middle_of_lens(), time),
         }
     }
+}
+
+/// Whether the camera stands somewhere and looks somewhere; what else it has is checked where it is used.
+fn check_numbers(camera: &Camera) -> Result<()> {
+    let Camera { eye, frame, ref end, shift, distortion, .. } = *camera;
+    for (eye, frame) in [(eye, frame)].into_iter().chain(end.as_ref().map(|end| (end.eye, end.frame))) {
+        if !eye.is_finite() {
+            return Err(Error::Usage(format!("a camera at {eye}: its place must be finite")));
+        }
+        // Not so of NaN.
+        let is_frame = frame.is_finite() && frame.determinant().abs() > 1e-6;
+        if !is_frame {
+            let message =
+                format!("a camera with the axes {frame}: they must be unit vectors to the right, up and back");
+            return Err(Error::Usage(message));
+        }
+    }
+    let Distortion { k1, k2, k3, p1, p2 } = distortion.unwrap_or_default();
+    if !shift.is_finite() || ![k1, k2, k3, p1, p2].into_iter().all(f64::is_finite) {
+        return Err(Error::Usage("a camera whose lens shift or distortion is not finite".to_owned()));
+    }
+    Ok(())
 }
 
 /// Unit vectors in f32 differ by 2^-24 at least where a component is near 1; twice that tells every two pixels apart.

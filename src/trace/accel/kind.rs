@@ -1,5 +1,7 @@
 //! The accelerators by name.
 
+use std::fmt;
+
 use super::binary::Binary;
 use super::bsp::Bsp;
 use super::grid::Grid;
@@ -42,6 +44,13 @@ pub struct Built {
     pub bytes: usize,
     /// What there is to say about how it was built: the grid's resolution, or where the BSP tree stopped.
     pub notes: Vec<String>,
+}
+
+impl fmt::Debug for Built {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bytes, notes, .. } = self;
+        f.debug_struct("Built").field("bytes", bytes).field("notes", notes).finish_non_exhaustive()
+    }
 }
 
 impl Accel {

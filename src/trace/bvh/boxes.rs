@@ -4,6 +4,8 @@
 //! (Embree's user geometry, instances of other scenes, curves). The caller names a box by its index, and is told which
 //! of them a ray enters, or are near a point.
 
+use std::fmt;
+
 use super::alone::Search;
 use super::build::{self, Record};
 use super::isa::{self, Isa, Kernel};
@@ -23,6 +25,15 @@ pub struct BoxTree {
     /// Which box each item of a leaf is.
     items: Vec<u32>,
     isa: Isa,
+}
+
+impl fmt::Debug for BoxTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BoxTree")
+            .field("boxes", &self.items.len())
+            .field("bounds", &self.bounds())
+            .finish_non_exhaustive()
+    }
 }
 
 impl BoxTree {

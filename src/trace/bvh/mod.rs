@@ -109,6 +109,7 @@ pub use packet::{Asked, Packet, PacketHits};
 pub use preset::{Options, Preset};
 pub use steps::Steps;
 
+use std::fmt;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -133,6 +134,19 @@ pub struct Bvh {
     preset: Preset,
     isa: Isa,
     travel: Travel,
+}
+
+impl fmt::Debug for Bvh {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { preset, isa, .. } = self;
+        let (objects, bytes) = (&self.objects.len(), &self.bytes());
+        f.debug_struct("Bvh")
+            .field("preset", preset)
+            .field("isa", isa)
+            .field("objects", objects)
+            .field("bytes", bytes)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Levels of at most this many primitives are built side by side.

@@ -17,7 +17,8 @@ use crate::trace::{Part, World};
 
 impl Bvh {
     /// Fits the trees to `world`, which differs from the one they were built for in positions of vertices, in shapes and
-    /// in transforms of placements only. Hits are those of a tree built for `world`.
+    /// in transforms of placements only. Hits are those of a tree built for `world`, and rays are in its coordinates, of which [`World::centre`] may be
+    /// another than before: [`World::ray`] heeds that.
     ///
     /// # Errors
     /// [`Error::Backend`] where `world` has other triangles, parts or objects, or where a triangle has become, or ceased to

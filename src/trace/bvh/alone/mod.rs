@@ -46,12 +46,13 @@ pub(super) type Doubted = Option<Found>;
 pub type Search = ControlFlow<(), f32>;
 
 impl Bvh {
-    /// The nearest fixed triangle that `ray` hits, into `found`. Whether there is one.
+    /// The nearest [fixed](crate::World::fixed) triangle that `ray` hits, into `found`. Whether there is one. What is placed by transforms, and what is
+    /// no triangle, is not asked: [`Tracer::closest`](crate::Tracer::closest) asks everything.
     pub fn closest_triangle(&self, ray: &SingleRay, found: &mut TriangleFound) -> bool {
         self.has_fixed() && isa::dispatch(self.isa, Alone { bvh: self, ray, found })
     }
 
-    /// Whether `ray` hits any fixed triangle.
+    /// Whether `ray` hits any fixed triangle, as [`Bvh::closest_triangle`] has it: [`Tracer::occluded`](crate::Tracer::occluded) asks everything.
     pub fn occludes(&self, ray: &SingleRay) -> bool {
         self.has_fixed() && isa::dispatch(self.isa, AnyAlone { bvh: self, ray })
     }
@@ -62,7 +63,7 @@ impl Bvh {
         !self.fixed.triangles.tree().is_empty()
     }
 
-    /// Shows `visitor` fixed triangles that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
+    /// Shows `visitor` fixed triangles, as [`Bvh::closest_triangle`] has them, that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
     /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
     pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> Search) {
         if self.has_fixed() && ray.is_valid() {
