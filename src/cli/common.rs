@@ -31,7 +31,7 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_enum, default_value_t)]
     normals: Normals,
 
-    /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the file stores)
+    /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the file stores; 0 with --animation)
     #[arg(long, value_name = "SECONDS", value_parser = parse_time)]
     pub(crate) time: Option<f64>,
 
