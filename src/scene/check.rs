@@ -3,6 +3,7 @@
 //! Loaders check as they go, and can name the place in the file; this is the net beneath them, so that no index of any
 //! format, old or new, reaches a tracer unchecked. Whoever makes a scene by hand has nothing else.
 
+use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -120,7 +121,7 @@ fn check_light(light: &Light) -> std::result::Result<(), String> {
         return Err(format!("its color is {color}"));
     }
     if let Light::Directional { direction, .. } | Light::Spot { direction, .. } = light
-        && !is_direction(*direction)
+        && !is_unit(*direction)
     {
         return Err(format!("its direction is {direction}"));
     }
@@ -134,14 +135,16 @@ fn check_light(light: &Light) -> std::result::Result<(), String> {
         if !terms.into_iter().all(|term| term.is_finite() && term >= 0.0) || terms == [0.0; 3] {
             return Err(format!("its attenuation is {constant}, {linear}, {quadratic}"));
         }
-        if range.is_nan() || *range < 0.0 {
+        if range.is_nan() || *range <= 0.0 {
             return Err(format!("its range is {range}"));
         }
     }
     match *light {
         Light::Point { radius, .. } if !(radius.is_finite() && radius >= 0.0) => Err(format!("its radius is {radius}")),
-        Light::Spot { inner_angle, outer_angle, .. } if !(0.0 <= inner_angle && inner_angle <= outer_angle) => {
-            Err(format!("its cone has the half-angles {inner_angle}, inside, and {outer_angle}"))
+        Light::Spot { inner_angle: inner, outer_angle: outer, .. }
+            if !(0.0 <= inner && inner < outer && outer <= FRAC_PI_2) =>
+        {
+            Err(format!("its cone has the half-angles {inner}, inside, and {outer}"))
         }
         _ => Ok(()),
     }
@@ -152,16 +155,19 @@ fn check_area(shape: &AreaShape, radiance: Vec3) -> std::result::Result<(), Stri
         return Err(format!("its radiance is {radiance}"));
     }
     let (centre, is_sound) = match *shape {
-        AreaShape::Rectangle { centre, half_edges } => (centre, half_edges.into_iter().all(is_direction)),
-        AreaShape::Disk { centre, normal, radius } => (centre, is_direction(normal) && is_radius(radius)),
+        AreaShape::Rectangle { centre, half_edges: [a, b] } => {
+            let area = a.cross(b);
+            (centre, area.is_finite() && area != DVec3::ZERO)
+        }
+        AreaShape::Disk { centre, normal, radius } => (centre, is_unit(normal) && is_radius(radius)),
         AreaShape::Sphere { centre, radius } => (centre, is_radius(radius)),
     };
     if centre.is_finite() && is_sound { Ok(()) } else { Err(format!("it shines from {shape:?}")) }
 }
 
-/// Whether a vector is finite and not zero.
-fn is_direction(vector: DVec3) -> bool {
-    vector.is_finite() && vector != DVec3::ZERO
+/// Whether a vector's length is 1, as near as who has rounded it to f32 can tell.
+fn is_unit(vector: DVec3) -> bool {
+    (vector.length() - 1.0).abs() < 1e-6
 }
 
 fn is_radius(radius: f64) -> bool {

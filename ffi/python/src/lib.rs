@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | `arrays` | rays and points as NumPy holds them, read in place |
 //! | `pool` | the threads that queries run on, without the interpreter's lock |
+//! | `stack` | whether a thread that Python has made has room for a query |
 //! | `scene` | meshes, and what can be asked of them |
 //! | `crossings` | all hits of many rays, as flat arrays |
 //! | `points`, `order`, `inside` | what can be asked of points, in which order it is done, and which of them are inside |
@@ -22,6 +23,7 @@ mod points;
 mod pool;
 mod render;
 mod scene;
+mod stack;
 
 use pyo3::prelude::*;
 
@@ -38,6 +40,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::stack::learn();
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("DEBUG_ASSERTIONS", cfg!(debug_assertions))?;
         module.add("ISA", twincast::trace::bvh::Isa::detect().name())

@@ -15,6 +15,8 @@ use rayon::iter::plumbing::{Producer, ProducerCallback};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::stack;
+
 struct Entry {
     process: u32,
     threads: usize,
@@ -94,15 +96,15 @@ pub fn interruptible<T: Send>(
     }
 }
 
-/// Does all tasks, on so many threads, without the interpreter's lock; one by itself here, since to hand it to another thread would take longer than
-/// a few rays do. What is left is not done once Python has a signal to handle, whose exception is the result.
+/// Does all tasks, on so many threads, without the interpreter's lock; one by itself here, where there is [room](crate::stack) for it, since to hand it
+/// to another thread would take longer than a few rays do. What is left is not done once Python has a signal to handle, whose exception is the result.
 pub fn each<I: IndexedParallelIterator>(
     py: Python<'_>,
     threads: usize,
     tasks: I,
     work: impl Fn(I::Item) + Send + Sync,
 ) -> PyResult<()> {
-    if tasks.len() <= 1 {
+    if tasks.len() <= 1 && stack::has_room() {
         // Not by rayon's own `for_each`, which would start its global pool.
         py.detach(|| tasks.with_producer(Here(work)));
         return Ok(());

@@ -23,10 +23,9 @@ def floats(name: str, value: Any, columns: int | None = None, shape: str | None 
     """
     array = _array(name, value)
     if array.dtype not in (np.float32, np.float64):
-        is_real = array.dtype.kind in "fiub"
         if array.dtype.kind == "O":
-            is_real = all(isinstance(number, numbers.Real) for number in array.flat)
-        if not is_real:
+            _check_objects(name, array, (numbers.Real, np.bool_), "real numbers")
+        elif array.dtype.kind not in "fiub":
             raise TypeError(f"{name} must hold real numbers, not {array.dtype}")
         try:
             array = array.astype(np.float64)
@@ -62,7 +61,9 @@ def indices(name: str, value: Any, columns: int = 3) -> np.ndarray:
     array = _array(name, value)
     if array.size == 0:
         return np.zeros((0, columns), dtype=np.uint32)
-    if array.dtype.kind not in "iu":
+    if array.dtype.kind == "O":
+        _check_objects(name, array, numbers.Integral, "integers")
+    elif array.dtype.kind not in "iu":
         raise TypeError(f"{name} must hold integers, not {array.dtype}")
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name} must have the shape (n, {columns}), not {array.shape}")
@@ -117,6 +118,13 @@ def _finite(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, not {array.tolist()}")
     return array
+
+
+def _check_objects(name: str, array: np.ndarray, kinds: Any, what: str) -> None:
+    """Whether all that is in an array of objects is of these kinds; else a TypeError says what is not."""
+    for item in array.flat:
+        if not isinstance(item, kinds):
+            raise TypeError(f"{name} must hold {what}, not {type(item).__name__}")
 
 
 def _array(name: str, value: Any) -> np.ndarray:
