@@ -158,10 +158,15 @@ fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sam
     let (width, height) = decoder.dimensions();
     check(width.into(), height.into())?;
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
-    let channels = Channels { colour: true, alpha: Some(Alpha::Straight) };
-    let deep = decoded.color().bytes_per_pixel() > decoded.color().channel_count();
-    let values =
-        if deep { Values::U16(decoded.into_rgba16().into_raw()) } else { Values::U8(decoded.into_rgba8().into_raw()) };
+    let color = decoded.color();
+    let is_deep = color.bytes_per_pixel() > color.channel_count();
+    let values = match (is_deep, color.has_alpha()) {
+        (false, false) => Values::U8(decoded.into_rgb8().into_raw()),
+        (false, true) => Values::U8(decoded.into_rgba8().into_raw()),
+        (true, false) => Values::U16(decoded.into_rgb16().into_raw()),
+        (true, true) => Values::U16(decoded.into_rgba16().into_raw()),
+    };
+    let channels = Channels { colour: true, alpha: color.has_alpha().then_some(Alpha::Straight) };
     Ok(Samples { width, height, channels, values })
 }
 
