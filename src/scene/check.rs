@@ -51,8 +51,7 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
         }
     }
     for material in &scene.materials {
-        let finite = |color: Vec3| color.is_finite() && color.min_element() >= 0.0;
-        let colors = [
+        let values = [
             material.ambient,
             material.diffuse,
             material.specular,
@@ -63,7 +62,7 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
             Vec3::splat(material.opacity),
             material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
         ];
-        if !colors.into_iter().all(finite) || material.ior == 0.0 {
+        if !values.into_iter().all(is_sound) || material.ior == 0.0 {
             return Err(format!("material {:?} has values that are negative or not finite", material.name));
         }
         if material.textures().any(|t| t as usize >= scene.textures.len()) {
@@ -71,10 +70,8 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
         }
     }
     for texture in &scene.textures {
-        let pixels = u64::from(texture.width) * u64::from(texture.height);
-        if pixels == 0 || pixels != texture.pixels.len() as u64 {
-            return Err(format!("texture {:?} has {} of {pixels} pixels", texture.name, texture.pixels.len()));
-        }
+        check_pixels(texture.width, texture.height, texture.pixels.len())
+            .map_err(|message| format!("texture {:?} {message}", texture.name))?;
     }
     for instance in &scene.instances {
         let transforms = [Some(instance.transform), instance.transform_end];
@@ -86,20 +83,18 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
         check_light(light).map_err(|message| format!("light {number}: {message}"))?;
     }
     for (what, light) in [("ambient light", Some(scene.ambient)), ("the background", scene.background)] {
-        if let Some(color) = light.filter(|&color| !is_light(color)) {
+        if let Some(color) = light.filter(|&color| !is_sound(color)) {
             return Err(format!("{what} is {color}"));
         }
     }
     if let Some(Fog { absorption, color, reach }) = scene.fog
-        && !(is_light(absorption) && is_light(color) && reach >= 0.0)
+        && !(is_sound(absorption) && is_sound(color) && reach >= 0.0)
     {
         return Err(format!("fog has the absorption {absorption}, the color {color} and the reach {reach}"));
     }
     if let Some(Environment { image, intensity, rotation }) = &scene.environment {
-        let pixels = u64::from(image.width) * u64::from(image.height);
-        if pixels == 0 || pixels != image.pixels.len() as u64 {
-            return Err(format!("the environment has {} of {pixels} pixels", image.pixels.len()));
-        }
+        check_pixels(image.width, image.height, image.pixels.len())
+            .map_err(|message| format!("the environment {message}"))?;
         if !(intensity.is_finite() && *intensity >= 0.0 && rotation.is_finite()) {
             return Err(format!("the environment has the intensity {intensity} and the rotation {rotation}"));
         }
@@ -107,18 +102,25 @@ pub(crate) fn fault(scene: &Scene) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Whether light can have this color.
-fn is_light(color: Vec3) -> bool {
-    color.is_finite() && color.min_element() >= 0.0
+/// Whether values, such as a color's, are finite and not negative.
+fn is_sound(values: Vec3) -> bool {
+    values.is_finite() && values.min_element() >= 0.0
+}
+
+fn check_pixels(width: u32, height: u32, found: usize) -> std::result::Result<(), String> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels != found as u64 { Err(format!("has {found} of {pixels} pixels")) } else { Ok(()) }
 }
 
 fn check_light(light: &Light) -> std::result::Result<(), String> {
-    let (Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. }) = light else {
-        let Light::Area { shape, radiance } = light else { unreachable!("all others have a color") };
-        return check_area(shape, *radiance);
-    };
-    if !is_light(*color) {
-        return Err(format!("its color is {color}"));
+    match light {
+        Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. }
+            if !is_sound(*color) =>
+        {
+            return Err(format!("its color is {color}"));
+        }
+        Light::Area { radiance, .. } if !is_sound(*radiance) => return Err(format!("its radiance is {radiance}")),
+        _ => {}
     }
     if let Light::Directional { direction, .. } | Light::Spot { direction, .. } = light
         && !is_unit(*direction)
@@ -146,15 +148,13 @@ fn check_light(light: &Light) -> std::result::Result<(), String> {
         {
             Err(format!("its cone has the half-angles {inner}, inside, and {outer}"))
         }
+        Light::Area { ref shape, .. } => check_area(shape),
         _ => Ok(()),
     }
 }
 
-fn check_area(shape: &AreaShape, radiance: Vec3) -> std::result::Result<(), String> {
-    if !is_light(radiance) {
-        return Err(format!("its radiance is {radiance}"));
-    }
-    let (centre, is_sound) = match *shape {
+fn check_area(shape: &AreaShape) -> std::result::Result<(), String> {
+    let (centre, is_whole) = match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             let area = a.cross(b);
             (centre, area.is_finite() && area != DVec3::ZERO)
@@ -162,7 +162,7 @@ fn check_area(shape: &AreaShape, radiance: Vec3) -> std::result::Result<(), Stri
         AreaShape::Disk { centre, normal, radius } => (centre, is_unit(normal) && is_radius(radius)),
         AreaShape::Sphere { centre, radius } => (centre, is_radius(radius)),
     };
-    if centre.is_finite() && is_sound { Ok(()) } else { Err(format!("it shines from {shape:?}")) }
+    if centre.is_finite() && is_whole { Ok(()) } else { Err(format!("it shines from {shape:?}")) }
 }
 
 /// Whether a vector's length is 1, as near as who has rounded it to f32 can tell.

@@ -22,6 +22,12 @@ def scene():
     return scene
 
 
+def in_its_own_process(program):
+    """Runs a program that knows what stands here."""
+    here = "import sys; sys.path.insert(0, sys.argv[1]); from test_threads import *\n"
+    subprocess.run([sys.executable, "-c", here + program, os.path.dirname(__file__)], check=True)
+
+
 RAY = np.float32([[0.25, 0.25, 1, 0, 0, -1]])
 
 #: More than one task: that is cast where it is asked for.
@@ -46,14 +52,13 @@ def test_few_pools_are_kept():
 def test_a_ray_by_itself_starts_no_thread():
     """Each kind of query of rays."""
     program = (
-        "import os, sys; sys.path.insert(0, sys.argv[1]); from test_threads import *\n"
         "one = scene(); one.compute_distance(RAYS[:, :3])\n"
         "before = len(os.listdir(TASKS))\n"
         "for ask in (one._scene.first, one._scene.occluded, one._scene.cast, one._scene.closest, one._scene.count):\n"
         "    for dtype in (np.float32, np.float64): ask(RAY[:, :3].astype(dtype), RAY[:, 3:].astype(dtype), threads=7)\n"
         "assert len(os.listdir(TASKS)) == before, (len(os.listdir(TASKS)), before)\n"
     )
-    subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)
+    in_its_own_process(program)
 
 
 @pytest.mark.parametrize("ask", ["first", "occluded", "cast", "closest", "count", "crossings", "list", "nearest", "distance", "inside"])
@@ -92,24 +97,24 @@ def test_a_query_can_be_interrupted(ask):
 
 def test_a_thread_of_little_stack_may_ask():
     program = (
-        "import sys, threading; sys.path.insert(0, sys.argv[1]); from test_threads import *\n"
+        "import threading\n"
         "one = scene(); threading.stack_size(256 * 1024); answers = []\n"
         "asks = [one.cast_rays, one.test_occlusions, one.count_intersections, one.list_intersections]\n"
         "thread = threading.Thread(target=lambda: answers.extend(ask(RAYS[:n]) for ask in asks for n in (1, 3000)))\n"
         "thread.start(); thread.join()\n"
         "assert len(answers) == 8\n"
     )
-    subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)
+    in_its_own_process(program)
 
 
 @pytest.mark.skipif(not os.path.isdir(TASKS), reason="nobody says how many threads there are")
 def test_too_many_threads_are_the_same_pool():
     program = (
-        "import os, sys; sys.path.insert(0, sys.argv[1]); from test_threads import *; one = scene()\n"
+        "one = scene()\n"
         "for threads in (1100, 1200, 1300): one.cast_rays(RAYS, nthreads=threads)\n"
         "assert len(os.listdir(TASKS)) < 1200, len(os.listdir(TASKS))\n"
     )
-    subprocess.run([sys.executable, "-c", program, os.path.dirname(__file__)], check=True)
+    in_its_own_process(program)
 
 
 def test_pools_that_are_in_use_are_not_ended(rng):

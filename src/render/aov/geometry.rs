@@ -91,7 +91,7 @@ impl Renderer<'_> {
     /// Distance, position and texture coordinates.
     fn place_of(&self, ray: &Ray, hit: &Hit) -> [f32; 6] {
         let point = self.whole_surface(ray, hit);
-        let [x, y, z] = (point.position + self.world.centre).as_vec3().to_array();
+        let [x, y, z] = self.world.to_scene(point.position).as_vec3().to_array();
         let depth = point.t * ray.direction.as_dvec3().length();
         [depth as f32, x, y, z, point.uv.x, point.uv.y]
     }

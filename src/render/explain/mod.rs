@@ -157,7 +157,7 @@ impl Renderer<'_> {
 
     /// A point of the world, where the scene has it.
     fn in_scene(&self, point: DVec3) -> [f64; 3] {
-        (point + self.world.centre).to_array()
+        self.world.to_scene(point).to_array()
     }
 }
 
