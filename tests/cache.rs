@@ -154,7 +154,7 @@ fn foreign_files_are_named() {
     kept.refuses(b"solid teapot\n", "too short");
     kept.refuses(&[b'#'; 5000], "no file of this program");
     for (at, words) in [
-        (8, "is of version 2, or layout, other than this program's 3"),
+        (8, "is of version 5, or layout, other than this program's 4"),
         (12, "another byte order"),
         (16, "or layout"),
         (24, "arrays, where"),

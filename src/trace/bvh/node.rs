@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
@@ -91,11 +92,11 @@ impl Child {
     }
 }
 
-/// Eight children: 256 bytes, four cache lines.
+/// Eight children: 256 bytes, four cache lines. Boxes are [widened](widened).
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Node {
-    /// Of each child: min x, max x, min y, max y, min z, max z.
+    /// Of each child: min x, max x, min y, max y, min z, max z; [`widened`].
     pub bounds: [[f32; WIDTH]; 6],
     pub child: [Child; WIDTH],
     /// Of each leaf its number of items, where several are in a block. Only while the tree is made.
@@ -115,8 +116,15 @@ impl Node {
         Self { bounds, child: [Child::NONE; WIDTH], items: [0; WIDTH], unused: [0; 24] }
     }
 
-    /// Fills one slot.
+    /// Fills one slot, with what is in `bounds`, which are not empty.
+    #[inline]
     pub fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
+        self.put(slot, &widened(bounds), child);
+    }
+
+    /// Fills one slot, with a box that is wide already.
+    #[inline]
+    fn put(&mut self, slot: usize, bounds: &Aabb, child: Child) {
         for axis in 0..3 {
             self.bounds[2 * axis][slot] = bounds.min[axis];
             self.bounds[2 * axis + 1][slot] = bounds.max[axis];
@@ -142,6 +150,34 @@ impl Node {
         };
         Aabb { min: corner(0), max: corner(1) }
     }
+}
+
+/// By what share of its coordinate each side of a box is farther out than what is in it, at least. Tests of boxes round relative to the coordinates of
+/// the box and of the ray's origin; the first part of that is in the box, so that rays need only know of the other, and what lies far away makes nothing near
+/// it less certain. What is in boxes together may be in a wider one, whose sides are farther out by more than their rounding grows.
+pub(super) const WIDENED: f32 = 7.0 * UNIT_ROUNDOFF;
+
+/// By what share of its largest coordinate besides: as far as a ray strays on its way there whose direction's components are off by this share of the
+/// largest, or corners that are rounded.
+pub(super) const WIDENED_ALL: f32 = 5.0 * UNIT_ROUNDOFF;
+
+/// The box, which is not empty, with each side moved out by [`WIDENED`] and [`WIDENED_ALL`], and by more for what that rounds. It grows with the box.
+#[inline(always)]
+pub(super) fn widened(bounds: &Aabb) -> Aabb {
+    let [min, max] = widened_corners([bounds.min.into(), bounds.max.into()]);
+    Aabb { min: min.into(), max: max.into() }
+}
+
+/// The same of a box's least and largest corner.
+#[inline(always)]
+pub(super) fn widened_corners([min, max]: [Vec3A; 2]) -> [Vec3A; 2] {
+    // All are f32, and both products and the difference round by a unit each.
+    const OUT: Vec3A = Vec3A::splat(1.0 + (WIDENED + 3.0 * UNIT_ROUNDOFF));
+    const IN: Vec3A = Vec3A::splat(1.0 - (WIDENED + 2.0 * UNIT_ROUNDOFF));
+    const ALL: f32 = WIDENED_ALL + UNIT_ROUNDOFF;
+    let is_below = |x: Vec3A| x.cmplt(Vec3A::ZERO);
+    let all = Vec3A::splat(min.abs().max(max.abs()).max_element() * ALL);
+    [min * Vec3A::select(is_below(min), OUT, IN) - all, max * Vec3A::select(is_below(max), IN, OUT) + all]
 }
 
 /// The largest coordinate's magnitude on each axis; of no box zero, and not infinity.
@@ -188,7 +224,7 @@ impl Tree {
         self.nodes.is_empty()
     }
 
-    /// The box around everything.
+    /// The box around everything, [`widened`].
     #[inline]
     pub fn bounds(&self) -> Aabb {
         self.bounds
@@ -254,7 +290,7 @@ impl Tree {
         f64::from(most) + f64::from(8.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
     }
 
-    /// The largest coordinate's magnitude on each axis: what the rounding of slab tests is relative to. Zero for no items.
+    /// The largest coordinate's magnitude on each axis. Zero for no items.
     #[inline]
     pub fn reach(&self) -> Vec3 {
         let [x, y, z, _] = self.reach;
@@ -318,7 +354,7 @@ impl Tree {
             for slot in 0..WIDTH {
                 let child = node.child[slot];
                 if !child.is_leaf() {
-                    node.set(slot, &below[child.node() as usize - index - 1].bounds(), child);
+                    node.put(slot, &below[child.node() as usize - index - 1].bounds(), child);
                 }
             }
         }

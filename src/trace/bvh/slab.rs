@@ -1,10 +1,11 @@
 //! A ray against eight boxes at once, conservatively.
 //!
 //! A slab's t is bound * (1 / direction) - origin * (1 / direction): with u = 2^-24, the reciprocal, both products, the
-//! sum and the offset below round by less than 5 u |1/d| (|bound| + |origin|) together, fused or not. The near and far t
-//! are moved apart by 6 u |1/d| (reach + |origin|), where the reach is the largest coordinate in the tree: an exact hit
+//! sum and the offset below round by less than 5 u |1/d| (|bound| + |origin|) together, fused or not. Boxes in the tree are wider by
+//! 7 u |bound| than what is in them ([`super::node::widened`]), and the near and far t are moved apart by 6 u |1/d| |origin|: an exact hit
 //! is never lost, and there is slack for the rounding of the hit's own t. (Ize 2013, *Robust BVH ray traversal*, moves the
-//! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations.) What is no normal number
+//! far t by a relative 2 ulp instead, which needs bound - origin to be formed first: twice the operations. To move both t by the largest coordinate
+//! in the tree makes rays in the middle of a large ground enter all that is near them.) What is no normal number
 //! rounds by more than that: hence another 2^-126, of t and of lengths.
 //!
 //! A direction component that is zero, or small against the largest, is replaced by 1e-18 of it, and the pad by how
@@ -12,10 +13,11 @@
 //! flushed to zero, is left open: [`OPEN`]. An infinite pad would do for boxes, but empty slots, whose bounds are infinite, would pass as well.
 //!
 //! A ray in an object's coordinates may be off by more ([`Blur`]), its origin by b and its direction by r times the largest
-//! component: at the t of a hit, at most the largest span over that component, it is off by b + r span, and the pad is wider
-//! by this over the component.
+//! component: at the t of a hit, at most the largest span over that component, the span being what is between the origin and the box, it is off by b + r span, and the pad is wider
+//! by this over the component. Boxes are wider by 5 u of their largest coordinate, so that the span is the origin's largest coordinate unless r is more than [`SLIGHT`], and else that
+//! and the reach, the largest coordinate in the tree.
 
-use super::node::Node;
+use super::node::{Node, WIDENED, WIDENED_ALL};
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -38,6 +40,11 @@ pub(super) struct SlabRay {
 
 /// The smallest share of the largest direction component that a component keeps.
 pub(super) const SMALLEST: f32 = 1e-18;
+
+/// Directions that are off by no more need no pad for how far away boxes are.
+pub(super) const SLIGHT: f32 = 4.5 * UNIT_ROUNDOFF;
+
+const _: () = assert!(1.1 * SLIGHT < WIDENED_ALL && 6.0 * UNIT_ROUNDOFF < WIDENED);
 
 /// Products of this size are not trusted to be finite after a sum.
 pub(super) const HUGE: f32 = 1e37;
@@ -106,11 +113,13 @@ impl<V: Vector> Slabs<V> {
         let (o, d) = (lanes::<S>(ray.origin), lanes::<S>(ray.direction));
         let largest = ray.direction.abs().max_element();
         let smallest = (SMALLEST * largest).max(f32::MIN_POSITIVE);
-        let span = o.abs().add(lanes::<S>(reach));
-        let stray = (4.0 * (smallest / largest) + 1.1 * blur.direction) * (ray.origin.abs() + reach).max_element()
-            + 1.1 * blur.origin
-            + f32::MIN_POSITIVE;
-        Self::new(o, d, span, splat(smallest), splat(stray))
+        let away = o.abs();
+        let span = away.add(lanes::<S>(reach));
+        let farthest = (ray.origin.abs() + reach).max_element();
+        let strayed = if blur.direction <= SLIGHT { ray.origin.abs().max_element() } else { farthest };
+        let stray =
+            4.0 * (smallest / largest) * farthest + 1.1 * (blur.direction * strayed + blur.origin) + f32::MIN_POSITIVE;
+        Self::new(o, d, away, span, splat(smallest), splat(stray))
     }
 
     /// Of as many rays as there are lanes, axis by axis. Origins are off by `off`, directions by `turn` of their largest component.
@@ -120,26 +129,29 @@ impl<V: Vector> Slabs<V> {
         let ([x, y, z], [dx, dy, dz], [rx, ry, rz]) = (origin, direction, reach);
         let largest = size(direction);
         let smallest = largest.mul(splat(SMALLEST)).max(splat(f32::MIN_POSITIVE));
-        let [sx, sy, sz] = [x.abs().add(rx), y.abs().add(ry), z.abs().add(rz)];
-        let stray = smallest.div(largest).mul(splat(4.0)).add(turn.mul(splat(1.1)));
-        let stray = stray.mul_add(sx.max(sy).max(sz), off.mul_add(splat(1.1), splat(f32::MIN_POSITIVE)));
+        let [ax, ay, az] = [x.abs(), y.abs(), z.abs()];
+        let [sx, sy, sz] = [ax.add(rx), ay.add(ry), az.add(rz)];
+        let farthest = sx.max(sy).max(sz);
+        let strayed = V::select(turn.at_most(splat(SLIGHT)), ax.max(ay).max(az), farthest);
+        let stray = turn.mul_add(strayed, off).mul_add(splat(1.1), splat(f32::MIN_POSITIVE));
+        let stray = smallest.div(largest).mul(splat(4.0)).mul_add(farthest, stray);
         [
-            Self::new(x, dx, sx, smallest, stray),
-            Self::new(y, dy, sy, smallest, stray),
-            Self::new(z, dz, sz, smallest, stray),
+            Self::new(x, dx, ax, sx, smallest, stray),
+            Self::new(y, dy, ay, sy, smallest, stray),
+            Self::new(z, dz, az, sz, smallest, stray),
         ]
     }
 
-    /// `span` is the origin's magnitude and the reach, `smallest` what a direction's component is at least taken to be, and `stray` how far the ray may be off besides
+    /// `away` is the origin's magnitude, `span` that and the reach, `smallest` what a direction's component is at least taken to be, and `stray` how far the ray may be off besides
     /// rounding, with room for lengths that are no normal numbers.
     #[inline(always)]
-    fn new(origin: V, direction: V, span: V, smallest: V, stray: V) -> Self {
+    fn new(origin: V, direction: V, away: V, span: V, smallest: V, stray: V) -> Self {
         let (splat, zero) = (V::splat, V::splat(0.0));
         let is_negative = direction.less(zero);
         let least = V::select(is_negative, zero.sub(smallest), smallest);
         let reciprocal = splat(1.0).div(V::select(direction.abs().less(smallest), least, direction));
         let steep = reciprocal.abs();
-        let width = steep.mul_add(span.mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
+        let width = steep.mul_add(away.mul_add(splat(6.0 * UNIT_ROUNDOFF), stray), splat(f32::MIN_POSITIVE));
         let is_small = steep.mul(span).less(splat(HUGE)).and(width.less(splat(HUGE)));
         let is_small = is_small.and(splat(OPEN).at_most(steep));
         let offset = zero.sub(origin).mul(reciprocal);
@@ -160,4 +172,61 @@ pub(super) fn least_t(tmin: f32) -> f32 {
 #[inline(always)]
 fn lanes<S: Simd>(v: Vec3) -> S::V4 {
     S::V4::load(&[v.x, v.y, v.z, 0.0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Aabb, DVec3};
+    use crate::trace::bvh::alone::SingleRay;
+    use crate::trace::bvh::node::{Child, Tree};
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::ready::ReadyRays;
+    use crate::trace::bvh::simd::Portable;
+
+    /// A number of either sign and any size down to 2^-40 of `most`.
+    fn number(random: &mut Random, most: f32) -> f32 {
+        random.unit() * most * (20.0 * (random.unit() - 1.0)).exp2()
+    }
+
+    fn vector(random: &mut Random, most: f32) -> Vec3 {
+        Vec3::new(number(random, most), number(random, most), number(random, most))
+    }
+
+    /// A point that a ray meets, no larger than f32 can tell: its box is entered at its t, whoever makes the ray ready, and whatever lies
+    /// beside it far away. Points, origins and directions are of all sizes, axis by axis.
+    #[test]
+    fn no_point_of_a_ray_is_lost() {
+        let mut random = Random::new(31);
+        for round in 0..200_000 {
+            let [near, far] = [round % 3, round / 3 % 3].map(|size| [1.0, 1e6, 1e-6][size]);
+            let (origin, t) = (vector(&mut random, far), number(&mut random, 1e3).abs());
+            let direction = (vector(&mut random, near) - origin) / t;
+            // Off by less than 2^-50 of the larger of both terms.
+            let point = origin.as_dvec3() + direction.as_dvec3() * f64::from(t);
+            let off = (origin.abs().as_dvec3() + direction.abs().as_dvec3() * f64::from(t)) * 2f64.powi(-50);
+            let below = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
+            let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
+            let bounds = Aabb { min: low(point - off), max: -low(-point - off) };
+            let mut node = Node::empty();
+            let slot = round % 8;
+            node.set(slot, &bounds, Child::leaf(0, 1));
+            if round % 2 == 0 {
+                let far = Vec3::splat(1e9);
+                node.set((slot + 1) % 8, &Aabb { min: far, max: far }, Child::leaf(1, 1));
+            }
+            let tree = Tree::new(vec![node]);
+            let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
+            let limit = t * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE;
+            let mut rays = ReadyRays::new(std::slice::from_ref(&ray), tree.reach(), Blur::NONE);
+            rays.next::<Portable>().expect("a valid ray");
+            let (single, _) =
+                SingleRay::from(&ray).ready::<Portable, false>(tree.reach_row(), Blur::NONE).expect("a valid ray");
+            let slabs = [SlabRay::new::<Portable>(&ray, tree.reach(), Blur::NONE), rays.ready().slab(), single];
+            for (slab, how) in slabs.iter().zip(["by itself", "of eight", "alone"]) {
+                let (entered, _) = slab.enter::<Portable>(&node, limit);
+                assert!(entered.bits() >> slot & 1 == 1, "{how}: {ray:?} misses {bounds:?}");
+            }
+        }
+    }
 }

@@ -93,6 +93,43 @@ mod tests {
     use crate::scene::{Geometry, Mesh, Scene};
     use crate::trace::World;
 
+    /// A ball on a ground that reaches a million times as far: rays at the ball look at no more than without the ground, and a few boxes of it.
+    #[test]
+    fn what_is_far_away_makes_nothing_near_uncertain() {
+        const SIDE: u32 = 64;
+        let angle = |k: u32| k as f32 * std::f32::consts::PI / SIDE as f32;
+        let at = |i: u32, j: u32| {
+            let ((sin, cos), (x, z)) = (angle(i).sin_cos(), (2.0 * angle(j)).sin_cos());
+            Vec3::new(sin * x, cos, sin * z)
+        };
+        let quads = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]));
+        let corners = quads.flatten().map(|(i, j)| at(i, j)).collect();
+        let ball = Mesh::new(
+            corners,
+            (0..SIDE * SIDE).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| 4 * k + i))).collect(),
+        );
+        let far = 1e6;
+        let corners = [(-far, -far), (far, -far), (far, far), (-far, far)].map(|(x, z)| Vec3::new(x, -1.0, z));
+        let ground = Mesh::new(corners.to_vec(), vec![[0, 2, 1], [0, 3, 2]]);
+        let mut random = crate::trace::bvh::random::Random::new(5);
+        let rays: Vec<Ray> = (0..500)
+            .map(|_| {
+                let origin = random.vec3().normalize() * 3.0;
+                Ray::new(origin, random.vec3() * 0.7 - origin)
+            })
+            .collect();
+        let [without, with] = [vec![ball.clone()], vec![ball, ground]].map(|meshes| {
+            let scene = Scene::from_geometries(meshes.into_iter().map(Geometry::Mesh).collect(), Vec::new());
+            let world = World::new(&scene).expect("sound");
+            let bvh = Bvh::build(&world);
+            rays.iter()
+                .map(|ray| bvh.steps(&world.ray(ray.origin.as_dvec3(), ray.direction)))
+                .fold((0, 0), |sum, steps| (sum.0 + steps.nodes, sum.1 + steps.blocks))
+        });
+        let few = rays.len() as u32 * 2;
+        assert!(with.0 <= without.0 + few && with.1 <= without.1 + few, "{with:?} instead of {without:?}");
+    }
+
     /// A row of squares across the ray: what is behind the nearest is not counted, and what is beside them neither.
     #[test]
     fn only_what_lies_before_the_hit_is_counted() {

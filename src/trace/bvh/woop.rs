@@ -33,7 +33,8 @@
 //! t |along| by r.
 //!
 //! Corners may be rounded themselves, by c each: the terms above have room for that, with b + 3 c in place of b, since an edge is then off
-//! by 2 c. Only the distance from a plane ([`Planes`](super::planes::Planes)) counts on edges that are exact, and is not asked for such corners.
+//! by 2 c. What c is by the distance of corners, and not for all alike, is in r: with c = x (Z + S), 3 x in r is 6.3 c in a sheared component; of depths 3/2 of 3 c count besides, where
+//! x is taken to be u. Only the distance from a plane ([`Planes`](super::planes::Planes)) counts on edges that are exact, and is not asked for such corners.
 
 use super::place::Blur;
 use super::planes::Heights;
@@ -221,7 +222,7 @@ impl<V: Vector> Sides<V> {
         let tame = bound.mul(splat(16.0)).less(area).and(finite);
         // 4, not 3; and room for products that underflow.
         let of_edges = bound.mul(size).mul_add(splat(4.0), splat(16.0 * f32::MIN_POSITIVE));
-        let of_depth = z[0].abs().add(size).mul(splat(12.0 * UNIT_ROUNDOFF));
+        let of_depth = z[0].abs().add(size).mul(splat(if ROUNDED { 17.0 } else { 12.0 } * UNIT_ROUNDOFF));
         let of_depth = if let Some(blur) = blur { of_depth.add(splat(1.6 * blur)) } else { of_depth };
         let off = of_depth.mul_add(area, of_edges);
         let (near, far) = (depth.sub(off), depth.add(off));

@@ -2,8 +2,9 @@
 //!
 //! Meshes are moved so that their middle is zero, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
 //! then keeps of them what it can, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
-//! u at most, and by what f64 rounds at the distance from zero where they were: by that, c, in sum. The filter wants 3 c more than the
-//! origin of a ray is off by ([`super::super::bvh`]).
+//! u times its largest coordinate, and by what f64 rounds at the distance from zero where they were, m. Its coordinate is at most that of a ray's origin
+//! and what is between both. By u times the latter it is off as a hit is by a direction that is off; and by the rest, c, in any case. The filter wants 3 c more than the
+//! origin of a ray is off by, and 3 u more than its direction is ([`super::super::bvh`]). What is large and far away thus leaves what is small as sharp as it is: only m knows of it.
 //!
 //! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
 //! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
@@ -22,9 +23,7 @@ pub(super) struct Frame {
     scale: f64,
     /// R, of everything in the tree.
     reach: f64,
-    /// c.
-    corner_error: f64,
-    /// What f64 rounds a point by that is as far away as the meshes are, in the tree's coordinates.
+    /// m: what f64 rounds a point by that is as far away as the meshes are, in the tree's coordinates. Zero if nothing is moved or rounded.
     moving_error: f64,
 }
 
@@ -44,6 +43,12 @@ pub(super) struct LocalRay {
 /// More than the rounding of a component to f32, relative to the largest.
 const ROUNDING: f32 = 1.01 * UNIT_ROUNDOFF;
 
+/// What corners count for that are rounded.
+const CORNERS: f32 = 3.03 * UNIT_ROUNDOFF;
+
+/// The same besides, relative to R: what f64 rounds of its way from where it is moved, some ten thousand R at most.
+const MOVED: f64 = 1.0 / (1u64 << 34) as f64;
+
 /// Less than this many times R is a ray's origin away, or it is moved.
 const NEAR: f64 = 4.0;
 
@@ -61,17 +66,18 @@ impl Frame {
         let is_handy = bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&radius);
         if is_handy && meshes.iter().flat_map(PreciseMesh::corners).all(is_f32) {
             let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
-            return Self { centre: DVec3::ZERO, scale: 1.0, reach, corner_error: 0.0, moving_error: 0.0 };
+            return Self { centre: DVec3::ZERO, scale: 1.0, reach, moving_error: 0.0 };
         }
         let scale = power_of_two_below(radius.max(SMALLEST)).recip();
         let moving_error = 4.0 * UNIT_ROUNDOFF_64 * (centre.abs().max_element() + radius) * scale;
-        let corner_error = f64::from(UNIT_ROUNDOFF) + moving_error;
-        Self { centre, scale, reach: 2.0, corner_error, moving_error }
+        // Not zero for a single point either.
+        let moving_error = moving_error.max(f64::MIN_POSITIVE);
+        Self { centre, scale, reach: 2.0, moving_error }
     }
 
     /// Whether everything is traced as it is.
     pub fn is_identity(&self) -> bool {
-        self.corner_error == 0.0
+        self.moving_error == 0.0
     }
 
     /// A corner that can be traced.
@@ -89,7 +95,12 @@ impl Frame {
         let rounded = local.as_vec3();
         let moved = 4.0 * UNIT_ROUNDOFF_64 * (p.abs().max_element() + self.centre.abs().max_element()) * self.scale;
         let error = (local - rounded.as_dvec3()).abs().max_element() + if self.is_identity() { 0.0 } else { moved };
-        (rounded, error + self.corner_error)
+        (rounded, error + self.corner_error())
+    }
+
+    /// By how much corners are off.
+    fn corner_error(&self) -> f64 {
+        if self.is_identity() { 0.0 } else { f64::from(UNIT_ROUNDOFF) + self.moving_error }
     }
 
     /// Lengths there are so many times those of the meshes.
@@ -107,9 +118,13 @@ impl Frame {
         if self.is_identity() && rays_are_f32 {
             return Blur::NONE;
         }
-        // As a ray that is moved is off by what f64 rounds, no more than a quarter of u R.
-        let base = 3.0 * self.corner_error + self.moving_error + 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach;
-        Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: ROUNDING }
+        let base = 4.0 * self.moving_error + MOVED * self.reach;
+        Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: self.straying() }
+    }
+
+    /// By what a direction is off, and an origin, relative to their largest component.
+    fn straying(&self) -> f32 {
+        if self.is_identity() { ROUNDING } else { ROUNDING + CORNERS }
     }
 
     /// The ray as it is, if it can be traced so.
@@ -162,10 +177,10 @@ impl Frame {
             time: 0.0,
         };
         let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
-        let is_common = off <= 0.25 * f64::from(UNIT_ROUNDOFF) * self.reach && local.is_valid();
+        let is_common = off <= MOVED * self.reach && local.is_valid();
         let common = self.blur(false);
-        let rounded = ROUNDING * local.origin.abs().max_element();
-        let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: ROUNDING };
+        let rounded = common.direction * local.origin.abs().max_element();
+        let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: common.direction };
         Some(LocalRay { ray: local, blur, is_common, start, stretch })
     }
 }

@@ -9,7 +9,7 @@ use crate::ray::Ray;
 use crate::trace::bvh::filter::{self, Filter};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Turned, Vector};
-use crate::trace::bvh::slab::{HUGE, SlabRay, least_t};
+use crate::trace::bvh::slab::{HUGE, SLIGHT, SlabRay, least_t};
 use crate::trace::bvh::woop::{Margin, SLACK};
 
 /// A ray by itself, in the order in which Embree's `RTCRay` begins: a caller's can be read where it is.
@@ -57,7 +57,7 @@ impl SingleRay {
     /// Made ready for nodes, and what is left to be made ready for triangles; none where it [is not valid](Ray::is_valid). `reach` is the tree's. If it is not
     /// `BLURRED`, it is the ray that is meant.
     #[inline(always)]
-    pub(super) fn ready<S: Simd, const BLURRED: bool>(
+    pub(in crate::trace::bvh) fn ready<S: Simd, const BLURRED: bool>(
         &self,
         reach: &[f32; 4],
         blur: Blur,
@@ -71,11 +71,13 @@ impl SingleRay {
         let shorten = splat(1.0).div(largest);
         let slope = direction.mul(shorten);
         let inverse = splat(1.0).div(direction);
-        let (steep, span) = (inverse.abs(), origin.abs().add(S::V4::load(reach)));
-        let farthest = steep.mul(span);
-        let (mut width, mut most) = (farthest.mul_add(splat(6.5 * UNIT_ROUNDOFF), splat(f32::MIN_POSITIVE)), farthest);
+        let (steep, away) = (inverse.abs(), origin.abs());
+        let span = away.add(S::V4::load(reach));
+        let mut width = steep.mul(away).mul_add(splat(6.5 * UNIT_ROUNDOFF), splat(f32::MIN_POSITIVE));
+        let mut most = steep.mul(span);
         if BLURRED {
-            let longest = span.max(span.yzx()).max(span.yzx().yzx());
+            let strayed = if blur.direction <= SLIGHT { away } else { span };
+            let longest = strayed.max(strayed.yzx()).max(strayed.yzx().yzx());
             let stray = longest.mul_add(splat(1.1 * blur.direction), splat(1.1 * blur.origin));
             width = steep.mul_add(stray, width);
             most = most.max(width);
@@ -108,7 +110,7 @@ impl SingleRay {
 
 /// What is left of a ray to be made ready for triangles, when it is for nodes. The root can be entered before: its numbers take some time to come, in
 /// which this is done.
-pub(super) struct Rest<S: Simd> {
+pub(in crate::trace::bvh) struct Rest<S: Simd> {
     origin: S::V4,
     direction: S::V4,
     /// The direction over its largest magnitude, and 1 over that.

@@ -120,6 +120,8 @@ impl Binary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Aabb;
+    use crate::trace::bvh::build::record::aabb;
     use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
@@ -207,19 +209,22 @@ mod tests {
         [leaf.min(node + below), node + leaf.min(below)]
     }
 
-    /// What nodes cost, the root with them; also tells how many levels they have.
-    fn cost(nodes: &[Node], node: u32) -> (f64, usize) {
+    /// What nodes cost, the root with them; also tells how many levels they have, and what is around them: boxes in nodes are wider.
+    fn cost(binary: &Binary, nodes: &[Node], node: u32) -> (f64, usize, Aabb) {
         let node = &nodes[node as usize];
-        let (mut sum, mut levels) = (f64::from(NODE_COST) * f64::from(node.bounds().half_area()), 0);
+        let (mut sum, mut levels, mut all) = (0.0, 0, Aabb::EMPTY);
         for (slot, child) in node.children() {
-            let (more, below) = if child.is_leaf() {
-                (f64::from(child.count()) * f64::from(node.child_bounds(slot).half_area()), 0)
+            let (more, below, bounds) = if child.is_leaf() {
+                let range = (child.first(), u32::from(node.items[slot]));
+                let leaf = binary.branches.iter().find(|branch| (branch.first, branch.len) == range).expect("a branch");
+                let bounds = aabb(&leaf.bounds);
+                (f64::from(child.count()) * f64::from(bounds.half_area()), 0, bounds)
             } else {
-                cost(nodes, child.node())
+                cost(binary, nodes, child.node())
             };
-            (sum, levels) = (sum + more, levels.max(below));
+            (sum, levels, all) = (sum + more, levels.max(below), all.union(bounds));
         }
-        (sum, levels + 1)
+        (sum + f64::from(NODE_COST) * f64::from(all.half_area()), levels + 1, all)
     }
 
     /// The items of a tree's leaves, in the order of its slots.
@@ -260,7 +265,7 @@ mod tests {
                 let mut all = Vec::new();
                 items(&nodes, 0, &mut all);
                 assert_eq!(all, (0..binary.branches[0].len).collect::<Vec<_>>(), "each item once, and in order");
-                let (found, [_, least]) = (cost(&nodes, 0).0, least(&binary, 0));
+                let (found, [_, least]) = (cost(&binary, &nodes, 0).0, least(&binary, 0));
                 leaves += usize::from(binary.branches[0].is_leaf);
                 assert!((found / least - 1.0).abs() < 1e-5, "{isa:?}, {ends} ends: {found}, best {least}");
                 let nodes = format!("{nodes:?}");
@@ -301,7 +306,8 @@ mod tests {
         let mut binary = shape.binary();
         binary.weigh::<Portable>(&RULE, true);
         let (deep, flat) = (binary.nodes(&RULE, usize::MAX), binary.nodes(&RULE, 9));
-        assert!(cost(&deep, 0).1 > 9 && cost(&flat, 0).1 <= 9, "{} and {}", cost(&deep, 0).1, cost(&flat, 0).1);
+        let levels = [&deep, &flat].map(|nodes| cost(&binary, nodes, 0).1);
+        assert!(levels[0] > 9 && levels[1] <= 9, "{levels:?}");
         let mut all = Vec::new();
         items(&flat, 0, &mut all);
         assert_eq!(all, (0..binary.branches[0].len).collect::<Vec<_>>());

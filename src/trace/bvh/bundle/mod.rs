@@ -95,7 +95,7 @@ pub(super) enum Fit {
 pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
 /// Absolute slack, against underflow.
 pub(super) const TINY: f32 = 1e-37;
-/// Error of a direction's component, over the depth, that counts for nothing beside its rounding.
+/// Error of a direction's component, over the component, that counts for nothing beside its rounding.
 const NOISE: f32 = UNIT_ROUNDOFF / 8.0;
 /// Slopes beyond this spoil the bounds for all rays.
 const STEEPEST: f32 = 16.0;
@@ -166,7 +166,9 @@ impl Bundle {
             self.blur += UNIT_ROUNDOFF * 1.01 * longest.largest() + noise;
         }
         let (is_finite, fit) = (self.blur < HUGE && origin.is_finite(), self.project::<S>(range));
-        is_finite && fit == Fit::Whole && noise <= NOISE * self.least_depth
+        let ([a, b], [c, d]) = (self.low, self.high);
+        let least_slope = a.abs().min(b.abs()).min(c.abs()).min(d.abs()).min(1.0);
+        is_finite && fit == Fit::Whole && noise <= NOISE * least_slope * self.least_depth
     }
 
     /// Directions and ranges as they are; where all rays start, or end.

@@ -2,7 +2,7 @@
 
 use super::{Bundle, axes};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
-use crate::trace::bvh::node::{Node, WIDTH};
+use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL, WIDTH};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 use crate::trace::bvh::slab::HUGE;
 
@@ -43,18 +43,21 @@ impl Bundle {
             reciprocal: [[1.0 / self.low[0], 1.0 / self.high[0]], [1.0 / self.low[1], 1.0 / self.high[1]]],
             forward: self.forward,
         };
+        let away = Vec3::from_array(self.origin).abs();
+        let span = away + reach;
         let mut is_finite = true;
         for (i, axis) in axes.into_iter().enumerate() {
-            let span = self.origin[axis].abs() + reach[axis];
-            // Origin and box are subtracted (2 u of the span), the slope is off by 2 u (in an object's coordinates by
-            // 4.25 u), its reciprocal and the product by another each, or by the least number that there is.
-            let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * span + self.blur + f32::MIN_POSITIVE);
+            // Origin and box are subtracted (2 u of both), the slope is off by 2 u (in an object's coordinates by
+            // 4.25 u), its reciprocal and the product by another each, or by the least number that there is. What of that is relative to the
+            // box is in the box.
+            const { assert!(10.0 * UNIT_ROUNDOFF < WIDENED + WIDENED_ALL) };
+            let pad = sign[i] * (10.0 * UNIT_ROUNDOFF * away[axis] + self.blur + f32::MIN_POSITIVE);
             slab.near_origin[i] = self.origin[axis] + pad;
             slab.far_origin[i] = self.origin[axis] - pad;
             (slab.near[i], slab.far[i]) =
                 if sign[i] > 0.0 { (2 * axis, 2 * axis + 1) } else { (2 * axis + 1, 2 * axis) };
             let steepest = slab.reciprocal.get(i).map_or(1.0, |[a, b]| a.abs().max(b.abs()));
-            is_finite &= steepest * span < HUGE;
+            is_finite &= steepest * span[axis] < HUGE;
         }
         is_finite.then_some(slab)
     }

@@ -5,7 +5,7 @@
 //!
 //! - every node but the root has one parent, which comes before it: no cycles, nothing unreachable; and the tree is no
 //!   deeper than the stack of a walk;
-//! - every box is finite and holds the boxes of the node below it, or the triangles of its leaf; slots without a child are empty;
+//! - every box is finite and holds the boxes of the node below it, or the triangles of its leaf, [`widened`]; slots without a child are empty;
 //! - every block is in one leaf, names triangles of the mesh, and has their corners;
 //! - every triangle that can be hit is in a leaf. In the high preset the leaves that name it hold all pieces that it is cut into:
 //!   these are cut once more.
@@ -21,12 +21,12 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::math::{Aabb, Vec3, is_traceable};
+use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
 use crate::trace::Part;
 use crate::trace::bvh::build::{MAX_DEPTH, presplit, triangle_items};
 use crate::trace::bvh::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
-use crate::trace::bvh::node::{Child, Node, Tree, WIDTH};
+use crate::trace::bvh::node::{Child, Node, Tree, WIDTH, widened, widened_corners};
 
 /// Nodes that are gone through by one thread at a time.
 const CHUNK: usize = 512;
@@ -134,12 +134,13 @@ const BATCH: usize = 256;
 impl Pass<'_> {
     fn check_nodes(&self, first: usize, nodes: &[Node]) -> Result<Counts, String> {
         let mut work = Work::default();
+        let most = widened(&Aabb { min: Vec3::ZERO, max: Vec3::splat(LARGEST_COORDINATE) }).max;
         for (index, node) in (first..).zip(nodes) {
             for slot in 0..WIDTH {
                 let (child, bounds) = (node.child[slot], node.child_bounds(slot));
                 let is_sound = match child {
                     Child::NONE => bounds == Aabb::EMPTY,
-                    _ => is_traceable(bounds.min) && is_traceable(bounds.max),
+                    _ => [bounds.min, bounds.max].iter().all(|corner| corner.abs().cmple(most).all()),
                 };
                 if !is_sound {
                     return Err(format!("has an impossible box in node {index}"));
@@ -245,7 +246,7 @@ impl Pass<'_> {
             let own = &pieces[pieces.partition_point(|piece| piece.0 < number)..];
             let mut own = own.iter().take_while(|piece| piece.0 == number);
             if self.triangles[number as usize].load(Relaxed) != 1
-                && !own.any(|(_, bounds)| contains(bounds, &item.bounds()))
+                && !own.any(|(_, bounds)| contains(bounds, &widened(&item.bounds())))
             {
                 return Err(format!("lacks a piece of triangle {}", item.primitive()));
             }
@@ -275,15 +276,16 @@ impl Pass<'_> {
     }
 }
 
-/// Whether all corners are in a box; false for NaN.
+/// Whether the box around all corners, [`widened`], is in a box; false for NaN.
 #[inline(always)]
 fn holds(bounds: &Aabb, [a, b, c]: [Vec3; 3]) -> bool {
     // Vectors of a register each, and one branch: this is asked of every triangle.
     let (min, max) = (Vec3A::from(bounds.min), Vec3A::from(bounds.max));
     let [a, b, c] = [Vec3A::from(a), Vec3A::from(b), Vec3A::from(c)];
-    let above = min.cmple(a) & min.cmple(b) & min.cmple(c);
-    let below = max.cmpge(a) & max.cmpge(b) & max.cmpge(c);
-    (above & below).all()
+    let [low, high] = widened_corners([a.min(b).min(c), a.max(b).max(c)]);
+    // A least and a largest number may pass over NaN, a sum does not.
+    let sum = a + b + c;
+    (min.cmple(low) & max.cmpge(high) & sum.cmpeq(sum)).all()
 }
 
 /// False for NaN.

@@ -28,7 +28,7 @@ use crate::trace::bvh::node::Node;
 const MAGIC: [u8; 8] = *b"\x89BVH\r\n\x1a\n";
 
 /// To be raised whenever what is stored changes, or what it means, or how trees are built.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 const BYTE_ORDER: u32 = 0x0102_0304;
 

@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use super::*;
-use crate::math::Vec3;
+use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Mesh, Scene, architecture, terrain};
 use crate::trace::bvh::block::Block;
@@ -128,7 +128,9 @@ fn wrong_nodes_are_refused() {
         case.refuses("impossible box", child(empty, empty_slot, Child::leaf(0, 1)));
         case.refuses("impossible box", child(0, root_slot, Child::NONE));
         case.refuses("no other leads to", |nodes, _| {
-            nodes[0].set(root_slot, &crate::math::Aabb::EMPTY, Child::NONE);
+            let none = Node::empty();
+            (0..6).for_each(|row| nodes[0].bounds[row][root_slot] = none.bounds[row][0]);
+            nodes[0].child[root_slot] = Child::NONE;
         });
         case.refuses("leads to", |nodes, _| {
             // Twice below one node, and another node nowhere.
@@ -147,6 +149,14 @@ fn wrong_nodes_are_refused() {
             case.refuses(words, |nodes, _| nodes[0].bounds[component][root_slot] = value);
         }
         let words = if preset == Preset::High { "lacks a piece" } else { "does not hold its triangles" };
+        case.refuses(words, |nodes, _| {
+            // The triangles are in it, but on the side that is farthest from zero it is not wide.
+            let size = |row: usize| nodes[leaf].bounds[row][leaf_slot].abs();
+            let row = (0..6).max_by(|&a, &b| size(a).total_cmp(&size(b))).expect("six");
+            let inwards = if row % 2 == 0 { 6.0 } else { -6.0 };
+            let side = &mut nodes[leaf].bounds[row][leaf_slot];
+            *side += side.abs() * inwards * UNIT_ROUNDOFF;
+        });
         case.refuses(words, |nodes, _| {
             let low = nodes[leaf].bounds[0][leaf_slot];
             nodes[leaf].bounds[1][leaf_slot] = low;
@@ -178,8 +188,8 @@ fn blocks_twice(nodes: &mut [Node]) {
     let twice = nodes.iter_mut().find_map(|node| {
         let leaf = node.child.iter().position(|&child| is_leaf(child))?;
         let empty = node.child.iter().position(|&child| child == Child::NONE)?;
-        let (bounds, child) = (node.child_bounds(leaf), node.child[leaf]);
-        node.set(empty, &bounds, child);
+        node.bounds.iter_mut().for_each(|row| row[empty] = row[leaf]);
+        node.child[empty] = node.child[leaf];
         Some(())
     });
     twice.expect("a node with a leaf and with room");

@@ -147,7 +147,7 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
     #[inline(always)]
     fn run<S: Simd>(mut self) {
         let (triangles, discs) = (self.triangles, self.discs);
-        let (tree, reach) = (triangles.tree(), triangles.tree().reach());
+        let tree = triangles.tree();
         let addresses = Addresses::of_triangles::<S>(triangles);
         let (mut flying, mut next) = (Set::NOBODY, [Child::NONE; TRAVELLERS]);
         (0..self.seekers.len()).for_each(|k| flying.insert(k));
@@ -161,7 +161,7 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
                 let (seeker, scale) = (&mut self.seekers[k], self.surveyor.scale());
                 let nearest = seeker.nearest::<S>(scale, self.surveyor.wants_points());
                 if let Some(sought) = self.surveyor.next(k, nearest) {
-                    seeker.start::<S>(sought, reach, scale);
+                    seeker.start::<S>(sought, scale);
                     next[k] = Child::ROOT;
                     at_nodes.insert(k);
                 } else {

@@ -46,11 +46,12 @@ impl Seeker {
         waiting: Waiting::NOBODY,
     };
 
-    /// Sets out in a tree with this reach, and this scale; with the triangle that was nearest to the point before, for it may be near this one too.
+    /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near this one too.
     #[inline(always)]
-    pub fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, reach: Vec3, scale: f64) {
-        let span = (local.abs() + reach).max_element();
-        (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * span);
+    pub fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, scale: f64) {
+        // What differences round relative to a box is in the box ([`super::super::node::widened`]).
+        let away = local.abs().max_element();
+        (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * away);
         self.point = point;
         if self.square < f64::INFINITY {
             self.square = self.measured::<S>(scale).square();
