@@ -36,6 +36,11 @@ struct Case {
 
 /// Triangles and rays on a grid, among them some that coincide and rays through corners and along axes, then placed far away and scaled.
 fn case(random: &mut Random, away: i64, scale: f64) -> Case {
+    case_beside(random, away, scale, &[])
+}
+
+/// The same with some triangles more.
+fn case_beside(random: &mut Random, away: i64, scale: f64, others: &[[Whole; 3]]) -> Case {
     let mut point =
         |size: i32| -> Whole { [0; 3].map(|_| i128::from((random.unit() * size as f32) as i32 - size / 2)) };
     let mut corners: Vec<[Whole; 3]> = (0..200)
@@ -53,6 +58,7 @@ fn case(random: &mut Random, away: i64, scale: f64) -> Case {
     for i in 40..50 {
         corners.extend([corners[i]; 30]);
     }
+    corners.extend(others);
     let rays = (0..400).map(|i| {
         let origin = point(800);
         let target = if i % 3 == 0 { corners[i / 3][i % 2] } else { point(400) };
@@ -73,10 +79,24 @@ fn case(random: &mut Random, away: i64, scale: f64) -> Case {
 #[test]
 fn every_hit_is_that_of_exact_arithmetic() {
     let mut random = Random::new(5);
-    for (away, scale) in
-        [(0, 1.0), (0, 2f64.powi(-10)), (1 << 40, 1.0), (-(1 << 30), 2f64.powi(-90)), (0, 2f64.powi(50))]
-    {
-        let Case { corners, rays, precise, traced } = case(&mut random, away, scale);
+    // Triangles that reach far beyond the others, beside and between them, and leave these in a corner of what is traced.
+    let far = |size: i128| {
+        let wall = |x: i128| [[x, -size, -size / 7], [x, 3 * size, size / 5], [x + 1, size / 3, 5 * size]];
+        let turned = |[x, y, z]: Whole| [z, x, y];
+        vec![wall(-320), wall(310).map(turned), wall(1000).map(turned).map(turned), wall(size)]
+    };
+    for (away, scale, far) in [
+        (0, 1.0, vec![]),
+        (0, 2f64.powi(-10), vec![]),
+        (1 << 40, 1.0, vec![]),
+        (-(1 << 30), 2f64.powi(-90), vec![]),
+        (0, 2f64.powi(50), vec![]),
+        (0, 1.0, far(1 << 18)),
+        (0, 1.0, far(1 << 27)),
+        (1 << 40, 1.0, far(1 << 22)),
+        (12_345, 2f64.powi(-10), far(1 << 34)),
+    ] {
+        let Case { corners, rays, precise, traced } = case_beside(&mut random, away, scale, &far);
         let mut first = vec![None; rays.len()];
         precise.closest_batch(&traced, &mut first);
         let mut names = vec![None; rays.len()];

@@ -8,7 +8,8 @@
 //! Manocha 1996, *OBBTree*), the alternative, take twice the memory and arithmetic.
 //!
 //! Discs are made in f64 around what f32 keeps of their centres and normals, and rounded up. With u = 2^-24 and q the vector from a centre to a point, height and
-//! distance from the axis are off by less than 12 u |q|, the square of the latter by less than 40 u |q|^2.
+//! distance from the axis are off by less than 12 u |q|, the square of the latter by less than 40 u |q|^2. Corners that are rounded are off by u times their distance from the point in each
+//! component, besides what does not grow with that; so by 1.8 u (|q| + height + radius) at most, of which the last two are in the disc.
 
 use super::node::{Child, Node, WIDTH};
 use super::simd::{Array, Simd, Vector};
@@ -67,7 +68,8 @@ impl Discs {
         S::address(&self.0, if child.is_leaf() { 0 } else { child.node() })
     }
 
-    /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off by at most `pad` in each component.
+    /// The squares of distances that no point of a child is nearer than, if the point and all corners together are off by at most `pad` in each component, and corners by u times their distance from the
+    /// point besides.
     #[inline(always)]
     pub(super) fn near<S: Simd>(&self, node: Child, point: Vec3, pad: f32) -> S::V8 {
         let discs = &self.0[node.node() as usize];
@@ -81,7 +83,7 @@ impl Discs {
         }
         // `length` is more than |q|, and 1.75 more than the length of three components of 1.
         let across = square.mul(S::V8::splat(1.0 - 40.0 * UNIT_ROUNDOFF)).sub(along.mul(along)).max(zero).sqrt();
-        let off = length.mul_add(S::V8::splat(12.0 * UNIT_ROUNDOFF), S::V8::splat(1.75 * pad));
+        let off = length.mul_add(S::V8::splat(14.0 * UNIT_ROUNDOFF), S::V8::splat(1.75 * pad));
         let above = along.abs().sub(S::V8::load(&discs.height)).sub(off).max(zero);
         let beside = across.sub(S::V8::load(&discs.radius)).sub(off).max(zero);
         let near = above.mul_add(above, beside.mul(beside)).mul(S::V8::splat(1.0 - 8.0 * UNIT_ROUNDOFF));
@@ -145,7 +147,8 @@ impl Eight {
             self.centre[axis][slot] = disc.centre[axis] as f32;
             self.normal[axis][slot] = disc.normal[axis] as f32;
         }
-        (self.height[slot], self.radius[slot]) = (rounded_up(disc.height), rounded_up(disc.radius));
+        let off = 1.8 * f64::from(UNIT_ROUNDOFF) * (disc.height + disc.radius);
+        (self.height[slot], self.radius[slot]) = (rounded_up(disc.height + off), rounded_up(disc.radius + off));
     }
 }
 

@@ -1,7 +1,7 @@
 //! The coordinates in which f64 meshes are traced, and how far rays and corners are off there.
 //!
-//! Meshes are moved so that their middle is zero, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
-//! then keeps of them what it can, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
+//! Meshes are moved so that zero is where most corners are, and scaled by a power of two so that the largest distance from it is in [1, 2): f32
+//! then keeps of them what it can, the most around zero, and neither overflows nor underflows, however small or large they are. With u = 2^-24 a corner is off by
 //! u times its largest coordinate, and by what f64 rounds at the distance from zero where they were, m. Its coordinate is at most that of a ray's origin
 //! and what is between both. By u times the latter it is off as a hit is by a direction that is off; and by the rest, c, in any case. The filter wants 3 c more than the
 //! origin of a ray is off by, and 3 u more than its direction is ([`super::super::bvh`]). What is large and far away thus leaves what is small as sharp as it is: only m knows of it.
@@ -9,7 +9,7 @@
 //! A ray that starts farther away than 4 R, R being the farthest coordinate, is started anew before it comes near; otherwise its rounding
 //! would count by its distance. Its direction is scaled to a largest component in [1, 2). A range of t is widened by the rounding.
 
-use super::{PreciseMesh, PreciseRay};
+use super::{PreciseMesh, PreciseRay, is_traceable};
 use crate::math::{DAabb, DVec3, UNIT_ROUNDOFF, UNIT_ROUNDOFF_64, Vec3};
 use crate::ray::Ray;
 use crate::scene::choose_origin;
@@ -43,11 +43,11 @@ pub(super) struct LocalRay {
 /// More than the rounding of a component to f32, relative to the largest.
 const ROUNDING: f32 = 1.01 * UNIT_ROUNDOFF;
 
-/// What corners count for that are rounded.
+/// What corners that are rounded count for besides.
 const CORNERS: f32 = 3.03 * UNIT_ROUNDOFF;
 
-/// The same besides, relative to R: what f64 rounds of its way from where it is moved, some ten thousand R at most.
-const MOVED: f64 = 1.0 / (1u64 << 34) as f64;
+/// By what a ray is off that is [common](LocalRay::is_common), relative to R: what f64 rounds of its way from where it is moved, some thousand R at most.
+const MOVED: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// Less than this many times R is a ray's origin away, or it is moved.
 const NEAR: f64 = 4.0;
@@ -62,12 +62,14 @@ impl Frame {
     /// Of meshes with this box around all that can be traced of them.
     pub fn around(meshes: &[PreciseMesh], bounds: DAabb) -> Self {
         let is_f32 = |p: DVec3| p.as_vec3().as_dvec3() == p || p.is_nan();
-        let (centre, radius) = if bounds.is_empty() { (DVec3::ZERO, 0.0) } else { (bounds.centre(), bounds.radius()) };
-        let is_handy = bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&radius);
+        let is_handy =
+            bounds.is_empty() || choose_origin(&bounds) == DVec3::ZERO && (1e-12..1e12).contains(&bounds.radius());
         if is_handy && meshes.iter().flat_map(PreciseMesh::corners).all(is_f32) {
             let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
             return Self { centre: DVec3::ZERO, scale: 1.0, reach, moving_error: 0.0 };
         }
+        let centre = middle(meshes).clamp(bounds.min, bounds.max);
+        let radius = (bounds.max - centre).max(centre - bounds.min).max_element();
         let scale = power_of_two_below(radius.max(SMALLEST)).recip();
         let moving_error = 4.0 * UNIT_ROUNDOFF_64 * (centre.abs().max_element() + radius) * scale;
         // Not zero for a single point either.
@@ -89,18 +91,17 @@ impl Frame {
         (p - self.centre) * self.scale
     }
 
-    /// A point, and by how much each component is off from what is meant, corners included.
+    /// A point, and by how much each component is off from what is meant, corners included but for u times their distance from it.
     pub fn blurred_point(&self, p: DVec3) -> (Vec3, f64) {
         let local = self.local(p);
         let rounded = local.as_vec3();
+        let off = (local - rounded.as_dvec3()).abs().max_element();
+        if self.is_identity() {
+            return (rounded, off);
+        }
         let moved = 4.0 * UNIT_ROUNDOFF_64 * (p.abs().max_element() + self.centre.abs().max_element()) * self.scale;
-        let error = (local - rounded.as_dvec3()).abs().max_element() + if self.is_identity() { 0.0 } else { moved };
-        (rounded, error + self.corner_error())
-    }
-
-    /// By how much corners are off.
-    fn corner_error(&self) -> f64 {
-        if self.is_identity() { 0.0 } else { f64::from(UNIT_ROUNDOFF) + self.moving_error }
+        let corners = self.moving_error + f64::from(UNIT_ROUNDOFF) * local.abs().max_element();
+        (rounded, off + moved + corners)
     }
 
     /// Lengths there are so many times those of the meshes.
@@ -183,6 +184,25 @@ impl Frame {
         let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: common.direction };
         Some(LocalRay { ray: local, blur, is_common, start, stretch })
     }
+}
+
+/// Corners that are looked at for where most are.
+const SAMPLE: usize = 4096;
+
+/// On each axis a coordinate that as many corners are below as above, of some of those that can be traced; zero if there are none.
+fn middle(meshes: &[PreciseMesh]) -> DVec3 {
+    let count = meshes.iter().map(|mesh| 3 * mesh.triangles.len()).sum::<usize>();
+    let step = count.div_ceil(SAMPLE).max(1);
+    let mut corners: Vec<DVec3> =
+        meshes.iter().flat_map(PreciseMesh::corners).step_by(step).filter(|&p| is_traceable(p)).collect();
+    let half = corners.len() / 2;
+    let mut median = |axis: usize| {
+        if corners.is_empty() {
+            return 0.0;
+        }
+        corners.select_nth_unstable_by(half, |a, b| a[axis].total_cmp(&b[axis])).1[axis]
+    };
+    DVec3::new(median(0), median(1), median(2))
 }
 
 /// f32 below and above a number that may be off by the rounding of t; none where that is not finite.

@@ -225,6 +225,69 @@ fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trace::bvh::{NearestTriangle, Sought, Surveyor};
+
+    /// What is looked at in f64: of a ray its candidates, of a point the triangles that are measured.
+    struct Count<'a> {
+        precise: &'a Precise,
+        point: Option<DVec3>,
+        measured: std::cell::Cell<usize>,
+    }
+
+    impl Surveyor for Count<'_> {
+        fn next(&mut self, _: usize, _: Option<NearestTriangle>) -> Option<Sought> {
+            let point = self.point.take()?;
+            let (local, error) = self.precise.frame.blurred_point(point);
+            Some(Sought { point, local, error: error as f32 * 1.01 })
+        }
+        fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
+            self.measured.set(self.measured.get() + 1);
+            self.precise.corners(geometry, primitive)
+        }
+        fn is_exact(&self) -> bool {
+            self.precise.frame.is_identity()
+        }
+        fn scale(&self) -> f64 {
+            self.precise.frame.scale()
+        }
+    }
+
+    /// Hills of small triangles above the rim of one that is ten million or ten thousand million times as large: hardly more of them are looked at than without it; those in one
+    /// block with it, which is as coarse as it is large.
+    #[test]
+    fn what_is_far_away_makes_nothing_near_uncertain() {
+        const SIDE: u32 = 50;
+        let at = |i: u32, k: u32| {
+            let (x, y) = (0.1 * f64::from(i), 0.1 * f64::from(k));
+            DVec3::new(x, y, 0.3 * (x + 0.2).sin() * y.cos())
+        };
+        let quads = (0..SIDE - 1).flat_map(|i| (0..SIDE - 1).map(move |k| SIDE * i + k));
+        let triangles: Vec<_> = quads.flat_map(|k| [[k, k + 1, k + SIDE], [k + 1, k + SIDE + 1, k + SIDE]]).collect();
+        let hills = PreciseMesh { positions: (0..SIDE * SIDE).map(|k| at(k / SIDE, k % SIDE)).collect(), triangles };
+        let mut counts = Vec::new();
+        for far in [0.0, 1e6, 1e9] {
+            let ground = [[-0.1, 0.0, -3.0], [far, -far, -3.0], [far, far, -3.1]].map(DVec3::from).to_vec();
+            let ground = PreciseMesh { positions: ground, triangles: vec![[0, 1, 2]] };
+            let precise = Precise::new(vec![hills.clone(), ground]).expect("meshes");
+            let (mut candidates, mut measured) = (0, 0);
+            for k in 0..200 {
+                let point = DVec3::new(0.0237 * f64::from(k), 0.0219 * f64::from(k), 1.0);
+                let ray = PreciseRay::new(point, DVec3::new(0.01, -0.02, -1.0));
+                let local = precise.frame.ray(&ray).expect("a valid ray");
+                precise.bvh.candidates(&local.ray, local.blur, &mut |geometry, _| {
+                    candidates += u32::from(geometry == 0);
+                    Some(f32::INFINITY)
+                });
+                let mut count = Count { precise: &precise, point: Some(point), measured: 0.into() };
+                precise.bvh.nearest_triangles(&precise.bvh.discs(), 1, &mut count);
+                measured += count.measured.get();
+            }
+            counts.push((candidates, measured));
+        }
+        let [(candidates, measured), others @ ..] = &counts[..] else { unreachable!("three") };
+        let is_more = |&(c, m): &(u32, usize)| c > candidates + 7 * 200 || m > measured + 7 * 200;
+        assert!(*candidates >= 190 && !others.iter().any(is_more), "{counts:?}");
+    }
 
     /// Vertices that are no triangle's, far away or not numbers, neither make the tree coarse nor keep what is f32 from being traced so.
     #[test]

@@ -109,10 +109,10 @@ fn segment<V: Vector>(a: V3<V>, edge: V3<V>) -> V {
     dot(q, q)
 }
 
-/// `error` is by how much a corner and the point may be off, both together, in each component.
+/// `error` is by how much a corner and the point may be off, both together, in each component; a corner besides by `rounding` times its distance from the point.
 #[inline(always)]
-pub(super) fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> Lower<S::V8> {
-    let zero = S::V8::splat(0.0);
+pub(super) fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32, rounding: f32) -> Lower<S::V8> {
+    let (zero, splat) = (S::V8::splat(0.0), S::V8::splat);
     let p = [S::V8::splat(point.x), S::V8::splat(point.y), S::V8::splat(point.z)];
     let [xs, ys, zs] = &block.corners;
     let a = [S::V8::load(&xs[0]), S::V8::load(&ys[0]), S::V8::load(&zs[0])];
@@ -131,10 +131,11 @@ pub(super) fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> L
     let farthest = size(a).add(S::V8::splat(block.size));
     // What the corners and the point are off by counts as rounding does.
     let relative = S::V8::splat(32.0 * UNIT_ROUNDOFF);
-    let off = farthest.mul_add(relative, S::V8::splat(8.0 * error));
+    let error = farthest.mul_add(splat(rounding), splat(error));
+    let off = farthest.mul_add(relative, error.mul(splat(8.0)));
     let area = S::V8::splat(3.0 * block.size * block.size);
     // A plane that is tilted is farther off the farther away it is.
-    let tilt = S::V8::splat(24.0 * error * block.size).mul(farthest);
+    let tilt = error.mul(splat(24.0 * block.size)).mul(farthest);
     let height_error = off.mul(area).mul(S::V8::splat(3.0)).add(tilt);
     let side_error = off.mul(area).mul(S::V8::splat(9.0)).mul(farthest);
     // Not surely outside.
@@ -142,7 +143,7 @@ pub(super) fn lower_bounds<S: Simd>(block: &Block, point: Vec3, error: f32) -> L
     let least = height.sub(height_error).max(zero);
     let plane = height.mul(height).div(square.max(S::V8::splat(f32::MIN_POSITIVE)));
     // The normal is off as well, each component by 4 (error + u S) S, and with it the square.
-    let normal_error = S::V8::splat((16.0 * error + 32.0 * UNIT_ROUNDOFF * block.size) * block.size);
+    let normal_error = error.mul_add(splat(16.0 * block.size), splat(32.0 * UNIT_ROUNDOFF * block.size * block.size));
     let size = normal_error.mul(area).mul(S::V8::splat(4.0)).add(square);
     Lower {
         square: S::V8::select(above, plane.min(edges), edges).to_array(),

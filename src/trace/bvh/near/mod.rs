@@ -20,7 +20,7 @@ use super::node::Child;
 use super::set::{Set, TRAVELLERS};
 use super::simd::{Doubles, Simd};
 use super::triangles::TriangleTree;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::shape::closest::TrianglePoint;
 use bounds::{Lower, lower_bounds};
 use measure::{by_axis, of_block};
@@ -33,7 +33,8 @@ pub(in crate::trace) struct Sought {
     pub point: DVec3,
     /// In the coordinates of the tree; no component above 1e18, so that squares of distances hold in f32.
     pub local: Vec3,
-    /// The local point and the corners may be off by so much in each component, both together.
+    /// The local point and the corners may be off by so much in each component, both together; and corners that are not [exact](Surveyor::is_exact) by a unit of f32 of their distance from
+    /// the point.
     pub error: f32,
 }
 
@@ -153,6 +154,7 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
         (0..self.seekers.len()).for_each(|k| flying.insert(k));
         let nothing = Sight { seeker: 0, leaf: Child::NONE, lower: Lower::none(), open: 0 };
         let mut sights: [Sight<S::V8>; TRAVELLERS] = [nothing; TRAVELLERS];
+        let rounding = if self.surveyor.is_exact() { 0.0 } else { UNIT_ROUNDOFF };
         while !flying.is_empty() {
             let (leaf, none) =
                 (S::highest_bits(bytemuck::cast_ref(&next)), S::equal(bytemuck::cast_ref(&next), Child::NONE.0));
@@ -176,7 +178,7 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
             for k in flying.of(leaf & !none) {
                 let (seeker, leaf, mut scratch) = (&mut self.seekers[k], next[k], None);
                 let block = triangles.block(leaf.first(), &mut scratch);
-                let lower = lower_bounds::<S>(block, seeker.local, seeker.error);
+                let lower = lower_bounds::<S>(block, seeker.local, seeker.error, rounding);
                 let open = lower.within(seeker.limit) & block.lanes;
                 sights[count % TRAVELLERS] = Sight { seeker: k, leaf, lower, open };
                 count += usize::from(open != 0);
