@@ -54,7 +54,7 @@ impl BoxTree {
         Self { tree, items: items.iter().map(Record::primitive).collect(), isa: options.isa }
     }
 
-    /// The box around all of them.
+    /// The box around all of them, a millionth of its coordinates wider.
     pub fn bounds(&self) -> Aabb {
         self.tree.bounds()
     }
@@ -78,7 +78,8 @@ impl BoxTree {
     }
 
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
-    /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves.
+    /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a millionth of
+    /// coordinates.
     pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> Search) {
         let mut radius = f64::from(radius);
         let mut open = vec![(0.0, Child::ROOT)];

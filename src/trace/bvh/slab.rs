@@ -193,40 +193,60 @@ mod tests {
         Vec3::new(number(random, most), number(random, most), number(random, most))
     }
 
+    /// The smallest box with f32 bounds around a point that is off by `off` at most.
+    fn around(point: DVec3, off: DVec3) -> Aabb {
+        let below = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
+        let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
+        Aabb { min: low(point - off), max: -low(-point - off) }
+    }
+
     /// A point that a ray meets, no larger than f32 can tell: its box is entered at its t, whoever makes the ray ready, and whatever lies
-    /// beside it far away. Points, origins and directions are of all sizes, axis by axis.
+    /// beside it far away. Points, origins and directions are of all sizes, axis by axis, some of them no normal numbers; and directions may be off.
     #[test]
     fn no_point_of_a_ray_is_lost() {
-        let mut random = Random::new(31);
-        for round in 0..200_000 {
-            let [near, far] = [round % 3, round / 3 % 3].map(|size| [1.0, 1e6, 1e-6][size]);
+        const SIZES: [f32; 4] = [1.0, 1e6, 1e-6, 1e-39];
+        let (mut random, mut valid) = (Random::new(31), 0);
+        for round in 0..240_000 {
+            let [near, far] = [round % 4, round / 4 % 4].map(|size| SIZES[size]);
             let (origin, t) = (vector(&mut random, far), number(&mut random, 1e3).abs());
             let direction = (vector(&mut random, near) - origin) / t;
-            // Off by less than 2^-50 of the larger of both terms.
-            let point = origin.as_dvec3() + direction.as_dvec3() * f64::from(t);
-            let off = (origin.abs().as_dvec3() + direction.abs().as_dvec3() * f64::from(t)) * 2f64.powi(-50);
-            let below = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
-            let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
-            let bounds = Aabb { min: low(point - off), max: -low(-point - off) };
+            let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
+            if !ray.is_valid() {
+                continue;
+            }
+            valid += 1;
+            // The ray that is meant, and of it a point, which is off by less than 2^-50 of the larger of both terms.
+            let turn = [0.0, SLIGHT * 0.99][round / 16 % 2];
+            let turned = random.vec3().as_dvec3() * f64::from(turn * direction.abs().max_element());
+            let way = (direction.as_dvec3() + turned) * f64::from(t);
+            let point = origin.as_dvec3() + way;
+            let bounds = around(point, (origin.abs().as_dvec3() + way.abs()) * 2f64.powi(-50));
             let mut node = Node::empty();
             let slot = round % 8;
             node.set(slot, &bounds, Child::leaf(0, 1));
-            if round % 2 == 0 {
+            if round / 32 % 2 == 0 {
                 let far = Vec3::splat(1e9);
                 node.set((slot + 1) % 8, &Aabb { min: far, max: far }, Child::leaf(1, 1));
             }
             let tree = Tree::new(vec![node]);
-            let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
             let limit = t * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE;
-            let mut rays = ReadyRays::new(std::slice::from_ref(&ray), tree.reach(), Blur::NONE);
+            // An origin in an object's coordinates is never without.
+            let blur = if turn == 0.0 { Blur::NONE } else { Blur { origin: f32::MIN_POSITIVE, direction: turn } };
+            let mut rays = ReadyRays::new(std::slice::from_ref(&ray), tree.reach(), blur);
             rays.next::<Portable>().expect("a valid ray");
-            let (single, _) =
-                SingleRay::from(&ray).ready::<Portable, false>(tree.reach_row(), Blur::NONE).expect("a valid ray");
-            let slabs = [SlabRay::new::<Portable>(&ray, tree.reach(), Blur::NONE), rays.ready().slab(), single];
+            let (single, reach) = (SingleRay::from(&ray), tree.reach_row());
+            let single = if turn == 0.0 {
+                single.ready::<Portable, false>(reach, blur)
+            } else {
+                single.ready::<Portable, true>(reach, blur)
+            };
+            let (single, _) = single.expect("a valid ray");
+            let slabs = [SlabRay::new::<Portable>(&ray, tree.reach(), blur), rays.ready().slab(), single];
             for (slab, how) in slabs.iter().zip(["by itself", "of eight", "alone"]) {
                 let (entered, _) = slab.enter::<Portable>(&node, limit);
-                assert!(entered.bits() >> slot & 1 == 1, "{how}: {ray:?} misses {bounds:?}");
+                assert!(entered.bits() >> slot & 1 == 1, "{how}: {ray:?}, off by {turn}, misses {bounds:?}");
             }
         }
+        assert!(valid > 150_000, "{valid}");
     }
 }

@@ -32,8 +32,10 @@ pub(super) struct LocalRay {
     pub ray: Ray,
     /// The blur of this one ray.
     pub blur: Blur,
-    /// Whether [`Frame::blur`] covers it, as one of many.
+    /// Whether [`Frame::blur`] may cover it, as one of many.
     pub is_common: bool,
+    /// By how much it is off for what f64 rounds of its way from where it is moved.
+    pub off: f64,
     /// t is that of the local ray and this,
     start: f64,
     /// times this.
@@ -46,8 +48,9 @@ const ROUNDING: f32 = 1.01 * UNIT_ROUNDOFF;
 /// What corners that are rounded count for besides.
 const CORNERS: f32 = 3.03 * UNIT_ROUNDOFF;
 
-/// By what a ray is off that is [common](LocalRay::is_common), relative to R: what f64 rounds of its way from where it is moved, some thousand R at most.
-const MOVED: f64 = 1.0 / (1u64 << 40) as f64;
+/// By what a ray is off at most that is [common](LocalRay::is_common), relative to R, of what f64 rounds of its way from where it is moved. Those that come from farther
+/// away than some ten million R would make all others coarse.
+const MOVED: f64 = 0.25 / (1u64 << 24) as f64;
 
 /// Less than this many times R is a ray's origin away, or it is moved.
 const NEAR: f64 = 4.0;
@@ -68,8 +71,11 @@ impl Frame {
             let reach = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
             return Self { centre: DVec3::ZERO, scale: 1.0, reach, moving_error: 0.0 };
         }
-        let centre = middle(meshes).clamp(bounds.min, bounds.max);
-        let radius = (bounds.max - centre).max(centre - bounds.min).max_element();
+        let (mut centre, mut radius) = (DVec3::ZERO, 0.0);
+        if !bounds.is_empty() {
+            centre = middle(meshes).clamp(bounds.min, bounds.max);
+            radius = (bounds.max - centre).max(centre - bounds.min).max_element();
+        }
         let scale = power_of_two_below(radius.max(SMALLEST)).recip();
         let moving_error = 4.0 * UNIT_ROUNDOFF_64 * (centre.abs().max_element() + radius) * scale;
         // Not zero for a single point either.
@@ -114,12 +120,10 @@ impl Frame {
         self.centre.abs().max_element() + self.reach / self.scale
     }
 
-    /// Of many rays, to be used as [`slab::ready`](super::super::bvh) does: in the second part relative to their own size.
-    pub fn blur(&self, rays_are_f32: bool) -> Blur {
-        if self.is_identity() && rays_are_f32 {
-            return Blur::NONE;
-        }
-        let base = 4.0 * self.moving_error + MOVED * self.reach;
+    /// Of many rays that are not [exact](Self::exact_ray), and [off](LocalRay::off) by so much at most, to be used as [`slab::ready`](super::super::bvh) does: in the second part relative to their own
+    /// size.
+    pub fn blur(&self, off: f64) -> Blur {
+        let base = 4.0 * self.moving_error + off;
         Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: self.straying() }
     }
 
@@ -179,10 +183,10 @@ impl Frame {
         };
         let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
         let is_common = off <= MOVED * self.reach && local.is_valid();
-        let common = self.blur(false);
+        let common = self.blur(off);
         let rounded = common.direction * local.origin.abs().max_element();
-        let blur = Blur { origin: common.origin + rounded + (off * 1.01) as f32, direction: common.direction };
-        Some(LocalRay { ray: local, blur, is_common, start, stretch })
+        let blur = Blur { origin: common.origin + rounded, direction: common.direction };
+        Some(LocalRay { ray: local, blur, is_common, off, start, stretch })
     }
 }
 

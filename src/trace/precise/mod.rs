@@ -161,6 +161,7 @@ impl Precise {
         let scene = Scene::from_geometries(meshes.iter().map(rounded).collect(), vec![Material::default()]);
         let world = World::new(&scene)?;
         debug_assert_eq!(world.centre, DVec3::ZERO, "the frame lies around zero");
+        // Not the high preset: a piece of a triangle is off by what its corners are, and boxes know only of their own coordinates.
         Ok(Self { bvh: Bvh::build(&world), bounds, discs: OnceLock::new(), closed: OnceLock::new(), meshes, frame })
     }
 

@@ -11,7 +11,7 @@ use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 use crate::shape::crossing::{Crossing, crossing_line};
 use crate::shape::triangle::{TriangleHit, intersect_line};
-use crate::trace::bvh::{Certain, Verdict, Wanted};
+use crate::trace::bvh::{Blur, Certain, Verdict, Wanted};
 use crate::trace::crossings::Crossings;
 
 /// Rays of a batch that are traced together.
@@ -245,10 +245,14 @@ impl Precise {
             }
             None => false,
         });
+        let mut most_off = 0.0f64;
         if !exact {
             for (i, (ray, local)) in rays.iter().zip(local.iter_mut()).enumerate() {
                 *local = match self.frame.ray(ray) {
-                    Some(LocalRay { ray, is_common: true, .. }) => ray,
+                    Some(LocalRay { ray, is_common: true, off, .. }) => {
+                        most_off = most_off.max(off);
+                        ray
+                    }
                     Some(_) => {
                         done(i, Certain::Doubt);
                         INVALID
@@ -268,7 +272,8 @@ impl Precise {
                 _ => Verdict::Miss,
             }
         };
-        self.bvh.certain(wanted, local, self.frame.blur(exact), &decide, &mut done);
+        let blur = if exact { Blur::NONE } else { self.frame.blur(most_off) };
+        self.bvh.certain(wanted, local, blur, &decide, &mut done);
     }
 
     /// The hit with one triangle, which the ray hits for sure; none where that is out of range.

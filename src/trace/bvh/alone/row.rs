@@ -73,7 +73,8 @@ impl SingleRay {
         let inverse = splat(1.0).div(direction);
         let (steep, away) = (inverse.abs(), origin.abs());
         let span = away.add(S::V4::load(reach));
-        let mut width = steep.mul(away).mul_add(splat(6.5 * UNIT_ROUNDOFF), splat(f32::MIN_POSITIVE));
+        let tiny = splat(f32::MIN_POSITIVE);
+        let mut width = steep.mul_add(away.mul_add(splat(6.5 * UNIT_ROUNDOFF), tiny), tiny);
         let mut most = steep.mul(span);
         if BLURRED {
             let strayed = if blur.direction <= SLIGHT { away } else { span };

@@ -134,7 +134,9 @@ const BATCH: usize = 256;
 impl Pass<'_> {
     fn check_nodes(&self, first: usize, nodes: &[Node]) -> Result<Counts, String> {
         let mut work = Work::default();
-        let most = widened(&Aabb { min: Vec3::ZERO, max: Vec3::splat(LARGEST_COORDINATE) }).max;
+        let most = Aabb { min: Vec3::ZERO, max: Vec3::splat(LARGEST_COORDINATE) };
+        // Above clusters boxes are around those of nodes, which are wide already.
+        let most = widened(&widened(&most)).max;
         for (index, node) in (first..).zip(nodes) {
             for slot in 0..WIDTH {
                 let (child, bounds) = (node.child[slot], node.child_bounds(slot));
