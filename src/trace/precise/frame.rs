@@ -124,12 +124,8 @@ impl Frame {
     /// size.
     pub fn blur(&self, off: f64) -> Blur {
         let base = 4.0 * self.moving_error + off;
-        Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction: self.straying() }
-    }
-
-    /// By what a direction is off, and an origin, relative to their largest component.
-    fn straying(&self) -> f32 {
-        if self.is_identity() { ROUNDING } else { ROUNDING + CORNERS }
+        let direction = if self.is_identity() { ROUNDING } else { ROUNDING + CORNERS };
+        Blur { origin: (base * 1.01) as f32 + f32::MIN_POSITIVE, direction }
     }
 
     /// The ray as it is, if it can be traced so.
@@ -183,30 +179,28 @@ impl Frame {
         };
         let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
         let is_common = off <= MOVED * self.reach && local.is_valid();
-        let common = self.blur(off);
-        let rounded = common.direction * local.origin.abs().max_element();
-        let blur = Blur { origin: common.origin + rounded, direction: common.direction };
+        let mut blur = self.blur(off);
+        blur.origin += blur.direction * local.origin.abs().max_element();
         Some(LocalRay { ray: local, blur, is_common, off, start, stretch })
     }
 }
 
-/// Corners that are looked at for where most are.
+/// Triangles whose corners are looked at for where most are.
 const SAMPLE: usize = 4096;
 
 /// On each axis a coordinate that as many corners are below as above, of some of those that can be traced; zero if there are none.
 fn middle(meshes: &[PreciseMesh]) -> DVec3 {
-    let count = meshes.iter().map(|mesh| 3 * mesh.triangles.len()).sum::<usize>();
-    let step = count.div_ceil(SAMPLE).max(1);
-    let mut corners: Vec<DVec3> =
-        meshes.iter().flat_map(PreciseMesh::corners).step_by(step).filter(|&p| is_traceable(p)).collect();
+    let count = meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
+    // Only corners of triangles that are taken are fetched.
+    let triangles = meshes.iter().flat_map(|mesh| mesh.triangles.iter().map(move |triangle| (mesh, triangle)));
+    let some = triangles.step_by(count.div_ceil(SAMPLE).max(1));
+    let corners = some.flat_map(|(mesh, triangle)| triangle.map(|i| mesh.positions[i as usize]));
+    let mut corners: Vec<DVec3> = corners.filter(|&p| is_traceable(p)).collect();
+    if corners.is_empty() {
+        return DVec3::ZERO;
+    }
     let half = corners.len() / 2;
-    let mut median = |axis: usize| {
-        if corners.is_empty() {
-            return 0.0;
-        }
-        corners.select_nth_unstable_by(half, |a, b| a[axis].total_cmp(&b[axis])).1[axis]
-    };
-    DVec3::new(median(0), median(1), median(2))
+    DVec3::from([0, 1, 2].map(|axis| corners.select_nth_unstable_by(half, |a, b| a[axis].total_cmp(&b[axis])).1[axis]))
 }
 
 /// f32 below and above a number that may be off by the rounding of t; none where that is not finite.

@@ -8,8 +8,8 @@
 //! times reciprocal and an offset. Intervals of origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
 //!
 //! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| + |origin|) together, fused or
-//! not; the origin is moved by 10 u of itself, and boxes in the tree are wide by as much of their bounds ([`super::super::node::widened`]), which leaves room for the rounding of
-//! the hit's own t. For triangles, which are not wide, it is moved by 10 u of the largest coordinate in the tree besides. It is moved by another 2^-126, and each offset by 2^-124,
+//! not; the origin is moved by 10 u of itself, and boxes, in the tree ([`super::super::node::widened`]) and around triangles, are wide by as much of their bounds, which leaves room for
+//! the rounding of the hit's own t. The origin is moved by another 2^-126, and each offset by 2^-124,
 //! for lengths and t that are no normal numbers, be they flushed to zero. Small components of directions are replaced as for single rays.
 
 use super::Packet;
@@ -31,10 +31,11 @@ pub(super) struct Beam {
     pub is_wide: bool,
     /// On each axis whether a box's upper side is met first.
     pub is_backward: [bool; 3],
-    /// For boxes in the tree.
-    boxes: Offsets,
-    /// For boxes around triangles.
-    triangles: Offsets,
+    /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal. One number more, here and
+    /// below, as a vector is stored.
+    near_offset: [f32; 4],
+    /// Of the sides that are met last: less the origin farthest back, moved back by the pad, times the reciprocal.
+    far_offset: [f32; 4],
     /// 1 / direction, of the least magnitude.
     least: [f32; 4],
     /// The same of the largest.
@@ -43,37 +44,10 @@ pub(super) struct Beam {
     tmin: f32,
 }
 
-/// What products of bounds and reciprocals are moved by. One number more of each, as a vector is stored.
-struct Offsets {
-    /// Of the sides that are met first: on each axis less the origin farthest on, and the pad, times the reciprocal.
-    near: [f32; 4],
-    /// Of the sides that are met last: less the origin farthest back, moved back by the pad, times the reciprocal.
-    far: [f32; 4],
-}
+/// By what share of themselves origins are moved, and boxes are wide.
+const ROUNDING: f32 = 10.0 * UNIT_ROUNDOFF;
 
-/// What rays have in common, an axis a lane: least and largest origin, and 1 / direction of the least and the largest magnitude.
-struct Sides<V: Vector> {
-    first: V,
-    last: V,
-    least: V,
-    most: V,
-    is_backward: V::Mask,
-}
-
-impl<V: Vector + Array<4>> Sides<V> {
-    /// With origins moved by `pad`.
-    #[inline(always)]
-    fn offsets(&self, pad: V) -> Offsets {
-        let Self { first, last, least, most, is_backward } = *self;
-        let (tiny, zero) = (V::splat(4.0 * f32::MIN_POSITIVE), V::splat(0.0));
-        let (back, on) = (first.sub(pad), last.add(pad));
-        let (near, far) = (V::select(is_backward, back, on), V::select(is_backward, on, back));
-        Offsets {
-            near: zero.sub(near.mul_add(least, tiny)).to_array(),
-            far: zero.sub(far.mul_sub(most, tiny)).to_array(),
-        }
-    }
-}
+const _: () = assert!(ROUNDING < WIDENED + WIDENED_ALL);
 
 /// Directions longer than this have reciprocals that may vanish.
 const LONGEST: f32 = 1e30;
@@ -119,32 +93,32 @@ impl Beam {
         let (first, last) = (S::V4::load(&[ox, oy, oz, 0.0]), S::V4::load(&[px, py, pz, 0.0]));
         let (low, high) = (S::V4::load(&[dx, dy, dz, 1.0]), S::V4::load(&[ex, ey, ez, 1.0]));
         let [rx, ry, rz] = bounds.min.abs().max(bounds.max.abs()).to_array();
-        let (away, reach) = (first.abs().max(last.abs()), S::V4::load(&[rx, ry, rz, 0.0]));
-        let span = away.add(reach);
+        let away = first.abs().max(last.abs());
+        let span = away.add(S::V4::load(&[rx, ry, rz, 0.0]));
         let stray = if is_clamped { 4.0 * (smallest / depth) * span.largest() } else { 0.0 };
-        let stray = splat(stray + f32::MIN_POSITIVE);
-        let rounding = splat(10.0 * UNIT_ROUNDOFF);
-        const { assert!(10.0 * UNIT_ROUNDOFF < WIDENED + WIDENED_ALL) };
-        let (narrow, pad) = (away.mul_add(rounding, stray), span.mul_add(rounding, stray));
+        let pad = away.mul_add(splat(ROUNDING), splat(stray + f32::MIN_POSITIVE));
         let (shortest, longest) = (splat(1.0).div(high), splat(1.0).div(low));
         let steepest = shortest.abs().max(longest.abs());
         if steepest.mul(span.add(pad)).less(splat(HUGE)).bits() & 0b111 != 0b111 {
             return None;
         }
         let is_backward = low.less(splat(0.0));
+        let (back, on) = (first.sub(pad), last.add(pad));
         let extent = (bounds.max - bounds.min).max_element();
         let apart = high.sub(low).mul_add(splat(extent / depth), last.sub(first));
         let backward = is_backward.bits();
         let least = S::V4::select(is_backward, longest, shortest);
         let most = S::V4::select(is_backward, shortest, longest);
-        let sides = Sides { first, last, least, most, is_backward };
+        let (near_origin, far_origin) = (S::V4::select(is_backward, back, on), S::V4::select(is_backward, on, back));
+        let tiny = splat(4.0 * f32::MIN_POSITIVE);
+        let zero = splat(0.0);
         Some(Self {
             axes: axes(along),
             limit: tmax.next_up(),
             is_wide: apart.less(splat(WIDE * extent)).bits() & 0b111 != 0b111,
             is_backward: [backward & 1 != 0, backward & 2 != 0, backward & 4 != 0],
-            boxes: sides.offsets(narrow),
-            triangles: sides.offsets(pad),
+            near_offset: zero.sub(near_origin.mul_add(least, tiny)).to_array(),
+            far_offset: zero.sub(far_origin.mul_sub(most, tiny)).to_array(),
             least: least.to_array(),
             most: most.to_array(),
             tmin: least_t(tmin),
@@ -153,11 +127,11 @@ impl Beam {
 
     /// Between the sides that are met first and those that are met last.
     #[inline(always)]
-    fn between<V: Vector>(&self, near_side: [V; 3], far_side: [V; 3], offsets: &Offsets, limit: f32) -> (V::Mask, V) {
+    fn between<V: Vector>(&self, near_side: [V; 3], far_side: [V; 3], limit: f32) -> (V::Mask, V) {
         let (mut near, mut far) = (V::splat(self.tmin), V::splat(limit));
         for axis in 0..3 {
-            let first = near_side[axis].mul_add(V::splat(self.least[axis]), V::splat(offsets.near[axis]));
-            let last = far_side[axis].mul_add(V::splat(self.most[axis]), V::splat(offsets.far[axis]));
+            let first = near_side[axis].mul_add(V::splat(self.least[axis]), V::splat(self.near_offset[axis]));
+            let last = far_side[axis].mul_add(V::splat(self.most[axis]), V::splat(self.far_offset[axis]));
             (near, far) = (first.max(near), last.min(far));
         }
         (near.at_most(far), near)
@@ -168,13 +142,15 @@ impl Beam {
     pub fn triangles<S: Simd>(&self, block: &Block, limit: f32) -> u32 {
         let zero = S::V8::splat(0.0);
         let (mut near, mut far) = ([zero; 3], [zero; 3]);
+        let (down, up) = (S::V8::splat(-ROUNDING), S::V8::splat(ROUNDING));
         for axis in 0..3 {
             let [a, b, c] = &block.corners[axis];
             let (a, b, c) = (S::V8::load(a), S::V8::load(b), S::V8::load(c));
             let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            let (low, high) = (low.abs().mul_add(down, low), high.abs().mul_add(up, high));
             (near[axis], far[axis]) = if self.is_backward[axis] { (high, low) } else { (low, high) };
         }
-        self.between(near, far, &self.triangles, limit).0.bits() & block.lanes
+        self.between(near, far, limit).0.bits() & block.lanes
     }
 }
 
@@ -205,6 +181,6 @@ impl Enter for Beam {
             near[axis] = S::V8::load(&node.bounds[2 * axis + side]);
             far[axis] = S::V8::load(&node.bounds[2 * axis + 1 - side]);
         }
-        self.between(near, far, &self.boxes, limit)
+        self.between(near, far, limit)
     }
 }
