@@ -1,6 +1,7 @@
 //! Random numbers for the tests of single files.
 
-use crate::math::Vec3;
+use crate::math::{Aabb, DVec3, Vec3};
+use crate::ray::Ray;
 
 /// Knuth's multiplier (MMIX).
 pub(super) struct Random(u64);
@@ -18,5 +19,32 @@ impl Random {
 
     pub fn vec3(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+
+    /// Of either sign and any size down to 2^-40 of `most`.
+    fn number(&mut self, most: f32) -> f32 {
+        self.unit() * most * (20.0 * (self.unit() - 1.0)).exp2()
+    }
+
+    fn numbers(&mut self, most: f32) -> Vec3 {
+        Vec3::new(self.number(most), self.number(most), self.number(most))
+    }
+
+    /// A ray that has a single t, and a point that it meets there, no larger than f32 can tell: the smallest box with f32 bounds. Points and origins are of all sizes, axis by
+    /// axis, some of them no normal numbers. The ray that is meant has a direction that differs by up to `turn` times the largest component. None where there is no
+    /// valid one.
+    pub fn ray_and_point(&mut self, turn: f32) -> Option<(Ray, Aabb)> {
+        let mut size = || [1.0, 1e6, 1e-6, 1e-39][(2.0 * self.unit() + 2.0) as usize % 4];
+        let (near, far) = (size(), size());
+        let (origin, t) = (self.numbers(far), self.number(1e3).abs());
+        let direction = (self.numbers(near) - origin) / t;
+        let turned = self.vec3().as_dvec3() * f64::from(turn * direction.abs().max_element());
+        let way = (direction.as_dvec3() + turned) * f64::from(t);
+        // Off by less than 2^-50 of the larger of both terms.
+        let (point, off) = (origin.as_dvec3() + way, (origin.abs().as_dvec3() + way.abs()) * 2f64.powi(-50));
+        let below = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
+        let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
+        let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
+        ray.is_valid().then(|| (ray, Aabb { min: low(point - off), max: -low(-point - off) }))
     }
 }

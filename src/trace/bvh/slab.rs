@@ -177,50 +177,21 @@ fn lanes<S: Simd>(v: Vec3) -> S::V4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Aabb, DVec3};
+    use crate::math::Aabb;
     use crate::trace::bvh::alone::SingleRay;
     use crate::trace::bvh::node::{Child, Tree};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::ready::ReadyRays;
     use crate::trace::bvh::simd::Portable;
 
-    /// A number of either sign and any size down to 2^-40 of `most`.
-    fn number(random: &mut Random, most: f32) -> f32 {
-        random.unit() * most * (20.0 * (random.unit() - 1.0)).exp2()
-    }
-
-    fn vector(random: &mut Random, most: f32) -> Vec3 {
-        Vec3::new(number(random, most), number(random, most), number(random, most))
-    }
-
-    /// The smallest box with f32 bounds around a point that is off by `off` at most.
-    fn around(point: DVec3, off: DVec3) -> Aabb {
-        let below = |x: f64| if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() };
-        let low = |v: DVec3| Vec3::new(below(v.x), below(v.y), below(v.z));
-        Aabb { min: low(point - off), max: -low(-point - off) }
-    }
-
-    /// A point that a ray meets, no larger than f32 can tell: its box is entered at its t, whoever makes the ray ready, and whatever lies
-    /// beside it far away. Points, origins and directions are of all sizes, axis by axis, some of them no normal numbers; and directions may be off.
+    /// The box around a point of a ray is entered at its t, whoever makes the ray ready, and whatever lies beside it far away; also where the ray is off.
     #[test]
     fn no_point_of_a_ray_is_lost() {
-        const SIZES: [f32; 4] = [1.0, 1e6, 1e-6, 1e-39];
         let (mut random, mut valid) = (Random::new(31), 0);
         for round in 0..240_000 {
-            let [near, far] = [round % 4, round / 4 % 4].map(|size| SIZES[size]);
-            let (origin, t) = (vector(&mut random, far), number(&mut random, 1e3).abs());
-            let direction = (vector(&mut random, near) - origin) / t;
-            let ray = Ray { tmin: t, tmax: t, ..Ray::new(origin, direction) };
-            if !ray.is_valid() {
-                continue;
-            }
-            valid += 1;
-            // The ray that is meant, and of it a point, which is off by less than 2^-50 of the larger of both terms.
             let turn = [0.0, SLIGHT * 0.99][round / 16 % 2];
-            let turned = random.vec3().as_dvec3() * f64::from(turn * direction.abs().max_element());
-            let way = (direction.as_dvec3() + turned) * f64::from(t);
-            let point = origin.as_dvec3() + way;
-            let bounds = around(point, (origin.abs().as_dvec3() + way.abs()) * 2f64.powi(-50));
+            let Some((ray, bounds)) = random.ray_and_point(turn) else { continue };
+            valid += 1;
             let mut node = Node::empty();
             let slot = round % 8;
             node.set(slot, &bounds, Child::leaf(0, 1));
@@ -229,7 +200,7 @@ mod tests {
                 node.set((slot + 1) % 8, &Aabb { min: far, max: far }, Child::leaf(1, 1));
             }
             let tree = Tree::new(vec![node]);
-            let limit = t * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE;
+            let limit = ray.tmax * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE;
             // An origin in an object's coordinates is never without.
             let blur = if turn == 0.0 { Blur::NONE } else { Blur { origin: f32::MIN_POSITIVE, direction: turn } };
             let mut rays = ReadyRays::new(std::slice::from_ref(&ray), tree.reach(), blur);

@@ -184,3 +184,37 @@ impl Enter for Beam {
         self.between(near, far, limit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::trace::bvh::node::{Child, Tree};
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
+
+    /// As of single rays: the box around a point of a ray that makes up a beam is entered, in the tree and as that around a triangle, whatever lies far away.
+    #[test]
+    fn no_point_of_a_beam_is_lost() {
+        let (mut random, mut beams) = (Random::new(32), 0);
+        for round in 0..240_000 {
+            let Some((ray, bounds)) = random.ray_and_point(0.0) else { continue };
+            let (mut node, mut block) = (Node::empty(), Block::EMPTY);
+            node.set(0, &bounds, Child::leaf(0, 1));
+            block.push([bounds.min, bounds.max, bounds.min], 0, 0);
+            if round % 2 == 0 {
+                let far = Vec3::splat(1e9);
+                node.set(1, &Aabb { min: far, max: far }, Child::leaf(1, 1));
+            }
+            let mut packet = Packet::NONE;
+            (0..Packet::RAYS).for_each(|lane| packet.set(lane, &ray));
+            let Some(beam) = Beam::new::<Portable, 1>(&[&packet], Tree::new(vec![node]).bounds()) else { continue };
+            beams += 1;
+            let (entered, _) = beam.enter::<Portable>(&node, beam.limit);
+            assert!(entered.bits() & 1 == 1, "{ray:?} misses {bounds:?}");
+            let met = beam.triangles::<Portable>(&block, beam.limit);
+            assert!(met & 1 == 1, "{ray:?} misses the triangle in {bounds:?}");
+        }
+        assert!(beams > 100_000, "{beams}");
+    }
+}
