@@ -257,6 +257,29 @@ fn a_render_writes_pictures_and_statistics_and_says_so() {
     assert!(stats["engines"][0]["bytes_per_triangle"].as_f64().is_some_and(|x| x > 12.0), "{stats}");
 }
 
+/// Faces that a file holds twice, a floor upon a floor, and one group twice in one place: every ray that hits one hits another at the same t, and that is no reason to reckon exactly.
+#[test]
+fn surfaces_that_lie_on_each_other_ask_for_no_exact_decisions() {
+    let folder = Folder::new();
+    let faces = "f 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
+    let turned = "f 2 5 1\nf 5 3 2\nf 5 3 4\nf 1 4 5\n";
+    let corners = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 1.5 0\n";
+    let floors = "v -4 0 -4\nv 5 0 -4\nv 4 0 6\nv -5 0 3\nf 6 8 7\nf 6 9 8\nf 6 9 7\nf 9 8 7\n";
+    std::fs::write(folder.path("scene.obj"), format!("{corners}{faces}{turned}{floors}")).expect("a file");
+    let instance = "[[instance]]\ngroup = \"m\"\ntransform = { rotate = [1, 2, 3, 40] }\n";
+    let placed = format!("[[group.m.file]]\npath = \"scene.obj\"\n{}", instance.repeat(2));
+    std::fs::write(folder.path("twice.toml"), placed).expect("a file");
+    for scene in ["scene.obj", "twice.toml"] {
+        let (scene, picture, stats) = (folder.path(scene), folder.path("out.png"), folder.path("stats.json"));
+        let output = twincast(&["render", &scene, "-o", &picture, "--stats", &stats, "--size", "128x128", "--spp", "1"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(stats).unwrap()).expect("JSON");
+        let rays = &stats["engines"][0]["rays"];
+        assert!(rays["exact"].as_u64().is_some_and(|exact| exact < 100), "{rays}");
+        assert_eq!(rays["camera"], 128 * 128);
+    }
+}
+
 #[test]
 fn threads_tile_orders_and_packets_give_the_same_file() {
     let folder = Folder::new();

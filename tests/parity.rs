@@ -226,6 +226,60 @@ fn degenerate_meshes() {
     assert_parity(&scenes::of_mesh(Mesh::default()), &scenes::rays(100, &[Vec3::ONE], 1));
 }
 
+/// Faces that are there twice, turned and in another order; plates upon plates, along an axis and aslant; objects placed in one place: rays hit both at one t, and the lower id counts.
+#[test]
+fn surfaces_that_lie_on_each_other() {
+    let mut random = Random::new(21);
+    let sphere = scenes::bumpy_sphere(16, 0.2, 6);
+    let turned = sphere.triangles.iter().rev().enumerate().map(|(i, &[a, b, c])| match i % 4 {
+        0 => [a, b, c],
+        1 => [b, c, a],
+        2 => [c, b, a],
+        _ => [b, a, c],
+    });
+    let twice = Mesh::new(sphere.positions.to_vec(), turned.chain(sphere.triangles.iter().copied()).collect());
+    // A quarter of them shares nothing with those of the others but the plane.
+    let (mut plates, mut corners) = (Vec::new(), Vec::new());
+    for i in 0..80u32 {
+        let p = |random: &mut Random| {
+            let [x, y] = [random.unit(), random.unit()].map(|x| (x * 64.0).round() / 32.0);
+            match i % 4 {
+                0 => Vec3::new(x, 0.5, y),
+                1 => Vec3::new(-1.25, x, y),
+                2 => Vec3::new(x, y, 0.7),
+                _ => Vec3::new(x, y, x + 0.5 * y),
+            }
+        };
+        corners.extend((0..3).map(|_| p(&mut random)));
+        plates.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let mut rays = scenes::rays(1500, &twice.positions.to_vec(), 4);
+    rays.extend(scenes::rays(500, &corners, 5));
+    // Of two cameras, one of them so far away that rays come by ones and twos.
+    for (eye, width) in [(Vec3::new(2.0, 3.0, 4.0), 0.1), (Vec3::new(1.0, -2.0, 3.0), 1.0)] {
+        for _ in 0..10 {
+            let towards = random.vec3() - eye;
+            rays.extend((0..64).map(|_| Ray::new(eye, towards + random.vec3() * width)));
+        }
+    }
+    let mut scene = scenes::of_mesh(twice);
+    let hits = assert_parity(&scene, &rays);
+    assert!(hits > 800, "{hits} hits");
+    let hits = assert_parity(&scenes::of_mesh(Mesh::new(corners, plates)), &rays);
+    assert!(hits > 800, "{hits} hits");
+
+    // The same group four times, three of them in one place, and among these one whose faces lie on those of the other group.
+    let place = |scene: &Scene, name: &str, shift: f64| twincast::scene::Instance {
+        name: name.into(),
+        transform: twincast::math::DAffine3::from_translation(twincast::math::DVec3::splat(shift)),
+        ..scene.instances[0].clone()
+    };
+    scene.instances =
+        [("a", 0.3), ("b", 0.0), ("c", 0.3), ("d", 0.3)].map(|(name, shift)| place(&scene, name, shift)).to_vec();
+    let hits = assert_parity(&scene, &rays);
+    assert!(hits > 800, "{hits} hits");
+}
+
 #[test]
 fn deep_trees() {
     // Coincident triangles cannot be told apart by any plane.

@@ -9,14 +9,16 @@ use twincast::{Hit, Ray, Tracer, World};
 use super::{closest_triangle, grid_sphere};
 use crate::scenes::{Random, soup};
 
-/// Spheres whose corners are exact, and triangles without order.
+/// Spheres whose corners are exact, a copy of one with its faces in another order and turned, and triangles without order.
 fn world() -> (World, Vec<Vec3>) {
     let sphere = grid_sphere(9, 1);
     let larger: Vec<Vec3> = sphere.positions.iter().map(|&p| p * 2.0).collect();
     let larger = Mesh::new(larger, sphere.triangles.to_vec());
+    let turned = larger.triangles.iter().rev().map(|&[a, b, c]| [c, b, a]);
+    let copy = Mesh::new(larger.positions.to_vec(), turned.collect());
     let mut corners = sphere.positions.to_vec();
     corners.extend(&larger.positions[..]);
-    let geometries = vec![Geometry::Mesh(sphere), Geometry::Mesh(larger), Geometry::Mesh(soup(300, 0.2, 3))];
+    let geometries = [sphere, larger, copy, soup(300, 0.2, 3)].map(Geometry::Mesh).to_vec();
     let scene = Scene::from_geometries(geometries, vec![Material::default()]);
     (World::new(&scene).expect("a world"), corners)
 }

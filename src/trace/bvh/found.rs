@@ -6,6 +6,7 @@
 
 use super::Bvh;
 use super::block::{Block, LANES};
+use super::coplanar::Spot;
 use super::filter::Candidates;
 use super::listed::Listed;
 use super::query::Query;
@@ -135,12 +136,23 @@ impl Found {
                     }
                     continue;
                 }
-                if low > self.limit {
+                if low > self.limit || self.settle(bvh, place, LANES as u32 * index + lane as u32) {
                     continue;
                 }
             }
             self.decide(bvh, place, index, block, lane, ray);
         }
+    }
+
+    /// Notes the one that counts, of the triangle that is noted and another that is hit for sure, if they are seen to lie in one plane. Whether they are.
+    #[inline(always)]
+    fn settle(&mut self, bvh: &Bvh, place: u32, id: u32) -> bool {
+        let noted = Spot { place: self.place, id: self.noted };
+        let first = if self.is_noted() { bvh.first_of_plane(noted, Spot { place, id }) } else { None };
+        first.is_some_and(|first| {
+            (self.place, self.noted) = (first.place, first.id);
+            true
+        })
     }
 
     /// As it was when it was left: a ray's [`Self::range`], and what is noted, and where that is.

@@ -28,6 +28,7 @@
 //! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |
 //! | `block`, `woop`, `planes`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
+//! | `coplanar` | surfaces that lie on each other |
 //! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
 //! | `steps` | what a ray cannot but look at, counted |
 //! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
@@ -53,6 +54,7 @@ mod candidates;
 mod certain;
 mod closest_point;
 mod clusters;
+mod coplanar;
 mod discs;
 mod edges;
 mod filter;

@@ -21,6 +21,7 @@ use std::ops::ControlFlow;
 use super::Bvh;
 use super::block::{Block, LANES};
 use super::candidates;
+use super::coplanar::Spot;
 use super::filter::{Candidates, Filter};
 use super::found::{Found, NONE};
 use super::isa::{self, Kernel};
@@ -237,7 +238,7 @@ impl Noted {
                     }
                     continue;
                 }
-                if low > self.limit {
+                if low > self.limit || self.settle(bvh, place, LANES as u32 * index + lane as u32) {
                     continue;
                 }
             }
@@ -247,6 +248,17 @@ impl Noted {
             }
         }
         false
+    }
+
+    /// Notes the one that counts, of the triangle that is noted and another that is hit for sure, if they are seen to lie in one plane. Whether they are.
+    #[inline(always)]
+    fn settle(&mut self, bvh: &Bvh, place: u32, id: u32) -> bool {
+        let noted = Spot { place: self.place, id: self.id };
+        let first = if self.id != NONE { bvh.first_of_plane(noted, Spot { place, id }) } else { None };
+        first.is_some_and(|first| {
+            (self.place, self.id) = (first.place, first.id);
+            true
+        })
     }
 
     /// Decides whether the ray hits one triangle of a block. By value, so that it need not lie in memory before.

@@ -1,10 +1,11 @@
 //! Rays of a packet of which bounds left in doubt what they hit: decided as single rays, at once.
 
-use super::octet::Octet;
+use super::octet::{Met, Octet};
 use super::{MOST, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::found::Found;
+use crate::trace::bvh::coplanar::Spot;
+use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Vector};
@@ -23,7 +24,7 @@ impl<'a> Doubts<'a> {
         Self { found, known: 0 }
     }
 
-    /// Decides of the rays of the bit mask `open`, of packet `number`, whether they hit triangle `id` of a block.
+    /// Decides of the rays of packet `number` that `met` leaves open whether they hit triangle `id` of a block.
     #[cold]
     #[inline(never)]
     #[expect(clippy::too_many_arguments, reason = "a triangle, and what is known of eight rays")]
@@ -33,12 +34,20 @@ impl<'a> Doubts<'a> {
         number: usize,
         packet: &Packet,
         octet: &mut Octet<V>,
-        open: u32,
+        met: &Met,
         block: &Block,
         id: u32,
     ) {
-        for lane in (0..RAYS).filter(|lane| open >> lane & 1 != 0) {
+        for lane in super::each(met.open) {
             if octet.limit[lane] < 0.0 {
+                continue;
+            }
+            let noted = Spot { place: FIXED, id: octet.noted(lane) };
+            if noted.id != NONE
+                && met.sure >> lane & 1 != 0
+                && let Some(first) = bvh.first_of_plane(noted, Spot { place: FIXED, id })
+            {
+                octet.note(lane, first.id);
                 continue;
             }
             let ray = packet.ray(lane);

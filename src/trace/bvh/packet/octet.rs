@@ -43,6 +43,12 @@ pub(super) struct Met {
     pub changed: bool,
     /// A bit for each ray of which it is in doubt.
     pub open: u32,
+    /// And for each that hits it for sure: only the order is.
+    pub sure: u32,
+}
+
+impl Met {
+    const NOTHING: Self = Self { changed: false, open: 0, sure: 0 };
 }
 
 impl<V: Vector + Array<RAYS>> Octet<V> {
@@ -108,7 +114,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         let sides = Sides::new(&Sheared { x, y, z }, &self.margin, size, None);
         let passed = sides.passed() & self.asked;
         if passed == 0 {
-            return Met { changed: false, open: 0 };
+            return Met::NOTHING;
         }
         let judged = woop::judge::<V, false, false>(
             &sides,
@@ -123,7 +129,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
                 planes::heights(corners, [ox, oy, oz], 0.0)
             },
         );
-        let Some(Judged { lanes, sure, low, high }) = judged else { return Met { changed: false, open: 0 } };
+        let Some(Judged { lanes, sure, low, high }) = judged else { return Met::NOTHING };
         let (limit, before) = (V::load(&self.limit), V::load(&self.sure));
         let nearest = sure.and(self.tmin.at_most(low)).and(high.at_most(before));
         let beyond = sure.and(limit.less(low));
@@ -135,7 +141,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
             V::select(nearest, splat(f32::from_bits(id)), V::load(&self.noted)).overwrite(&mut self.noted);
             self.hit |= taken;
         }
-        Met { changed: taken != 0, open: lanes & !taken & !beyond.bits() }
+        Met { changed: taken != 0, open: lanes & !taken & !beyond.bits(), sure: sure.bits() }
     }
 
     /// What is noted for a ray.
@@ -147,6 +153,11 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
     #[inline(always)]
     pub fn all_noted(&self) -> [u32; RAYS] {
         bytemuck::cast(self.noted)
+    }
+
+    /// Another is, in the same plane.
+    pub fn note(&mut self, lane: usize, id: u32) {
+        self.noted[lane % RAYS] = f32::from_bits(id);
     }
 
     /// What was noted for a ray has been computed.

@@ -46,7 +46,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
                         changed |= met.changed;
                         if met.open != 0 {
                             let packet = asked.packets[number % N];
-                            doubts.decide::<Q, S::V8>(bvh, number, packet, octet, met.open, block, id);
+                            doubts.decide::<Q, S::V8>(bvh, number, packet, octet, &met, block, id);
                             changed = true;
                         }
                     }

@@ -164,6 +164,10 @@ impl<Q: Query> Walk<'_, Q> {
             if self.bundle.is_turned {
                 open &= !self.behind_starts::<S>(edges, pair);
             }
+            if !Q::ANY {
+                let sure = open & self.inside::<S>(edges, pair);
+                open &= !self.settle(first + pair.lane() as u32, pair.group::<S>() * S::Wide::LANES, sure);
+            }
             changed |= self.decide_all::<S>(first, pair, open);
         }
         changed
@@ -192,6 +196,13 @@ impl<Q: Query> Walk<'_, Q> {
             changed |= self.decide(ray, first + pair.lane() as u32);
         }
         changed
+    }
+
+    /// A bit for each ray that passes within the triangle for sure.
+    #[inline(always)]
+    fn inside<S: Simd>(&self, edges: &Edges, pair: Pair) -> u32 {
+        let [u, v, w] = pair.sides::<S>(edges, self.bundle);
+        S::Wide::splat(edges.edge_error[pair.lane()]).less(u.min(v).min(w)).bits()
     }
 
     /// A bit for each ray of a turned bundle that starts beyond the triangle's plane.

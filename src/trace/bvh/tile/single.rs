@@ -150,7 +150,7 @@ impl<Q: Query> Walk<'_, Q> {
                     changed = true;
                     continue;
                 }
-                if low[lane] > self.found.limit.0[ray] {
+                if low[lane] > self.found.limit.0[ray] || self.settle(first + lane as u32, ray, 1) != 0 {
                     continue;
                 }
             }

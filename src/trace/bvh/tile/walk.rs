@@ -10,6 +10,8 @@ use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS, SLACK, TINY};
+use crate::trace::bvh::coplanar::Spot;
+use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::rows;
@@ -81,6 +83,35 @@ impl<Q: Query> Walk<'_, Q> {
             changed |= S::apart(Meeting { walk: self, index, rows, most });
         }
         changed
+    }
+
+    /// Of rays from `ray` on, a bit each, that hit triangle `id` for sure: those whose noted triangle is seen to lie in one plane with it, so that nothing is left to be decided. Noted is then
+    /// whichever counts.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn settle(&mut self, id: u32, ray: usize, mut sure: u32) -> u32 {
+        let Self { bvh, place, found, .. } = self;
+        let (other, mut settled, mut last) = (Spot { place: *place, id }, 0, None);
+        while sure != 0 {
+            let lane = sure.trailing_zeros();
+            let ray = (ray + lane as usize) % RAYS;
+            sure &= sure - 1;
+            let noted = Spot { place: found.place[ray], id: found.noted[ray] };
+            if noted.id == NONE {
+                continue;
+            }
+            // Neighbours mostly hit the same two.
+            let first = match last {
+                Some((same, first)) if same == noted => first,
+                _ => bvh.first_of_plane(noted, other),
+            };
+            last = Some((noted, first));
+            if let Some(first) = first {
+                (found.place[ray], found.noted[ray]) = (first.place, first.id);
+                settled |= 1 << lane;
+            }
+        }
+        settled
     }
 
     /// What the bounds leave open.
