@@ -271,7 +271,8 @@ fn surfaces_that_lie_on_each_other_ask_for_no_exact_decisions() {
     std::fs::write(folder.path("twice.toml"), placed).expect("a file");
     for scene in ["scene.obj", "twice.toml"] {
         let (scene, picture, stats) = (folder.path(scene), folder.path("out.png"), folder.path("stats.json"));
-        let output = twincast(&["render", &scene, "-o", &picture, "--stats", &stats, "--size", "128x128", "--spp", "1"]);
+        let output =
+            twincast(&["render", &scene, "-o", &picture, "--stats", &stats, "--size", "128x128", "--spp", "1"]);
         assert!(output.status.success(), "{}", text(&output.stderr));
         let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(stats).unwrap()).expect("JSON");
         let rays = &stats["engines"][0]["rays"];

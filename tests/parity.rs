@@ -268,14 +268,15 @@ fn surfaces_that_lie_on_each_other() {
     let hits = assert_parity(&scenes::of_mesh(Mesh::new(corners, plates)), &rays);
     assert!(hits > 800, "{hits} hits");
 
-    // The same group four times, three of them in one place, and among these one whose faces lie on those of the other group.
-    let place = |scene: &Scene, name: &str, shift: f64| twincast::scene::Instance {
+    // The same group five times, three of them in one place, and one next to it, nearer than bounds tell.
+    let place = |scene: &Scene, name: &str, shift: f32| twincast::scene::Instance {
         name: name.into(),
-        transform: twincast::math::DAffine3::from_translation(twincast::math::DVec3::splat(shift)),
+        transform: twincast::math::DAffine3::from_translation(twincast::math::DVec3::splat(shift.into())),
         ..scene.instances[0].clone()
     };
-    scene.instances =
-        [("a", 0.3), ("b", 0.0), ("c", 0.3), ("d", 0.3)].map(|(name, shift)| place(&scene, name, shift)).to_vec();
+    scene.instances = [("a", 0.3), ("b", 0.0), ("c", 0.3f32.next_up()), ("d", 0.3), ("e", 0.3)]
+        .map(|(name, shift)| place(&scene, name, shift))
+        .to_vec();
     let hits = assert_parity(&scene, &rays);
     assert!(hits > 800, "{hits} hits");
 }

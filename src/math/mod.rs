@@ -5,6 +5,7 @@
 //! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
 
 pub mod expansion;
+pub(crate) mod integers;
 pub mod number;
 
 pub use glam::{

@@ -9,16 +9,20 @@
 use super::expansion::{Expansion, count_decision};
 use super::{DVec3, UNIT_ROUNDOFF_64};
 
-/// What a polynomial is evaluated in.
-pub trait Number: Clone {
-    /// A finite number, exactly.
-    fn new(x: f64) -> Self;
+/// What sums and products are computed in.
+pub trait Ring: Clone {
     /// The sum.
     fn add(&self, other: &Self) -> Self;
     /// The difference.
     fn sub(&self, other: &Self) -> Self;
     /// The product.
     fn mul(&self, other: &Self) -> Self;
+}
+
+/// What a polynomial is evaluated in.
+pub trait Number: Ring {
+    /// A finite number, exactly.
+    fn new(x: f64) -> Self;
 }
 
 /// An f64, and how far it may be from the exact value.
@@ -53,6 +57,9 @@ impl Number for Bounded {
     fn new(value: f64) -> Self {
         Self { value, error: 0.0 }
     }
+}
+
+impl Ring for Bounded {
     #[inline(always)]
     fn add(&self, other: &Self) -> Self {
         let value = self.value + other.value;
@@ -76,6 +83,9 @@ impl Number for Expansion {
     fn new(x: f64) -> Self {
         x.into()
     }
+}
+
+impl Ring for Expansion {
     fn add(&self, other: &Self) -> Self {
         self + other
     }
@@ -126,31 +136,31 @@ pub fn vector<N: Number>(v: DVec3) -> Vector<N> {
 
 /// The difference.
 #[inline(always)]
-pub fn minus<N: Number>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
+pub fn minus<N: Ring>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
     [a[0].sub(&b[0]), a[1].sub(&b[1]), a[2].sub(&b[2])]
 }
 
 /// The sum.
 #[inline(always)]
-pub fn plus<N: Number>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
+pub fn plus<N: Ring>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
     [a[0].add(&b[0]), a[1].add(&b[1]), a[2].add(&b[2])]
 }
 
 /// The product with a number.
 #[inline(always)]
-pub fn times<N: Number>(a: &Vector<N>, b: &N) -> Vector<N> {
+pub fn times<N: Ring>(a: &Vector<N>, b: &N) -> Vector<N> {
     [a[0].mul(b), a[1].mul(b), a[2].mul(b)]
 }
 
 /// The scalar product.
 #[inline(always)]
-pub fn dot<N: Number>(a: &Vector<N>, b: &Vector<N>) -> N {
+pub fn dot<N: Ring>(a: &Vector<N>, b: &Vector<N>) -> N {
     a[0].mul(&b[0]).add(&a[1].mul(&b[1])).add(&a[2].mul(&b[2]))
 }
 
 /// The vector product.
 #[inline(always)]
-pub fn cross<N: Number>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
+pub fn cross<N: Ring>(a: &Vector<N>, b: &Vector<N>) -> Vector<N> {
     let minor = |i: usize, j: usize| a[i].mul(&b[j]).sub(&a[j].mul(&b[i]));
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }

@@ -11,9 +11,10 @@
 //! that touches an edge or a corner from one side crosses twice (in and out), or not at all. To keep one of the hits whose t
 //! differ by little, the simpler alternative, needs a tolerance, counts a touched silhouette once, and loses thin walls.
 
+use super::exactly::Seen;
 use super::triangle::{Corners, TriangleHit, intersect, intersect_line};
 use crate::math::DVec3;
-use crate::math::expansion::{Expansion, count_decision, cross, dot};
+use crate::math::expansion::count_decision;
 use crate::ray::Ray;
 
 /// A hit, and where in the triangle it is.
@@ -63,29 +64,16 @@ fn with_place(origin: DVec3, d: DVec3, corners: &impl Corners, hit: TriangleHit)
 #[inline(never)]
 fn touch(origin: DVec3, d: DVec3, corners: &impl Corners) -> Option<Touch> {
     count_decision();
-    let origin = origin.to_array().map(Expansion::from);
-    let d = d.to_array().map(Expansion::from);
-    let p = corners.exact().map(|p| [0, 1, 2].map(|i| &p[i] - &origin[i]));
-    let mut between = [true; 3];
-    let (mut signs, mut sum) = ([0; 3], 0);
-    for k in 0..3 {
-        let (from, to) = (&p[(k + 1) % 3], &p[(k + 2) % 3]);
-        let sign = dot(&d, &cross(from, to)).signum();
-        between[k] = sign != 0;
-        sum += sign;
-        signs[k] = if sign != 0 { sign } else { sign_aside(&d, from, to) };
-    }
+    let signs = match Seen::in_integers(origin, d, [corners.in_f64()]) {
+        Some(seen) => seen.signs_aside(),
+        None => Seen::in_expansions(origin, d, corners).signs_aside(),
+    };
+    let between = signs.map(|[sign, _]| sign != 0);
     if between == [true; 3] {
         return None;
     }
-    let is_crossed = signs.iter().all(|&sign| sign == signs[0]);
-    Some(Touch { between, is_leaving: sum > 0, is_crossed })
-}
-
-/// The sign of an edge's volume that is zero, after the move; 0 for an edge along the ray, which hit triangles lack.
-fn sign_aside(d: &[Expansion; 3], from: &[Expansion; 3], to: &[Expansion; 3]) -> i32 {
-    let edge = [0, 1, 2].map(|i| &to[i] - &from[i]);
-    cross(d, &edge).iter().map(Expansion::signum).find(|&sign| sign != 0).unwrap_or(0)
+    let is_crossed = signs.iter().all(|[_, aside]| *aside == signs[0][1]);
+    Some(Touch { between, is_leaving: signs.iter().map(|[sign, _]| sign).sum::<i32>() > 0, is_crossed })
 }
 
 #[cfg(test)]

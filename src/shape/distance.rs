@@ -11,6 +11,7 @@
 
 use std::cmp::Ordering;
 
+use super::exactly::Seen;
 use super::triangle::{Corners, Placed};
 use crate::math::expansion::{Expansion, count_decision, cross, dot};
 use crate::math::{Affine3, DVec3, Vec3};
@@ -44,6 +45,17 @@ pub(crate) enum Support {
 /// How far apart two t may be, relative to the larger, whose order is not that of what they stand for: twice the error of
 /// each.
 const UNORDERED: f64 = 1.0 / (1 << 25) as f64;
+
+impl Support {
+    /// Of a triangle, in the world, where f64 holds them.
+    fn corners(&self) -> Option<[DVec3; 3]> {
+        match self {
+            Self::Triangle(corners) => corners.in_f64(),
+            Self::Placed(corners, to_world) => Placed { corners: *corners, to_world }.in_f64(),
+            Self::Itself | Self::Unknown | Self::Plane(..) => None,
+        }
+    }
+}
 
 impl Distance {
     /// One that is known to be in order with every other.
@@ -79,6 +91,11 @@ impl Distance {
             }
             _ => {
                 count_decision();
+                let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                let corners = [self.support.corners(), other.support.corners()];
+                if let Some(seen) = Seen::in_integers(origin, direction, corners) {
+                    return Some(seen.order());
+                }
                 let ([a, b], [c, d]) = (self.fraction(ray), other.fraction(ray));
                 let difference = (&(&a * &d) - &(&c * &b)).signum();
                 Some((difference * b.signum() * d.signum()).cmp(&0))

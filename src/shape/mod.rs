@@ -13,6 +13,7 @@ mod cylinder;
 mod disk;
 pub(crate) mod distance;
 mod ellipsoid;
+mod exactly;
 mod flat;
 mod line;
 mod plane;

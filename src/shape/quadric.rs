@@ -70,7 +70,7 @@ fn is_good([a, b, c, e, s]: &[Bounded; 5]) -> bool {
 pub(super) mod tests {
     use super::*;
     use crate::math::expansion::Expansion;
-    use crate::math::number::Number;
+    use crate::math::number::Ring;
     use crate::math::{DVec3, Vec3};
     use crate::ray::Ray;
     use crate::shape::line::Line;

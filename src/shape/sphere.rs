@@ -107,6 +107,7 @@ mod tests {
     fn the_bounds_by_hand_cover_the_errors() {
         use crate::lab::rays::Random;
         use crate::math::expansion::Expansion;
+        use crate::math::number::Ring;
         for case in 0..5000 {
             let mut random = Random::new(1, case);
             let sphere = Sphere { centre: random.vector() * 9.0, radius: random.unit() };

@@ -12,7 +12,8 @@
 //! A zero volume counts as inside; a ray in the triangle's plane and a triangle without an area miss.
 
 use super::distance::Support;
-use crate::math::expansion::{Expansion, count_decision, cross, dot};
+use super::exactly;
+use crate::math::expansion::{Expansion, count_decision, dot};
 use crate::math::{Affine3, DVec3, Vec3, gamma64};
 use crate::ray::Ray;
 
@@ -39,6 +40,10 @@ pub(crate) trait Corners {
     fn slack(&self) -> [DVec3; 3];
     /// The corners as they are.
     fn exact(&self) -> [[Expansion; 3]; 3];
+    /// The same where f64 holds them.
+    fn in_f64(&self) -> Option<[DVec3; 3]> {
+        Some(self.rounded())
+    }
     /// What the t of a hit follows from.
     fn support(&self) -> Support;
 }
@@ -115,6 +120,23 @@ impl Corners for Placed<'_> {
                 &dot(&row, &p) + &translation[i].into()
             })
         })
+    }
+    fn in_f64(&self) -> Option<[DVec3; 3]> {
+        let (matrix, translation) = (self.to_world.matrix3, self.to_world.translation);
+        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3::as_dvec3);
+        let mut exact = [translation.as_dvec3(); 3];
+        for (sum, corner) in exact.iter_mut().zip(&self.corners) {
+            for (axis, &length) in axes.iter().zip(&corner.to_array()) {
+                // Products of f32 are exact.
+                let term = *axis * f64::from(length);
+                let next = *sum + term;
+                if next - *sum != term || next - term != *sum {
+                    return None;
+                }
+                *sum = next;
+            }
+        }
+        Some(exact)
     }
     #[inline]
     fn support(&self) -> Support {
@@ -239,19 +261,10 @@ fn intersect_exactly(origin: DVec3, direction: DVec3, corners: &impl Corners) ->
     count_decision();
     #[cfg(test)]
     tests::EXACT.with(|count| count.set(count.get() + 1));
-    let origin = origin.to_array().map(Expansion::from);
-    let d = direction.to_array().map(Expansion::from);
-    let [a, b, c] = corners.exact().map(|p| [0, 1, 2].map(|i| &p[i] - &origin[i]));
-    let bc = cross(&b, &c);
-    let volumes = [dot(&d, &bc), dot(&d, &cross(&c, &a)), dot(&d, &cross(&a, &b))];
-    let signs = [volumes[0].signum(), volumes[1].signum(), volumes[2].signum()];
-    if signs.contains(&1) == signs.contains(&-1) {
-        // Outside, or all three zero: no area seen from the ray.
-        return None;
+    match exactly::Seen::in_integers(origin, direction, [corners.in_f64()]) {
+        Some(seen) => seen.hit(),
+        None => exactly::Seen::in_expansions(origin, direction, corners).hit(),
     }
-    let determinant = (&(&volumes[0] + &volumes[1]) + &volumes[2]).estimate();
-    let share = |numerator: &Expansion| numerator.estimate() / determinant;
-    Some(TriangleHit { t: share(&dot(&a, &bc)), u: share(&volumes[1]), v: share(&volumes[2]) })
 }
 
 /// The cross product with every minus made a plus: bounds the rounding error of the real one.

@@ -58,12 +58,12 @@ fn trace_one<S: Simd>(
         noted.is_doubted = true;
         doubted.insert(Walked::NONE).take([noted.sure, noted.limit], found.nearest[i]);
     }
-    let before = (noted.sure, noted.id);
+    let before = (noted.sure, noted.place, noted.id);
     match ready {
         Some(ready) => bvh.walk_place_ready::<S>(place, &single, ready, &mut noted, &mut doubted),
         None => bvh.walk_place::<S, Closest>(place, &single, ray, &mut noted, &mut doubted),
     }
-    if noted.is_doubted || before != (noted.sure, noted.id) {
+    if noted.is_doubted || before != (noted.sure, noted.place, noted.id) {
         range.set(i, noted.sure, noted.limit.min(range.limit.0[i]));
         (found.noted[i], found.place[i]) = (noted.id, noted.place);
         if noted.id == NONE
