@@ -18,7 +18,7 @@ pub(crate) struct Integers<const K: usize> {
     pub exponent: i32,
 }
 
-/// Beside the bits of three factors: a sign, three for six products, and two for the sum of three such sums.
+/// Beside the bits of three factors: a sign, three for six products, and two for the sum of three such sums, or where two of the factors are edges, one bit longer each.
 const SPARE: u32 = 6;
 
 impl<const K: usize> Integers<K> {
