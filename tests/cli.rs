@@ -257,7 +257,7 @@ fn a_render_writes_pictures_and_statistics_and_says_so() {
     assert!(stats["engines"][0]["bytes_per_triangle"].as_f64().is_some_and(|x| x > 12.0), "{stats}");
 }
 
-/// Faces that a file holds twice, a floor upon a floor, and one group twice in one place: every ray that hits one hits another at the same t, and that is no reason to reckon exactly.
+/// Faces that a file holds twice, a floor upon a floor, and one group twice in one place: every ray that hits one hits another at the same t, and that is no reason to reckon exactly, whoever looks at the corners first.
 #[test]
 fn surfaces_that_lie_on_each_other_ask_for_no_exact_decisions() {
     let folder = Folder::new();

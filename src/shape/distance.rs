@@ -3,7 +3,7 @@
 //! The t of a hit is an f64 that is off by at most 2^-26 of itself. Two that are farther apart are in order as they are.
 //! Of the others, and there are none but where surfaces all but touch, t is a fraction: with p a point of the plane that
 //! is hit and n its normal, t = (p - o) . n / d . n for a ray from o along d. Both its parts are sums of products of the
-//! numbers that are stored, and are computed without rounding ([`Expansion`]); so are the products that tell which
+//! numbers that are stored, and are computed without rounding ([`Integers`](crate::math::integers::Integers), or [`Expansion`]); so are the products that tell which
 //! fraction is the smaller. Triangles of one plane are hit at exactly the same t, whatever the order of their corners; most show it
 //! [at a glance](are_coplanar), a hundred times as fast.
 //!
@@ -155,8 +155,10 @@ mod tests {
 
     #[test]
     fn corners_in_any_order_are_as_far() {
-        let [a, b, c] = [Vec3::new(-0.7, -0.4, 0.1), Vec3::new(0.9, -0.3, -0.2), Vec3::new(0.1, 0.8, 0.3)];
-        let mut differ = 0;
+        // Of so few digits that the middle of two is f32.
+        let [a, b, c] = [Vec3::new(-0.7, -0.4, 0.1), Vec3::new(0.9, -0.3, -0.2), Vec3::new(0.1, 0.8, 0.3)]
+            .map(|p| (p * 1_048_576.0).round() / 1_048_576.0);
+        let (mut differ, mut halves) = (0, 0);
         for i in 0..200u8 {
             let from = Vec3::new(f32::from(i) * 0.013, 0.7, 3.1);
             let target = a.lerp(b, f32::from(i % 7) / 9.0).lerp(c, f32::from(i % 11) / 17.0);
@@ -170,8 +172,14 @@ mod tests {
                 differ += u32::from(other.t != one.t);
                 assert_eq!(one.order(&other, &ray), Some(Ordering::Equal));
             }
+            // Half of it, which does not show that it lies in the same plane.
+            let half = [a.lerp(b, 0.5), b, c];
+            if triangle::intersect(&ray, &half).is_some() {
+                assert_eq!(of(&ray, half).order(&one, &ray), Some(Ordering::Equal));
+                halves += 1;
+            }
         }
-        assert!(differ > 50, "f64 alone tells {differ} apart");
+        assert!(differ > 50 && halves > 20, "f64 alone tells {differ} apart; {halves}");
     }
 
     /// Squares 2^-40 of the distance apart, in closed form.
@@ -209,5 +217,28 @@ mod tests {
                 assert_eq!(other.order(&behind, &ray), Some(Ordering::Less), "{scale} {length}");
             }
         }
+    }
+
+    /// And what shares neither corners nor a coordinate is no plane at a glance.
+    #[test]
+    fn what_is_placed_elsewhere_is_not_as_far() {
+        let corners = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
+        let ray = Ray::new(Vec3::new(0.1, 0.2, 1.0), Vec3::new(0.01, -0.02, -1.0));
+        let at = |z: f32| {
+            let to_world = Affine3::from_translation(Vec3::Z * z);
+            let t = triangle::intersect(&ray, &Placed { corners, to_world: &to_world }).expect("hit").t;
+            Distance { t, support: Support::Placed(corners, to_world) }
+        };
+        let (far, near) = (at(0.0), at(libm::scalbnf(1.0, -30)));
+        assert_eq!(near.order(&far, &ray), Some(Ordering::Less));
+        assert_eq!(far.order(&near, &ray), Some(Ordering::Greater));
+        assert_eq!(far.order(&at(-0.0), &ray), Some(Ordering::Equal));
+        let [a, b, c] = corners;
+        assert!(are_coplanar(&corners, &[b, c, a]) && are_coplanar(&corners, &[a * 2.0, c * 3.0, b]));
+        assert!(
+            !are_coplanar(&[a, b, Vec3::Z], &[a, b, Vec3::ONE])
+                && !are_coplanar(&corners, &corners.map(|p| p.with_z(1.0)))
+        );
+        assert!(!are_coplanar(&corners, &corners.map(|p| p.with_z(f32::NAN))));
     }
 }

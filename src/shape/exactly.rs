@@ -1,4 +1,5 @@
-//! Triangles as a ray's line sees them, without rounding: in integers where their digits allow ([`Integers`]), else in expansions.
+//! Triangles as a ray's line sees them, without rounding: in integers where their digits allow ([`Integers`]), else in expansions. Which of two is nearer
+//! is told here in integers alone; what has no room there is for [`super::distance`].
 
 use std::cmp::Ordering;
 
@@ -216,6 +217,11 @@ mod tests {
         assert!(fits(origin, DVec3::ZERO, corners) && fits(DVec3::ZERO, DVec3::X, [DVec3::ZERO; 3]));
         assert!(!fits(origin, DVec3::new(1.0, 1e-30, 0.0), corners));
         assert!(!fits(origin * far, DVec3::X, corners));
+        let wide = |bits: i32| {
+            let far = DVec3::X * libm::scalbn(1.0, bits);
+            fits(-far, DVec3::ONE, [far + DVec3::Y, DVec3::X, DVec3::Z])
+        };
+        assert!(wide(52) && !wide(62), "differences must fit into an i64");
         assert!(!fits(DVec3::splat(0.1), DVec3::splat(0.3), corners.map(|p| p / 3.0)));
     }
 

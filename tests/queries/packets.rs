@@ -224,3 +224,35 @@ fn packets_in_an_empty_world_hit_nothing() {
     assert_eq!(closest(&bvh, &asked).map(|hits| hits.lanes), [0, 0]);
     assert_eq!(bvh.occluded_packets(&asked), [0, 0]);
 }
+
+/// Plates of many sizes in one plane, packets past their corners and edges.
+#[test]
+fn packets_past_plates_of_one_plane() {
+    let mut random = Random::new(77);
+    let (mut corners, mut plates) = (Vec::new(), Vec::new());
+    for i in 0..120u32 {
+        let size = [0.01, 0.1, 1.0, 100.0][random.below(4)];
+        let middle = Vec3::new(random.unit(), 0.0, random.unit());
+        corners.extend((0..3).map(|_| (middle + random.vec3() * size).with_y(0.3)));
+        plates.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let scene = Scene::from_geometries(
+        vec![Geometry::Mesh(Mesh::new(corners.clone(), plates.clone()))],
+        vec![Material::default()],
+    );
+    let world = World::new(&scene).expect("a world");
+    let brute = Brute::new(&world);
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
+        for round in 0..600 {
+            let eye = Vec3::new(0.3, 2.0, 0.4) + random.vec3() * 0.2;
+            let plate = plates[random.below(plates.len())].map(|i| corners[i as usize]);
+            let near = [0.0, 1e-7, 1e-6, 1e-5][round % 4] * (plate[1] - plate[0]).length();
+            let at = random.unit();
+            let rays: [Ray; 16] = std::array::from_fn(|i| {
+                Ray::new(eye, plate[0].lerp(plate[1], at + i as f32 * 1e-3) + random.vec3() * near - eye)
+            });
+            assert_packets(&bvh, &brute, &rays, 0xffff, &format!("{isa:?} {round}"));
+        }
+    }
+}

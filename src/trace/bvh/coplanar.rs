@@ -7,6 +7,7 @@
 
 use super::Bvh;
 use super::block::{Block, Lane};
+use super::found::NONE;
 use crate::math::{Affine3, Vec3};
 use crate::shape::distance::are_coplanar;
 
@@ -20,15 +21,19 @@ pub(super) struct Spot {
 }
 
 impl Bvh {
-    /// Of two triangles that a ray hits for sure the one that counts, where they are seen to lie in one plane.
+    /// Of a triangle that is noted and another that the ray hits for sure, too, the one that counts, where they are seen to lie in one plane. It takes the other's place: bounds on t are
+    /// those of both. None if none is noted.
     #[cold]
     #[inline(never)]
-    pub(super) fn first_of_plane(&self, one: Spot, other: Spot) -> Option<Spot> {
+    pub(super) fn first_of_plane(&self, noted: Spot, other: Spot) -> Option<Spot> {
+        if noted.id == NONE {
+            return None;
+        }
         let (mut a, mut b) = (None, None);
-        let (one_name, one_corners, one_way) = self.named(one, &mut a);
+        let (noted_name, noted_corners, noted_way) = self.named(noted, &mut a);
         let (name, corners, way) = self.named(other, &mut b);
-        let is_seen = one_way == way && are_coplanar(&one_corners, &corners);
-        is_seen.then_some(if name < one_name { other } else { one })
+        let is_seen = noted_way == way && are_coplanar(&noted_corners, &corners);
+        is_seen.then_some(if name < noted_name { other } else { noted })
     }
 
     /// Instance, geometry and primitive of a triangle, its corners, and the transform that places it.

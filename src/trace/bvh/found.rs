@@ -136,23 +136,17 @@ impl Found {
                     }
                     continue;
                 }
-                if low > self.limit || self.settle(bvh, place, LANES as u32 * index + lane as u32) {
+                if low > self.limit {
+                    continue;
+                }
+                let (noted, id) = (self.noted, LANES as u32 * index + lane as u32);
+                if let Some(first) = bvh.first_of_plane(Spot { place: self.place, id: noted }, Spot { place, id }) {
+                    (self.place, self.noted) = (first.place, first.id);
                     continue;
                 }
             }
             self.decide(bvh, place, index, block, lane, ray);
         }
-    }
-
-    /// Notes the one that counts, of the triangle that is noted and another that is hit for sure, if they are seen to lie in one plane. Whether they are.
-    #[inline(always)]
-    fn settle(&mut self, bvh: &Bvh, place: u32, id: u32) -> bool {
-        let noted = Spot { place: self.place, id: self.noted };
-        let first = if self.is_noted() { bvh.first_of_plane(noted, Spot { place, id }) } else { None };
-        first.is_some_and(|first| {
-            (self.place, self.noted) = (first.place, first.id);
-            true
-        })
     }
 
     /// As it was when it was left: a ray's [`Self::range`], and what is noted, and where that is.

@@ -238,7 +238,12 @@ impl Noted {
                     }
                     continue;
                 }
-                if low > self.limit || self.settle(bvh, place, LANES as u32 * index + lane as u32) {
+                if low > self.limit {
+                    continue;
+                }
+                let (noted, id) = (self.id, LANES as u32 * index + lane as u32);
+                if let Some(first) = bvh.first_of_plane(Spot { place: self.place, id: noted }, Spot { place, id }) {
+                    (self.place, self.id) = (first.place, first.id);
                     continue;
                 }
             }
@@ -248,17 +253,6 @@ impl Noted {
             }
         }
         false
-    }
-
-    /// Notes the one that counts, of the triangle that is noted and another that is hit for sure, if they are seen to lie in one plane. Whether they are.
-    #[inline(always)]
-    fn settle(&mut self, bvh: &Bvh, place: u32, id: u32) -> bool {
-        let noted = Spot { place: self.place, id: self.id };
-        let first = if self.id != NONE { bvh.first_of_plane(noted, Spot { place, id }) } else { None };
-        first.is_some_and(|first| {
-            (self.place, self.id) = (first.place, first.id);
-            true
-        })
     }
 
     /// Decides whether the ray hits one triangle of a block. By value, so that it need not lie in memory before.

@@ -5,7 +5,7 @@ use super::{MOST, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::coplanar::Spot;
-use crate::trace::bvh::found::{Found, NONE};
+use crate::trace::bvh::found::Found;
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Vector};
@@ -43,8 +43,7 @@ impl<'a> Doubts<'a> {
                 continue;
             }
             let noted = Spot { place: FIXED, id: octet.noted(lane) };
-            if noted.id != NONE
-                && met.sure >> lane & 1 != 0
+            if met.sure >> lane & 1 != 0
                 && let Some(first) = bvh.first_of_plane(noted, Spot { place: FIXED, id })
             {
                 octet.note(lane, first.id);

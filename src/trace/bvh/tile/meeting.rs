@@ -166,7 +166,9 @@ impl<Q: Query> Walk<'_, Q> {
             }
             if !Q::ANY {
                 let sure = open & self.inside::<S>(edges, pair);
-                open &= !self.settle(first + pair.lane() as u32, pair.group::<S>() * S::Wide::LANES, sure);
+                if sure != 0 {
+                    open &= !self.settle(first + pair.lane() as u32, pair.group::<S>() * S::Wide::LANES, sure);
+                }
             }
             changed |= self.decide_all::<S>(first, pair, open);
         }

@@ -11,7 +11,6 @@ use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS, SLACK, TINY};
 use crate::trace::bvh::coplanar::Spot;
-use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::rows;
@@ -97,9 +96,6 @@ impl<Q: Query> Walk<'_, Q> {
             let ray = (ray + lane as usize) % RAYS;
             sure &= sure - 1;
             let noted = Spot { place: found.place[ray], id: found.noted[ray] };
-            if noted.id == NONE {
-                continue;
-            }
             // Neighbours mostly hit the same two.
             let first = match last {
                 Some((same, first)) if same == noted => first,
