@@ -6,7 +6,7 @@
 //! volume with the opposite sign, so a test that gets the signs right leaks neither at edges nor at vertices.
 //!
 //! The signs are right because each volume is computed in f64 with a bound on its rounding error, and where the bound
-//! cannot decide, in exact arithmetic ([`Integers`](crate::math::integers::Integers), or [`Expansion`]). Woop's test alone, the simpler alternative, is watertight too,
+//! cannot decide, in exact arithmetic (in integers, or [`Expansion`]). Woop's test alone, the simpler alternative, is watertight too,
 //! but decides for corners that its shear has rounded: it names a neighbour on a ray that passes near an edge.
 //!
 //! A zero volume counts as inside; a ray in the triangle's plane and a triangle without an area miss.
