@@ -124,7 +124,9 @@ mod tests {
         let expected: f64 = joined[..length].parse::<T>().ok().expect("a number").into();
         let value: f64 = value.into();
         assert_eq!(value.to_bits(), expected.to_bits(), "{joined}: {value} for {expected}");
-        assert!(length <= text.len(), "{joined}: {length} bytes of {text:?}");
+        // After an e, a sign and digits are the same number's.
+        let goes_on = text.ends_with(['e', 'E']) && followed_by.starts_with('-');
+        assert!(length <= text.len() || goes_on, "{joined}: {length} bytes of {text:?}");
         length == text.len()
     }
 
