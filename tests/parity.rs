@@ -256,7 +256,7 @@ fn surfaces_that_lie_on_each_other() {
     let mut rays = scenes::rays(1500, &twice.positions.to_vec(), 4);
     // So many that those of the cameras come by whole bundles.
     rays.extend(scenes::rays(548, &corners, 5));
-    // Of two cameras, one of them so far away that rays come by ones and twos.
+    // Of two cameras, one of them so wide that rays come to triangles by ones and twos.
     for (eye, width) in [(Vec3::new(2.0, 3.0, 4.0), 0.1), (Vec3::new(1.0, -2.0, 3.0), 1.0)] {
         for _ in 0..10 {
             let towards = random.vec3() - eye;

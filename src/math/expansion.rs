@@ -146,17 +146,6 @@ impl Mul for &Expansion {
     }
 }
 
-/// The dot product, exactly.
-pub fn dot(a: &[Expansion; 3], b: &[Expansion; 3]) -> Expansion {
-    &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
-}
-
-/// The cross product, exactly.
-pub fn cross(a: &[Expansion; 3], b: &[Expansion; 3]) -> [Expansion; 3] {
-    let minor = |i: usize, j: usize| &(&a[i] * &b[j]) - &(&a[j] * &b[i]);
-    [minor(1, 2), minor(2, 0), minor(0, 1)]
-}
-
 /// a + b as a rounded sum and its error (Knuth 1969).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;

@@ -5,15 +5,16 @@
 //! is hit and n its normal, t = (p - o) . n / d . n for a ray from o along d. Both its parts are sums of products of the
 //! numbers that are stored, and are computed without rounding ([`Integers`](crate::math::integers::Integers), or [`Expansion`]); so are the products that tell which
 //! fraction is the smaller. Triangles of one plane are hit at exactly the same t, whatever the order of their corners; most show it
-//! [at a glance](are_coplanar), a hundred times as fast.
+//! [at a glance](are_coplanar).
 //!
 //! To compute t in more digits, the simpler alternative, would never say that two are equal.
 
 use std::cmp::Ordering;
 
-use super::exactly::Seen;
+use super::exactly::{Seen, normal};
 use super::triangle::{Corners, Placed};
-use crate::math::expansion::{Expansion, count_decision, cross, dot};
+use crate::math::expansion::{Expansion, count_decision};
+use crate::math::number::{Vector, dot, minus, vector};
 use crate::math::{Affine3, DVec3, Vec3};
 use crate::ray::Ray;
 
@@ -105,16 +106,14 @@ impl Distance {
 
     /// t, exactly, as a numerator and a denominator that is near 1.
     fn fraction(&self, ray: &Ray) -> [Expansion; 2] {
-        let exact = |v: DVec3| v.to_array().map(Expansion::from);
         let (point, normal) = match self.support {
             Support::Itself | Support::Unknown => return [self.t.into(), 1.0f64.into()],
             Support::Triangle(corners) => plane(corners.exact()),
             Support::Placed(corners, to_world) => plane(Placed { corners, to_world: &to_world }.exact()),
-            Support::Plane(point, normal) => (exact(point), exact(normal)),
+            Support::Plane(point, normal) => (vector(point), vector(normal)),
         };
-        let origin = exact(ray.origin.as_dvec3());
-        let way = [0, 1, 2].map(|i| &point[i] - &origin[i]);
-        let (height, slope) = (dot(&way, &normal), dot(&exact(ray.direction.as_dvec3()), &normal));
+        let way = minus(&point, &vector(ray.origin.as_dvec3()));
+        let (height, slope) = (dot(&way, &normal), dot(&vector(ray.direction.as_dvec3()), &normal));
         // So that products neither overflow nor underflow, whatever the scale.
         let scale = 1.0 / power_of_two(slope.estimate());
         [height.scaled(scale), slope.scaled(scale)]
@@ -130,10 +129,10 @@ pub(crate) fn are_coplanar(one: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
 }
 
 /// A point and the normal of the plane of three corners.
-fn plane([a, b, c]: [[Expansion; 3]; 3]) -> ([Expansion; 3], [Expansion; 3]) {
-    let edge = |p: &[Expansion; 3]| [0, 1, 2].map(|i| &p[i] - &a[i]);
-    let normal = cross(&edge(&b), &edge(&c));
-    (a, normal)
+fn plane(corners: [Vector<Expansion>; 3]) -> (Vector<Expansion>, Vector<Expansion>) {
+    let normal = normal(&corners);
+    let [point, ..] = corners;
+    (point, normal)
 }
 
 /// The largest power of two that is not above the magnitude of `x`; 1 for zero and for what has no reciprocal.
@@ -219,7 +218,7 @@ mod tests {
         }
     }
 
-    /// And what shares neither corners nor a coordinate is no plane at a glance.
+    /// The same corners elsewhere are another plane, and what shares neither corners nor a coordinate is none at a glance.
     #[test]
     fn what_is_placed_elsewhere_is_not_as_far() {
         let corners = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];

@@ -7,7 +7,7 @@ use super::triangle::{Corners, TriangleHit};
 use crate::math::DVec3;
 use crate::math::expansion::Expansion;
 use crate::math::integers::Integers;
-use crate::math::number::{Ring, Vector, cross, dot, minus};
+use crate::math::number::{Ring, Vector, cross, dot, minus, vector};
 
 /// Numbers without rounding.
 pub(super) trait Exact: Ring {
@@ -61,10 +61,9 @@ impl<const K: usize> Seen<i128, K> {
 impl Seen<Expansion, 1> {
     /// In expansions.
     pub fn in_expansions(origin: DVec3, direction: DVec3, triangle: &impl Corners) -> Self {
-        let exact = |v: DVec3| v.to_array().map(Expansion::from);
-        let origin = exact(origin);
+        let origin = vector(origin);
         let corners = triangle.exact().map(|corner| minus(&corner, &origin));
-        Self { direction: exact(direction), triangles: [corners], exponent: 0 }
+        Self { direction: vector(direction), triangles: [corners], exponent: 0 }
     }
 }
 
@@ -103,16 +102,21 @@ impl Seen<i128, 2> {
     #[inline]
     pub fn order(&self) -> Ordering {
         // t is a quotient of these.
-        let fraction = |[a, b, c]: &[Vector<i128>; 3]| {
-            let normal = cross(&minus(b, a), &minus(c, a));
-            (dot(a, &normal), dot(&self.direction, &normal))
-        };
-        let [(a, b), (c, d)] = [fraction(&self.triangles[0]), fraction(&self.triangles[1])];
+        let [(a, b), (c, d)] = self.triangles.each_ref().map(|corners| {
+            let normal = normal(corners);
+            (dot(&corners[0], &normal), dot(&self.direction, &normal))
+        });
         let signs = [a.signum() * b.signum(), c.signum() * d.signum()];
         let product = |x: i128, y: i128| product(x.unsigned_abs(), y.unsigned_abs());
         let sizes = || product(a, d).cmp(&product(c, b));
         signs[0].cmp(&signs[1]).then_with(|| if signs[0] < 0 { sizes().reverse() } else { sizes() })
     }
+}
+
+/// The normal of the plane of three corners.
+#[inline]
+pub(super) fn normal<N: Ring>([a, b, c]: &[Vector<N>; 3]) -> Vector<N> {
+    cross(&minus(b, a), &minus(c, a))
 }
 
 /// Of 256 bits: the upper half and the lower.
@@ -156,19 +160,13 @@ mod tests {
         ]
     }
 
-    fn expansions(origin: DVec3, direction: DVec3, corners: &[DVec3; 3]) -> Seen<Expansion, 1> {
-        let exact = |v: DVec3| v.to_array().map(Expansion::new);
-        let corners = corners.map(|corner| minus(&exact(corner), &exact(origin)));
-        Seen { direction: exact(direction), triangles: [corners], exponent: 0 }
-    }
-
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
         #[test]
         fn integers_see_what_expansions_see([origin, direction, a, b, c, d, e, f] in points(), length in -60..60) {
             let direction = direction * libm::scalbn(1.0, length);
             let triangles = [[a, b, c], [d, e, f]];
-            let exact = triangles.map(|triangle| expansions(origin, direction, &triangle));
+            let exact = triangles.map(|triangle| Seen::in_expansions(origin, direction, &triangle));
             for (triangle, exact) in triangles.iter().zip(&exact) {
                 let Some(seen) = Seen::in_integers(origin, direction, [Some(*triangle)]) else { continue };
                 prop_assert_eq!(seen.signs_aside(), exact.signs_aside());
@@ -180,11 +178,10 @@ mod tests {
                     }
                 }
             }
-            let fraction = |Seen { direction, triangles: [[a, b, c]], .. }: &Seen<Expansion, 1>| {
-                let normal = cross(&minus(b, a), &minus(c, a));
-                (dot(a, &normal), dot(direction, &normal))
-            };
-            let [(a, b), (c, d)] = exact.each_ref().map(fraction);
+            let [(a, b), (c, d)] = exact.map(|Seen { direction, triangles: [[a, b, c]], .. }| {
+                let normal = cross(&minus(&b, &a), &minus(&c, &a));
+                (dot(&a, &normal), dot(&direction, &normal))
+            });
             if let Some(seen) = Seen::in_integers(origin, direction, triangles.map(Some))
                 && b.sign() * d.sign() != 0
             {

@@ -13,7 +13,8 @@
 
 use super::distance::Support;
 use super::exactly;
-use crate::math::expansion::{Expansion, count_decision, dot};
+use crate::math::expansion::{Expansion, count_decision};
+use crate::math::number::dot;
 use crate::math::{Affine3, DVec3, Vec3, gamma64};
 use crate::ray::Ray;
 

@@ -1,7 +1,7 @@
 //! Triangles of one plane, told at a glance.
 //!
 //! Where surfaces lie on each other, every ray that hits one hits the other at exactly the same t, and the lower id counts. Bounds
-//! cannot tell that, and exact arithmetic ([`Distance::order`](crate::shape::distance::Distance::order)) takes a hundred times as long as the rest of a
+//! cannot tell that, and exact arithmetic ([`Distance::order`](crate::shape::distance::Distance::order)) takes many times as long as the rest of a
 //! ray. But nearly all such surfaces show it by their corners: faces that a file holds twice, turned or not, have the same three; floors, walls and
 //! decals on them share a coordinate. What does not show it is left to exact arithmetic.
 
@@ -21,8 +21,8 @@ pub(super) struct Spot {
 }
 
 impl Bvh {
-    /// Of a triangle that is noted and another that the ray hits for sure, too, the one that counts, where they are seen to lie in one plane. It takes the other's place: bounds on t are
-    /// those of both. None if none is noted.
+    /// Of a triangle that is noted and another that the ray hits for sure, too, the one that counts, where they are seen to lie in one plane. Bounds on
+    /// the t of either hold for both. None if none is noted.
     #[cold]
     #[inline(never)]
     pub(super) fn first_of_plane(&self, noted: Spot, other: Spot) -> Option<Spot> {

@@ -306,7 +306,8 @@ fn four<S: Simd>(values: &PerRay, i: usize) -> S::V4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::expansion::{Expansion, cross, dot};
+    use crate::math::expansion::Expansion;
+    use crate::math::number::{cross, dot};
     use crate::math::{DVec3, Mat3};
     use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
     use crate::trace::bvh::random::Random;

@@ -155,7 +155,7 @@ impl<V: Vector + Array<RAYS>> Octet<V> {
         bytemuck::cast(self.noted)
     }
 
-    /// Another is, in the same plane.
+    /// Notes another triangle for a ray that has one noted, in the same plane.
     pub fn note(&mut self, lane: usize, id: u32) {
         self.noted[lane % RAYS] = f32::from_bits(id);
     }
