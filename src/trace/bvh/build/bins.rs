@@ -2,8 +2,8 @@
 //! all three axes in one pass.
 
 use super::lanes::Boxes;
-use super::record::{EMPTY, Record};
-use super::split::{Cheapest, Cut, Rule, Split};
+use super::record::Record;
+use super::split::{Cheapest, Cut, Rule, Split, join};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// Bins an axis of a large range is divided into.
@@ -15,6 +15,9 @@ pub(super) const FEW: usize = 8;
 /// Ranges of fewer items than this are divided into [`FEW`] bins.
 pub(super) const LARGE: usize = 512;
 
+/// One in the lanes of the largest coordinates, zero in the others.
+const AXES: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0];
+
 /// From a centre to its bin: centres are doubled, as [-c, c].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
@@ -25,15 +28,16 @@ pub(super) struct Grid {
 impl Grid {
     /// Bins for centres within `centres`.
     #[inline(always)]
-    pub fn new<const N: usize>(centres: &[f32; 8]) -> Self {
-        let mut grid = Self { origin: [0.0; 8], scale: [0.0; 8] };
-        for axis in 0..3 {
-            let (min, max) = (0.0 - centres[axis], centres[axis + 4]);
-            grid.origin[axis + 4] = min;
-            // Where all centres coincide they fall into bin 0, and nothing can be divided.
-            grid.scale[axis + 4] = if max > min { N as f32 / (max - min) } else { 0.0 };
-        }
-        grid
+    pub fn new<S: Simd, const N: usize>(centres: &[f32; 8]) -> Self {
+        // Vectors, stored whole: whoever loads what was just stored lane by lane waits until it is in the cache.
+        let zero = S::V8::splat(0.0);
+        let axes = S::V8::load(&AXES);
+        let max = S::V8::load(centres);
+        let min = zero.sub(max.swap_halves());
+        let size = max.sub(min);
+        // Where all centres coincide they fall into bin 0, and nothing can be divided.
+        let scale = S::V8::select(zero.less(size.mul(axes)), S::V8::splat(N as f32).div(size), zero);
+        Self { origin: S::V8::select(zero.less(axes), min, zero).to_array(), scale: scale.to_array() }
     }
 
     /// Where a bin begins, but for rounding.
@@ -44,66 +48,157 @@ impl Grid {
 }
 
 /// Boxes and numbers of items of each bin; of each axis.
-#[derive(Clone)]
 pub(super) struct Bins<const N: usize> {
+    /// Of every other item, and in the end of all.
+    sums: Sums<N>,
+    /// Of those between: neighbours mostly fall into one bin, and the second would wait for what the first has stored.
+    others: Sums<N>,
+}
+
+/// Boxes and numbers of items of each bin, for each axis.
+#[repr(align(64))]
+struct Sums<const N: usize> {
     boxes: [[[f32; 8]; 3]; N],
     counts: [[u32; 4]; N],
 }
 
 impl<const N: usize> Bins<N> {
+    /// With anything in them.
+    pub const ANY: Self = Self { sums: Sums::ANY, others: Sums::ANY };
+
+    /// Nothing is in them any more.
     #[inline(always)]
-    pub fn empty() -> Self {
-        Self { boxes: [[EMPTY; 3]; N], counts: [[0; 4]; N] }
+    pub fn clear<S: Simd>(&mut self) {
+        self.sums.clear::<S>();
+        self.others.clear::<S>();
     }
 
-    /// Adds the items to their bins.
+    /// Adds items; once, after they were cleared.
     #[inline(always)]
-    pub fn add<'a, S: Simd>(&mut self, items: impl Iterator<Item = &'a Record>, grid: &Grid) {
-        let (origin, scale) = (S::V8::load(&grid.origin), S::V8::load(&grid.scale));
-        let last = S::V8::splat((N - 1) as f32);
-        for item in items {
-            let bounds = S::V8::load(&item.0);
-            let centre = bounds.sub(bounds.swap_halves());
-            // The last bin also takes what is not a number (an infinite scale times zero).
-            let bins = centre.sub(origin).mul(scale).min(last).truncate();
-            for axis in 0..3 {
-                let bin = bins[axis + 4] as usize % N;
-                let sum = &mut self.boxes[bin][axis];
-                *sum = bounds.max(S::V8::load(sum)).to_array();
-                self.counts[bin][axis] += 1;
+    pub fn add<'a, S: Simd>(&mut self, mut items: impl Iterator<Item = &'a Record>, grid: &Grid) {
+        let Self { sums, others } = self;
+        while let Some(item) = items.next() {
+            sums.add::<S>(item, grid);
+            let Some(item) = items.next() else { break };
+            others.add::<S>(item, grid);
+        }
+        for (sums, others) in sums.boxes.iter_mut().zip(&others.boxes) {
+            for (sum, other) in sums.iter_mut().zip(others) {
+                *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
             }
+        }
+        for (sum, other) in sums.counts.iter_mut().zip(&others.counts) {
+            add(sum, other);
         }
     }
 
     /// The cheapest plane that leaves something on both sides; None where all centres coincide.
     #[inline(always)]
     pub fn best<S: Simd>(&self, grid: &Grid, rule: &Rule) -> Option<Split> {
-        let load = |boxes: &[[f32; 8]; 3]| [S::V8::load(&boxes[0]), S::V8::load(&boxes[1]), S::V8::load(&boxes[2])];
-        let join = |a: [S::V8; 3], b: [S::V8; 3]| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
-        let add = |sum: &mut [u32; 4], counts: &[u32; 4]| {
-            for (sum, count) in sum.iter_mut().zip(counts) {
-                *sum += count;
-            }
-        };
-        let cost = |boxes, counts: &[u32; 4]| {
-            S::V4::load(&S::V8::half_areas(boxes)).mul(S::V4::load(&rule.blocks_of_four(counts)))
-        };
         let nothing = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
         let mut right_costs = [[0.0; 4]; N];
         let (mut right, mut count) = nothing;
         for (bin, right_cost) in right_costs.iter_mut().enumerate().skip(1).rev() {
-            right = join(right, load(&self.boxes[bin]));
-            add(&mut count, &self.counts[bin]);
-            *right_cost = cost(right, &count).to_array();
+            right = join(right, load::<S>(&self.sums.boxes[bin]));
+            add(&mut count, &self.sums.counts[bin]);
+            *right_cost = cost::<S>(right, &count, rule).to_array();
         }
         let mut cheapest = Cheapest::<S>::new();
         let (mut left, mut count) = nothing;
         for (bin, right_cost) in right_costs.iter().enumerate().skip(1) {
-            left = join(left, load(&self.boxes[bin - 1]));
-            add(&mut count, &self.counts[bin - 1]);
-            cheapest.offer(bin, cost(left, &count).add(S::V4::load(right_cost)));
+            left = join(left, load::<S>(&self.sums.boxes[bin - 1]));
+            add(&mut count, &self.sums.counts[bin - 1]);
+            cheapest.offer(bin, cost::<S>(left, &count, rule).add(S::V4::load(right_cost)));
         }
         let (axis, bin, cost) = cheapest.found()?;
         Some(Split { cut: Cut::Plane { axis, at: grid.border(axis, bin) }, cost })
+    }
+}
+
+impl<const N: usize> Sums<N> {
+    const ANY: Self = Self { boxes: [[[0.0; 8]; 3]; N], counts: [[0; 4]; N] };
+
+    #[inline(always)]
+    fn clear<S: Simd>(&mut self) {
+        let nothing = S::V8::splat(f32::NEG_INFINITY);
+        for sum in self.boxes.as_flattened_mut() {
+            *sum = nothing.to_array();
+        }
+        self.counts = [[0; 4]; N];
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, item: &Record, grid: &Grid) {
+        let (origin, scale) = (S::V8::load(&grid.origin), S::V8::load(&grid.scale));
+        let last = S::V8::splat((N - 1) as f32);
+        let bounds = S::V8::load(&item.0);
+        let centre = bounds.sub(bounds.swap_halves());
+        // The last bin also takes what is not a number (an infinite scale times zero).
+        let bins = centre.sub(origin).mul(scale).min(last).truncate();
+        for axis in 0..3 {
+            let bin = bins[axis + 4] as usize % N;
+            let sum = &mut self.boxes[bin][axis];
+            *sum = bounds.max(S::V8::load(sum)).to_array();
+            self.counts[bin][axis] += 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd>([x, y, z]: &[[f32; 8]; 3]) -> [S::V8; 3] {
+    [S::V8::load(x), S::V8::load(y), S::V8::load(z)]
+}
+
+#[inline(always)]
+fn add(sum: &mut [u32; 4], counts: &[u32; 4]) {
+    for (sum, count) in sum.iter_mut().zip(counts) {
+        *sum += count;
+    }
+}
+
+/// Of boxes and counts on three axes.
+#[inline(always)]
+fn cost<S: Simd>(boxes: [S::V8; 3], counts: &[u32; 4], rule: &Rule) -> S::V4 {
+    S::V4::load(&S::V8::half_areas(boxes)).mul(S::V4::load(&rule.blocks_of_four(counts)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Aabb, Vec3};
+    use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
+
+    /// Any number of items, one after the other in one bin or not, is what each bin's items come to one by one; whatever was there before.
+    #[test]
+    fn bins_hold_what_falls_into_them() {
+        let mut random = Random::new(9);
+        let mut bins = Bins::<8>::ANY;
+        for count in [1, 2, 3, 50, 101] {
+            let item = |i| {
+                let corner = if i % 3 == 0 { Vec3::splat(0.5) } else { random.vec3().abs() };
+                Record::new(&Aabb { min: corner, max: corner + Vec3::splat(0.25) }, 0, i)
+            };
+            let items: Vec<Record> = (0..count).map(item).collect();
+            let centre = |item: &Record| (item.bounds().min + item.bounds().max).to_array();
+            let grid = Grid::new::<Portable, 8>(&[0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 0.0]);
+            bins.clear::<Portable>();
+            bins.add::<Portable>(items.iter(), &grid);
+            for bin in 0..8 {
+                for axis in 0..3 {
+                    let within = |item: &&Record| (centre(item)[axis] * 2.0) as usize == bin;
+                    let inside: Vec<&Record> = items.iter().filter(within).collect();
+                    assert_eq!(
+                        bins.sums.counts[bin][axis],
+                        inside.len() as u32,
+                        "{count} items, bin {bin} of axis {axis}"
+                    );
+                    let bounds = inside.iter().fold(Aabb::EMPTY, |sum, item| sum.union(item.bounds()));
+                    if !inside.is_empty() {
+                        assert_eq!(crate::trace::bvh::build::record::aabb(&bins.sums.boxes[bin][axis]), bounds);
+                    }
+                }
+            }
+        }
     }
 }

@@ -14,9 +14,8 @@ pub(in crate::trace::bvh) trait Boxes: Copy {
     fn swap_halves(self) -> Self;
     /// Each lane towards zero; anything for what does not fit.
     fn truncate(self) -> [i32; 8];
-    /// Joins this box to `sides[0]` where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to `sides[1]`; whether
-    /// it does.
-    fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool;
+    /// Two boxes, this one joined to the first where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to the second; and whether it does.
+    fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool);
     /// Half the surface of three boxes; the last lane is anything.
     fn half_areas(boxes: [Self; 3]) -> [f32; 4];
     /// For each of the first `n` keys, none of them NaN, how many of these are less. The rest is anything.
@@ -36,11 +35,9 @@ impl Boxes for [f32; 8] {
     }
 
     #[inline(always)]
-    fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool {
+    fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool) {
         let is_left = self[axis % 4 + 4] - self[axis % 4] < at;
-        let side = &mut sides[usize::from(!is_left)];
-        *side = self.max(*side);
-        is_left
+        if is_left { (self.max(left), right, true) } else { (left, self.max(right), false) }
     }
 
     #[inline(always)]
@@ -83,15 +80,15 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn join_side(self, axis: usize, at: f32, sides: &mut [Self; 2]) -> bool {
+        fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool) {
             unsafe {
                 let of = |lane: usize| _mm256_permutevar8x32_ps(self.0, _mm256_set1_epi32(lane as i32));
                 let is_left = _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_sub_ps(of(axis + 4), of(axis)), _mm256_set1_ps(at));
                 // Both sides and no branch, which would be guessed wrong every other time.
                 let nothing = _mm256_set1_ps(f32::NEG_INFINITY);
-                sides[0].0 = _mm256_max_ps(_mm256_blendv_ps(nothing, self.0, is_left), sides[0].0);
-                sides[1].0 = _mm256_max_ps(_mm256_blendv_ps(self.0, nothing, is_left), sides[1].0);
-                _mm256_movemask_ps(is_left) & 1 != 0
+                let left = _mm256_max_ps(_mm256_blendv_ps(nothing, self.0, is_left), left.0);
+                let right = _mm256_max_ps(_mm256_blendv_ps(self.0, nothing, is_left), right.0);
+                (Self(left), Self(right), _mm256_movemask_ps(is_left) & 1 != 0)
             }
         }
 
@@ -156,9 +153,14 @@ mod tests {
             fn run<S: Simd>(self) -> Self::Output {
                 let boxes = self.0.map(|b| S::V8::load(&b));
                 let [x, y, z, _] = S::V8::half_areas(boxes).map(f32::to_bits);
-                let mut sides = [boxes[0]; 2];
-                let is_left = boxes[1].swap_halves().join_side(1, 0.0, &mut sides);
-                (is_left, sides.map(S::V8::to_array), boxes[2].truncate(), [x, y, z], S::V8::ranks(&self.1, RANKED))
+                let (left, right, is_left) = boxes[1].swap_halves().join_side(1, 0.0, boxes[0], boxes[0]);
+                (
+                    is_left,
+                    [left.to_array(), right.to_array()],
+                    boxes[2].truncate(),
+                    [x, y, z],
+                    S::V8::ranks(&self.1, RANKED),
+                )
             }
         }
         if !Isa::Avx2.is_available() {

@@ -1,8 +1,10 @@
 //! A range of items, and how it is divided in two.
 
+use std::hint::black_box;
+
 use super::lanes::Boxes;
 use super::record::{EMPTY, Record, half_area};
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// What a tree costs.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +26,7 @@ impl Rule {
     /// Blocks that hold `count` items.
     #[inline(always)]
     pub fn blocks(&self, count: usize) -> f32 {
-        count.div_ceil(self.block as usize) as f32
+        ((count as u32 + self.block - 1) >> self.block.trailing_zeros()) as f32
     }
 
     /// The same for four counts.
@@ -64,17 +66,6 @@ impl Range {
         Self { first, len: items.len() as u32, bounds: bounds.to_array(), centres: centres.to_array() }
     }
 
-    /// A box around the doubled centres of those items whose boxes lie within `bounds`. To find the smallest one would
-    /// take another look at each of them.
-    #[inline(always)]
-    fn centres_within(&self, bounds: &[f32; 8]) -> [f32; 8] {
-        let mut centres = self.centres;
-        for (centre, bound) in centres.iter_mut().zip(bounds) {
-            *centre = centre.min(2.0 * bound);
-        }
-        centres
-    }
-
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
         half_area(&self.bounds)
@@ -106,40 +97,45 @@ pub(super) enum Cut {
     Half,
 }
 
+/// Boxes joined, axis by axis.
+#[inline(always)]
+pub(super) fn join<V: Vector>([a, b, c]: [V; 3], [d, e, f]: [V; 3]) -> [V; 3] {
+    [a.max(d), b.max(e), c.max(f)]
+}
+
 /// The cheapest of many ways to divide, tried on three axes at a time.
 pub(super) struct Cheapest<S: Simd> {
+    /// On each axis the least cost so far, and its place. No branch says which is less: nobody could predict it.
     least: S::V4,
-    /// Axis, place on it, cost.
-    found: Option<(usize, usize, f32)>,
+    place: S::V4,
 }
 
 impl<S: Simd> Cheapest<S> {
     #[inline(always)]
     pub fn new() -> Self {
-        Self { least: S::V4::splat(f32::INFINITY), found: None }
+        Self { least: S::V4::splat(f32::INFINITY), place: S::V4::splat(0.0) }
     }
 
-    /// Tries a place with its cost on each axis, and a fourth number that is passed over. NaN is not cheap: an empty side
+    /// Tries a place, later than those before, with its cost on each axis, and a fourth number that is passed over. NaN is not cheap: an empty side
     /// costs infinity times zero.
     #[inline(always)]
     pub fn offer(&mut self, place: usize, costs: S::V4) {
-        if costs.less(self.least).bits() & 7 == 0 {
-            return;
-        }
-        let mut least = self.least.to_array()[0];
-        for (axis, cost) in costs.to_array().into_iter().enumerate().take(3) {
-            if cost < least {
-                least = cost;
-                self.found = Some((axis, place, cost));
-            }
-        }
-        self.least = S::V4::splat(least);
+        let is_less = costs.less(self.least);
+        self.least = S::V4::select(is_less, costs, self.least);
+        self.place = S::V4::select(is_less, S::V4::splat(place as f32), self.place);
     }
 
-    /// Axis, place and cost; None where everything costs infinity.
+    /// Axis, place and cost; of equal costs the first place, on the first axis. None where everything costs infinity.
     #[inline(always)]
     pub fn found(&self) -> Option<(usize, usize, f32)> {
-        self.found
+        let (least, place) = (self.least.to_array(), self.place.to_array());
+        let mut found = (0, place[0], least[0]);
+        for axis in 1..3 {
+            if least[axis] < found.2 || least[axis] == found.2 && place[axis] < found.1 {
+                found = (axis, place[axis], least[axis]);
+            }
+        }
+        (found.2 < f32::INFINITY).then_some((found.0, found.1 as usize, found.2))
     }
 }
 
@@ -151,56 +147,116 @@ impl Split {
     /// nothing on one side gives an empty range.
     #[inline(always)]
     pub fn partition<S: Simd>(&self, items: &mut [Record], range: &Range) -> [Range; 2] {
-        let mut sides = [S::V8::splat(f32::NEG_INFINITY); 2];
-        let mut split = 0;
+        let nothing = S::V8::splat(f32::NEG_INFINITY);
+        let (mut left, mut right, mut split) = (nothing, nothing, 0);
         match self.cut {
             Cut::Plane { axis, at } => {
                 for i in 0..items.len() {
                     let item = items[i];
-                    let is_left = S::V8::load(&item.0).join_side(axis, at, &mut sides);
+                    let is_left;
+                    (left, right, is_left) = S::V8::load(&item.0).join_side(axis, at, left, right);
                     // Without a branch, too: what lies between `split` and i belongs to the right, and the first of it
                     // changes place with the item.
                     items[i] = items[split];
                     items[split] = item;
                     split += usize::from(is_left);
                 }
+                // In registers up to here, but not longer: what lives on among calls would be in memory in the loop, too, where each item waits for the last.
+                (left, right) = black_box((left, right));
             }
             Cut::Mask(mask) => {
-                let mut right = [Record::NOTHING; 32];
+                let mut others = [Record::NOTHING; 32];
                 for i in 0..items.len() {
                     let item = items[i];
                     let is_left = mask >> (i % 32) & 1 != 0;
-                    right[(i - split) % 32] = item;
+                    others[(i - split) % 32] = item;
                     items[split] = item;
                     split += usize::from(is_left);
                 }
                 let len = items.len() - split;
-                items[split..].copy_from_slice(&right[..len]);
-                let join = |sum: S::V8, item: &Record| S::V8::load(&item.0).max(sum);
-                sides = [items[..split].iter().fold(sides[0], join), items[split..].iter().fold(sides[1], join)];
+                items[split..].copy_from_slice(&others[..len]);
+                (left, right) = (around::<S>(&items[..split]), around::<S>(&items[split..]));
             }
             Cut::Half => {
                 split = items.len() / 2;
-                let join = |sum: S::V8, item: &Record| S::V8::load(&item.0).max(sum);
-                sides = [items[..split].iter().fold(sides[0], join), items[split..].iter().fold(sides[1], join)];
+                (left, right) = (around::<S>(&items[..split]), around::<S>(&items[split..]));
             }
         }
-        self.sides(range, split, [sides[0].to_array(), sides[1].to_array()])
+        self.sides::<S>(range, split, left, right)
     }
 
     /// The two sides of `range`, by the number of items of the left one and by their boxes.
     #[inline(always)]
-    pub fn sides(&self, range: &Range, left_len: usize, bounds: [[f32; 8]; 2]) -> [Range; 2] {
-        let len = left_len as u32;
-        let [left, right] = bounds;
-        let side = |bounds: [f32; 8]| Range { first: range.first, len, bounds, centres: range.centres_within(&bounds) };
-        let mut sides = [side(left), side(right)];
-        sides[1].first += len;
-        sides[1].len = range.len - len;
+    pub fn sides<S: Simd>(&self, range: &Range, left_len: usize, left: S::V8, right: S::V8) -> [Range; 2] {
+        // Doubled centres lie within doubled boxes: not always the smallest box, but to find that one would take another look at each item.
+        let centres = S::V8::load(&range.centres);
+        let (mut left_centres, mut right_centres) = (left.add(left).min(centres), right.add(right).min(centres));
         if let Cut::Plane { axis, at } = self.cut {
-            sides[0].centres[axis + 4] = at.min(sides[0].centres[axis + 4]);
-            sides[1].centres[axis] = (-at).min(sides[1].centres[axis]);
+            // No single lane is stored: see `Grid::new`.
+            let [max, min] = [S::V8::load(&ALL_BUT[axis + 4]), S::V8::load(&ALL_BUT[axis])];
+            left_centres = S::V8::splat(at).max(max).min(left_centres);
+            right_centres = S::V8::splat(-at).max(min).min(right_centres);
         }
-        sides
+        let (first, len) = (range.first, left_len as u32);
+        [
+            Range { first, len, bounds: left.to_array(), centres: left_centres.to_array() },
+            Range {
+                first: first + len,
+                len: range.len - len,
+                bounds: right.to_array(),
+                centres: right_centres.to_array(),
+            },
+        ]
+    }
+}
+
+/// The box around all of them.
+#[inline(always)]
+fn around<S: Simd>(items: &[Record]) -> S::V8 {
+    let mut around = S::V8::splat(f32::NEG_INFINITY);
+    for item in items {
+        around = S::V8::load(&item.0).max(around);
+    }
+    around
+}
+
+/// Infinite in all lanes but one.
+const ALL_BUT: [[f32; 8]; 8] = {
+    let mut all_but = [[f32::INFINITY; 8]; 8];
+    let mut lane = 0;
+    while lane < 8 {
+        all_but[lane][lane] = f32::NEG_INFINITY;
+        lane += 1;
+    }
+    all_but
+};
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::trace::bvh::simd::Portable;
+
+    /// Costs of which many are equal, and some are no cost.
+    fn cost() -> impl Strategy<Value = f32> {
+        prop_oneof![4 => (0u8..6).prop_map(f32::from), 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
+    }
+
+    proptest! {
+        #[test]
+        fn of_equal_costs_the_first_is_found(costs in prop::collection::vec([cost(), cost(), cost(), cost()], 0..20)) {
+            let mut cheapest = Cheapest::<Portable>::new();
+            let mut least = None::<(usize, usize, f32)>;
+            for (place, costs) in costs.iter().enumerate() {
+                cheapest.offer(place, *costs);
+                for (axis, &cost) in costs[..3].iter().enumerate() {
+                    if cost < least.map_or(f32::INFINITY, |(_, _, least)| least) {
+                        least = Some((axis, place, cost));
+                    }
+                }
+            }
+            prop_assert_eq!(cheapest.found(), least);
+        }
     }
 }

@@ -87,7 +87,7 @@ impl Kernel for BinaryKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> Binary {
         let Self { rule, items, range, levels, is_root } = self;
-        let mut local = Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData };
+        let mut local = Local::<S>::new(rule, items, range.first);
         let mut binary = Binary::new(range, levels, rule, &mut local);
         binary.weigh::<S>(rule, is_root);
         binary
@@ -108,7 +108,7 @@ impl Kernel for DivideKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> Option<[Range; 2]> {
         let Self { rule, items, range, levels } = self;
-        Local::<S> { rule, items, base: range.first, isa: std::marker::PhantomData }.divide(&range, levels)
+        Local::<S>::new(rule, items, range.first).divide(&range, levels)
     }
 }
 
@@ -137,10 +137,19 @@ pub(super) struct Local<'a, S> {
     rule: &'a Rule,
     items: &'a mut [Record],
     base: u32,
+    /// Used again and again: to make them costs as much as to fill them with few items.
+    few: Bins<{ bins::FEW }>,
+    many: Bins<{ bins::MANY }>,
     isa: std::marker::PhantomData<S>,
 }
 
-impl<S: Simd> Local<'_, S> {
+impl<'a, S: Simd> Local<'a, S> {
+    /// Of all `items`.
+    #[inline(always)]
+    fn new(rule: &'a Rule, items: &'a mut [Record], base: u32) -> Self {
+        Self { rule, items, base, few: Bins::ANY, many: Bins::ANY, isa: std::marker::PhantomData }
+    }
+
     /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything else; none where a leaf is no worse.
     #[inline(always)]
     pub fn divide(&mut self, range: &Range, levels: u32) -> Option<[Range; 2]> {
@@ -158,9 +167,9 @@ impl<S: Simd> Local<'_, S> {
         let best = if items.len() <= sweep::MOST {
             sweep::best::<S>(items, self.rule)
         } else if items.len() < bins::LARGE {
-            binned::<S, { bins::FEW }>(items, range, self.rule)
+            binned::<S, _>(&mut self.few, items, range, self.rule)
         } else {
-            binned::<S, { bins::MANY }>(items, range, self.rule)
+            binned::<S, _>(&mut self.many, items, range, self.rule)
         };
         best.unwrap_or(Split::HALF)
     }
@@ -182,9 +191,14 @@ pub(super) fn in_halves(len: u32) -> u32 {
 
 /// The best plane between `N` bins.
 #[inline(always)]
-pub(super) fn binned<S: Simd, const N: usize>(items: &[Record], range: &Range, rule: &Rule) -> Option<Split> {
-    let grid = Grid::new::<N>(&range.centres);
-    let mut bins = Bins::<N>::empty();
+pub(super) fn binned<S: Simd, const N: usize>(
+    bins: &mut Bins<N>,
+    items: &[Record],
+    range: &Range,
+    rule: &Rule,
+) -> Option<Split> {
+    let grid = Grid::new::<S, N>(&range.centres);
+    bins.clear::<S>();
     if items.len() < 2 * SAMPLE {
         bins.add::<S>(items.iter(), &grid);
     } else {

@@ -5,7 +5,7 @@
 
 use super::lanes::{Boxes, RANKED};
 use super::record::Record;
-use super::split::{Cheapest, Cut, Rule, Split};
+use super::split::{Cheapest, Cut, Rule, Split, join};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// The largest number of items.
@@ -16,26 +16,31 @@ pub(super) const MOST: usize = RANKED;
 pub(super) fn best<S: Simd>(items: &[Record], rule: &Rule) -> Option<Split> {
     let n = items.len();
     let orders = sorted::<S>(items);
-    // Written out, for what is mapped over an array is not always compiled for the instruction set.
-    let item = |order: &[u8; MOST], k: usize| S::V8::load(&items[usize::from(order[k])].0);
-    let at = |k: usize| [item(&orders[0], k), item(&orders[1], k), item(&orders[2], k)];
-    let join = |a: [S::V8; 3], b: [S::V8; 3]| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
     let mut right_areas = [[0.0; 4]; MOST];
     let mut right = [S::V8::splat(f32::NEG_INFINITY); 3];
     for k in (1..n).rev() {
-        right = join(right, at(k));
+        right = join(right, at::<S>(items, &orders, k));
         right_areas[k] = S::V8::half_areas(right);
     }
     let mut cheapest = Cheapest::<S>::new();
     let mut left = [S::V8::splat(f32::NEG_INFINITY); 3];
     for (k, right_areas) in right_areas.iter().enumerate().take(n).skip(1) {
-        left = join(left, at(k - 1));
+        left = join(left, at::<S>(items, &orders, k - 1));
         let left_cost = S::V4::load(&S::V8::half_areas(left)).mul(S::V4::splat(rule.blocks(k)));
         cheapest.offer(k, S::V4::load(right_areas).mul(S::V4::splat(rule.blocks(n - k))).add(left_cost));
     }
     let (axis, k, cost) = cheapest.found()?;
     let mask = orders[axis][..k].iter().fold(0, |mask, &i| mask | 1 << i);
     Some(Split { cut: Cut::Mask(mask), cost })
+}
+
+/// Of each axis' order the item in that place.
+#[inline(always)]
+fn at<S: Simd>(items: &[Record], orders: &[[u8; MOST]; 3], k: usize) -> [S::V8; 3] {
+    // Written out: what is mapped over an array, or is a closure, is not always compiled for the instruction set.
+    let [x, y, z] = orders;
+    let [x, y, z] = [&items[usize::from(x[k])], &items[usize::from(y[k])], &items[usize::from(z[k])]];
+    [S::V8::load(&x.0), S::V8::load(&y.0), S::V8::load(&z.0)]
 }
 
 /// The items' numbers by rising centre, for each axis.

@@ -4,12 +4,12 @@
 
 use rayon::prelude::*;
 
-use super::bins::MANY;
+use super::bins::{Bins, MANY};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::subtree::binned;
 use crate::trace::bvh::isa::{self, Isa, Kernel};
-use crate::trace::bvh::simd::{Simd, Vector};
+use crate::trace::bvh::simd::{Portable, Simd, Vector};
 
 /// Items in a chunk.
 const CHUNK: usize = 1 << 15;
@@ -57,7 +57,7 @@ impl Shared<'_> {
         }
         let union = |[left, right]: [Range; 2], [l, r]: [Range; 2]| [left.union(l), right.union(r)];
         let [left, right] = sides.into_iter().fold([Range::EMPTY; 2], union);
-        split.sides(range, left_len, [left.bounds, right.bounds])
+        split.sides::<Portable>(range, left_len, left.bounds, right.bounds)
     }
 }
 
@@ -136,7 +136,8 @@ impl Kernel for FindKernel<'_> {
     type Output = Option<Split>;
     #[inline(always)]
     fn run<S: Simd>(self) -> Option<Split> {
-        binned::<S, MANY>(self.items, self.range, self.rule)
+        let mut bins = Bins::ANY;
+        binned::<S, MANY>(&mut bins, self.items, self.range, self.rule)
     }
 }
 
