@@ -47,7 +47,7 @@ impl Grid {
     }
 }
 
-/// Boxes and numbers of items of each bin; of each axis.
+/// Items in bins, on each axis.
 pub(super) struct Bins<const N: usize> {
     /// Of every other item, and in the end of all.
     sums: Sums<N>,
@@ -55,7 +55,7 @@ pub(super) struct Bins<const N: usize> {
     others: Sums<N>,
 }
 
-/// Boxes and numbers of items of each bin, for each axis.
+/// Boxes and numbers of the items of each bin, on each axis. No box lies across two cache lines.
 #[repr(align(64))]
 struct Sums<const N: usize> {
     boxes: [[[f32; 8]; 3]; N],
@@ -66,30 +66,18 @@ impl<const N: usize> Bins<N> {
     /// With anything in them.
     pub const ANY: Self = Self { sums: Sums::ANY, others: Sums::ANY };
 
-    /// Nothing is in them any more.
+    /// Holds these items, and no others.
     #[inline(always)]
-    pub fn clear<S: Simd>(&mut self) {
-        self.sums.clear::<S>();
-        self.others.clear::<S>();
-    }
-
-    /// Adds items; once, after they were cleared.
-    #[inline(always)]
-    pub fn add<'a, S: Simd>(&mut self, mut items: impl Iterator<Item = &'a Record>, grid: &Grid) {
+    pub fn fill<'a, S: Simd>(&mut self, mut items: impl Iterator<Item = &'a Record>, grid: &Grid) {
         let Self { sums, others } = self;
+        sums.clear::<S>();
+        others.clear::<S>();
         while let Some(item) = items.next() {
             sums.add::<S>(item, grid);
             let Some(item) = items.next() else { break };
             others.add::<S>(item, grid);
         }
-        for (sums, others) in sums.boxes.iter_mut().zip(&others.boxes) {
-            for (sum, other) in sums.iter_mut().zip(others) {
-                *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
-            }
-        }
-        for (sum, other) in sums.counts.iter_mut().zip(&others.counts) {
-            add(sum, other);
-        }
+        sums.join::<S>(others);
     }
 
     /// The cheapest plane that leaves something on both sides; None where all centres coincide.
@@ -100,14 +88,14 @@ impl<const N: usize> Bins<N> {
         let (mut right, mut count) = nothing;
         for (bin, right_cost) in right_costs.iter_mut().enumerate().skip(1).rev() {
             right = join(right, load::<S>(&self.sums.boxes[bin]));
-            add(&mut count, &self.sums.counts[bin]);
+            add_up(&mut count, &self.sums.counts[bin]);
             *right_cost = cost::<S>(right, &count, rule).to_array();
         }
         let mut cheapest = Cheapest::<S>::new();
         let (mut left, mut count) = nothing;
         for (bin, right_cost) in right_costs.iter().enumerate().skip(1) {
             left = join(left, load::<S>(&self.sums.boxes[bin - 1]));
-            add(&mut count, &self.sums.counts[bin - 1]);
+            add_up(&mut count, &self.sums.counts[bin - 1]);
             cheapest.offer(bin, cost::<S>(left, &count, rule).add(S::V4::load(right_cost)));
         }
         let (axis, bin, cost) = cheapest.found()?;
@@ -125,6 +113,16 @@ impl<const N: usize> Sums<N> {
             *sum = nothing.to_array();
         }
         self.counts = [[0; 4]; N];
+    }
+
+    #[inline(always)]
+    fn join<S: Simd>(&mut self, others: &Self) {
+        for (sum, other) in self.boxes.as_flattened_mut().iter_mut().zip(others.boxes.as_flattened()) {
+            *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
+        }
+        for (sum, other) in self.counts.iter_mut().zip(&others.counts) {
+            add_up(sum, other);
+        }
     }
 
     #[inline(always)]
@@ -150,7 +148,7 @@ fn load<S: Simd>([x, y, z]: &[[f32; 8]; 3]) -> [S::V8; 3] {
 }
 
 #[inline(always)]
-fn add(sum: &mut [u32; 4], counts: &[u32; 4]) {
+fn add_up(sum: &mut [u32; 4], counts: &[u32; 4]) {
     for (sum, count) in sum.iter_mut().zip(counts) {
         *sum += count;
     }
@@ -166,38 +164,86 @@ fn cost<S: Simd>(boxes: [S::V8; 3], counts: &[u32; 4], rule: &Rule) -> S::V4 {
 mod tests {
     use super::*;
     use crate::math::{Aabb, Vec3};
+    use crate::trace::bvh::build::record::aabb;
+    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
     use crate::trace::bvh::random::Random;
-    use crate::trace::bvh::simd::Portable;
 
-    /// Any number of items, one after the other in one bin or not, is what each bin's items come to one by one; whatever was there before.
+    struct Fill<'a>(&'a mut Bins<8>, &'a [Record], Grid);
+
+    impl Kernel for Fill<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run<S: Simd>(self) {
+            self.0.fill::<S>(self.1.iter(), &self.2);
+        }
+    }
+
+    struct Grids<'a>(&'a [f32; 8]);
+
+    impl Kernel for Grids<'_> {
+        type Output = Grid;
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Grid {
+            Grid::new::<S, 8>(self.0)
+        }
+    }
+
+    /// Any number of items, runs of which fall into one bin, are what each bin's items come to one by one; whatever was there before.
     #[test]
     fn bins_hold_what_falls_into_them() {
         let mut random = Random::new(9);
-        let mut bins = Bins::<8>::ANY;
-        for count in [1, 2, 3, 50, 101] {
-            let item = |i| {
-                let corner = if i % 3 == 0 { Vec3::splat(0.5) } else { random.vec3().abs() };
-                Record::new(&Aabb { min: corner, max: corner + Vec3::splat(0.25) }, 0, i)
-            };
-            let items: Vec<Record> = (0..count).map(item).collect();
-            let centre = |item: &Record| (item.bounds().min + item.bounds().max).to_array();
-            let grid = Grid::new::<Portable, 8>(&[0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 0.0]);
-            bins.clear::<Portable>();
-            bins.add::<Portable>(items.iter(), &grid);
-            for bin in 0..8 {
-                for axis in 0..3 {
-                    let within = |item: &&Record| (centre(item)[axis] * 2.0) as usize == bin;
-                    let inside: Vec<&Record> = items.iter().filter(within).collect();
-                    assert_eq!(
-                        bins.sums.counts[bin][axis],
-                        inside.len() as u32,
-                        "{count} items, bin {bin} of axis {axis}"
-                    );
-                    let bounds = inside.iter().fold(Aabb::EMPTY, |sum, item| sum.union(item.bounds()));
-                    if !inside.is_empty() {
-                        assert_eq!(crate::trace::bvh::build::record::aabb(&bins.sums.boxes[bin][axis]), bounds);
-                    }
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            let mut bins = Bins::<8>::ANY;
+            for count in [101, 1, 2, 3, 50, 0] {
+                let item = |i| {
+                    let corner = if i % 8 < 4 { Vec3::splat(0.5) } else { random.vec3().abs() * 2.0 };
+                    Record::new(&Aabb { min: corner, max: corner + Vec3::splat(0.25) }, 0, i)
+                };
+                let items: Vec<Record> = (0..count).map(item).collect();
+                // Centres up to 4.25: the last lie behind the last bin, and are in it.
+                let grid = dispatch(isa, Grids(&[0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 0.0]));
+                dispatch(isa, Fill(&mut bins, &items, grid));
+                for (bin, axis) in (0..8).flat_map(|bin| (0..3).map(move |axis| (bin, axis))) {
+                    let inside = items.iter().filter(|item| {
+                        let Aabb { min, max } = item.bounds();
+                        (((min + max)[axis] * 2.0) as usize).min(7) == bin
+                    });
+                    let place = format!("{isa:?}, {count} items, bin {bin} of axis {axis}");
+                    assert_eq!(bins.sums.counts[bin][axis], inside.clone().count() as u32, "{place}");
+                    let bounds = inside.fold(Aabb::EMPTY, |sum, item| sum.union(item.bounds()));
+                    assert_eq!(aabb(&bins.sums.boxes[bin][axis]), bounds, "{place}");
                 }
+            }
+        }
+    }
+
+    /// Where all centres coincide, or are infinitely far apart or away, nothing is divided.
+    #[test]
+    fn grids_are_those_of_one_axis_after_the_other() {
+        let infinity = f32::INFINITY;
+        let sides = [
+            (-1.0, 2.0),
+            (0.0, 0.0),
+            (3.0, 3.0),
+            (5.0, 5.5),
+            (-infinity, infinity),
+            (infinity, infinity),
+            (infinity, -infinity),
+            (0.0, 1e-45),
+            (-3e38, 3e38),
+        ];
+        for (k, &(min, max)) in sides.iter().enumerate() {
+            let ((p, q), (r, s)) = (sides[(k + 1) % sides.len()], sides[(k + 2) % sides.len()]);
+            let ids = [f32::from_bits(7), f32::from_bits(u32::MAX)];
+            let centres = [0.0 - min, 0.0 - p, 0.0 - r, ids[0], max, q, s, ids[1]];
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let grid = dispatch(isa, Grids(&centres));
+                for (axis, (min, max)) in [(min, max), (p, q), (r, s)].into_iter().enumerate() {
+                    let scale = if max > min { 8.0 / (max - min) } else { 0.0 };
+                    assert_eq!((grid.origin[axis + 4], grid.scale[axis + 4]), (min, scale), "{isa:?}, axis {axis}");
+                    assert_eq!((grid.origin[axis], grid.scale[axis]), (0.0, 0.0));
+                }
+                assert_eq!([grid.origin[3], grid.scale[3], grid.origin[7], grid.scale[7]], [0.0; 4]);
             }
         }
     }

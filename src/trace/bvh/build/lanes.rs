@@ -14,7 +14,7 @@ pub(in crate::trace::bvh) trait Boxes: Copy {
     fn swap_halves(self) -> Self;
     /// Each lane towards zero; anything for what does not fit.
     fn truncate(self) -> [i32; 8];
-    /// Two boxes, this one joined to the first where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to the second; and whether it does.
+    /// `left` and `right`, this box joined to the first where its doubled centre on `axis` (0, 1, 2) lies before `at`, else to the second; and whether it does.
     fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool);
     /// Half the surface of three boxes; the last lane is anything.
     fn half_areas(boxes: [Self; 3]) -> [f32; 4];
@@ -37,7 +37,10 @@ impl Boxes for [f32; 8] {
     #[inline(always)]
     fn join_side(self, axis: usize, at: f32, left: Self, right: Self) -> (Self, Self, bool) {
         let is_left = self[axis % 4 + 4] - self[axis % 4] < at;
-        if is_left { (self.max(left), right, true) } else { (left, self.max(right), false) }
+        let (mut sides, side) = ([left, right], usize::from(!is_left));
+        sides[side] = self.max(sides[side]);
+        let [left, right] = sides;
+        (left, right, is_left)
     }
 
     #[inline(always)]

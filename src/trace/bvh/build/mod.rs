@@ -309,9 +309,11 @@ mod tests {
                 (format!("{tree:?}"), numbers)
             };
             let expected = build(Isa::Portable, 1, 0);
-            for (threads, others) in [(1, 0), (2, 0), (3, 0), (3, 1000)] {
-                let same = build(Isa::detect(), threads, others) == expected;
-                assert!(same, "{} items, {threads} threads, {others} beside", case.len());
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                for (threads, others) in [(1, 0), (2, 0), (3, 0), (3, 1000)] {
+                    let same = build(isa, threads, others) == expected;
+                    assert!(same, "{isa:?}, {} items, {threads} threads, {others} beside", case.len());
+                }
             }
         }
     }

@@ -26,7 +26,8 @@ impl Rule {
     /// Blocks that hold `count` items.
     #[inline(always)]
     pub fn blocks(&self, count: usize) -> f32 {
-        ((count as u32 + self.block - 1) >> self.block.trailing_zeros()) as f32
+        let [blocks, ..] = self.blocks_of_four(&[count as u32; 4]);
+        blocks
     }
 
     /// The same for four counts.
@@ -161,7 +162,7 @@ impl Split {
                     items[split] = item;
                     split += usize::from(is_left);
                 }
-                // In registers up to here, but not longer: what lives on among calls would be in memory in the loop, too, where each item waits for the last.
+                // Into memory here and not before: else both are kept there in the loop, too, since they live on across calls, and each item waits for the last.
                 (left, right) = black_box((left, right));
             }
             Cut::Mask(mask) => {
@@ -193,9 +194,9 @@ impl Split {
         let (mut left_centres, mut right_centres) = (left.add(left).min(centres), right.add(right).min(centres));
         if let Cut::Plane { axis, at } = self.cut {
             // No single lane is stored: see `Grid::new`.
-            let [max, min] = [S::V8::load(&ALL_BUT[axis + 4]), S::V8::load(&ALL_BUT[axis])];
-            left_centres = S::V8::splat(at).max(max).min(left_centres);
-            right_centres = S::V8::splat(-at).max(min).min(right_centres);
+            let [others, opposite_others] = [S::V8::load(&ALL_BUT[axis + 4]), S::V8::load(&ALL_BUT[axis])];
+            left_centres = S::V8::splat(at).max(others).min(left_centres);
+            right_centres = S::V8::splat(-at).max(opposite_others).min(right_centres);
         }
         let (first, len) = (range.first, left_len as u32);
         [
@@ -213,11 +214,11 @@ impl Split {
 /// The box around all of them.
 #[inline(always)]
 fn around<S: Simd>(items: &[Record]) -> S::V8 {
-    let mut around = S::V8::splat(f32::NEG_INFINITY);
+    let mut sum = S::V8::splat(f32::NEG_INFINITY);
     for item in items {
-        around = S::V8::load(&item.0).max(around);
+        sum = S::V8::load(&item.0).max(sum);
     }
-    around
+    sum
 }
 
 /// Infinite in all lanes but one.
@@ -236,11 +237,75 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::math::Aabb;
+    use crate::trace::bvh::build::record::aabb;
+    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
 
     /// Costs of which many are equal, and some are no cost.
     fn cost() -> impl Strategy<Value = f32> {
         prop_oneof![4 => (0u8..6).prop_map(f32::from), 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
+    }
+
+    struct Partition<'a>(&'a mut [Record], &'a Range, Split);
+
+    impl Kernel for Partition<'_> {
+        type Output = [Range; 2];
+        #[inline(always)]
+        fn run<S: Simd>(self) -> [Range; 2] {
+            self.2.partition::<S>(self.0, self.1)
+        }
+    }
+
+    /// Each side has the items that the plane leaves on it, the box around them, and a box around their centres that ends at the plane.
+    #[test]
+    fn sides_are_those_of_the_plane() {
+        let mut random = Random::new(5);
+        for (isa, axis) in
+            Isa::ALL.into_iter().filter(|isa| isa.is_available()).flat_map(|isa| [(isa, 0), (isa, 1), (isa, 2)])
+        {
+            for at in [-9.0, -0.5, 0.0, 0.75, 9.0] {
+                let item = |i| {
+                    let corner = random.vec3();
+                    Record::new(&Aabb { min: corner, max: corner + random.vec3().abs() * 0.5 }, 0, i)
+                };
+                let mut items: Vec<Record> = (0..100).map(item).collect();
+                let range = Range { first: 1000, ..Range::new::<Portable>(&items, 0) };
+                let centre = |item: &Record| (item.bounds().min + item.bounds().max).to_array();
+                let count = items.iter().filter(|item| centre(item)[axis] < at).count();
+                let split = Split { cut: Cut::Plane { axis, at }, cost: 0.0 };
+                let sides = dispatch(isa, Partition(&mut items, &range, split));
+                assert_eq!([sides[0].first, sides[1].first], [1000, 1000 + count as u32]);
+                let (left, right) = items.split_at(count);
+                for (is_right, (side, items)) in sides.iter().zip([left, right]).enumerate() {
+                    assert_eq!(side.len as usize, items.len());
+                    let around = items.iter().fold(Aabb::EMPTY, |sum, item| sum.union(item.bounds()));
+                    assert_eq!(aabb(&side.bounds), around);
+                    let [min, max] = [aabb(&side.centres).min.to_array(), aabb(&side.centres).max.to_array()];
+                    for centre in items.iter().map(centre) {
+                        assert!((0..3).all(|k| min[k] <= centre[k] && centre[k] <= max[k]), "{isa:?}, {axis} at {at}");
+                        assert_eq!(centre[axis] >= at, is_right == 1);
+                    }
+                    let whole = aabb(&range.centres);
+                    assert!(if is_right == 1 {
+                        min[axis] == at.max(whole.min[axis]).max(2.0 * around.min[axis])
+                    } else {
+                        max[axis] == at.min(whole.max[axis]).min(2.0 * around.max[axis])
+                    });
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_are_begun_ones() {
+        for block in [1, 2, 4, 8] {
+            let rule = Rule { block, leaf: 4 * block };
+            for count in [0, 1, 2, 7, 8, 9, 31, 32, 33, 1 << 20] {
+                assert_eq!(rule.blocks(count), count.div_ceil(block as usize) as f32);
+            }
+        }
     }
 
     proptest! {

@@ -144,7 +144,7 @@ pub(super) struct Local<'a, S> {
 }
 
 impl<'a, S: Simd> Local<'a, S> {
-    /// Of all `items`.
+    /// Of `items`, the first of which has the index `base`.
     #[inline(always)]
     fn new(rule: &'a Rule, items: &'a mut [Record], base: u32) -> Self {
         Self { rule, items, base, few: Bins::ANY, many: Bins::ANY, isa: std::marker::PhantomData }
@@ -198,11 +198,10 @@ pub(super) fn binned<S: Simd, const N: usize>(
     rule: &Rule,
 ) -> Option<Split> {
     let grid = Grid::new::<S, N>(&range.centres);
-    bins.clear::<S>();
     if items.len() < 2 * SAMPLE {
-        bins.add::<S>(items.iter(), &grid);
+        bins.fill::<S>(items.iter(), &grid);
     } else {
-        bins.add::<S>(sample(items), &grid);
+        bins.fill::<S>(sample(items), &grid);
     }
     bins.best::<S>(&grid, rule)
 }
