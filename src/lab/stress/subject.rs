@@ -112,7 +112,7 @@ impl Column {
         let classics = || Accel::ALL.into_iter().filter(|accel| accel.has_methods()).count();
         match self {
             Self::Native => {
-                let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available()).count();
+                let isas = Isa::available().count();
                 Preset::ALL.len() * isas * NATIVE_WAYS.len()
             }
             Self::Accel(_) => 1,

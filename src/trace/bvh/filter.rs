@@ -363,7 +363,7 @@ mod tests {
             let mut block = Block::EMPTY;
             block.push(corners, 0, 0);
             let filter = Filter::new(&ray, Blur::NONE);
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for isa in Isa::available() {
                 let Candidates { lanes, sure, .. } = isa::dispatch(isa, Test(&filter, &block, f32::INFINITY));
                 let hit = triangle::intersect(&ray, &corners);
                 assert!(lanes & sure == 0 || hit.is_some(), "{isa:?} {ray:?} {corners:?}");

@@ -18,9 +18,14 @@ impl Isa {
     /// All of them, the best last.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
+    /// Those that this processor has, the best last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|isa| isa.is_available())
+    }
+
     /// The best of this processor.
     pub fn detect() -> Self {
-        Self::ALL.into_iter().rfind(|isa| isa.is_available()).unwrap_or(Self::Portable)
+        Self::available().last().unwrap_or(Self::Portable)
     }
 
     /// As in options and reports.

@@ -378,7 +378,7 @@ mod tests {
                 let ray = Ray::new(random.vec3() * case.away.max(3.0), random.vec3());
                 Ray { tmin: random.unit().abs(), tmax: 1.0 + random.unit().abs(), ..ray }
             });
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for isa in Isa::available() {
                 let [together, alone] = dispatch(isa, Each(cases.each_ref().map(|case| &case.place), rays.each_ref()));
                 for (i, ((numbers, is_known), (expected, is_expected))) in together.into_iter().zip(alone).enumerate() {
                     assert_eq!(is_known, is_expected, "{group} {i} {isa:?}");

@@ -4,7 +4,7 @@
 use super::lanes::Boxes;
 use super::record::Record;
 use super::split::{Cheapest, Cut, Rule, Split, join};
-use crate::trace::bvh::simd::{Array, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 
 /// Bins an axis of a large range is divided into.
 pub(super) const MANY: usize = 16;
@@ -15,7 +15,7 @@ pub(super) const FEW: usize = 8;
 /// Ranges of fewer items than this are divided into [`FEW`] bins.
 pub(super) const LARGE: usize = 512;
 
-/// One in the lanes of the largest coordinates, zero in the others.
+/// Positive in the lanes of the largest coordinates.
 const AXES: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0];
 
 /// From a centre to its bin: centres are doubled, as [-c, c].
@@ -31,13 +31,13 @@ impl Grid {
     pub fn new<S: Simd, const N: usize>(centres: &[f32; 8]) -> Self {
         // Vectors, stored whole: whoever loads what was just stored lane by lane waits until it is in the cache.
         let zero = S::V8::splat(0.0);
-        let axes = S::V8::load(&AXES);
+        let axes = zero.less(S::V8::load(&AXES));
         let max = S::V8::load(centres);
         let min = zero.sub(max.swap_halves());
         let size = max.sub(min);
         // Where all centres coincide they fall into bin 0, and nothing can be divided.
-        let scale = S::V8::select(zero.less(size.mul(axes)), S::V8::splat(N as f32).div(size), zero);
-        Self { origin: S::V8::select(zero.less(axes), min, zero).to_array(), scale: scale.to_array() }
+        let scale = S::V8::select(axes.and(zero.less(size)), S::V8::splat(N as f32).div(size), zero);
+        Self { origin: S::V8::select(axes, min, zero).to_array(), scale: scale.to_array() }
     }
 
     /// Where a bin begins, but for rounding.
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn bins_hold_what_falls_into_them() {
         let mut random = Random::new(9);
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        for isa in Isa::available() {
             let mut bins = Bins::<8>::ANY;
             for count in [101, 1, 2, 3, 50, 0] {
                 let item = |i| {
@@ -236,7 +236,7 @@ mod tests {
             let ((p, q), (r, s)) = (sides[(k + 1) % sides.len()], sides[(k + 2) % sides.len()]);
             let ids = [f32::from_bits(7), f32::from_bits(u32::MAX)];
             let centres = [0.0 - min, 0.0 - p, 0.0 - r, ids[0], max, q, s, ids[1]];
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for isa in Isa::available() {
                 let grid = dispatch(isa, Grids(&centres));
                 for (axis, (min, max)) in [(min, max), (p, q), (r, s)].into_iter().enumerate() {
                     let scale = if max > min { 8.0 / (max - min) } else { 0.0 };

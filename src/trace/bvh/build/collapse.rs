@@ -258,7 +258,7 @@ mod tests {
         for ends in (2..15).flat_map(|ends| [ends; 24]).chain([2; 500]) {
             let mut expected = None;
             let shape = Shape::random(&mut random, ends);
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for isa in Isa::available() {
                 let mut binary = shape.binary();
                 dispatch(isa, Weigh(&mut binary));
                 let nodes = binary.nodes(&RULE, 9);

@@ -309,7 +309,7 @@ mod tests {
                 (format!("{tree:?}"), numbers)
             };
             let expected = build(Isa::Portable, 1, 0);
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for isa in Isa::available() {
                 for (threads, others) in [(1, 0), (2, 0), (3, 0), (3, 1000)] {
                     let same = build(isa, threads, others) == expected;
                     assert!(same, "{isa:?}, {} items, {threads} threads, {others} beside", case.len());

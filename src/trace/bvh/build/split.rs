@@ -239,7 +239,8 @@ mod tests {
     use super::*;
     use crate::math::Aabb;
     use crate::trace::bvh::build::record::aabb;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::build::top::PartitionKernel;
+    use crate::trace::bvh::isa::{Isa, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
 
@@ -248,23 +249,11 @@ mod tests {
         prop_oneof![4 => (0u8..6).prop_map(f32::from), 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
     }
 
-    struct Partition<'a>(&'a mut [Record], &'a Range, Split);
-
-    impl Kernel for Partition<'_> {
-        type Output = [Range; 2];
-        #[inline(always)]
-        fn run<S: Simd>(self) -> [Range; 2] {
-            self.2.partition::<S>(self.0, self.1)
-        }
-    }
-
     /// Each side has the items that the plane leaves on it, the box around them, and a box around their centres that ends at the plane.
     #[test]
     fn sides_are_those_of_the_plane() {
         let mut random = Random::new(5);
-        for (isa, axis) in
-            Isa::ALL.into_iter().filter(|isa| isa.is_available()).flat_map(|isa| [(isa, 0), (isa, 1), (isa, 2)])
-        {
+        for (isa, axis) in Isa::available().flat_map(|isa| [(isa, 0), (isa, 1), (isa, 2)]) {
             for at in [-9.0, -0.5, 0.0, 0.75, 9.0] {
                 let item = |i| {
                     let corner = random.vec3();
@@ -275,7 +264,7 @@ mod tests {
                 let centre = |item: &Record| (item.bounds().min + item.bounds().max).to_array();
                 let count = items.iter().filter(|item| centre(item)[axis] < at).count();
                 let split = Split { cut: Cut::Plane { axis, at }, cost: 0.0 };
-                let sides = dispatch(isa, Partition(&mut items, &range, split));
+                let sides = dispatch(isa, PartitionKernel { items: &mut items, range: &range, split: &split });
                 assert_eq!([sides[0].first, sides[1].first], [1000, 1000 + count as u32]);
                 let (left, right) = items.split_at(count);
                 for (is_right, (side, items)) in sides.iter().zip([left, right]).enumerate() {

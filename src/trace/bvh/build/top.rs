@@ -141,10 +141,11 @@ impl Kernel for FindKernel<'_> {
     }
 }
 
-struct PartitionKernel<'a> {
-    items: &'a mut [Record],
-    range: &'a Range,
-    split: &'a Split,
+/// [`Split::partition`].
+pub(super) struct PartitionKernel<'a> {
+    pub items: &'a mut [Record],
+    pub range: &'a Range,
+    pub split: &'a Split,
 }
 
 impl Kernel for PartitionKernel<'_> {

@@ -315,7 +315,7 @@ mod tests {
                     .collect();
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
-                for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                for isa in Isa::available() {
                     let mut traveller = Traveller { len, ..Traveller::NONE };
                     traveller.found.limit = limit;
                     for (i, &(near, child)) in entries.iter().enumerate() {

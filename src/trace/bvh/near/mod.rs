@@ -301,7 +301,7 @@ mod tests {
             .collect();
         assert!(ties > 250, "{ties} ties of {}", points.len());
 
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        for isa in Isa::available() {
             for preset in Preset::ALL {
                 let bvh = Bvh::build_with(&world, Options { preset, isa, progress: None });
                 // Also corners so small that products of four lengths vanish.

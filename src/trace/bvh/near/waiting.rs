@@ -107,7 +107,7 @@ mod tests {
                     .collect();
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
-                for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                for isa in Isa::available() {
                     let mut waiting = Waiting { len, ..Waiting::NOBODY };
                     for (i, &(near, child)) in entries.iter().enumerate() {
                         (waiting.near[i + 1], waiting.children[i + 1]) = (near, child);

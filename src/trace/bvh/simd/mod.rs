@@ -289,15 +289,11 @@ mod tests {
         nears.flat_map(move |near| (0..256).map(move |named| Entered { near, named, child }))
     }
 
-    fn sets() -> impl Iterator<Item = Isa> {
-        Isa::ALL.into_iter().filter(|isa| isa.is_available())
-    }
-
     /// Whichever children are named, each instruction set has them in the order of a sort.
     #[test]
     fn children_are_sorted_alike() {
         for case in cases() {
-            for isa in sets() {
+            for isa in Isa::available() {
                 assert_eq!(dispatch(isa, Sort(case)), case.sorted(), "{isa:?}: {:08b} of {:?}", case.named, case.near);
             }
         }
@@ -309,7 +305,7 @@ mod tests {
         for case in cases() {
             let mut expected = case.sorted();
             let nearest = expected.pop();
-            for isa in sets() {
+            for isa in Isa::available() {
                 let context = format!("{isa:?}: {:08b} of {:?}", case.named, case.near);
                 let (child, mut others) = dispatch(isa, Nearest(case));
                 assert!(nearest.is_none_or(|(_, expected)| child == expected), "{context}");
@@ -331,7 +327,7 @@ mod tests {
             let (limit, count) = (f32::from_bits(entries[case.named as usize % 8].0 & !7), case.named as usize % 13);
             let is_near = |(near, _): &(u32, Child)| f32::from_bits(near & !7) <= limit;
             let expected: Vec<_> = entries.into_iter().take(count).filter(is_near).collect();
-            for isa in sets() {
+            for isa in Isa::available() {
                 assert_eq!(
                     dispatch(isa, Within { limit, entries, count }),
                     expected,
