@@ -111,11 +111,13 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// How far it reaches along `way`, and against it: the largest scalar products of these with any of its points.
-    #[inline]
-    pub fn extent(&self, way: DVec3) -> [f64; 2] {
-        let (a, b) = (way * self.min.as_dvec3(), way * self.max.as_dvec3());
-        [a.max(b).element_sum(), -a.min(b).element_sum()]
+    /// How far it reaches along each row of a matrix, and against it: the largest scalar products of these with any of its points.
+    #[inline(always)]
+    pub fn extents(&self, rows: &DMat3) -> [DVec3; 2] {
+        let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
+        let products = |axis: usize| (rows.col(axis) * min[axis], rows.col(axis) * max[axis]);
+        let ((ax, bx), (ay, by), (az, bz)) = (products(0), products(1), products(2));
+        [ax.max(bx) + ay.max(by) + az.max(bz), -(ax.min(bx) + ay.min(by) + az.min(bz))]
     }
 
     /// Half the surface area, the measure of the surface area heuristic; 0 where empty.

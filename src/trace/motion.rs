@@ -145,13 +145,14 @@ impl Placement {
 
     /// A box around the object whose own box is `object`, in world coordinates, at all times; rounded outwards.
     pub fn bounds(&self, object: Aabb) -> Aabb {
-        self.bounds_of(object, |way| object.extent(way))
+        self.bounds_of(object, |rows| object.extents(rows))
     }
 
-    /// The same, and tighter, of an object of which more is known: `extent` is at least the scalar product of any of its points with
-    /// the given direction, in the object's coordinates, and with the opposite one.
-    pub fn bounds_of(&self, object: Aabb, extent: impl Fn(DVec3) -> [f64; 2]) -> Aabb {
-        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, extent) };
+    /// The same, and tighter, of an object of which more is known: `extents` are at least the scalar products of any of its points with
+    /// the rows of the given matrix, directions in the object's coordinates, and with the opposite ones.
+    #[inline(always)]
+    pub fn bounds_of(&self, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> Aabb {
+        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, extents) };
         if object.is_empty() {
             return Aabb::EMPTY;
         }
@@ -162,31 +163,29 @@ impl Placement {
         let most = start.matrix3.abs().max_entries(&end.matrix3.abs());
         let rounding = most * reach + start.translation.abs().max(end.translation.abs());
         let slack = rounding * (1.01 * f64::from(UNIT_ROUNDOFF));
-        bounds_under(&start, reach, slack, &extent).union(bounds_under(&end, reach, slack, &extent))
+        bounds_under(&start, reach, slack, &extents).union(bounds_under(&end, reach, slack, &extents))
     }
 }
 
-/// The box in the world of an object that a transform places; `extent` is as of [`Placement::bounds_of`].
-pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, extent: impl Fn(DVec3) -> [f64; 2]) -> Aabb {
+/// The box in the world of an object that a transform places; `extents` are as of [`Placement::bounds_of`].
+#[inline(always)]
+pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> Aabb {
     if object.is_empty() {
         return Aabb::EMPTY;
     }
     let reach = object.min.abs().max(object.max.abs()).as_dvec3();
-    bounds_under(&to_world.as_daffine3(), reach, DVec3::ZERO, &extent)
+    bounds_under(&to_world.as_daffine3(), reach, DVec3::ZERO, &extents)
 }
 
 /// `reach` is the largest magnitude of each coordinate of the object.
-fn bounds_under(to_world: &DAffine3, reach: DVec3, slack: DVec3, extent: &impl Fn(DVec3) -> [f64; 2]) -> Aabb {
+#[inline(always)]
+fn bounds_under(to_world: &DAffine3, reach: DVec3, slack: DVec3, extents: &impl Fn(&DMat3) -> [DVec3; 2]) -> Aabb {
     let DAffine3 { matrix3, translation } = to_world;
     // f64 rounding of the sums, far below one step of f32.
     let slack = slack + (matrix3.abs() * reach + translation.abs()) * gamma64(16);
-    let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
-    for axis in 0..3 {
-        let [along, against] = extent(matrix3.row(axis));
-        min[axis] = ((translation[axis] - against - slack[axis]) as f32).next_down();
-        max[axis] = ((translation[axis] + along + slack[axis]) as f32).next_up();
-    }
-    Aabb { min, max }
+    let [along, against] = extents(matrix3);
+    let (min, max) = ((translation - against - slack).as_vec3(), (translation + along + slack).as_vec3());
+    Aabb { min: min.map(f32::next_down), max: max.map(f32::next_up) }
 }
 
 #[cfg(test)]

@@ -60,20 +60,6 @@ impl Block {
         Aabb::around(self.used().flat_map(|lane| self.triangle(lane)))
     }
 
-    /// The largest scalar product of `way` with a corner, as f32 rounds it.
-    pub fn farthest(&self, way: Vec3) -> f32 {
-        let Vec3 { x, y, z } = way;
-        let [px, py, pz] = &self.corners;
-        let mut farthest = [f32::NEG_INFINITY; LANES];
-        for k in 0..3 {
-            for lane in 0..LANES {
-                let reach = x * px[k][lane] + y * py[k][lane] + z * pz[k][lane];
-                farthest[lane] = farthest[lane].max(reach);
-            }
-        }
-        self.used().map(|lane| farthest[lane]).fold(f32::NEG_INFINITY, f32::max)
-    }
-
     #[inline(always)]
     pub fn triangle(&self, lane: usize) -> [Vec3; 3] {
         let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = &self.corners;

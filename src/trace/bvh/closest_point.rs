@@ -203,7 +203,7 @@ impl<'a> Search<'a> {
             Level::Placed(index) => {
                 let (_, Through { to_world, .. }) = self.placed(index);
                 // Where it stands at time 0, as its triangles are measured.
-                bounds_placed(to_world, bounds, |way| bounds.extent(way))
+                bounds_placed(to_world, bounds, |rows| bounds.extents(rows))
             }
             Level::Fixed | Level::Placements | Level::Moving => bounds,
         };

@@ -1,7 +1,8 @@
 //! Everything in one coordinate system: that of the world, or that of an object which is placed in it.
 
+use super::farthest::Waiting;
 use super::filter::Filter;
-use super::node::Child;
+use super::isa::{self, Isa, Kernel};
 use super::place::{Blur, Place};
 use super::preset::Options;
 use super::query::Query;
@@ -28,6 +29,23 @@ pub(super) struct Through<'a> {
     pub to_world: &'a Affine3,
 }
 
+/// [`Level::farthest`].
+struct Farthest<'a> {
+    level: &'a Level,
+    ways: &'a [Vec3],
+    visits: usize,
+    values: &'a mut [f64],
+}
+
+impl Kernel for Farthest<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { level, ways, visits, values } = self;
+        level.search::<S>(ways, visits, values);
+    }
+}
+
 impl Level {
     /// Of a tree over the triangles of `parts`; that over their shapes, of which there are few, is built.
     pub fn new(triangles: TriangleTree, parts: &[Part], options: &Options<'_>) -> Self {
@@ -38,10 +56,20 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// At least the scalar product of `way` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it; `first` is
-    /// a leaf of the triangles.
-    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>) -> f64 {
-        self.triangles.farthest(way, visits, first).max(self.shapes.farthest(way, visits))
+    /// At least the scalar product of each of `ways` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it: best in an
+    /// order in which neighbours differ little.
+    pub fn farthest(&self, isa: Isa, ways: &[Vec3], visits: usize, values: &mut [f64]) {
+        isa::dispatch_narrow(isa, Farthest { level: self, ways, visits, values });
+    }
+
+    /// [`Self::farthest`].
+    #[inline(always)]
+    pub fn search<S: Simd>(&self, ways: &[Vec3], visits: usize, values: &mut [f64]) {
+        let (mut waiting, mut first) = (Waiting::new(), None);
+        for (value, &way) in values.iter_mut().zip(ways) {
+            let of_triangles = self.triangles.farthest::<S>(way, visits, &mut waiting, &mut first);
+            *value = of_triangles.max(self.shapes.farthest::<S>(way, visits, &mut waiting));
+        }
     }
 
     /// Offers the triangles that `ray`, in the world, hits in this level, which may be placed; all by itself.

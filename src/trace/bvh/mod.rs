@@ -16,7 +16,7 @@
 //! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
-//! | `support` | how far objects reach, for the boxes around them where they are placed |
+//! | `support`, `farthest` | how far objects reach, for the boxes around them where they are placed; the search for that |
 //! | `moving` | placed objects that move |
 //! | `place` | an object in its place, and how far rays in its coordinates may be off |
 //! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
@@ -57,6 +57,7 @@ mod clusters;
 mod coplanar;
 mod discs;
 mod edges;
+mod farthest;
 mod filter;
 mod flight;
 mod footprint;

@@ -230,66 +230,6 @@ impl Tree {
         self.bounds
     }
 
-    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
-    /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
-    /// farther than what has been found and the 256th part of the width, or so many nodes and leaves have been visited. `first` is a leaf
-    /// that is asked before all others, besides these, and then one of those that reach farthest: of ways that differ little, mostly the same. Infinite where
-    /// nothing may be visited.
-    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>, of_leaf: impl Fn(Child) -> f32) -> f64 {
-        if self.is_empty() {
-            return f64::NEG_INFINITY;
-        }
-        let size = way.abs().dot(self.reach());
-        if visits == 0 || size.is_nan() || size > f32::MAX / 4.0 {
-            return f64::INFINITY;
-        }
-        let [x, y, z] = way.to_array();
-        let upper = |component: f32| usize::from(component >= 0.0);
-        let sides = [upper(x), 2 + upper(y), 4 + upper(z)];
-        let spare = way.abs().dot(self.bounds.size()) / 256.0;
-        let known = first.map(|leaf| of_leaf(leaf) + spare).filter(|reach| reach.is_finite());
-        let mut most = known.unwrap_or(f32::NEG_INFINITY);
-        let mut open = Vec::with_capacity(8 * WIDTH);
-        open.push((f32::INFINITY, Child::ROOT));
-        let mut left = visits;
-        while left > 0 {
-            let Some((farthest, child)) = open.pop() else { break };
-            if farthest <= most {
-                continue;
-            }
-            left -= 1;
-            if child.is_leaf() {
-                let reach = (of_leaf(child) + spare).min(farthest);
-                if reach > most {
-                    (most, *first) = (reach, Some(child));
-                }
-                continue;
-            }
-            let node = self.node(child);
-            let [bx, by, bz] = sides.map(|side| &node.bounds[side]);
-            let mut reach = [0.0; WIDTH];
-            for slot in 0..WIDTH {
-                reach[slot] = x * bx[slot] + y * by[slot] + z * bz[slot];
-            }
-            let (mut farthest, mut next) = (most, None);
-            for (slot, &reach) in reach.iter().enumerate() {
-                // Not so of an empty slot: there it is infinitely little, or not a number.
-                if reach > most {
-                    if reach > farthest {
-                        (farthest, next) = (reach, Some(open.len()));
-                    }
-                    open.push((reach, node.child[slot]));
-                }
-            }
-            if let (Some(next), Some(last)) = (next, open.len().checked_sub(1)) {
-                open.swap(next, last);
-            }
-        }
-        let most = open.iter().fold(most, |most, &(reach, _)| most.max(reach));
-        // Three products and two sums in f32, with as much again to spare.
-        f64::from(most) + f64::from(8.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
-    }
-
     /// The largest coordinate's magnitude on each axis. Zero for no items.
     #[inline]
     pub fn reach(&self) -> Vec3 {

@@ -68,6 +68,7 @@ const _: () = assert!(size_of::<Place>() == 3 * 64 && std::mem::offset_of!(Place
 
 impl Place {
     /// `reach` is that of the object's triangles.
+    #[inline]
     pub fn new(placement: &Placement, reach: Vec3) -> Self {
         let to_world = placement.to_world.as_daffine3();
         let to_object = &placement.to_object;
@@ -97,9 +98,13 @@ impl Place {
     }
 
     /// The same, given the grain of the object's triangles.
+    #[inline]
     pub fn with_grain(self, grain: f32) -> Self {
-        let volume = self.to_world.as_daffine3().matrix3.determinant().abs();
-        Self { grain: grain * volume.cbrt().powi(2) as f32, ..self }
+        // About how much larger areas become: the mean square of what the axes are stretched by.
+        let columns = self.to_world.matrix3;
+        let squares =
+            columns.x_axis.length_squared() + columns.y_axis.length_squared() + columns.z_axis.length_squared();
+        Self { grain: grain * squares / 3.0, ..self }
     }
 
     pub fn through(&self) -> Through<'_> {

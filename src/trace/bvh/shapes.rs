@@ -2,10 +2,12 @@
 
 use super::PartId;
 use super::build::{self, Record};
+use super::farthest::Waiting;
 use super::level::Through;
 use super::node::{Child, Tree};
 use super::preset::Options;
 use super::query::{Query, SOMETHING};
+use super::simd::Simd;
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
@@ -55,8 +57,9 @@ impl ShapeTree {
     }
 
     /// As [`Tree::farthest`], of the boxes around shapes.
-    pub fn farthest(&self, way: Vec3, visits: usize) -> f64 {
-        self.tree.farthest(way, visits, &mut None, |_| f32::INFINITY)
+    #[inline(always)]
+    pub fn farthest<S: Simd>(&self, way: Vec3, visits: usize, waiting: &mut Waiting) -> f64 {
+        self.tree.farthest::<S>(way, visits, waiting, &mut None, |_| f32::INFINITY)
     }
 
     /// Memory it holds, in bytes.

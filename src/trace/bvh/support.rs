@@ -11,9 +11,10 @@
 
 use rayon::prelude::*;
 
+use super::isa::{self, Isa, Kernel};
 use super::level::Level;
-use super::node::Child;
-use crate::math::{Aabb, DVec3, Vec3};
+use super::simd::{Doubles, Simd};
+use crate::math::{Aabb, DMat3, DVec3, Vec3};
 use crate::trace::Placement;
 
 /// Nodes and leaves that are visited at most for all that is placed, so that many objects that are placed now and then do not take long;
@@ -26,6 +27,7 @@ const LEAST_VISITS: usize = 16;
 /// The boxes around objects where they are placed.
 pub(super) struct Outlines<'a> {
     objects: &'a [Level],
+    isa: Isa,
     /// One for each object that is placed often.
     tables: Vec<Option<Table>>,
     /// For each search of other objects.
@@ -34,7 +36,7 @@ pub(super) struct Outlines<'a> {
 
 impl<'a> Outlines<'a> {
     /// For `placements` of `objects`.
-    pub fn new<'b>(objects: &'a [Level], placements: impl Iterator<Item = &'b Placement>) -> Self {
+    pub fn new<'b>(objects: &'a [Level], isa: Isa, placements: impl Iterator<Item = &'b Placement>) -> Self {
         // What moves has two boxes, at its start and at its end.
         let mut boxes = vec![0; objects.len()];
         for placement in placements.filter(|placement| !objects[placement.object as usize].bounds().is_empty()) {
@@ -43,26 +45,55 @@ impl<'a> Outlines<'a> {
         let searches = boxes.iter().map(|&boxes| Table::cells(boxes).map_or(6 * boxes, Table::entries));
         let visits = ALL_VISITS / searches.sum::<usize>().max(1);
         let table = |(level, &boxes): (&Level, &usize)| {
-            let support = |way, first: &mut _| level.farthest(way, visits.max(LEAST_VISITS), first);
+            let support = |ways: &[_], values: &mut _| level.farthest(isa, ways, visits.max(LEAST_VISITS), values);
             Table::cells(boxes).map(|cells| Table::new(cells, support))
         };
-        Self { objects, tables: objects.par_iter().zip(&boxes).map(table).collect(), visits }
+        Self { objects, isa, tables: objects.par_iter().zip(&boxes).map(table).collect(), visits }
     }
 
     /// The box around `placement`, at all times.
     pub fn around(&self, placement: &Placement) -> Aabb {
-        let level = &self.objects[placement.object as usize];
-        let (bounds, table) = (level.bounds(), &self.tables[placement.object as usize]);
-        placement.bounds_of(bounds, |way| {
-            let [along, against] = match table {
-                Some(table) => table.extent(way),
-                // A row of a matrix of f32, so nothing is lost.
-                None => [way, -way].map(|way| level.farthest(way.as_vec3(), self.visits, &mut None)),
-            };
-            let [most, most_against] = bounds.extent(way);
-            [along.min(most), against.min(most_against)]
-        })
+        isa::dispatch_narrow(self.isa, Around { outlines: self, placement })
     }
+}
+
+/// [`Outlines::around`].
+struct Around<'a> {
+    outlines: &'a Outlines<'a>,
+    placement: &'a Placement,
+}
+
+impl Kernel for Around<'_> {
+    type Output = Aabb;
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Aabb {
+        let Self { outlines: Outlines { objects, tables, visits, .. }, placement } = self;
+        let level = &objects[placement.object as usize];
+        let (bounds, table) = (level.bounds(), &tables[placement.object as usize]);
+        placement.bounds_of(
+            bounds,
+            #[inline(always)]
+            |rows| {
+                let [along, against] = match table {
+                    Some(table) => table.extents::<S>(rows),
+                    None => searched::<S>(level, rows, *visits),
+                };
+                let [most, most_against] = bounds.extents(rows);
+                [along.min(most), against.min(most_against)]
+            },
+        )
+    }
+}
+
+/// How far an object reaches along each row of a matrix and against it, searched for.
+#[inline(always)]
+fn searched<S: Simd>(level: &Level, rows: &DMat3, visits: usize) -> [DVec3; 2] {
+    // Rows of a matrix of f32, so nothing is lost.
+    let [x, y, z] = [0, 1, 2].map(|axis| rows.row(axis).as_vec3());
+    let mut values = [0.0; 6];
+    level.search::<S>(&[x, y, z, -x, -y, -z], visits, &mut values);
+    let [x, y, z, rest @ ..] = values;
+    [DVec3::new(x, y, z), DVec3::from_array(rest)]
 }
 
 /// A support function's values on the surface of the cube from -1 to 1.
@@ -90,21 +121,25 @@ impl Table {
         2 * 3 * (cells + 1) * (cells + 1)
     }
 
-    /// Of a support function, which is asked for neighbours one after the other, as [`Level::farthest`] is.
-    fn new(cells: usize, support: impl Fn(Vec3, &mut Option<Child>) -> f64 + Sync) -> Self {
+    /// Of a support function, which is asked for neighbours together, as [`Level::farthest`] is.
+    fn new(cells: usize, support: impl Fn(&[Vec3], &mut [f64]) + Sync) -> Self {
         let side = cells + 1;
         let mut values = vec![[0.0; 2]; Self::entries(cells) / 2];
         values.par_chunks_mut(side).enumerate().for_each(|(row, values)| {
             let (axis, j) = (row / side, row % side);
-            let component = |i: usize| 2.0 * i as f32 / cells as f32 - 1.0;
-            let mut first = [None; 2];
-            for (i, [along, against]) in values.iter_mut().enumerate() {
-                let mut way = Vec3::ZERO;
-                way[axis] = 1.0;
+            let component = |at: usize| 2.0 * at as f32 / cells as f32 - 1.0;
+            let mut ways = vec![Vec3::ZERO; side];
+            for (i, way) in ways.iter_mut().enumerate() {
                 let [p, q] = OTHERS[axis];
-                (way[p], way[q]) = (component(i), component(j));
-                *along = support(way, &mut first[0]);
-                *against = support(-way, &mut first[1]);
+                (way[axis], way[p], way[q]) = (1.0, component(i), component(j));
+            }
+            let mut reach = vec![0.0; side];
+            for end in 0..2 {
+                support(&ways, &mut reach);
+                for ((value, &reach), way) in values.iter_mut().zip(&reach).zip(&mut ways) {
+                    value[end] = reach;
+                    *way = -*way;
+                }
             }
         });
         let most = values.as_flattened().iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -113,33 +148,49 @@ impl Table {
         Self { cells, values, spare }
     }
 
-    /// At least the support in a direction whose components are those of f32, and in the opposite one; infinite or NaN where nothing is known.
-    #[inline]
-    fn extent(&self, way: DVec3) -> [f64; 2] {
-        // The largest component, and where along and against are on its face: without branches, which nobody can predict.
-        let size = way.abs();
-        let axis = usize::from(size.y > size.x);
-        let axis = if size.z > size[axis] { 2 } else { axis };
-        let is_against = usize::from(way[axis] < 0.0);
-        let [p, q] = OTHERS[axis];
-        let half = self.cells as f64 / 2.0;
-        // The way is so many times as long as one on the cube, which it runs along or against.
-        let (length, scale) = (size[axis], half / way[axis]);
-        let place = |component: f64| {
-            let at = component * scale + half;
-            let cell = (at as i32 as usize).min(self.cells - 1);
-            (cell, at - cell as f64)
+    /// At least the support along each row of a matrix, whose entries are those of f32, and in the opposite direction; infinite or NaN where nothing is known.
+    #[inline(always)]
+    fn extents<S: Simd>(&self, rows: &DMat3) -> [DVec3; 2] {
+        let lanes = |axis: usize| {
+            let DVec3 { x, y, z } = rows.col(axis);
+            S::D4::load(&[x, y, z, 1.0])
         };
-        let ((i, f), (j, g)) = (place(way[p]), place(way[q]));
+        let [x, y, z] = [lanes(0), lanes(1), lanes(2)];
+        // The largest component, the others in their order, and on which face that is: without branches, which nobody can predict.
+        let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+        let two = ax.max(ay);
+        let face = |x: f64, y: f64, z: f64| {
+            let [x, y, z] = [x, y, z].map(S::D4::splat);
+            two.less_select(az, z, ax.less_select(ay, y, x))
+        };
+        let main = two.less_select(az, z, ax.less_select(ay, y, x));
+        let p = two.less_select(az, x, ax.less_select(ay, x, y));
+        let q = two.less_select(az, y, z);
+        let length = two.max(az);
         let side = self.cells + 1;
-        let corners = &self.values[(axis * side + j) * side + i..][..side + 2];
-        // The cell is cut into two triangles.
-        let beside = if f > g { 1 } else { side };
-        let (more, less) = (f.max(g), f.min(g));
-        let [low, beside, across] = [&corners[0], &corners[beside], &corners[side + 1]];
-        let on = |k: usize| low[k] * (1.0 - more) + beside[k] * (more - less) + across[k] * less;
-        let extent = [on(0), on(1)].map(|value| length * (value + self.spare));
-        [extent[is_against], extent[1 - is_against]]
+        let faces = side * side;
+        let first = face(0.0, faces as f64, (2 * faces) as f64).to_array();
+        // The way is so many times as long as one on the cube, which it runs along or against.
+        let half = S::D4::splat(self.cells as f64 / 2.0);
+        let scale = half.div(main);
+        let [at_p, at_q] = [p, q].map(|component| component.mul(scale).add(half).to_array());
+        let (main, length) = (main.to_array(), length.to_array());
+        let (mut along, mut against) = (DVec3::ZERO, DVec3::ZERO);
+        for row in 0..3 {
+            let cell = |at: f64| (at as i32 as usize).min(self.cells - 1);
+            let (i, j) = (cell(at_p[row]), cell(at_q[row]));
+            let (f, g) = (at_p[row] - i as f64, at_q[row] - j as f64);
+            let corners = &self.values[first[row] as usize + j * side + i..][..side + 2];
+            // The cell is cut into two triangles.
+            let beside = if f > g { 1 } else { side };
+            let (more, less) = (f.max(g), f.min(g));
+            let [low, beside, across] = [&corners[0], &corners[beside], &corners[side + 1]];
+            let on = |k: usize| low[k] * (1.0 - more) + beside[k] * (more - less) + across[k] * less;
+            let extent = [on(0), on(1)].map(|value| length[row] * (value + self.spare));
+            let is_against = usize::from(main[row] < 0.0);
+            (along[row], against[row]) = (extent[is_against], extent[1 - is_against]);
+        }
+        [along, against]
     }
 }
 
@@ -151,7 +202,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::math::{DAffine3, DMat3};
+    use crate::math::DAffine3;
     use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
     use crate::shape::{Shape, Sphere};
     use crate::trace::World;
@@ -253,16 +304,60 @@ mod tests {
                 for way in ways {
                     let most = reach(&mesh, way.as_dvec3());
                     for visits in [0, 1, 2, 7, 10_000] {
-                        let farthest = level.farthest(way, visits, &mut None);
+                        let farthest = farthest(level, way, visits);
                         assert!(farthest >= most, "{farthest} < {most} along {way} after {visits} of {preset:?}");
                     }
                     // The 256th part of the width to spare, and rounding.
                     let wide = f64::from(way.abs().dot(level.bounds().size()));
-                    let farthest = level.farthest(way, 10_000, &mut None);
+                    let farthest = farthest(level, way, 10_000);
                     assert!(farthest <= most + wide / 250.0 + 1e-5, "{farthest} > {most} along {way}, {preset:?}");
                 }
             }
         }
+    }
+
+    /// What the search finds, the same on every instruction set.
+    fn farthest(level: &Level, way: Vec3, visits: usize) -> f64 {
+        let on = |isa| {
+            let mut farthest = [0.0];
+            level.farthest(isa, &[way], visits, &mut farthest);
+            farthest[0]
+        };
+        let found: Vec<f64> = Isa::available().map(on).collect();
+        assert!(found.iter().all(|farthest| *farthest == found[0]), "{found:?} along {way}, {visits} visits");
+        found[0]
+    }
+
+    fn tabulated(cells: usize, support: impl Fn(DVec3) -> f64 + Sync) -> Table {
+        Table::new(cells, |ways, values| {
+            for (value, way) in values.iter_mut().zip(ways) {
+                *value = support(way.as_dvec3());
+            }
+        })
+    }
+
+    /// What a table has for `way`, whichever row it is, the same on every instruction set.
+    fn extent(table: &Table, way: DVec3) -> [f64; 2] {
+        struct Extents<'a>(&'a Table, DMat3);
+        impl Kernel for Extents<'_> {
+            type Output = [DVec3; 2];
+            #[inline(always)]
+            fn run<S: Simd>(self) -> [DVec3; 2] {
+                self.0.extents::<S>(&self.1)
+            }
+        }
+        let mut found = Vec::new();
+        for row in 0..3 {
+            let mut rows = [DVec3::new(-2.0, 3.0, 5.0), DVec3::new(7.0, 3.0, -1.0), DVec3::new(0.0, -0.5, 0.0)];
+            rows[row] = way;
+            let rows = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose();
+            for isa in Isa::available() {
+                found.push(isa::dispatch(isa, Extents(table, rows)).map(|extents| extents[row]));
+            }
+        }
+        let bits = |extent: [f64; 2]| extent.map(f64::to_bits);
+        assert!(found.iter().all(|&extent| bits(extent) == bits(found[0])), "{found:?} along {way}");
+        found[0]
     }
 
     /// The farthest of all corners along `way`, in f64.
@@ -276,8 +371,8 @@ mod tests {
         let mut random = Random::new(9);
         let soup = soup(&mut random);
         for cells in [8, 16] {
-            let ball = Table::new(cells, |way, _| way.as_dvec3().length());
-            let corners = Table::new(cells, |way, _| reach(&soup, way.as_dvec3()));
+            let ball = tabulated(cells, |way| way.length());
+            let corners = tabulated(cells, |way| reach(&soup, way));
             let (mut worst, finer) = (0.0_f64, 1.0 / (cells * cells) as f64);
             for case in 0..20_000 {
                 let length = [1.0, 10.0, 1e4, 1e30, 1e37, 1e-4, 1e-30, 1e-40][case / 4 % 8];
@@ -290,16 +385,16 @@ mod tests {
                 }
                 let way = way.as_dvec3();
                 for way in [way, -way] {
-                    let (most, farthest) = (way.length(), ball.extent(way)[0]);
+                    let (most, farthest) = (way.length(), extent(&ball, way)[0]);
                     assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
                     worst = worst.max((farthest - most) / way.abs().max_element());
-                    let (most, [farthest, against]) = (reach(&soup, way), corners.extent(way));
+                    let (most, [farthest, against]) = (reach(&soup, way), extent(&corners, way));
                     assert!(farthest >= most, "{farthest:e} < {most:e} along {way} of {cells} cells");
-                    assert_eq!([against, farthest], corners.extent(-way));
+                    assert_eq!([against, farthest], extent(&corners, -way));
                 }
             }
             assert!(worst > 0.8 * finer && worst < 1.0001 * finer, "{worst} of {cells} cells");
-            assert!(ball.extent(DVec3::ZERO).iter().all(|at| at.is_nan()), "nowhere is no way");
+            assert!(extent(&ball, DVec3::ZERO).iter().all(|at| at.is_nan()), "nowhere is no way");
         }
     }
 
@@ -338,8 +433,8 @@ mod tests {
             let world = World::placed(&scene).expect("sound");
             let bvh = Bvh::build(&world);
             let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let [outlines, again] =
-                [4, 1].map(|threads| pool(threads).install(|| Outlines::new(&bvh.objects, world.placements.iter())));
+            let [outlines, again] = [4, 1]
+                .map(|threads| pool(threads).install(|| Outlines::new(&bvh.objects, bvh.isa, world.placements.iter())));
             let mut tables = 0;
             for placement in &world.placements {
                 let (level, bounds) = (&bvh.objects[placement.object as usize], outlines.around(placement));
@@ -388,7 +483,7 @@ mod tests {
             };
             let world = World::placed(&scene).expect("sound");
             let bvh = Bvh::build(&world);
-            let outlines = Outlines::new(&bvh.objects, world.placements.iter());
+            let outlines = Outlines::new(&bvh.objects, bvh.isa, world.placements.iter());
             assert_eq!(outlines.tables[0].is_some(), times >= 128, "{times}");
             for placement in &world.placements {
                 let (bounds, to_world) = (outlines.around(placement), placement.to_world.as_daffine3());

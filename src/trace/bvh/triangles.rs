@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::block::{Block, LANES, Lane};
 use super::build::{self, presplit};
 use super::clusters;
+use super::farthest::Waiting;
 use super::filter::Filter;
 use super::leaves::Leaves;
 use super::level::Through;
@@ -102,11 +103,22 @@ impl TriangleTree {
     }
 
     /// As [`Tree::farthest`], of the triangles themselves.
-    pub fn farthest(&self, way: Vec3, visits: usize, first: &mut Option<Child>) -> f64 {
-        self.tree.farthest(way, visits, first, |leaf| {
-            let of_block = |index| self.leaves.block(index, &mut None).farthest(way);
-            leaf.blocks().map(of_block).fold(f32::NEG_INFINITY, f32::max)
-        })
+    #[inline(always)]
+    pub fn farthest<S: Simd>(&self, way: Vec3, visits: usize, waiting: &mut Waiting, first: &mut Option<Child>) -> f64 {
+        self.tree.farthest::<S>(
+            way,
+            visits,
+            waiting,
+            first,
+            #[inline(always)]
+            |leaf| {
+                let mut farthest = f32::NEG_INFINITY;
+                for index in leaf.blocks() {
+                    farthest = farthest.max(self.leaves.block(index, &mut None).farthest::<S>(way));
+                }
+                farthest
+            },
+        )
     }
 
     /// How large they are, about: the area that their box shows to one side, over their number.
