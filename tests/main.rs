@@ -8,6 +8,7 @@ mod camera_flags;
 mod cli;
 mod compare;
 mod denoise;
+mod documents;
 #[cfg(feature = "embree")]
 mod embree;
 mod image;

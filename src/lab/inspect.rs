@@ -34,7 +34,7 @@ pub struct Inspection {
     pub materials: Vec<String>,
     /// The textures.
     pub textures: Vec<TextureInfo>,
-    /// Kinds of the lights: `directional`, `point` or `spot`.
+    /// Kinds of the lights: `directional`, `point`, `spot` or `area`.
     pub lights: Vec<&'static str>,
     /// Names of the cameras.
     pub cameras: Vec<String>,
