@@ -92,12 +92,12 @@ fn of_comparisons() {
     let scene = scene!("gallery/gallery.glb");
     check("compare SCENE --json", &["compare", scene, "--json", "--size", "16x8"], &[]);
     check("compare SCENE --all --json", &["compare", scene, "--all", "--json", "--size", "16x8"], &[]);
+    let bench = ["bench", "terrain10", "--json", "--size", "16", "--repeat", "1", "--threads", "1"];
+    check("bench SCENE --json", &bench, &[]);
 }
 
 #[test]
-fn of_rates() {
-    let bench = ["bench", "terrain10", "--json", "--size", "16", "--repeat", "1", "--threads", "1"];
-    check("bench SCENE --json", &bench, &[]);
+fn of_growth() {
     let scaling = ["bench", "--scaling", "--json", "--max", "10"];
     check("bench --scaling --json", &scaling, &[]);
 }
