@@ -1,6 +1,8 @@
 //! The benchmark: its rays are those of `benches/embree_ref.cpp`, its figures hang together, and it finds wrong answers.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use twincast::io::UpAxis;
 use twincast::lab::bench::{Built, Contender, Kind, SIDE, Setup, Subject};
@@ -115,17 +117,37 @@ fn setup<'a>(subject: &'a Subject, contenders: &'a [Contender], kinds: &'a [Kind
     Setup { subject, contenders, kinds, side: 32, threads: 1, repeat: 2, cancel: None, on_step: None }
 }
 
+/// Two engines of which each says that its builds take so many seconds.
+#[test]
+fn builds_that_take_no_time_are_repeated() {
+    let (subject, _) = Subject::new("terrain2", UpAxis::Y).unwrap();
+    for (seconds, expected) in [(0.5, 2), (0.1, 2), (0.05, 3), (0.001, 41)] {
+        let builds = Arc::new(AtomicUsize::new(0));
+        let engine = |backend, mode| {
+            let builds = builds.clone();
+            let build = move |world: &World| {
+                builds.fetch_add(1, Ordering::Relaxed);
+                Ok(Built { seconds, bytes: 0, sah_cost: None, tracer: Box::new(Bvh::build(world)) })
+            };
+            Contender { backend, mode, build: Box::new(build) }
+        };
+        let contenders = [engine("native", "default"), engine("embree", "robust")];
+        setup(&subject, &contenders, &[Kind::Primary]).run().unwrap();
+        assert_eq!(builds.load(Ordering::Relaxed), 2 * expected, "of {seconds} seconds each");
+    }
+}
+
 #[test]
 fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
     let (subject, _) = Subject::new("terrain20", UpAxis::Y).unwrap();
     let engines = [("native", "default"), ("embree", "robust"), ("embree", "fast")];
     let contenders = engines.map(|(backend, mode)| contender(backend, mode, |_, hit, _| hit));
     for threads in [1, 3] {
-        let steps = std::sync::atomic::AtomicU64::new(0);
-        let count = || _ = steps.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let steps = AtomicU64::new(0);
+        let count = || _ = steps.fetch_add(1, Ordering::Relaxed);
         let setup = Setup { threads, on_step: Some(&count), ..setup(&subject, &contenders, &Kind::ALL) };
         let report = setup.run().unwrap();
-        assert_eq!(steps.load(std::sync::atomic::Ordering::Relaxed), setup.steps());
+        assert_eq!(steps.load(Ordering::Relaxed), setup.steps());
 
         let json = serde_json::to_value(&report).unwrap();
         assert_eq!(

@@ -72,7 +72,7 @@ pub(super) struct BenchArgs {
     #[arg(long, value_enum)]
     isa: Option<IsaArg>,
 
-    /// How often everything is measured
+    /// How often everything is measured; builds of small meshes are measured up to 41 times
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
 

@@ -17,6 +17,12 @@ use crate::trace::{Tracer, Width, World};
 /// The widths that are measured.
 pub const WIDTHS: [Width; 3] = [Width::One, Width::Eight, Width::Sixteen];
 
+/// As long as all builds together have not taken so many seconds they are repeated: a single one of a small mesh takes less than a millisecond, and says nothing.
+const BUILDING: f64 = 0.25;
+
+/// But no more often than this, if not asked to.
+const MOST_BUILDS: usize = 41;
+
 /// An engine in one of its modes.
 pub struct Contender {
     /// `native` or `embree`.
@@ -58,7 +64,7 @@ pub struct Setup<'a> {
     pub side: usize,
     /// Threads that build and trace, at least 1.
     pub threads: usize,
-    /// How often everything is measured, at least 1.
+    /// How often everything is measured, at least 1; builds that take no time more often.
     pub repeat: usize,
     /// Stops the measurement once set.
     pub cancel: Option<&'a AtomicBool>,
@@ -110,19 +116,26 @@ impl Setup<'_> {
         })
     }
 
-    /// Builds every engine in turn, `repeat` times, and keeps the last of each.
+    /// Builds every engine in turn, `repeat` times and more, and keeps the last of each.
     fn build(&self) -> Result<(Vec<AnyTracer>, Vec<BuildRow>)> {
         let mut built: Vec<Option<Built>> = self.contenders.iter().map(|_| None).collect();
         let mut rates = vec![Vec::new(); built.len()];
         let triangles = self.subject.world.stored_triangles() as f64;
-        for _ in 0..self.repeat {
+        let mut seconds = 0.0;
+        for turn in 0..self.repeat.max(MOST_BUILDS) {
+            if turn >= self.repeat && seconds >= BUILDING {
+                break;
+            }
             for ((contender, slot), rates) in self.contenders.iter().zip(&mut built).zip(&mut rates) {
                 // Its memory goes before the next one takes its own.
                 *slot = None;
                 let new = (contender.build)(&self.subject.world)?;
                 rates.push(triangles / new.seconds.max(1e-9) / 1e6);
+                seconds += new.seconds;
                 *slot = Some(new);
-                self.step()?;
+                if turn < self.repeat {
+                    self.step()?;
+                }
             }
         }
         let rows = self.contenders.iter().zip(&built).zip(&rates).map(|((contender, built), rates)| BuildRow {
