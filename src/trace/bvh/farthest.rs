@@ -6,7 +6,8 @@ use super::node::{Child, Node, Tree, WIDTH};
 use super::simd::{Array, Simd, Vector, everywhere};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 
-/// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it.
+/// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it: the lowest three bits mean nothing, and without
+/// them it is a little less.
 pub(super) struct Waiting {
     short: [u32; ENTRIES],
     child: [Child; ENTRIES],
@@ -59,11 +60,11 @@ fn short(key: u32) -> f32 {
 }
 
 impl Tree {
-    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow. `of_leaf` is that of a
+    /// At least the scalar product of `way` with any point of anything; infinite where f32 might overflow, or nothing may be visited. `of_leaf` is that of a
     /// leaf, as f32 rounds it, or infinite. Of each node the child is visited first that may reach farthest, until nothing reaches
     /// farther than what has been found and the 256th part of the width, or so many nodes and leaves have been visited. `first` is a leaf
-    /// that is asked before all others, besides these, and then one of those that reach farthest: of ways that differ little, mostly the same. Infinite where
-    /// nothing may be visited. The bits are the same whatever the instruction set.
+    /// that is asked before all others, which is no visit, and then one of those that reach farthest: of ways that differ little, mostly the same. The bits
+    /// are the same whatever the instruction set, since trees are made of them.
     #[inline(always)]
     pub fn farthest<S: Simd>(
         &self,
@@ -83,7 +84,8 @@ impl Tree {
         let bounds = self.bounds();
         let upper = way.cmpge(Vec3::ZERO);
         let spare = way.abs().dot(bounds.size()) / 256.0;
-        // The corner of the box around all that is farthest: everything is told by how much it falls short of that. A zero has no sign.
+        // The corner of the box around all that is farthest: everything is told by how much it falls short of that.
+        // Not -0, which keys could not put in order.
         let most = Vec3::select(upper, bounds.max, bounds.min).dot(way) + 0.0;
         let row = |axis: u32| (2 * axis + u32::from(upper.test(axis as usize))) * Node::ROW;
         let rows = [row(0), row(1), row(2)];
@@ -111,6 +113,7 @@ impl Tree {
             }
             let node = self.node(child);
             let [bx, by, bz] = [S::row(node, rows[0]), S::row(node, rows[1]), S::row(node, rows[2])];
+            // Not fused, which would round otherwise.
             let reach = x.mul(bx).add(y.mul(by)).add(z.mul(bz));
             // An empty slot falls infinitely short, or by what is not a number.
             let short = S::V8::splat(0.0).max(S::V8::splat(most).sub(reach));
@@ -121,7 +124,8 @@ impl Tree {
             waiting.push(others);
             next = if nearest < least { Some((nearest, child)) } else { waiting.pop(least) };
         }
-        // Three products and two sums of each of two numbers in f32 and their difference, with as much again to spare.
+        // Three products and two sums of what is farthest, their difference from another such sum, what is spared, and the other sum itself where they are held to differ by
+        // nothing: eight roundings, with as much again to spare; and products that underflow.
         f64::from(most) - f64::from(least) + f64::from(16.0 * UNIT_ROUNDOFF * size + f32::MIN_POSITIVE)
     }
 }
@@ -135,6 +139,7 @@ impl Block {
         let mut most = S::V8::splat(f32::NEG_INFINITY);
         for k in 0..3 {
             let [bx, by, bz] = [S::V8::load(&px[k]), S::V8::load(&py[k]), S::V8::load(&pz[k])];
+            // Not fused, as above.
             most = most.max(x.mul(bx).add(y.mul(by)).add(z.mul(bz)));
         }
         if self.lanes == (1 << LANES) - 1 {
@@ -142,5 +147,36 @@ impl Block {
         }
         let most = most.to_array();
         self.used().map(|lane| most[lane]).fold(f32::NEG_INFINITY, f32::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lowest_bits_of_keys_mean_nothing() {
+        let mut waiting = Waiting::new();
+        let key = |short: f32, slot| short.to_bits() & !7 | slot;
+        let (short, child) = waiting.above();
+        short[..3].copy_from_slice(&[key(3.0, 7), key(1.0, 5), key(2.0, 6)]);
+        child[..3].copy_from_slice(&[Child(3), Child(1), Child(2)]);
+        waiting.push(3);
+        assert_eq!(waiting.least(), 1.0);
+        assert_eq!(waiting.pop(2.0_f32.next_up()), Some((2.0, Child(2))));
+        assert_eq!(waiting.pop(1.0), None, "neither falls less short");
+        assert_eq!(waiting.least(), f32::INFINITY, "nothing is left");
+    }
+
+    #[test]
+    fn there_is_room_for_the_deepest_tree() {
+        let mut waiting = Waiting::new();
+        for level in 0..MAX_DEPTH {
+            let (short, child) = waiting.above();
+            (*short, *child) = ([level as u32; WIDTH], [Child(level as u32); WIDTH]);
+            waiting.push(WIDTH - 1);
+        }
+        _ = waiting.above();
+        assert_eq!(waiting.pop(f32::INFINITY).map(|(_, child)| child), Some(Child(MAX_DEPTH as u32 - 1)));
     }
 }

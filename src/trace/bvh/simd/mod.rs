@@ -1,8 +1,8 @@
 //! Several numbers at a time, by whatever the processor has.
 //!
 //! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, [`Avx2`]
-//! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so f32 serves only tests
-//! that reject conservatively. f64 is never fused: its operations round as the scalar ones of
+//! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so what is fused serves only tests
+//! that reject conservatively; where bits of f32 are kept, as by [`super::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 
 #[cfg(target_arch = "x86_64")]
@@ -61,7 +61,7 @@ pub(super) trait Simd {
         sorted_child: &mut [Child; 8],
     ) -> usize;
     /// Of the children that the mask names the nearest, told as [`Self::far_to_near`] does; and how many others there are. These are stored likewise, but in
-    /// order only where they are two. Vectors take no branch that depends on what the mask names. If it names none, the child is anyone's.
+    /// order only where they are two, and else in one that is the same on every instruction set. Vectors take no branch that depends on what the mask names. If it names none, the child is anyone's.
     fn nearest_apart(
         near: Self::V8,
         mask: <Self::V8 as Vector>::Mask,
@@ -308,6 +308,7 @@ mod tests {
             for isa in Isa::available() {
                 let context = format!("{isa:?}: {:08b} of {:?}", case.named, case.near);
                 let (child, mut others) = dispatch(isa, Nearest(case));
+                assert_eq!(others, dispatch(Isa::Portable, Nearest(case)).1, "{context}");
                 assert!(nearest.is_none_or(|(_, expected)| child == expected), "{context}");
                 if others.len() > 2 {
                     others.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
