@@ -51,7 +51,7 @@ fn single_rays_meet_what_brute_force_meets_with_its_normal() {
     let (world, rays) = world_and_rays();
     let brute = Brute::new(&world);
     let all = triangles(&world);
-    let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available());
+    let isas = Isa::available();
     for (isa, preset) in isas.flat_map(|isa| Preset::ALL.map(|preset| (isa, preset))) {
         let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
         for (i, ray) in rays.iter().enumerate() {
@@ -94,7 +94,7 @@ fn a_ray_begins_at_its_origin_at_the_earliest() {
 fn visitors_see_every_hit_up_to_where_they_look() {
     let (world, rays) = world_and_rays();
     let all = triangles(&world);
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+    for isa in Isa::available() {
         let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
         for ray in rays.iter().step_by(7) {
             let mut seen = BTreeSet::new();

@@ -147,7 +147,7 @@ fn packets_meet_what_single_rays_and_brute_force_meet() {
     let brute = Brute::new(&world);
     let families = families(&corners);
     let mut hit_count = 0;
-    let isas = Isa::ALL.into_iter().filter(|isa| isa.is_available());
+    let isas = Isa::available();
     for (isa, preset) in isas.flat_map(|isa| [Preset::Default, Preset::Compact].map(|preset| (isa, preset))) {
         let bvh = Bvh::build_with(&world, Options { isa, preset, ..Options::default() });
         for (number, rays) in families.iter().enumerate() {
@@ -164,7 +164,7 @@ fn packets_meet_what_lies_at_the_ends_of_their_ranges() {
     let (world, corners) = world();
     let brute = Brute::new(&world);
     let mut hit_count = 0;
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+    for isa in Isa::available() {
         let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
         for (number, rays) in families(&corners).iter().enumerate() {
             let hits: Vec<Ray> =
@@ -207,7 +207,7 @@ fn packets_meet_what_is_the_least_number_away() {
             let along = f32::from_bits(steepness.to_bits() + i as u32 % 3);
             Ray::new(Vec3::new(0.25, -0.5, below), Vec3::new(0.948_278, 0.913_099_1, along))
         });
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        for isa in Isa::available() {
             let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
             hit_count += assert_packets(&bvh, &brute, &rays, 0xffff, &format!("{isa:?} {plate} {steepness:e}"));
         }
@@ -242,7 +242,7 @@ fn packets_past_plates_of_one_plane() {
     );
     let world = World::new(&scene).expect("a world");
     let brute = Brute::new(&world);
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+    for isa in Isa::available() {
         let bvh = Bvh::build_with(&world, Options { isa, ..Options::default() });
         for round in 0..600 {
             let eye = Vec3::new(0.3, 2.0, 0.4) + random.vec3() * 0.2;

@@ -7,7 +7,8 @@ use super::simd::{Array, Simd, Vector, everywhere};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 
 /// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it: the lowest three bits mean nothing, and without
-/// them it is a little less.
+/// them it is a little less. Unlike where [points](super::near) wait, nobody goes through them when something farther is found: each is asked when it is its turn, since a
+/// search wants to know of those it comes to by how much they fall short.
 pub(super) struct Waiting {
     short: [u32; ENTRIES],
     child: [Child; ENTRIES],
