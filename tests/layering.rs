@@ -73,7 +73,12 @@ fn without_comments(text: &str) -> String {
 
 /// Without its tests, which may look up: they compare with the oracle and render whole scenes.
 fn without_tests(text: &str) -> &str {
-    text.find("#[cfg(test)]\nmod ").map_or(text, |start| &text[..start])
+    // A module in a file of its own is only declared, wherever modules are: what follows is no test.
+    let is_here = |&(start, mark): &(usize, &str)| {
+        let rest = &text[start + mark.len()..];
+        rest.find(['{', ';']).is_some_and(|end| rest[end..].starts_with('{'))
+    };
+    text.match_indices("#[cfg(test)]\nmod ").find(is_here).map_or(text, |(start, _)| &text[..start])
 }
 
 /// The modules of a file's path: `trace/bvh/mod.rs` is `trace::bvh`.
@@ -196,6 +201,10 @@ fn the_scan_itself_finds_what_it_should() {
     assert_eq!(wrong("trace/bvh/walk.rs", "use super::super::super::shade::x; use super::super::World;"), 1);
     assert_eq!(wrong("trace/mod.rs", "// crate::render\nlet x = crate::render::y();"), 1);
     assert_eq!(wrong("math/mod.rs", "fn f() {}\n#[cfg(test)]\nmod tests { use crate::lab; }"), 0);
+    assert_eq!(
+        wrong("math/mod.rs", "#[cfg(test)]\nmod tests;\nuse crate::lab;\n#[cfg(test)]\nmod more { use crate::lab; }"),
+        1
+    );
     assert_eq!(wrong("novel.rs", ""), 1);
     assert_eq!(wrong("ray.rs", "use crate::novel::x;"), 1);
 }
