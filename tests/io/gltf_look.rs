@@ -50,6 +50,46 @@ fn only(material: Value) -> Material {
     square(material).files().scene("a.gltf").materials[0].clone()
 }
 
+/// A colour at all vertices is the same as in the material, whatever the material makes of it: matte, metal, glass.
+#[test]
+fn colours_of_vertices_multiply_the_base_colour() {
+    let physical = |color: [f32; 4], metallic: f32, transmission: f32| {
+        json!({
+            "pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": metallic, "roughnessFactor": 0.4},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission}},
+        })
+    };
+    let color = [0.75f32, 0.5, 0.25, 1.0];
+    for (metallic, transmission) in [(0.0, 0.0), (1.0, 0.0), (0.5, 0.0), (0.0, 1.0), (0.25, 0.5)] {
+        let by_factor = square(physical(color, metallic, transmission)).files().scene("a.gltf");
+        let mut maker = square(physical([1.0; 4], metallic, transmission));
+        let colors = maker.floats("VEC4", &[color; 4].concat());
+        maker.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
+        let by_vertices = maker.files().scene("a.gltf");
+        let [expected, got] = [by_factor, by_vertices].map(|mut scene| {
+            scene.background = Some(Vec3::splat(0.5));
+            halves(&scene)[0]
+        });
+        assert!(got.abs_diff_eq(expected, 1e-6), "{metallic} metal, {transmission} glass: {got}, {expected}");
+    }
+    // Without a material it is glTF's own, a rough metal.
+    let bare = |material: Option<Value>| {
+        let mut maker = square(material.clone().unwrap_or(json!({})));
+        let colors = maker.floats("VEC3", &[1.0, 0.0, 0.0].repeat(4));
+        let primitive = &mut maker.json["meshes"][0]["primitives"][0];
+        match material {
+            Some(_) => {}
+            None => {
+                primitive["attributes"]["COLOR_0"] = json!(colors);
+                primitive.as_object_mut().unwrap().remove("material");
+            }
+        }
+        halves(&maker.files().scene("a.gltf"))[0]
+    };
+    let red = bare(Some(json!({"pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.0, 0.0, 1.0]}})));
+    assert!(bare(None).abs_diff_eq(red, 1e-6) && red.x > 0.1 && red.y == 0.0, "{red}");
+}
+
 const UNLIT: &str = "KHR_materials_unlit";
 const PLACE: &str = "KHR_texture_transform";
 

@@ -21,8 +21,8 @@ use crate::scene::{
 /// The materials of a document, converted when a primitive first uses them.
 pub(super) struct Materials<'a> {
     document: &'a Document<'a>,
-    /// By glTF's index; None is the default material.
-    known: HashMap<Option<usize>, (u32, Sets)>,
+    /// By glTF's index, of which None is the default material, and whether the vertices have colours.
+    known: HashMap<(Option<usize>, bool), (u32, Sets)>,
     list: Vec<Material>,
     textures: Textures<'a>,
 }
@@ -33,6 +33,8 @@ struct Surface {
     /// Of all textures but the colour's.
     means: Texels,
     color_texture: Option<u32>,
+    /// Whether the vertices have colours, which multiply that.
+    is_colored: bool,
     mean_color: Vec3,
     opacity: f32,
 }
@@ -46,7 +48,8 @@ impl Surface {
             diffuse,
             diffuse_texture: self.color_texture,
             opacity: self.opacity,
-            physical: Some(self.physical).filter(|physical| physical.varies(self.color_texture.is_some())),
+            physical: Some(self.physical)
+                .filter(|physical| physical.varies(self.is_colored || self.color_texture.is_some())),
             ..self.physical.phong(&Texels { color: self.mean_color, ..self.means })
         }
     }
@@ -57,28 +60,34 @@ impl<'a> Materials<'a> {
         Self { document, known: HashMap::new(), list: Vec::new(), textures: Textures::new(document) }
     }
 
-    /// The scene's index of a material, and which sets of texture coordinates it needs; `pointer` says who asks.
-    pub(super) fn get(&mut self, index: Option<usize>, pointer: &str) -> Result<(u32, Sets)> {
+    /// The scene's index of a material where vertices have colours or not, and which sets of texture coordinates it needs; `pointer` says who asks.
+    pub(super) fn get(&mut self, index: Option<usize>, is_colored: bool, pointer: &str) -> Result<(u32, Sets)> {
         let document = self.document;
         let materials = &document.root.materials;
         if let Some(index) = index {
             document.check_index(&format!("{pointer}/material"), index, materials.len(), "material")?;
         }
-        if let Some(known) = self.known.get(&index) {
+        if let Some(known) = self.known.get(&(index, is_colored)) {
             return Ok(*known);
         }
         let mut sets = Sets::default();
         let material = match index {
-            Some(index) => self.convert(&materials[index], &mut sets, &format!("/materials/{index}"))?,
+            Some(index) => self.convert(&materials[index], is_colored, &mut sets, &format!("/materials/{index}"))?,
             None => {
                 let extensions = extension::read(&schema::Extensions::new()).map_err(|m| document.error("", m))?;
-                self.metallic_roughness(&Source::default(), &extensions, &mut sets, "")?.phong()
+                let surface = self.metallic_roughness(&Source::default(), &extensions, &mut sets, "")?;
+                Surface { is_colored, ..surface }.phong()
             }
         };
-        self.list.push(material);
-        let new = (self.list.len() as u32 - 1, sets);
-        self.known.insert(index, new);
-        Ok(new)
+        // Most are the same with colours and without.
+        let other = self.known.get(&(index, !is_colored)).map(|(other, _)| *other);
+        let same = other.filter(|other| self.list[*other as usize] == material);
+        let new = same.unwrap_or(self.list.len() as u32);
+        if same.is_none() {
+            self.list.push(material);
+        }
+        self.known.insert((index, is_colored), (new, sets));
+        Ok((new, sets))
     }
 
     /// Hands materials and textures over to the scene.
@@ -88,7 +97,13 @@ impl<'a> Materials<'a> {
         scene.textures = self.textures.into_list();
     }
 
-    fn convert(&mut self, source: &schema::Material, sets: &mut Sets, pointer: &str) -> Result<Material> {
+    fn convert(
+        &mut self,
+        source: &schema::Material,
+        is_colored: bool,
+        sets: &mut Sets,
+        pointer: &str,
+    ) -> Result<Material> {
         let document = self.document;
         let pbr = &source.pbr_metallic_roughness;
         let mut numbers = pbr.base_color_factor.iter().chain(&source.emissive_factor);
@@ -107,6 +122,7 @@ impl<'a> Materials<'a> {
             None => self.metallic_roughness(pbr, &extensions, sets, pointer)?,
             Some(source) => self.specular_glossiness(source, sets, pointer)?,
         };
+        let surface = Surface { is_colored, ..surface };
         let emissive = source.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO);
         let emission_texture = self.textures.get(emissive, sets, &format!("{pointer}/emissiveTexture"))?;
         let normal = source.normal_texture.as_ref();
@@ -226,6 +242,13 @@ impl<'a> Materials<'a> {
             specular_color: self.textures.mean_color(textures.specular_color),
         };
         let mean_color = self.textures.mean_color(color_texture);
-        Surface { physical: Physical { workflow, textures }, means, color_texture, mean_color, opacity }
+        Surface {
+            physical: Physical { workflow, textures },
+            means,
+            color_texture,
+            is_colored: false,
+            mean_color,
+            opacity,
+        }
     }
 }

@@ -24,7 +24,7 @@ pub struct Shading {
 }
 
 impl Shading {
-    /// The colours of `material` at `point`, seen along `direction`, in a scene with the given ambient light.
+    /// The colours of `material`, as it [is at](crate::shade::appearance::at) `point`, seen along `direction`, in a scene with the given ambient light.
     pub fn new(
         point: &SurfacePoint,
         direction: Vec3,
@@ -36,7 +36,7 @@ impl Shading {
             let texture = texture.and_then(|i| textures.get(i as usize));
             texture.map_or(Vec3::ONE, |t| texture::sample(t, point.uv_of(t)).truncate())
         };
-        let tint = texel(material.diffuse_texture) * point.color.truncate();
+        let tint = texel(material.diffuse_texture);
         let emission = match material.emission_texture {
             None => material.emission,
             texture => material.emission * texel(texture),
