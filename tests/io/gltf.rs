@@ -336,6 +336,25 @@ fn orthographic_cameras() {
     refused(&changed(&[("/cameras/0", flat)]), "a.gltf", "/cameras/0/orthographic/ymag", "height of 0");
 }
 
+/// Exporters write cones whose angles are one; and what no node shows may be as it is.
+#[test]
+fn lights_that_are_not_quite_right() {
+    const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights";
+    let angles = |inner: f32, outer: f32| {
+        let spot = json!({"innerConeAngle": inner, "outerConeAngle": outer});
+        changed(&[(&format!("{LIGHTS}/2/spot"), spot)])
+    };
+    let scene = angles(0.5, 0.5).scene("a.gltf");
+    let Light::Spot { inner_angle, outer_angle, .. } = scene.lights[0] else { panic!("{:?}", scene.lights) };
+    assert!(inner_angle < outer_angle && inner_angle > 0.4999 && outer_angle == 0.5);
+    for (inner, outer) in [(0.6, 0.5), (0.0, 0.0), (0.1, 1.6)] {
+        refused(&angles(inner, outer), "a.gltf", &format!("{LIGHTS}/2"), "0 <= inner < outer");
+    }
+    let range = (format!("{LIGHTS}/1/range"), json!(0));
+    refused(&changed(&[(&range.0, range.1.clone())]), "a.gltf", &format!("{LIGHTS}/1"), "a range of 0");
+    assert_eq!(changed(&[(&range.0, range.1), ("/nodes/5", json!({}))]).scene("a.gltf").lights.len(), 2);
+}
+
 #[test]
 fn what_is_not_rendered_is_a_warning() {
     let say = |changes: &[(&str, Value)], place: &str, words: &str| {
@@ -352,6 +371,7 @@ fn what_is_not_rendered_is_a_warning() {
         "{warnings:?}"
     );
     say(&[("/meshes/0/primitives/1/mode", json!(1))], "/meshes", "1 primitives are points or lines");
+    say(&[("/meshes/0/primitives/1/attributes", json!({"NORMAL": 2}))], "/meshes", "1 primitives have no POSITION");
     say(&[("/extensionsUsed", json!(["EXT_new", "KHR_lights_punctual"]))], "/extensionsUsed", "EXT_new");
     let two = json!([{"attributes": {"POSITION": 0}}]);
     let nodes = json!([{"mesh": 0}, {"mesh": 0, "scale": [1, 0, 1], "name": "flat"}, {}, {}]);
@@ -408,7 +428,6 @@ fn faults_are_told_with_their_pointer() {
         "without data",
     );
     fault("/meshes/0/primitives/0/attributes/POSITION", json!(9), "/accessors", "no accessor 9");
-    fault("/meshes/0/primitives/0/attributes", json!({}), "/meshes/0/primitives/0/attributes", "POSITION is missing");
     fault("/meshes/0/primitives/0/mode", json!(7), "/meshes/0/primitives/0/mode", "mode 7");
     fault("/meshes/0/primitives/0/material", json!(1), "/meshes/0/primitives/0/material", "no material 1");
     fault("/nodes/1/children", json!([0]), "/nodes/1/children/0", "child of itself");

@@ -41,6 +41,8 @@ pub(super) struct Groups<'a> {
     counted: Vec<bool>,
     /// Points and lines.
     flat: usize,
+    /// Primitives without positions.
+    placeless: usize,
     /// Primitives without texture coordinates that their material needs.
     bare: usize,
 }
@@ -55,6 +57,7 @@ impl<'a> Groups<'a> {
             joints: HashMap::new(),
             counted: vec![false; document.root.meshes.len()],
             flat: 0,
+            placeless: 0,
             bare: 0,
         }
     }
@@ -105,6 +108,7 @@ impl<'a> Groups<'a> {
             let mode = primitive.mode.unwrap_or(4);
             match mode {
                 0..=3 => self.flat += usize::from(counts),
+                _ if !primitive.attributes.contains_key("POSITION") => self.placeless += usize::from(counts),
                 4..=6 => {
                     let read = self.read(primitive, mode, deformation, &pointer)?;
                     scene.geometries.push(Geometry::Mesh(Mesh { name: mesh.name.clone(), ..read }));
@@ -126,6 +130,9 @@ impl<'a> Groups<'a> {
         if self.flat > 0 {
             warn(format!("{} primitives are points or lines, which have no area, and are left out", self.flat));
         }
+        if self.placeless > 0 {
+            warn(format!("{} primitives have no POSITION and are left out", self.placeless));
+        }
         if self.bare > 0 {
             warn(format!(
                 "{} primitives lack texture coordinates that their materials want: one point of each texture is seen",
@@ -140,7 +147,8 @@ impl<'a> Groups<'a> {
         let packed = draco::decode(document, primitive, pointer)?;
         let (mut attributes, positions) = Attributes::new(document, primitive, packed.as_ref(), pointer)?;
         let material = variants::material(document, primitive, self.variant, pointer)?;
-        let (material, sets) = self.materials.get(material, pointer)?;
+        let is_colored = primitive.attributes.contains_key("COLOR_0");
+        let (material, sets) = self.materials.get(material, is_colored, pointer)?;
         let normals = attributes.find("NORMAL", &["VEC3"])?;
         let colors = attributes.find("COLOR_0", &["VEC3", "VEC4"])?;
         let mut triangles = match &packed {

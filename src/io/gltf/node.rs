@@ -51,7 +51,8 @@ pub(super) fn place(
             let pointer = format!("{pointer}/extensions/KHR_lights_punctual/light");
             let light = light.as_u64().and_then(|l| usize::try_from(l).ok()).unwrap_or(usize::MAX);
             document.check_index(&pointer, light, lights.len(), "light")?;
-            stage.scene.lights.push(punctual::move_light(&lights[light], &transform));
+            let light = punctual::light(document, light, &lights[light])?;
+            stage.scene.lights.push(punctual::move_light(&light, &transform));
         }
     }
     Ok(())

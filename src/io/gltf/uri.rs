@@ -21,11 +21,12 @@ const LONGEST_NAME: usize = 1024;
 /// # Errors
 /// What is wrong with it.
 pub(super) fn resolve(base: &Path, uri: &str) -> Placeless<Target> {
-    if let Some(rest) = uri.strip_prefix("data:") {
+    if let Some((_, rest)) = uri.split_at_checked(5).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("data:")) {
         let (head, data) = rest.split_once(',').ok_or("a data URI without a comma")?;
-        return match head.strip_suffix(";base64") {
-            Some(_) => base64(data.as_bytes()).map(Target::Data),
-            None => percent(data).map(Target::Data),
+        let last = head.rsplit_once(';').map_or("", |(_, last)| last);
+        return match last.trim().eq_ignore_ascii_case("base64") {
+            true => base64(data.as_bytes()).map(Target::Data),
+            false => percent(data).map(Target::Data),
         };
     }
     // A scheme: letters before a colon, more than the one of a drive.
@@ -109,7 +110,10 @@ mod tests {
         let base = Path::new("models/a.gltf");
         assert_eq!(resolve(base, "my%20tex.png"), Ok(Target::File("models/my tex.png".into())));
         assert_eq!(resolve(base, "data:,a%2Cb"), Ok(Target::Data(b"a,b".to_vec())));
-        assert_eq!(resolve(base, "data:image/png;base64,Zg=="), Ok(Target::Data(b"f".to_vec())));
+        for head in ["data:image/png;base64", "data:;BASE64", "DATA:text/plain;charset=x; base64"] {
+            assert_eq!(resolve(base, &format!("{head},Zg==")), Ok(Target::Data(b"f".to_vec())), "{head}");
+        }
+        assert_eq!(resolve(base, "data:base64,Zg=="), Ok(Target::Data(b"Zg==".to_vec())));
         for bad in ["http://example.org/a.png", "file:///a", "a%2", "data:x", "", &"a".repeat(1025)] {
             assert!(resolve(base, bad).is_err(), "{bad}");
         }
