@@ -4,6 +4,9 @@
 //! Sproull, Schumacker 1974). A fan from the first corner would be right for convex polygons alone, and is what those
 //! get; a sweep (O(n log n)) would only pay above some thousand corners, which faces of meshes do not have.
 
+use std::collections::VecDeque;
+use std::iter;
+
 use crate::math::{DVec2, DVec3};
 
 /// Most point-in-triangle tests for one polygon: about a second.
@@ -26,46 +29,59 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> O
     }
 
     let begin = triangles.len();
-    let mut left: Vec<usize> = (0..count).collect();
-    let (mut tests, mut at, mut refused) = (0, 0, 0);
-    while left.len() > 3 {
-        let n = left.len();
-        let [a, b, c] = [left[(at + n - 1) % n], left[at % n], left[(at + 1) % n]];
+    // The corners that are left, each with its neighbours.
+    let mut next: Vec<usize> = (1..=count).map(|i| i % count).collect();
+    let mut before: Vec<usize> = (0..count).map(previous).collect();
+    // Whether a corner is an ear's tip changes with its neighbours only, so each waits to be looked at when they have changed; with how often it was put
+    // there, for the last time counts.
+    let mut waiting: VecDeque<(usize, usize)> = (0..count).map(|i| (i, 0)).collect();
+    let mut turns = vec![0; count];
+    let (mut tests, mut left, mut has_clipped, mut somewhere) = (0, count, false, 0);
+    while left > 3 {
+        let (b, is_waiting) = match waiting.pop_front() {
+            Some((b, turn)) if turns[b] == turn => (b, true),
+            Some(_) => continue,
+            // Once more, for bridges to holes lie upon each other, and the one may have been in the way of the other.
+            None if has_clipped => {
+                waiting.extend(iter::successors(Some(somewhere), |&i| Some(next[i])).take(left).map(|i| (i, turns[i])));
+                has_clipped = false;
+                continue;
+            }
+            // No ear is left: the polygon crosses itself or what is left has no area; clip anyway.
+            None => (somewhere, false),
+        };
+        let (a, c) = (before[b], next[b]);
         let [pa, pb, pc] = [projected[a], projected[b], projected[c]];
-        tests += reflex.len() + 1;
+        // Corners that coincide with the ear's do not block it: they are bridges to holes.
+        let blocks = |&r: &usize| {
+            let p = projected[r];
+            ![pa, pb, pc].contains(&p) && cross(pa, pb, p) >= 0.0 && cross(pb, pc, p) >= 0.0 && cross(pc, pa, p) >= 0.0
+        };
+        let is_convex = cross(pa, pb, pc) > 0.0;
+        let blocked = if is_convex { reflex.iter().position(blocks) } else { Some(0) };
+        tests += 1 + blocked.unwrap_or(reflex.len());
         if tests > MOST_TESTS {
             triangles.truncate(begin);
             return None;
         }
-        // Corners that coincide with the ear's do not block it: they are bridges to holes.
-        let blocks = |&&r: &&usize| {
-            let p = projected[r];
-            ![pa, pb, pc].contains(&p) && cross(pa, pb, p) >= 0.0 && cross(pb, pc, p) >= 0.0 && cross(pc, pa, p) >= 0.0
-        };
-        let is_ear = cross(pa, pb, pc) > 0.0 && reflex.iter().find(blocks).is_none();
-        // A whole round without an ear: the polygon crosses itself or what is left has no area; clip anyway.
-        if !is_ear && refused < n {
-            refused += 1;
-            at = (at + 1) % n;
+        if is_waiting && blocked.is_some() {
             continue;
         }
         triangles.push([a as u32, b as u32, c as u32]);
-        left.remove(at % n);
-        refused = 0;
-        // Neighbours may have become convex; they never become reflex.
-        let n = left.len();
-        at %= n;
+        (next[a], before[c]) = (c, a);
+        (left, has_clipped, somewhere, turns[b]) = (left - 1, true, c, usize::MAX);
         reflex.retain(|&r| r != b);
-        for k in [(at + n - 1) % n, at] {
-            let r = left[k];
-            if cross(projected[left[(k + n - 1) % n]], projected[r], projected[left[(k + 1) % n]]) >= 0.0 {
-                reflex.retain(|&x| x != r);
+        // Last, behind the others: slices instead of a fan of slivers. They may have become convex; they never become reflex.
+        for k in [a, c] {
+            if cross(projected[before[k]], projected[k], projected[next[k]]) >= 0.0 {
+                reflex.retain(|&r| r != k);
             }
+            turns[k] += 1;
+            waiting.push_back((k, turns[k]));
         }
-        // The corner after next: slices instead of a fan of slivers.
-        at = (at + 1) % n;
     }
-    triangles.push([left[0] as u32, left[1] as u32, left[2] as u32]);
+    let (a, c) = (before[somewhere], next[somewhere]);
+    triangles.push([a as u32, somewhere as u32, c as u32]);
     Some(())
 }
 
@@ -166,6 +182,23 @@ mod tests {
                 .collect();
             let expected = points as f64 * 0.5 * (std::f64::consts::PI / points as f64).sin();
             check(&star, expected);
+        }
+    }
+
+    /// Bands along a spiral of some turns: half of all corners are reflex, and most corners are no ear's tip for a long time.
+    #[test]
+    fn ribbons_of_any_length() {
+        for (corners, turns) in [(400, 1.0), (3000, 0.99), (3000, 5.0), (12_000, 20.0)] {
+            let half = corners / 2;
+            let at = |i: usize, aside: f64| {
+                let angle = i as f64 / half as f64 * turns * std::f64::consts::TAU;
+                let r = 3.0 + angle + aside;
+                [r * angle.cos(), r * angle.sin()]
+            };
+            let ribbon: Vec<_> = (0..half).map(|i| at(i, 0.0)).chain((0..half).rev().map(|i| at(i, -0.5))).collect();
+            let next = ribbon.iter().cycle().skip(1);
+            let area: f64 = ribbon.iter().zip(next).map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum();
+            check(&ribbon, area * 0.5);
         }
     }
 

@@ -141,6 +141,18 @@ fn polygons_and_strips() {
     let scene = Files::one("a.ply", format!("{strips}{vertices}7 0 1 2 3 -1 0 1\n")).scene("a.ply");
     let [a, b, c, d] = SQUARE.map(Vec3::from);
     assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [c, b, d]]);
+    // Strips before faces: neither takes the other's place.
+    let both = strips.replace("end_header", "element face 1\nproperty list uchar int vertex_indices\nend_header");
+    let scene = Files::one("a.ply", format!("{both}{vertices}4 0 1 2 3\n3 0 2 3\n")).scene("a.ply");
+    assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [c, b, d], [a, c, d]]);
+    let mut bytes = both.replace("ascii", "binary_big_endian").into_bytes();
+    bytes.extend(SQUARE.iter().flatten().flat_map(|x| x.to_be_bytes()));
+    for list in [&[0i32, 1, 2, 3][..], &[0, 2, 3]] {
+        bytes.push(list.len() as u8);
+        bytes.extend(list.iter().flat_map(|i| i.to_be_bytes()));
+    }
+    let scene = Files::one("a.ply", bytes).scene("a.ply");
+    assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [c, b, d], [a, c, d]]);
     // Triangles, a quadrilateral, then a triangle: from the fast path to the slow one.
     let mut bytes = header("binary_little_endian", 4, 3).into_bytes();
     bytes.extend(SQUARE.iter().flatten().flat_map(|x| x.to_le_bytes()));

@@ -18,10 +18,17 @@ impl Faces {
         let list = indices(element)?;
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
-        self.triangles = items.triangles(element, positions.len());
+        // Behind those of strips that came first.
+        let at_once = items.triangles(element, positions.len());
+        let read = at_once.len();
+        if self.triangles.is_empty() {
+            self.triangles = at_once
+        } else {
+            self.triangles.extend(at_once)
+        }
         let (mut values, mut corners) = (Vec::new(), Vec::new());
         let (mut around, mut parts) = (Vec::new(), Vec::new());
-        for i in self.triangles.len()..count {
+        for i in read..count {
             if i % TELL == 0 {
                 items.tell();
             }
