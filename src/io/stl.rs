@@ -23,7 +23,7 @@ const TELL: usize = 1 << 14;
 
 /// Reads an STL file.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let mesh = if is_text(file) { text(path, file)? } else { binary(path, file, warnings)? };
+    let mesh = if is_text(file) { text(path, file, warnings)? } else { binary(path, file, warnings)? };
     Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]))
 }
 
@@ -86,16 +86,18 @@ fn vectors(bits: Vec<[u32; 3]>) -> Vec<Vec3> {
     bits.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
 }
 
-fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
+fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Mesh> {
     let bytes = without_mark(file);
     let mut told = 0;
     let mut words = Words::new(bytes, 1);
     let mut weld = Weld::new();
     let mut triangles = Vec::new();
     let mut name = String::new();
+    let mut is_open = false;
     while let Some(word) = words.next() {
         match word.to_ascii_lowercase().as_slice() {
             b"solid" => {
+                is_open = true;
                 let before = words.remaining();
                 let text = &bytes[bytes.len() - before..];
                 words.skip_line();
@@ -103,7 +105,10 @@ fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
                     name = super::text::name(&text[..before - words.remaining()]);
                 }
             }
-            b"endsolid" => words.skip_line(),
+            b"endsolid" => {
+                is_open = false;
+                words.skip_line();
+            }
             b"facet" => {
                 expect(path, &mut words, "normal")?;
                 // Not read: of a triangle without an area some programs write what is no number at all.
@@ -132,6 +137,10 @@ fn text(path: &Path, file: &Mapped<'_>) -> Result<Mesh> {
             }
             _ => return Err(unexpected(path, &words, Some(word), "facet, solid or endsolid")),
         }
+    }
+    if is_open {
+        let message = "the file ends without endsolid: there may have been more of it";
+        warnings.push(Warning::new(path, format!("line {}", words.line), message));
     }
     let positions: Vec<_> = weld.into_keys().into_iter().map(|bits| DVec3::from(bits.map(f64::from_bits))).collect();
     let mut mesh = Mesh { name, triangles: Arc::new(triangles), ..Mesh::default() };

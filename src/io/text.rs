@@ -12,7 +12,16 @@ pub(super) fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
-/// Lines of a text, numbered from 1, without their ends (`\n` or `\r\n`).
+/// The length of the first line with its end (`\n`, `\r\n`, or `\r` alone, as programs of the old Macintosh wrote them), and that without it.
+pub(super) fn first_line(text: &[u8]) -> (usize, usize) {
+    match memchr::memchr2(b'\n', b'\r', text) {
+        Some(end) if text[end..].starts_with(b"\r\n") => (end + 2, end),
+        Some(end) => (end + 1, end),
+        None => (text.len(), text.len()),
+    }
+}
+
+/// Lines of a text, numbered from 1, without their ends.
 pub(super) struct Lines<'a> {
     rest: &'a [u8],
     line: usize,
@@ -28,26 +37,28 @@ impl<'a> Lines<'a> {
         self.line
     }
 
-    fn physical(&mut self) -> Option<&'a [u8]> {
+    /// The next line as it stands.
+    pub(super) fn physical(&mut self) -> Option<&'a [u8]> {
         if self.rest.is_empty() {
             return None;
         }
-        let end = memchr::memchr(b'\n', self.rest).unwrap_or(self.rest.len());
+        let (next, end) = first_line(self.rest);
         let line = &self.rest[..end];
-        self.rest = self.rest.get(end + 1..).unwrap_or_default();
+        self.rest = &self.rest[next..];
         self.line += 1;
-        Some(line.strip_suffix(b"\r").unwrap_or(line))
+        Some(line)
     }
 }
 
 impl<'a> Iterator for Lines<'a> {
     type Item = (usize, Cow<'a, [u8]>);
 
-    /// The next line and its number; lines that end in a backslash are joined with what follows.
+    /// The next line and its number; lines that end in a backslash are joined with what follows, but for comments, which may end in a Windows path.
     fn next(&mut self) -> Option<Self::Item> {
         let line = self.physical()?;
         let number = self.line;
-        let Some(begin) = line.strip_suffix(b"\\") else {
+        let continued = line.strip_suffix(b"\\").filter(|_| !line.trim_ascii_start().starts_with(b"#"));
+        let Some(begin) = continued else {
             return Some((number, Cow::Borrowed(line)));
         };
         let mut joined = begin.to_vec();
@@ -91,8 +102,7 @@ impl<'a> Words<'a> {
 
     /// Skips to the end of the line.
     pub(super) fn skip_line(&mut self) {
-        let rest = &self.text[self.at..];
-        self.at += rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        self.at += first_line(&self.text[self.at..]).1;
     }
 
     /// The next word as a number. None where there is no word, or it is not a number.
@@ -129,8 +139,8 @@ impl<'a> Words<'a> {
     fn begin(&self) -> (usize, usize) {
         let (mut at, mut line) = (self.at, self.line);
         while let Some(b) = self.text.get(at).filter(|b| is_space(**b)) {
-            line += usize::from(*b == b'\n');
             at += 1;
+            line += usize::from(*b == b'\n' || *b == b'\r' && self.text.get(at) != Some(&b'\n'));
         }
         (at, line)
     }
@@ -196,6 +206,20 @@ mod tests {
         assert_eq!(text, [(1, "a"), (2, "b  c  d"), (5, ""), (6, "e")]);
         assert_eq!(Lines::new(b"x\\").next().unwrap(), (1, Cow::Borrowed(&b"x"[..])));
         assert_eq!(Lines::new(b"").next(), None);
+        let lines: Vec<_> = Lines::new(b" # C:\\\nv 1\n").map(|(n, l)| (n, l.into_owned())).collect();
+        assert_eq!(lines, [(1, b" # C:\\".to_vec()), (2, b"v 1".to_vec())]);
+        let lines: Vec<_> = Lines::new(b"a\rb \\\rc\r\rd\n\re\r").map(|(n, l)| (n, l.into_owned())).collect();
+        assert_eq!(
+            lines,
+            [
+                (1, b"a".to_vec()),
+                (2, b"b  c".to_vec()),
+                (4, vec![]),
+                (5, b"d".to_vec()),
+                (6, vec![]),
+                (7, b"e".to_vec())
+            ]
+        );
     }
 
     #[test]
@@ -208,6 +232,12 @@ mod tests {
         assert_eq!((words.number::<f32>(), words.line), (None, 9));
         assert_eq!(words.next(), None);
         assert_eq!(words.remaining(), 0);
+        let mut words = Words::new(b"1\r2 x\r\n3\r\r4\n\r5", 1);
+        let mut read = || (words.number::<i32>(), words.line);
+        assert_eq!([read(), read()], [(Some(1), 1), (Some(2), 2)]);
+        words.skip_line();
+        let mut read = || (words.number::<i32>(), words.line);
+        assert_eq!([read(), read(), read()], [(Some(3), 3), (Some(4), 5), (Some(5), 7)]);
     }
 
     /// A number is one word, whichever way it is read.

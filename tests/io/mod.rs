@@ -114,6 +114,40 @@ fn suffixes_are_known_in_any_case() {
     assert_eq!(Files::one("a.OBJ", TRIANGLE).scene("a.OBJ").primitive_count(), 1);
 }
 
+/// Files of Windows end their lines in `\r\n`, of the old Macintosh in `\r`: both hold the same scene, and what is wrong is in the same line.
+#[test]
+fn lines_end_in_any_way() {
+    let ply = "ply\nformat ascii 1.0\ncomment \\\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let stl = "solid a b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a b\n";
+    let nff = "# a b\nf 1 0 0 1 0 1 0 1\np 3\n0 0 0\n1 0 0\n0 1 0\n";
+    let course = "# a b\nsize 10 10\ncamera 0 0 5 0 0 0 0 1 0 40\nmaxverts 3\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\ntri 0 1 2\n";
+    let obj = "# a b\nmtllib a.mtl\nv 0 0 0\nv 1 \\\n0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    let mtl = "newmtl grey\nKd 1 1 1\nnewmtl red\nKd 1 0 0\n";
+    for end in ["\n", "\r\n", "\r"] {
+        let ended = |text: &str| text.replace('\n', end);
+        for (name, text) in [("a.ply", ply), ("a.stl", stl), ("a.nff", nff), ("a.test", course), ("a.obj", obj)] {
+            let files = Files::one(name, ended(text)).and("a.mtl", ended(mtl));
+            let scene = files.scene(name);
+            assert_eq!(corners(meshes(&scene)[0]), [[Vec3::ZERO, Vec3::X, Vec3::Y]], "{name}, {end:?}");
+            if name == "a.obj" {
+                assert_eq!(scene.materials[meshes(&scene)[0].material as usize].diffuse, Vec3::X);
+            }
+            let at = text.rfind("0 1 0").expect("a vertex");
+            let wrong = format!("{}0 x 0{}", &text[..at], &text[at + 5..]);
+            let line = 1 + text[..at].matches('\n').count();
+            let words = if name == "a.obj" { "v needs 3 numbers" } else { "\"x\"" };
+            refused_bytes(name, ended(&wrong), &format!("line {line}"), words);
+        }
+    }
+    // Behind a header whose lines end in `\r`, a `\n` belongs to the body.
+    let header = "ply\rformat binary_little_endian 1.0\relement vertex 3\rproperty uchar x\rproperty uchar y\rproperty uchar z\relement face 1\r\
+                  property list uchar uchar vertex_indices\rend_header\r";
+    let body = [b'\n', 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2];
+    let scene = Files::one("a.ply", [header.as_bytes(), &body].concat()).scene("a.ply");
+    assert_eq!(corners(meshes(&scene)[0]), [[Vec3::X * 10.0, Vec3::X, Vec3::Y]]);
+}
+
 #[test]
 fn a_scene_without_triangles_is_refused() {
     refused_bytes("a.obj", "v 0 0 0\n", "", "nothing to render");

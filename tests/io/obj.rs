@@ -92,6 +92,26 @@ fn smoothing_groups() {
     assert_eq!(mixed, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO]);
 }
 
+/// Slips that other readers pass over: a comment behind fewer numbers than there may be, a map without a name, a comment that ends in a
+/// path of Windows, and libraries that have nothing of what is named.
+#[test]
+fn slips_cost_no_more_than_what_they_are() {
+    let obj = format!("# C:\\models\\\n{VERTICES}mtllib a.mtl\nvt 0.5 # c\nusemtl red\nf 1/1 2/1 3/1\n");
+    let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl red\nKd 0.25 # grey\nmap_Kd\nKs 0.5\n");
+    let (scene, warnings) = files.load("a.obj");
+    let (mesh, material) = (meshes(&scene)[0], &scene.materials[0]);
+    assert_eq!((mesh.triangles.len(), mesh.uvs[0]), (1, Vec2::new(0.5, 0.0)));
+    assert_eq!((material.diffuse, material.specular), (Vec3::splat(0.25), Vec3::splat(0.5)));
+    assert!(warnings.len() == 1 && warnings[0].message.contains("map_Kd without a file name"), "{warnings:?}");
+    for (library, words) in [(Some("# none\n"), "in no material library"), (None, "\"my red.mtl\" is missing")] {
+        let files = Files::one("a.obj", obj.replace("a.mtl", "my red.mtl"));
+        let files = if let Some(text) = library { files.and("my red.mtl", text) } else { files };
+        let (_, warnings) = files.load("a.obj");
+        assert!(warnings.len() == 1, "{warnings:?}");
+        assert!(warnings[0].message.replace(&*files.path("").to_string_lossy(), "").contains(words), "{warnings:?}");
+    }
+}
+
 #[test]
 fn materials_and_textures() {
     let obj = format!(
@@ -255,7 +275,7 @@ fn faults_in_what_it_refers_to_name_that() {
     check("newmtl a\nKd xyzzy 1 2 3\n", b"x", "a.mtl", "line 2", "r g b");
     check("newmtl a\nKd 1 -1 1\n", b"x", "a.mtl", "line 2", "from 0 up");
     check("Kd 1 1 1\n", b"x", "a.mtl", "line 1", "newmtl");
-    check("newmtl a\nmap_Kd\n", b"x", "a.mtl", "line 2", "file name");
+    check("newmtl a\nmap_Kd -s 2\n", b"x", "a.mtl", "line 2", "file name");
     check("newmtl a\nmap_Kd a.png\n", b"x", "a.png", "", "not a PNG");
     let whole = picture();
     check("newmtl a\nmap_Kd a.png\n", &whole[..whole.len() - 20], "a.png", "", "broken");

@@ -70,3 +70,13 @@ fn faults_are_told_with_their_place() {
     let cut = text();
     refused_bytes("a.stl", &cut[..cut.len() - 30], "line 14", "the file ends where endfacet");
 }
+
+/// The one place where a text may be cut and still be read.
+#[test]
+fn a_solid_without_an_end_is_told() {
+    let whole = text();
+    let cut = whole.replace("endsolid two words\n", "");
+    let (scene, warnings) = Files::one("a.stl", &cut).load("a.stl");
+    assert_eq!(scene.primitive_count(), FACETS.len() as u64);
+    assert!(warnings.len() == 1 && warnings[0].message.contains("without endsolid"), "{warnings:?}");
+}

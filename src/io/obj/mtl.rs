@@ -64,7 +64,8 @@ impl Library {
         let files: Vec<PathBuf> = if whole.is_file() {
             vec![whole]
         } else {
-            names.split_whitespace().map(|name| beside(obj, name)).collect()
+            let each: Vec<_> = names.split_whitespace().map(|name| beside(obj, name)).collect();
+            if each.iter().any(|file| file.exists()) { each } else { vec![whole] }
         };
         for file in files {
             match Mapped::open(&file) {
@@ -136,7 +137,7 @@ impl Library {
         for name in names {
             let Some(entry) = self.entries.get(&name) else {
                 // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
-                if !name.is_empty() && !self.entries.is_empty() {
+                if !name.is_empty() && !self.files.is_empty() {
                     let message = format!("material {} is in no material library; it is grey", quoted(name.as_bytes()));
                     warnings.push(Warning::new(obj, "", message));
                 }
@@ -195,6 +196,9 @@ impl Entry {
                 self.mirror = (3..=9).contains(&model).then_some(line);
             }
             b"map_Kd" => {
+                if words.rest().is_empty() {
+                    return Ok(Some("map_Kd without a file name".to_owned()));
+                }
                 let (map, left_out) = Map::parse(line, words)?;
                 self.map = Some(map);
                 return Ok(left_out);
@@ -348,6 +352,7 @@ fn color(keyword: &[u8], words: &mut Words<'_>) -> Placeless<Vec3> {
     let r: f32 = words.number().ok_or_else(problem)?;
     let color = match words.next() {
         None => Vec3::splat(r),
+        Some(comment) if comment.starts_with(b"#") => Vec3::splat(r),
         Some(g) => Vec3::new(r, number(g).ok_or_else(problem)?, words.number().ok_or_else(problem)?),
     };
     if !color.is_finite() || color.min_element() < 0.0 {

@@ -126,7 +126,8 @@ impl Reader<'_> {
             b"v" => self.vertex(&mut words)?,
             b"vt" => {
                 let u = words.number().ok_or("vt needs a number, the texture coordinate u")?;
-                let v = words.next().map_or(Some(0.0), number).ok_or("vt: v is not a number")?;
+                let v = words.next().filter(|word| !word.starts_with(b"#"));
+                let v = v.map_or(Some(0.0), number).ok_or("vt: v is not a number")?;
                 self.slots.uvs[self.counts[1] - self.begin.counts[1]] = Vec2::new(u, v);
                 self.counts[1] += 1;
             }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::io::text::{Lines, Words};
+use crate::io::text::{Lines, Words, first_line};
 
 /// The least bytes of a stretch, the last apart.
 const LENGTH: usize = 1 << 20;
@@ -26,10 +26,12 @@ fn divide_at(mut text: &[u8], length: usize) -> Vec<&[u8]> {
     while !text.is_empty() {
         let mut end = length.min(text.len());
         end = loop {
-            let Some(newline) = memchr::memchr(b'\n', &text[end..]) else { break text.len() };
-            end += newline + 1;
-            let line = &text[..end - 1];
-            if !line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\") {
+            let (next, line) = first_line(&text[end..]);
+            // Between `\r` and `\n` no line begins.
+            let line = &text[..end + line];
+            let is_continued = line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\");
+            end += next;
+            if !is_continued || end == text.len() {
                 break end;
             }
         };
@@ -83,5 +85,22 @@ mod tests {
         assert_eq!((begins[5].line, counts), (8, [2, 1, 1]));
         assert_eq!(begins[2], Begin { line: 3, counts: [1, 1, 0] });
         assert!(divide(b"").is_empty());
+    }
+
+    /// Wherever a text is divided, it has the lines that it has as a whole, however these end.
+    #[test]
+    fn no_line_is_cut() {
+        let text = "v 1\nvt \\\nv 2\n vn 1\n\nvv\nv 3 \\\n\n4\nf";
+        for end in ["\n", "\r\n", "\r"] {
+            let text = text.replace('\n', end).into_bytes();
+            let whole: Vec<_> = Lines::new(&text).map(|(_, line)| line).collect();
+            assert_eq!(whole, ["v 1", "vt  v 2", " vn 1", "", "vv", "v 3  ", "4", "f"].map(str::as_bytes));
+            for length in 1..text.len() {
+                let stretches = divide_at(&text, length);
+                let lines: Vec<_> =
+                    stretches.iter().flat_map(|stretch| Lines::new(stretch)).map(|(_, line)| line).collect();
+                assert_eq!((lines, stretches.concat() == text), (whole.clone(), true), "{end:?}, {length} bytes");
+            }
+        }
     }
 }

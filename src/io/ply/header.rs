@@ -115,9 +115,11 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut last = 1;
-    // Lines without joining: a comment may end in a backslash.
+    // Lines without joining: a comment may end in a backslash. All end as the first one does: behind a `\r` alone, with which the format's author
+    // has them end, a binary body may begin with `\n`.
+    let end = if bytes.starts_with(b"ply\r") && !bytes.starts_with(b"ply\r\n") { b'\r' } else { b'\n' };
     let mut length = 0;
-    for (index, raw) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+    for (index, raw) in bytes.split_inclusive(|&b| b == end).enumerate() {
         length += raw.len();
         last = index + 1;
         let (line, text) = (last, Lines::new(raw).next().map(|(_, text)| text.into_owned()).unwrap_or_default());
@@ -188,7 +190,7 @@ fn property(words: &mut Words<'_>) -> Placeless<Property> {
             format!("{} is no type; use char, uchar, short, ushort, int, uint, float or double", quoted(word))
         })
     };
-    let is_list = words.rest().starts_with(b"list ");
+    let is_list = Words::new(words.rest(), words.line).next() == Some(b"list");
     let list = if is_list {
         words.next();
         let counter = scalar(words)?;
