@@ -9,7 +9,7 @@ use super::progress;
 use crate::error::{Error, Result, Warning};
 use crate::io::{self, Animation, LoadOptions};
 use crate::math::DVec3;
-use crate::render::LARGEST_SIDE;
+use crate::scene::LARGEST_SIDE;
 use crate::scene::Scene;
 
 /// A scene file and how to read it.

@@ -6,7 +6,7 @@ use super::common::{Size, by_name, parse_vector};
 use super::plan::PlanArgs;
 use crate::math::Vec3;
 use crate::render::{Adaptive, Crop, Filter, Sampling, Settings, TileOrder};
-use crate::scene::{Integrator, Request};
+use crate::scene::{Integrator, MOST_DEPTH, MOST_SPP, Request};
 use crate::trace::{Batch, Width};
 
 /// Everything about a picture but its camera.
@@ -21,7 +21,7 @@ pub(super) struct PictureArgs {
     crop: Option<Crop>,
 
     /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
     spp: Option<u32>,
 
     /// Take samples where they are needed: until the error of the pixels that are noisy is this, root mean square, as a screen shows it, 1
@@ -30,7 +30,7 @@ pub(super) struct PictureArgs {
     noise: Option<f32>,
 
     /// The most samples of a pixel, with --noise (default: 1024)
-    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
     max_spp: Option<u32>,
 
     /// How far light is followed: ray-cast, whitted (mirrors and glass), path (all light), or auto, the cheapest that
@@ -39,7 +39,7 @@ pub(super) struct PictureArgs {
     integrator: Option<Wish>,
 
     /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for paths 64)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_DEPTH)))]
     max_depth: Option<u32>,
 
     /// Chooses among equally good sample patterns (default: the scene's, else 0)
@@ -134,14 +134,14 @@ impl PictureArgs {
             background: self.background,
             crop: self.crop,
             aovs: Vec::new(),
-            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp.unwrap_or(MOST_SPP) }),
+            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp.unwrap_or(USUAL_MOST_SPP) }),
             complete: self.plan.complete(),
         }
     }
 }
 
 /// As many samples as a pixel has at most where nothing else is asked for.
-const MOST_SPP: u32 = 1024;
+const USUAL_MOST_SPP: u32 = 1024;
 
 /// An integrator, or none for the one that is chosen.
 #[derive(Clone, Copy, Debug)]

@@ -19,7 +19,7 @@ use super::statement::{Statement, statements};
 use super::suggest::suggestion;
 use super::text::{name, quoted};
 use crate::error::{Error, Result};
-use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3, can_place, is_invertible};
 use crate::memory::Mapped;
 use crate::scene::{
     Attenuation, Camera, Geometry, Group, Instance, Integrator, Light, Material, Scene, Specular, Unlit,
@@ -121,7 +121,7 @@ impl Reader {
         statement.usage = usage;
         match keyword {
             "size" => self.scene.request.size = Some(statement.picture_size()?),
-            "maxdepth" => self.scene.request.max_depth = Some(statement.whole()?),
+            "maxdepth" => self.scene.request.max_depth = Some(statement.depth()?),
             "output" => self.scene.request.output = Some(name(statement.word()?)),
             "maxverts" | "maxvertnorms" => drop(statement.whole()?),
             "camera" => self.camera(statement)?,
@@ -211,7 +211,7 @@ impl Reader {
         ball(centre, radius)?;
         let place = DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(radius)), centre);
         let transform = self.transform * place;
-        if !is_invertible(&transform) {
+        if !can_place(&transform) {
             return Err("the sphere is too small under its transform".into());
         }
         self.balls.push(Ball { line: statement.line, material, transform });
@@ -312,10 +312,6 @@ fn corners<T: Copy + Default>(statement: &mut Statement<'_>, what: &str, pile: &
 fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
     DAffine3::from_quat(DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize())
-}
-
-fn is_invertible(transform: &DAffine3) -> bool {
-    transform.is_finite() && transform.matrix3.determinant().is_normal() && transform.inverse().is_finite()
 }
 
 /// The factor by which a matrix scales, where it turns, mirrors and scales alike in every direction, up to rounding.

@@ -3,12 +3,12 @@
 //! A `#` at the beginning of a word starts a comment. What is wrong with a statement is said with the word, and with what
 //! the statement looks like when it is right.
 
-use super::Placeless;
-use super::text::{Words, number, quoted, without_mark};
-use crate::math::{DVec3, Vec3};
+use std::iter;
 
-/// Longest side of a picture that a file may ask for.
-const LONGEST_SIDE: u32 = 65_536;
+use super::Placeless;
+use super::text::{Lines, Words, number, quoted, without_mark};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{LARGEST_SIDE, MOST_DEPTH};
 
 /// One line with something on it.
 pub(super) struct Statement<'a> {
@@ -21,7 +21,8 @@ pub(super) struct Statement<'a> {
 
 /// The statements of a text.
 pub(super) fn statements(text: &[u8]) -> impl Iterator<Item = Statement<'_>> {
-    without_mark(text).split(|&byte| byte == b'\n').zip(1..).filter_map(|(text, line)| {
+    let mut lines = Lines::new(without_mark(text));
+    iter::from_fn(move || lines.physical()).zip(1..).filter_map(|(text, line)| {
         let words = Words::new(without_comment(text), line);
         let statement = Statement { line, usage: "", words };
         (!statement.words.rest().is_empty()).then_some(statement)
@@ -93,9 +94,15 @@ impl<'a> Statement<'a> {
     /// Width and height of a picture.
     pub(super) fn picture_size(&mut self) -> Placeless<[u32; 2]> {
         let size = [self.whole()?, self.whole()?];
-        let fits = size.iter().all(|side| (1..=LONGEST_SIDE).contains(side));
+        let fits = size.iter().all(|side| (1..=LARGEST_SIDE).contains(side));
         let [width, height] = size;
-        if fits { Ok(size) } else { Err(format!("{width} x {height} pixels; each side may be 1 to {LONGEST_SIDE}")) }
+        if fits { Ok(size) } else { Err(format!("{width} x {height} pixels; each side may be 1 to {LARGEST_SIDE}")) }
+    }
+
+    /// How often a ray may be sent on.
+    pub(super) fn depth(&mut self) -> Placeless<u32> {
+        let depth = self.whole()?;
+        if depth <= MOST_DEPTH { Ok(depth) } else { Err(format!("a depth of {depth}; at most {MOST_DEPTH}")) }
     }
 
     /// An angle of view in degrees.

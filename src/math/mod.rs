@@ -51,6 +51,16 @@ pub fn tangents(n: DVec3) -> [DVec3; 2] {
     [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
+/// Whether a transform can be undone.
+pub fn is_invertible(transform: &DAffine3) -> bool {
+    transform.is_finite() && transform.matrix3.determinant().is_normal() && transform.inverse().is_finite()
+}
+
+/// Whether things can be placed by a transform: it can be undone, and so can what it is as f32, which is what tracers place them by.
+pub fn can_place(transform: &DAffine3) -> bool {
+    is_invertible(transform) && is_invertible(&transform.as_affine3().as_daffine3())
+}
+
 /// The normal of a triangle, (b - a) x (c - a): not of unit length, and on the side from which a, b, c run counterclockwise.
 #[inline(always)]
 pub fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {

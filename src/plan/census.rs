@@ -105,7 +105,7 @@ impl Census {
             moving: scene.instances.iter().filter(|instance| instance.transform_end.is_some()).count() as u64,
             lights: Lights::new(scene, world),
             ambient: scene.ambient != Vec3::ZERO,
-            environment: scene.environment.as_ref().is_some_and(|light| light.intensity > 0.0),
+            environment: scene.environment.as_ref().is_some_and(|light| !light.is_black()),
             fog: scene.fog.is_some_and(|fog| fog.absorption != Vec3::ZERO),
             ..Self::default()
         };

@@ -12,7 +12,8 @@
 //!
 //! [`Plan::new`] takes the census and switches off what no pixel can show: shadow rays where no light casts
 //! any, texture coordinates where no texture is used, shading normals where no mesh in view of a light has them, the
-//! ambient term, lights that are black or out of reach. The renderer reads the plan and never asks the scene again.
+//! ambient term, lights that are black or out of reach. What the plan decides the renderer reads there, and never decides again; of the scene it takes
+//! materials, textures and the lights that are left.
 
 mod build;
 mod census;
@@ -188,8 +189,9 @@ impl Plan {
         let normal_maps = (lit || depth > 0) && materials.normal_mapped > 0 || surfaces;
         let attributes = Attributes {
             normals: (lit || depth > 0) && meshes.normals > 0 || surfaces,
-            uvs: (lit || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0 || normal_maps,
-            colors: (lit || ambient || alpha || materials.unlit > 0) && meshes.colors > 0 || surfaces,
+            uvs: (lit || depth > 0 || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0
+                || normal_maps,
+            colors: (lit || depth > 0 || ambient || alpha || materials.unlit > 0) && meshes.colors > 0 || surfaces,
         };
         let casting = match &lighting {
             Lighting::Lights(lights) => &lights[..],
@@ -249,8 +251,9 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DVec3, Vec2};
-    use crate::scene::{Attenuation, Geometry, Material, Mesh};
+    use crate::image::Image;
+    use crate::math::{DVec3, Vec2, Vec4};
+    use crate::scene::{Attenuation, Environment, Geometry, Material, Mesh};
 
     fn scene() -> Scene {
         let mesh = Mesh {
@@ -295,6 +298,19 @@ mod tests {
         assert!(plan.shadows() && !plan.attributes.uvs, "the textured material is not used");
         scene.lights.pop();
         assert!(!self::plan(&scene).shadows());
+    }
+
+    #[test]
+    fn an_environment_without_light_is_none() {
+        let around = |pixel: Vec4, intensity: f32| {
+            let image = Image { pixels: vec![Vec4::W, pixel], ..Image::new(2, 1) };
+            plan(&Scene { environment: Some(Environment { intensity, ..Environment::new(image) }), ..scene() })
+        };
+        for (pixel, intensity) in [(Vec4::W, 1.0), (Vec4::ONE, 0.0)] {
+            let plan = around(pixel, intensity);
+            assert_eq!((plan.environment, plan.lighting), (false, Lighting::Headlight), "{pixel} times {intensity}");
+        }
+        assert!(around(Vec4::Z, 1.0).environment);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub use filter::Filter;
 pub use finished::Finished;
 pub use rounds::Picture;
 pub use sampler::Sampling;
-pub use settings::{Crop, LARGEST_SIDE, Settings};
+pub use settings::{Crop, Settings};
 pub use tiles::{LARGEST_TILE, TileOrder};
 
 use crate::error::{Error, Result};
@@ -110,7 +110,7 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`], a camera that cannot be, and settings that do not go
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`](crate::scene::LARGEST_SIDE), a camera that cannot be, and settings that do not go
     /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
     /// what is not there.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
@@ -125,12 +125,12 @@ impl<'a> Renderer<'a> {
             let message = format!("a shutter from {open} to {close}: things move from time 0 to 1, and it closes last");
             return Err(Error::Usage(message));
         }
-        let environment = scene.environment.as_ref().map(EnvironmentLight::new).filter(|light| !light.is_black());
         let plan = Plan::new(scene, world, &settings.wishes());
         if plan.integrator == Integrator::Path && sampling == Sampling::Grid {
             let why = "its numbers are the same for every pixel, and what one path misses all of them miss";
             return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));
         }
+        let environment = scene.environment.as_ref().filter(|_| plan.environment);
         // A headlight stays where the camera is half-way.
         let eye = camera.pose(f64::from(open.midpoint(close))).eye;
         let mut renderer = Self {
@@ -144,7 +144,7 @@ impl<'a> Renderer<'a> {
             // A single sample is the pixel's middle, whatever the filter.
             filter: FilterSampler::new(if most == 1 { Filter::Box } else { filter }),
             lights: Lights::default(),
-            environment: environment.map(Arc::new),
+            environment: environment.map(|light| Arc::new(EnvironmentLight::new(light))),
             ambient: if plan.ambient { scene.ambient } else { Vec3::ZERO },
             fallback: Material::default(),
             request,

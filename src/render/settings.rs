@@ -5,11 +5,8 @@ use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::plan::{Complete, Plan, Rays, Wishes};
-use crate::scene::Integrator;
+use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH};
 use crate::trace::Batch;
-
-/// Most pixels a picture may have along one side.
-pub const LARGEST_SIDE: u32 = 65_536;
 
 /// What picture to make of a scene.
 #[derive(Clone, Debug)]
@@ -38,7 +35,7 @@ pub struct Settings {
     pub light_samples: u32,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,
-    /// How often a ray may be sent on; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
+    /// How often a ray may be sent on, up to [`MOST_DEPTH`]; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
     /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
     pub max_depth: Option<u32>,
     /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
@@ -163,6 +160,9 @@ impl Settings {
                     "the sampler \"{sampling}\" {why}: with a noise threshold take sobol"
                 )));
             }
+        }
+        if let Some(depth) = self.max_depth.filter(|depth| *depth > MOST_DEPTH) {
+            return Err(Error::Usage(format!("a depth of {depth}: a ray may be sent on {MOST_DEPTH} times at most")));
         }
         if self.light_samples == 0 {
             return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::image::Image;
+use crate::math::Vec4;
 
 /// An equirectangular picture around the scene: light that comes from everywhere, and what is seen behind everything.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,5 +21,11 @@ impl Environment {
     /// The picture as it is.
     pub fn new(image: Image) -> Self {
         Self { image: Arc::new(image), intensity: 1.0, rotation: 0.0 }
+    }
+
+    /// Whether no light comes from it.
+    pub fn is_black(&self) -> bool {
+        let shines = |pixel: &Vec4| pixel.truncate().max_element() > 0.0;
+        !(self.intensity > 0.0 && self.image.pixels.iter().any(shines))
     }
 }

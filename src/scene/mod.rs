@@ -34,7 +34,7 @@ pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossi
 pub use pose::{Journey, Pose};
 pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
-pub use request::{Integrator, Request};
+pub use request::{Integrator, LARGEST_SIDE, MOST_DEPTH, MOST_SPP, Request};
 pub use rocks::rocks;
 pub use search::{Accel, Resolution, Search};
 pub use texture::{Filter, Pixels, Texture, Wrap};

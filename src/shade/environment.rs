@@ -53,12 +53,6 @@ impl EnvironmentLight {
         light
     }
 
-    /// Whether any light comes from it.
-    pub fn is_black(&self) -> bool {
-        // The shares end at 1 unless all of them are 0.
-        self.intensity == 0.0 || self.rows.last().is_none_or(|&sum| sum < 0.5)
-    }
-
     /// Linear RGB that is seen along `direction` (any length).
     pub fn radiance(&self, direction: DVec3) -> Vec3 {
         let at = self.pixel(direction) - 0.5;
@@ -207,7 +201,6 @@ mod tests {
     #[test]
     fn black_is_black() {
         let black = light(|_, _| Vec3::ZERO, 0.0);
-        assert!(black.is_black() && !light(sun, 0.0).is_black());
         assert_eq!(black.density(DVec3::Y), None);
     }
 }

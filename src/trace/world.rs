@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::limits;
 use super::motion::{Motion, singular_on_the_way};
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, is_traceable};
+use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, can_place, is_traceable};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Instance, Mesh, Scene, choose_origin};
 use crate::shape::Shape;
@@ -188,9 +188,6 @@ impl World {
             let start = rounded(&instance.transform);
             // The inverse of what is traced, not of what was asked for: the two differ by f32 rounding.
             let to_object = start.as_daffine3().inverse();
-            if !to_object.is_finite() {
-                return Err(singular(i, instance));
-            }
             world.lookup[i] = Lookup { placement: Some(world.placements.len() as u32), ..lookup };
             let motion = match &instance.transform_end {
                 None => None,
@@ -339,18 +336,13 @@ fn group_origin(scene: &Scene, group: u32) -> DVec3 {
 }
 
 fn check_transform(index: usize, instance: &Instance) -> Result<()> {
-    let determinant = instance.transform.matrix3.determinant();
-    let invertible = determinant != 0.0 && instance.transform.inverse().is_finite();
-    let ends = instance.transform_end.is_none_or(|end| end.is_finite());
-    if invertible && instance.transform.is_finite() && ends { Ok(()) } else { Err(singular(index, instance)) }
-}
-
-fn singular(index: usize, instance: &Instance) -> Error {
-    let name = &instance.name;
-    Error::Backend {
-        backend: "scene",
-        message: format!("instance {index} ({name:?}) has a singular transform; give it a scale that is not zero"),
+    let Instance { name, transform, transform_end, .. } = instance;
+    if can_place(transform) && transform_end.is_none_or(|end| end.is_finite()) {
+        return Ok(());
     }
+    let remedy = "give it a scale that is neither zero nor beyond what f32 holds";
+    let message = format!("instance {index} ({name:?}) has a singular transform; {remedy}");
+    Err(Error::Backend { backend: "scene", message })
 }
 
 #[cfg(test)]

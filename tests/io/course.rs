@@ -148,6 +148,7 @@ fn faults_are_told_with_line_word_and_remedy() {
         ("attenuation 0 0 0\n", 1, "divides by zero"),
         ("diffuse -1 0 0\n", 1, "from 0 up"),
         ("size 0 10\n", 1, "each side may be 1 to"),
+        ("\nmaxdepth 1001\n", 2, "a depth of 1001; at most 1000"),
         ("directional 0 0 0 1 1 1\n", 1, "no direction"),
     ] {
         refused_bytes("a.test", text, &format!("line {line}"), words);

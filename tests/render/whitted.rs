@@ -2,7 +2,7 @@
 
 use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::render::{Control, Counted};
-use twincast::scene::{Attenuation, Camera, Geometry, Light, Material};
+use twincast::scene::{Attenuation, Camera, Geometry, Light, MOST_DEPTH, Material};
 use twincast::{Cuboid, Disk, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
 
 use super::{engines, from_above, render, settings};
@@ -51,6 +51,19 @@ fn two_mirrors_make_a_geometric_series() {
         let got = pixel(&scene, &from_above(), &deep(depth));
         assert!((got - sum.extend(1.0)).abs().max_element() < 1e-6, "{depth} deep: {got} against {sum}");
     }
+}
+
+/// As often as a ray may be sent on at all, the stack has room: each mirror adds what it gives off, for it reflects all. More is refused.
+#[test]
+fn rays_are_sent_on_as_often_as_can_be_asked_for() {
+    let mirror = Material { emission: Vec3::new(0.25, 0.5, 1.0), reflection: Vec3::ONE, ..black() };
+    let scene = scene(vec![(plane(0.0, Vec3::Y), mirror.clone()), (plane(20.0, Vec3::NEG_Y), mirror)]);
+    let times = (MOST_DEPTH + 1) as f32;
+    let seen = pixel(&scene, &from_above(), &deep(MOST_DEPTH));
+    assert_eq!(seen, (Vec3::new(0.25, 0.5, 1.0) * times).extend(1.0));
+    let world = World::new(&scene).unwrap();
+    let refused = Renderer::new(&scene, &world, from_above(), deep(MOST_DEPTH + 1)).map(|_| ()).unwrap_err();
+    assert!(refused.to_string().contains("1000 times at most"), "{refused}");
 }
 
 /// Seen obliquely through a pane of thickness d, things stand aside by d sin(a) (1 - cos(a) / sqrt(n^2 - sin(a)^2)).

@@ -132,6 +132,7 @@ GOOD = np.zeros((2, 3))
         (ValueError, "seed", lambda: twincast.render(TRIANGLE, seed=-1)),
         (ValueError, "threads", lambda: twincast.render(TRIANGLE, threads=-1)),
         (ValueError, "max_depth", lambda: twincast.render(TRIANGLE, max_depth=-1)),
+        (ValueError, "max_depth", lambda: twincast.render(TRIANGLE, max_depth=1001)),
         (ValueError, "size", lambda: twincast.render(TRIANGLE, size=(2**32, 1))),
         (TypeError, "size", lambda: twincast.render(TRIANGLE, size=5)),
         (ValueError, "size", lambda: twincast.render(TRIANGLE, size=(1, 2, 3))),

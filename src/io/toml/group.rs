@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::include::Placed;
 use super::table::{Fault, Read, Table, Value};
 use crate::io::suggest::suggestion;
-use crate::math::{DAffine3, DMat3, DQuat, DVec3};
+use crate::math::{DAffine3, DMat3, DQuat, DVec3, can_place};
 use crate::scene::{Instance, Scene};
 
 /// Groups within groups within groups.
@@ -151,8 +151,10 @@ impl Groups<'_> {
         }
         for child in &body.children {
             let (name, place) = (joined(path, &child.name), place.of(&child.place));
-            if !is_invertible(&place.start) || place.end.is_some_and(|end| !is_invertible(&end)) {
-                let message = format!("{name:?} has a transform that nothing undoes; no scale may be 0");
+            if !can_place(&place.start) || place.end.is_some_and(|end| !can_place(&end)) {
+                let message = format!(
+                    "{name:?} has a transform that nothing undoes; no scale may be 0, nor beyond what f32 holds"
+                );
                 return Err(Fault { at: child.at, message });
             }
             match &child.target {
@@ -173,10 +175,6 @@ fn joined(path: &str, name: &str) -> String {
         (path, "") => path.to_owned(),
         (path, name) => format!("{path}/{name}"),
     }
-}
-
-fn is_invertible(transform: &DAffine3) -> bool {
-    transform.is_finite() && transform.matrix3.determinant().is_normal() && transform.inverse().is_finite()
 }
 
 /// The value of `transform`: a step, or a list of steps of which the last is applied to the group first, as with the

@@ -4,13 +4,11 @@ use super::table::{Read, Table, Value};
 use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, Light, Pose, Projection, Request, Resolution,
-    Search, ThinLens,
+    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, LARGEST_SIDE, Light, MOST_DEPTH, MOST_SPP,
+    Pose, Projection, Request, Resolution, Search, ThinLens,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
-/// Longest side of a picture.
-const LONGEST_SIDE: u64 = 65_536;
 /// Vertical angle of view where none is given, degrees.
 const USUAL_FOV: f64 = 40.0;
 
@@ -44,18 +42,20 @@ impl Render {
         };
         let Some(mut table) = table else { return Ok(render) };
         let side = |length: f64| {
-            (length.fract() == 0.0 && (1.0..=LONGEST_SIDE as f64).contains(&length)).then_some(length as u32)
+            (length.fract() == 0.0 && (1.0..=f64::from(LARGEST_SIDE)).contains(&length)).then_some(length as u32)
         };
         render.request = Request {
             size: table.optional("size", |value| {
                 let [width, height] = value.numbers::<2>()?.map(side);
                 let size = width.zip(height).map(|(width, height)| [width, height]);
-                size.ok_or_else(|| value.fault(format!("\"size\" wants two whole numbers from 1 to {LONGEST_SIDE}")))
+                size.ok_or_else(|| value.fault(format!("\"size\" wants two whole numbers from 1 to {LARGEST_SIDE}")))
             })?,
-            spp: table.optional("spp", |value| value.whole(1..=65_536))?.map(|spp| spp as u32),
+            spp: table.optional("spp", |value| value.whole(1..=MOST_SPP.into()))?.map(|spp| spp as u32),
             seed: table.optional("seed", |value| value.whole(0..=u64::MAX))?,
             integrator: table.optional("integrator", |value| value.choice(&integrators()))?.flatten(),
-            max_depth: table.optional("max_depth", |value| value.whole(0..=u32::MAX.into()))?.map(|depth| depth as u32),
+            max_depth: table
+                .optional("max_depth", |value| value.whole(0..=MOST_DEPTH.into()))?
+                .map(|depth| depth as u32),
             output: table.optional("output", |value| value.text())?.map(str::to_owned),
             exposure: table.optional("exposure", |value| {
                 let stops = value.number()? as f32;

@@ -19,6 +19,8 @@ _Mesh = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
 #: The most of the numbers that the native part has in 32 bits.
 _U32 = 2**32 - 1
+# `scene::MOST_DEPTH` of the library.
+_MOST_DEPTH = 1000
 
 
 def render(
@@ -62,7 +64,7 @@ def render(
     integrator : str, optional
         ray-cast, whitted, path or auto; the file's, else the cheapest that shows all the scene contains.
     max_depth : int, optional
-        How often a ray may be sent on.
+        How often a ray may be sent on, up to 1000.
     background : (3,) float, optional
         Linear RGB behind everything, opaque; the file's, else transparent black.
     seed : int, optional
@@ -97,7 +99,7 @@ def render(
         "seed": None if seed is None else _arguments.whole("seed", seed, most=2**64 - 1),
         "camera": _arguments.text("camera", camera),
         "integrator": _arguments.text("integrator", integrator),
-        "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_U32),
+        "max_depth": None if max_depth is None else _arguments.whole("max_depth", max_depth, most=_MOST_DEPTH),
         "background": None if background is None else _arrays.vector("background", background).tolist(),
         "threads": _arguments.whole("threads", threads),
     }
