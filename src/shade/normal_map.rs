@@ -63,23 +63,21 @@ fn along_triangle([a, b, c]: [DVec3; 3], corners: [usize; 3], uvs: &[Vec2], map:
 
 /// The same along a shape at a point of it, in the shape's coordinates: by how its parameters change from one side of the point to the other.
 fn along_shape(shape: &Shape, at: DVec3, map: &Texture) -> Option<[DVec3; 2]> {
-    // Steps over what is bent are small for how it is bent.
+    // How large it is where it is bent, for steps are to be small against that, and whether parameters run around it, and begin again at 0.
     let size = || f64::from(shape.bounds().size().max_element());
-    let step = STEP
-        * match shape {
-            Shape::Plane(_) => 1.0,
-            Shape::Cuboid(_) | Shape::Polygon(_) => size(),
-            Shape::Sphere(sphere) => f64::from(sphere.radius),
-            Shape::Disk(disk) => f64::from(disk.radius),
-            Shape::Cylinder(cylinder) => f64::from(cylinder.radius),
-            Shape::Cone(cone) => f64::from(cone.base_radius.max(cone.apex_radius)),
-            Shape::Ellipsoid(ellipsoid) => {
-                let Mat3 { x_axis, y_axis, z_axis } = ellipsoid.axes;
-                f64::from(x_axis.length().min(y_axis.length()).min(z_axis.length()))
-            }
-        };
-    // Where parameters run around, they begin again at 0.
-    let runs_around = !matches!(shape, Shape::Plane(_) | Shape::Polygon(_) | Shape::Cuboid(_));
+    let (size, runs_around) = match shape {
+        Shape::Plane(_) => (1.0, false),
+        Shape::Cuboid(_) | Shape::Polygon(_) => (size(), false),
+        Shape::Sphere(sphere) => (f64::from(sphere.radius), true),
+        Shape::Disk(disk) => (f64::from(disk.radius), true),
+        Shape::Cylinder(cylinder) => (f64::from(cylinder.radius), true),
+        Shape::Cone(cone) => (f64::from(cone.base_radius.max(cone.apex_radius)), true),
+        Shape::Ellipsoid(ellipsoid) => {
+            let Mat3 { x_axis, y_axis, z_axis } = ellipsoid.axes;
+            (f64::from(x_axis.length().min(y_axis.length()).min(z_axis.length())), true)
+        }
+    };
+    let step = STEP * size;
     let sides = tangents(shape.normal(at).try_normalize()?);
     let [p, q] = sides.map(|side| {
         let [before, after] = [-step, step].map(|step| shape.uv(at + side * step));

@@ -270,21 +270,15 @@ fn barycentrics(ray: &Ray, a: DVec3, e1: DVec3, e2: DVec3) -> [f64; 2] {
 }
 
 fn on_shape(ray: &Ray, placement: Option<&Placement>, shape: &Shape, t: f32) -> SurfacePoint {
-    let to_object = placement.map_or(DAffine3::IDENTITY, |p| p.to_object);
     let to_world = placement.map_or(DAffine3::IDENTITY, |p| p.to_world.as_daffine3());
-    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-    let local = Ray {
-        origin: to_object.transform_point3(origin).as_vec3(),
-        direction: to_object.transform_vector3(direction).as_vec3(),
-        ..*ray
-    };
+    let local = placement.map_or(*ray, |p| p.object_ray(ray));
     // A named shape that f64 says is missed is met where the ray comes closest to what the engine said.
     let root = select_root(shape, &local, t).unwrap_or(ShapeHit { t: f64::from(t), uv: Vec2::ZERO });
     let (from, along) = (local.origin.as_dvec3(), local.direction.as_dvec3() * root.t);
     let on_shape = from + along;
     let position = to_world.transform_point3(on_shape);
     let normal = cofactor(&to_world.matrix3) * shape.normal(on_shape);
-    let outwards = normal.try_normalize().unwrap_or_else(|| -direction.normalize());
+    let outwards = normal.try_normalize().unwrap_or_else(|| -ray.direction.as_dvec3().normalize());
     // None of a plane: the rounding of a point on it is that of its coordinates.
     let extent = to_world.matrix3 * shape.bounds().size().max(Vec3::ZERO).as_dvec3();
     // Not relative to where the point is, for it may be zero: what f64 rounds off on the way there.
