@@ -91,6 +91,38 @@ fn a_render_that_is_killed_goes_on_to_the_same_file() {
     assert!(code == Some(3) && said.contains("no checkpoint to resume"), "{said}");
 }
 
+/// What a render is kept in takes the place of nothing else: neither of an output, nor of what the scene is read from, nor of a file that is no checkpoint.
+#[test]
+fn a_checkpoint_replaces_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let run = |scene: &str, flags: &[&str]| {
+        let output = command().arg("render").arg(scene).args(["--size", "8x8", "-q"]).args(flags).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let plain = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
+    std::fs::write(path("plain.toml"), plain).unwrap();
+    let [scene, picture, kept] = ["plain.toml", "a.png", "a.checkpoint.exr"].map(path);
+    let often = ["-o", &picture, "--checkpoint", "1h"];
+
+    for flag in ["-o", "--stats"] {
+        let (code, said) = run(&scene, &[&often[..], &[flag, &kept]].concat());
+        assert!(code == Some(2) && said.contains("the render is kept in this file"), "{said}");
+    }
+    let (code, said) = run(&scene, &["-o", &kept]);
+    assert_eq!((code, said.as_str()), (Some(0), ""));
+    let before = std::fs::read(&kept).unwrap();
+    let (code, said) = run(&scene, &often);
+    assert!(code == Some(4) && said.contains("is no checkpoint"), "{code:?}: {said}");
+    let sky = format!("[environment]\nimage = \"a.checkpoint.exr\"\n{plain}");
+    std::fs::write(path("sky.toml"), sky).unwrap();
+    let (code, said) = run(&path("sky.toml"), &often);
+    assert!(code == Some(2) && said.contains("the scene is read from this file"), "{said}");
+    let (code, said) = run(&scene, &["-o", &kept, "--camera", &kept]);
+    assert!(code == Some(2) && said.contains("named twice"), "{said}");
+    assert_eq!(std::fs::read(&kept).unwrap(), before);
+}
+
 /// Ctrl-C ends it with 130 and leaves a checkpoint, where one was asked for.
 #[cfg(unix)]
 #[test]

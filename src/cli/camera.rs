@@ -1,6 +1,6 @@
 //! Where to look from: a camera of the file, or flags; and a camera as flags.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
@@ -128,6 +128,12 @@ impl CameraArgs {
         camera.distortion = self.distortion.or(camera.distortion);
         camera.shutter = self.shutter.unwrap_or(camera.shutter);
         Ok((camera, source))
+    }
+
+    /// The picture whose camera is asked for, if it is one of a file.
+    pub(super) fn picture(&self) -> Option<PathBuf> {
+        let path = Path::new(self.camera.as_ref()?);
+        (image::holds_channels(path) && path.is_file()).then(|| path.to_owned())
     }
 
     fn without_lens(&self, scene: &Scene, bounds: &DAabb, aspect: f64) -> Result<(Camera, String)> {

@@ -7,10 +7,10 @@ use std::time::Duration;
 use clap::Args;
 
 use super::engine::BackendArg;
-use super::say;
+use super::{outputs, say};
 use crate::error::{Error, Result};
 use crate::output;
-use crate::render::Checkpoint;
+use crate::render::{Checkpoint, is_checkpoint};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct CheckpointArgs {
@@ -37,7 +37,15 @@ impl CheckpointArgs {
     /// # Errors
     /// [`Error::Usage`] where there is no picture or more than one engine, [`Error::Input`] where there is nothing to resume, and
     /// [`Error::Output`] where the file cannot be written.
-    pub(super) fn open(&self, pictures: &[PathBuf], backend: BackendArg) -> Result<Option<Kept>> {
+    ///
+    /// Its file must be none of the run's other ones: of the outputs, of which pictures are the first, nor of what is read.
+    pub(super) fn open(
+        &self,
+        pictures: &[PathBuf],
+        stats: Option<&PathBuf>,
+        read: &[PathBuf],
+        backend: BackendArg,
+    ) -> Result<Option<Kept>> {
         if self.checkpoint.is_none() && !self.resume {
             return Ok(None);
         }
@@ -55,6 +63,17 @@ impl CheckpointArgs {
         if self.resume && !path.exists() {
             let message = "there is no checkpoint to resume: leave out --resume to begin anew";
             return Err(Error::input(path, "", message));
+        }
+        outputs::spare([&path], read)?;
+        let outputs: Vec<PathBuf> = pictures.iter().chain(stats).cloned().collect();
+        if outputs::spare([&path], &outputs).is_err() {
+            let message = format!("{}: the render is kept in this file; give the output another name", path.display());
+            return Err(Error::Usage(message));
+        }
+        if path.exists() && !is_checkpoint(&path) {
+            let message =
+                "is no checkpoint, and would be replaced by one; move it away, or give the picture another name";
+            return Err(Error::output(&path, message.to_owned()));
         }
         if self.checkpoint.is_some() {
             output::check_writable(&path)?;
@@ -123,12 +142,12 @@ mod tests {
         let args = CheckpointArgs { checkpoint: Some(Duration::ZERO), resume: false };
         let folder = tempfile::tempdir().expect("a folder");
         let pictures = [folder.path().join("a.png"), folder.path().join("b.exr")];
-        let kept = args.open(&pictures, BackendArg::Native).unwrap().unwrap();
+        let kept = args.open(&pictures, None, &[], BackendArg::Native).unwrap().unwrap();
         assert_eq!(kept.path, folder.path().join("a.checkpoint.exr"));
         assert!(kept.remove().is_ok(), "there is none");
-        let code = |args: &CheckpointArgs, backend| args.open(&pictures, backend).err().unwrap().exit_code();
+        let code = |args: &CheckpointArgs, backend| args.open(&pictures, None, &[], backend).err().unwrap().exit_code();
         assert_eq!(code(&args, BackendArg::Both), 2);
         assert_eq!(code(&CheckpointArgs { checkpoint: None, resume: true }, BackendArg::Native), 3);
-        assert!(args.open(&[], BackendArg::Native).is_err());
+        assert!(args.open(&[], None, &[], BackendArg::Native).is_err());
     }
 }

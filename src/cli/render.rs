@@ -1,5 +1,6 @@
 //! `twincast render`: from a scene file to finished pictures.
 
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -16,7 +17,7 @@ use super::checkpoint::{CheckpointArgs, Kept};
 use super::common::SceneArgs;
 use super::denoise::{DenoiseArgs, Denoising};
 use super::display::{Display, parse_address};
-use super::engine::{BackendArg, Job, Outcome};
+use super::engine::{BackendArg, Job, Outcome, Pass};
 use super::explain::ExplainArgs;
 use super::frames::{self, FrameArgs};
 use super::light::LightArgs;
@@ -32,9 +33,9 @@ use crate::image::{Metadata, Reference, Response, WriteOptions};
 use crate::io;
 use crate::memory::process;
 use crate::plan;
-use crate::render::Renderer;
-use crate::scene::{Geometry, Request, Scene};
-use crate::trace::accel::Accel;
+use crate::render::{Renderer, Settings};
+use crate::scene::{Camera, Geometry, Request, Scene};
+use crate::trace::accel::{Accel, Options as AccelOptions};
 use crate::trace::bvh::Preset;
 
 /// Render a scene
@@ -152,7 +153,7 @@ fn render(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {
         return Err(no_picture());
     }
-    outputs::check_places(&args.output, &args.stats, args.inputs())?;
+    outputs::check_places(&args.output, &args.stats, &args.inputs())?;
     let pool = ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
     // A thread that starts registers what is to be done at its end, under the lock that the system's loader holds as long as it loads libraries. So all are there
@@ -171,66 +172,43 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
     let display = args.display_server.as_deref().map(|address| Display::connect(address, title())).transpose()?;
 
     pool.install(|| {
-        let start = Instant::now();
-        let (mut scene, warnings) = args.scene.load_with_bar(args.camera.has_shutter(), args.quiet)?;
-        warn(&warnings);
-        args.light.apply(&mut scene)?;
-        let load_seconds = start.elapsed().as_secs_f64();
-        interrupt::check()?;
-
-        let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &args.cache)?;
-        let mut settings = args.picture.settings(&scene.request, args.backend.best_width());
-        settings.aovs = denoising.as_ref().map_or_else(|| args.aov.aovs(), Denoising::aovs);
-        let (width, height) = settings.crop.map_or((settings.width, settings.height), |crop| (crop.width, crop.height));
-        args.check_reference(reference.as_ref(), width, height)?;
-        if settings.adaptive.is_some() && args.backend == BackendArg::Both {
-            return Err(Error::Usage(
-                "--noise is for one engine, not for --backend both: each would choose its samples".into(),
-            ));
-        }
-        let pictures = args.pictures(&scene.request)?;
-        outputs::spare(pictures.iter().chain(&args.stats), &scene.files)?;
-        args.aov.check(&pictures)?;
-        let kept = args.checkpoint.open(&pictures, args.backend)?;
-        let aspect = f64::from(settings.width) / f64::from(settings.height);
-        let (camera, camera_source) = args.camera.choose(&scene, aspect)?;
+        let asked = args.ask(denoising.as_ref(), reference.as_ref())?;
+        let Asked { scene, settings, camera, accel, .. } = &asked;
         if args.print_camera {
-            say(camera_flags(&camera, &scene.bounds()))?;
-            if pictures.is_empty() {
+            say(camera_flags(camera, &scene.bounds()))?;
+            if asked.pictures.is_empty() {
                 return Ok(());
             }
         }
 
         let start = Instant::now();
-        let world = plan::world(&scene, settings.complete)?;
-        let renderer = Renderer::new(&scene, &world, camera.clone(), settings.clone())?;
+        let world = plan::world(scene, settings.complete)?;
+        let renderer = Renderer::new(scene, &world, camera.clone(), settings.clone())?;
         let prepare_seconds = start.elapsed().as_secs_f64();
         interrupt::check()?;
         if args.explain.is_wanted() {
-            return args.explain.run(&world, &renderer, args.backend, &accel);
+            return args.explain.run(&world, &renderer, args.backend, accel);
         }
 
-        let pixels = u64::from(width) * u64::from(height);
-        let stored = world.stored_triangles();
         // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
         let build = match accel.0 {
             Accel::Bvh => {
                 let rays = settings.expected_rays(renderer.plan());
-                args.build.choose(args.backend, stored, &rays, pixels, &settings.aovs)?
+                args.build.choose(args.backend, world.stored_triangles(), &rays, asked.pixels(), &settings.aovs)?
             }
             _ => None,
         };
         let job = Job {
             world: &world,
             renderer: &renderer,
-            pixels,
+            pixels: asked.pixels(),
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
-            accel: &accel,
+            accel,
             cache: cache.as_ref(),
             display: display.as_ref(),
-            kept: kept.as_ref(),
+            kept: asked.kept.as_ref(),
         };
         let outcome = job.run(args.backend).and_then(|mut outcome| {
             let denoise =
@@ -240,61 +218,117 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         });
         warn(display.and_then(Display::finish).as_slice());
         if !args.quiet
-            && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &kept)
+            && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &asked.kept)
         {
             kept.tell()?;
         }
-        let (outcome, denoised) = outcome?;
+        let (outcome, denoise) = outcome?;
+        let write_seconds = args.write(&asked, &outcome.passes[0])?;
+
         let pass = &outcome.passes[0];
-        let picture = &pass.picture;
-        let mean_spp = picture.samples as f64 / pixels as f64;
-
-        let start = Instant::now();
-        let metadata = Metadata {
-            samples_per_pixel: Some(mean_spp.round() as u32),
-            texts: picture.texts.clone(),
-            ..metadata(&camera, &settings, pass.render_seconds)
-        };
-        let options = WriteOptions { response: args.response.choose(&scene.request), ..WriteOptions::default() };
-        outputs::write_pictures(&pictures, &picture.image, &picture.channels, &metadata, &options)?;
-        kept.as_ref().map_or(Ok(()), Kept::remove)?;
-        let write_seconds = start.elapsed().as_secs_f64();
-
+        let [width, height] = asked.size();
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
-            triangles: placed_triangles(&scene),
+            triangles: placed_triangles(scene),
             size: [width, height],
             spp: settings.spp,
-            mean_spp,
+            mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
             threads: rayon::current_num_threads(),
             packet: settings.batch.width.rays(),
-            load_seconds,
+            load_seconds: asked.load_seconds,
             prepare_seconds,
             write_seconds,
             peak_memory: process::peak(),
-            denoise: denoised,
-            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
+            denoise,
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
         };
         if let Some(path) = &args.stats {
             outputs::write_json(path, &stats)?;
         }
         if !args.quiet {
-            let mut summary = Rendered {
-                scene: &scene,
-                renderer: &renderer,
-                camera: &camera_source,
-                build: build.as_ref(),
-                stats: &stats,
-            }
-            .summary(args.verbose);
-            pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
+            let camera = &asked.camera_source;
+            let mut summary = Rendered { scene, renderer: &renderer, camera, build: build.as_ref(), stats: &stats }
+                .summary(args.verbose);
+            asked.pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
             say(summary)?;
         }
-        args.judge(&outcome, reference.as_ref(), &options.response)
+        args.judge(&outcome, reference.as_ref(), &args.response.choose(&scene.request))
     })
 }
 
+/// What is to be rendered, by the scene and the flags.
+struct Asked {
+    scene: Scene,
+    load_seconds: f64,
+    settings: Settings,
+    accel: (Accel, AccelOptions),
+    /// Where it goes.
+    pictures: Vec<PathBuf>,
+    kept: Option<Kept>,
+    camera: Camera,
+    /// Where the camera is from, for the summary.
+    camera_source: String,
+}
+
+impl Asked {
+    /// Width and height of what is rendered, in pixels.
+    fn size(&self) -> [u32; 2] {
+        let Settings { width, height, crop, .. } = self.settings;
+        crop.map_or([width, height], |crop| [crop.width, crop.height])
+    }
+
+    fn pixels(&self) -> u64 {
+        self.size().into_iter().map(u64::from).product()
+    }
+}
+
 impl RenderArgs {
+    /// Reads the scene, and says what is to be made of it. Everything that can be refused before the work is.
+    fn ask(&self, denoising: Option<&Denoising>, reference: Option<&Reference>) -> Result<Asked> {
+        let start = Instant::now();
+        let (mut scene, warnings) = self.scene.load_with_bar(self.camera.has_shutter(), self.quiet)?;
+        warn(&warnings);
+        self.light.apply(&mut scene)?;
+        let load_seconds = start.elapsed().as_secs_f64();
+        interrupt::check()?;
+
+        let accel = self.accel.choose(scene.request.search, self.backend, Some(&self.build), &self.cache)?;
+        let mut settings = self.picture.settings(&scene.request, self.backend.best_width());
+        settings.aovs = denoising.map_or_else(|| self.aov.aovs(), Denoising::aovs);
+        if settings.adaptive.is_some() && self.backend == BackendArg::Both {
+            return Err(Error::Usage(
+                "--noise is for one engine, not for --backend both: each would choose its samples".into(),
+            ));
+        }
+        let pictures = self.pictures(&scene.request)?;
+        outputs::spare(pictures.iter().chain(&self.stats), &scene.files)?;
+        self.aov.check(&pictures)?;
+        let read = [&self.inputs()[..], &scene.files].concat();
+        let kept = self.checkpoint.open(&pictures, self.stats.as_ref(), &read, self.backend)?;
+        let aspect = f64::from(settings.width) / f64::from(settings.height);
+        let (camera, camera_source) = self.camera.choose(&scene, aspect)?;
+        let asked = Asked { scene, load_seconds, settings, accel, pictures, kept, camera, camera_source };
+        self.check_reference(reference, asked.size())?;
+        Ok(asked)
+    }
+
+    /// Writes the pictures, after which nothing need be kept of the render; in how many seconds.
+    fn write(&self, asked: &Asked, pass: &Pass) -> Result<f64> {
+        let start = Instant::now();
+        let picture = &pass.picture;
+        let mean_spp = picture.samples as f64 / asked.pixels() as f64;
+        let metadata = Metadata {
+            samples_per_pixel: Some(mean_spp.round() as u32),
+            texts: picture.texts.clone(),
+            ..metadata(&asked.camera, &asked.settings, pass.render_seconds)
+        };
+        let response = self.response.choose(&asked.scene.request);
+        let options = WriteOptions { response, ..WriteOptions::default() };
+        outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
+        asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+
     /// The pictures to write: those of the flags, else the one that the scene names.
     fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
         if !self.output.is_empty() || self.print_camera || self.explain.is_wanted() {
@@ -306,18 +340,19 @@ impl RenderArgs {
             return Err(no_picture());
         };
         let pictures = vec![picture];
-        outputs::check(&pictures, &self.stats, self.inputs())?;
+        outputs::check(&pictures, &self.stats, &self.inputs())?;
         Ok(pictures)
     }
 
     /// The files it reads.
-    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        [Some(&self.scene.scene), self.reference.as_ref(), self.light.environment.as_ref()].into_iter().flatten()
+    fn inputs(&self) -> Vec<PathBuf> {
+        let files = [self.reference.clone(), self.light.environment.clone(), self.camera.picture()];
+        iter::once(self.scene.scene.clone()).chain(files.into_iter().flatten()).collect()
     }
 
-    fn check_reference(&self, reference: Option<&Reference>, width: u32, height: u32) -> Result<()> {
+    fn check_reference(&self, reference: Option<&Reference>, [width, height]: [u32; 2]) -> Result<()> {
         let (Some(Reference { image: picture, .. }), Some(path)) = (reference, &self.reference) else { return Ok(()) };
-        if (picture.width, picture.height) == (width, height) {
+        if [picture.width, picture.height] == [width, height] {
             return Ok(());
         }
         let own = format_args!("{}x{}", picture.width, picture.height);

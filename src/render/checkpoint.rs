@@ -36,6 +36,12 @@ const OWN: &str = "twincast/";
 /// The entry that holds the number of samples with which the present round began.
 const ROUND: &str = "round";
 
+/// Whether a file is a checkpoint, of whatever render.
+pub(crate) fn is_checkpoint(path: &Path) -> bool {
+    let is_own = |name: &str| name.strip_prefix(OWN) == Some(ROUND);
+    image::read_metadata(path).is_ok_and(|metadata| metadata.texts.iter().any(|(name, _)| is_own(name)))
+}
+
 /// Writes checkpoints.
 pub(super) struct Keeper<'k> {
     path: &'k Path,

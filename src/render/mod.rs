@@ -33,6 +33,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 pub use adaptive::Adaptive;
 pub use aov::{Aov, Expression};
 pub use checkpoint::Checkpoint;
+pub(crate) use checkpoint::is_checkpoint;
 pub use counted::Counted;
 pub use explain::{Explanation, HitTrail, LightTrail, RayTrail, SampleTrail};
 pub use filter::Filter;
