@@ -114,6 +114,24 @@ fn only_codes_are_developed() {
     assert!(over_black.iter().zip([51, 26, 102]).all(|(&a, b): (&u8, u8)| a.abs_diff(b) <= 3), "{over_black:?}");
 }
 
+/// What a PNG says of its codes is what they are (PNG, third edition, sections 11.3.2.2 and 11.3.2.5): no sRGB where they are the light itself.
+#[cfg(feature = "oiio")]
+#[test]
+fn codes_without_a_transfer_function_are_not_called_srgb() {
+    use twincast::image::{Curve, Response};
+    let folder = tempfile::tempdir().unwrap();
+    for curve in Curve::ALL {
+        let path = folder.path().join("a.png");
+        let options = WriteOptions { response: Response { curve, ..Response::default() }, ..Default::default() };
+        image::write(&path, &Image::new(2, 2), &Metadata::default(), &options).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        let find = |name: &[u8]| bytes.windows(4).position(|at| at == name);
+        let gamma = find(b"gAMA").map(|at| u32::from_be_bytes(*bytes[at + 4..].first_chunk().unwrap()));
+        assert_eq!(find(b"sRGB").is_some(), curve != Curve::Linear, "{curve}");
+        assert!(gamma.is_none_or(|gamma| (gamma == 100_000) == (curve == Curve::Linear)), "{curve}: {gamma:?}");
+    }
+}
+
 #[test]
 fn metadata_comes_back() {
     let folder = tempfile::tempdir().unwrap();

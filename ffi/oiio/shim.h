@@ -51,6 +51,8 @@ struct Layout {
     // Whether the last channel is alpha, and if so, whether colours are not multiplied by it.
     bool alpha;
     bool straight;
+    // Whether codes are written without a transfer function; of what is read nothing is said.
+    bool linear;
     // What follows the colours in each pixel, of four bytes each.
     Slice<Named> beside;
 };

@@ -67,7 +67,7 @@ void write(const std::string& name, const Layout& layout, const Attributes& attr
     if (layout.beside.length != 0)
         spec.channelformats.insert(spec.channelformats.begin(), layout.channels, type);
     const bool integers = layout.kind == Kind::U8 || layout.kind == Kind::U16;
-    spec.attribute("oiio:ColorSpace", integers ? "sRGB" : "Linear");
+    spec.attribute("oiio:ColorSpace", layout.linear ? "Linear" : "sRGB");
     if (layout.tile) {
         spec.tile_width = spec.tile_height = int(layout.tile);
         spec.tile_depth                    = 1;

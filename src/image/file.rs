@@ -8,7 +8,7 @@ use std::path::Path;
 use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
 use super::pure as backend;
-use super::response::Response;
+use super::response::{Curve, Response};
 use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Image, Metadata, channels};
 use crate::error::{Error, Result, one_line};
@@ -49,6 +49,9 @@ pub(super) struct Encoding {
     pub alpha: bool,
     /// Edge of a tile; 0 for rows, as most formats have them.
     pub tile: u32,
+    /// Whether codes are the light itself, without a transfer function. The writers of builds without OpenImageIO say nothing of it.
+    #[cfg_attr(not(feature = "oiio"), expect(dead_code))]
+    pub linear: bool,
 }
 
 /// The largest finite number of binary16.
@@ -231,11 +234,12 @@ fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
         let is_held = |value: f32| !value.is_finite() || value.abs() <= MOST_HALF;
         let fits = || image.pixels.iter().all(|pixel| pixel.to_array().into_iter().all(is_held));
         let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
-        Encoding { kind, alpha: true, tile: options.tile }
+        Encoding { kind, alpha: true, tile: options.tile, linear: true }
     } else if RADIANCE.contains(&suffix) {
-        Encoding { kind: Type::Float, alpha: false, tile: 0 }
+        Encoding { kind: Type::Float, alpha: false, tile: 0, linear: true }
     } else {
-        Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0 }
+        let linear = options.response.curve == Curve::Linear;
+        Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0, linear }
     }
 }
 

@@ -7,8 +7,8 @@ use super::samples::{Type, decode, encode};
 use super::{Channel, Image, Metadata, Response, Window, oiio, pure};
 use crate::math::Vec4;
 
-const HALF: Encoding = Encoding { kind: Type::Half, alpha: true, tile: 64 };
-const BYTES: Encoding = Encoding { kind: Type::U8, alpha: true, tile: 0 };
+const HALF: Encoding = Encoding { kind: Type::Half, alpha: true, tile: 64, linear: true };
+const BYTES: Encoding = Encoding { kind: Type::U8, alpha: true, tile: 0, linear: false };
 
 /// Not a multiple of a tile, every 8-bit code in each channel, alpha in steps, values over 1, and the odd ones.
 fn picture() -> Image {
@@ -50,7 +50,7 @@ fn pixels_are_identical() {
     let folder = tempfile::tempdir().unwrap();
     let bits =
         |image: &Image| -> Vec<u32> { image.pixels.iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect() };
-    let float = Encoding { kind: Type::Float, alpha: true, tile: 16 };
+    let float = Encoding { kind: Type::Float, alpha: true, tile: 16, linear: true };
     for (suffix, encoding) in [("exr", HALF), ("exr", float), ("png", BYTES)] {
         let files = write_both(folder.path(), suffix, encoding);
         let mut images = Vec::new();

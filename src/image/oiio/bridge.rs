@@ -100,6 +100,8 @@ pub(super) struct Layout<'a> {
     /// Whether the last channel is alpha, and if so, whether colours are not multiplied by it.
     pub(super) alpha: bool,
     pub(super) straight: bool,
+    /// Whether codes are written without a transfer function; of what is read nothing is said.
+    pub(super) linear: bool,
     /// What follows the colours in each pixel, of four bytes each.
     pub(super) beside: Slice<'a, Named<'a>>,
 }

@@ -73,6 +73,7 @@ pub(super) fn write(
         tile: encoding.tile,
         alpha: samples.channels.alpha.is_some(),
         straight: samples.channels.alpha == Some(Alpha::Straight),
+        linear: encoding.linear,
         beside: beside[..].into(),
     };
     let [camera, screen] = [&metadata.world_to_camera, &metadata.world_to_screen].map(|m| m.as_ref().map(narrow));
