@@ -198,6 +198,14 @@ pub fn load_watched(
         );
         warnings.push(Warning::new(path, "", message));
     }
+    // glTF's reader, which knows of sets of coordinates, tells itself.
+    let bare = meshes(&scene).filter(|mesh| mesh.uvs.is_empty() && has_texture(&scene, mesh)).count();
+    if bare > 0 && !is_gltf {
+        let message = format!(
+            "{bare} meshes lack texture coordinates that their materials want: one point of each texture is seen"
+        );
+        warnings.push(Warning::new(path, "", message));
+    }
     let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
     if bad > 0 {
         let message = format!("{bad} triangles have corners that are NaN, infinite or too far away; no ray hits them");
@@ -270,6 +278,12 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
         Geometry::Mesh(mesh) => Some(mesh),
         Geometry::Shapes { .. } => None,
     })
+}
+
+/// Whether a mesh's material looks anything up by its texture coordinates.
+fn has_texture(scene: &Scene, mesh: &Mesh) -> bool {
+    let material = scene.materials.get(mesh.material as usize);
+    material.is_some_and(|material| material.textures().next().is_some())
 }
 
 /// What the system says about a file, as a message.

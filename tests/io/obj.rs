@@ -115,7 +115,7 @@ fn slips_cost_no_more_than_what_they_are() {
 #[test]
 fn materials_and_textures() {
     let obj = format!(
-        "mtllib a b.mtl\n{VERTICES}vt 0 0\no left\nusemtl red\nf 1 2 3\ng right\nusemtl shiny\nf 2 3 4\nusemtl red\nf 1 2 4\n"
+        "mtllib a b.mtl\n{VERTICES}vt 0 0\no left\nusemtl red\nf 1 2 3\ng right\nusemtl shiny\nf 2/1 3/1 4/1\nusemtl red\nf 1 2 4\n"
     );
     let mtl = "newmtl red\nKd 1 0.5 0.25\nKa 0.1 0.2 0.3\nKs 1 1 1\nNs 50\nillum 1\nKe 0 0 2\n\
         newmtl shiny\nKs 0.5 0.5 0.5\nNs 100\nillum 2\nNi 1.5\nmap_Kd -s 2 3 1 -o 0.5 -clamp on my pic.png\n";
@@ -172,7 +172,7 @@ fn what_is_missing_is_a_warning() {
 fn colours_in_xyz_and_options_without_effect() {
     // D65's white, a red beyond the display's, and grey from one number.
     let mtl = "newmtl a\nKa xyz 0.5\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\n";
-    let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
+    let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
     let (scene, warnings) = Files::one("a.obj", &obj).and("a.mtl", mtl).and("a.png", picture()).load("a.obj");
     let material = &scene.materials[0];
     assert!(material.diffuse.abs_diff_eq(Vec3::ONE, 1e-3), "{material:?}");
@@ -203,6 +203,11 @@ fn colours_in_xyz_and_options_without_effect() {
         .and("a.png", picture())
         .load("a.obj");
     assert!(warnings.len() == 1 && warnings[0].message.contains("option \"-mm\""), "{warnings:?}");
+    // A picture, but nothing that lies it over the surface.
+    let bare = obj.replace("/1", "");
+    let files = Files::one("a.obj", bare).and("a.mtl", "newmtl a\nmap_Kd a.png\n").and("a.png", picture());
+    let (_, warnings) = files.load("a.obj");
+    assert!(warnings.len() == 1 && warnings[0].message.contains("lack texture coordinates"), "{warnings:?}");
 }
 
 #[test]

@@ -248,7 +248,7 @@ fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::R
         Interface::Fresnel => writeln!(out, "type = \"glass\"")?,
         Interface::Thin => writeln!(out, "type = \"glass\"\nthin = true")?,
     }
-    if let Some(Absorption { color, distance }) = material.absorption {
+    if let Some(Absorption { color, distance }) = material.absorption.filter(|_| *transmission != Vec3::ZERO) {
         writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
     }
     if let Some(gloss) = material.gloss {

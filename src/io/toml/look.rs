@@ -231,6 +231,10 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     camera.end = end(&mut table, [eye, target, up])?;
     camera.projection = projection(&mut table)?;
     camera.lens = table.optional("lens", lens)?;
+    if let (Some(value), Projection::Equirectangular) = (table.get("lens"), camera.projection) {
+        return Err(value
+            .fault("\"lens\" is not for equirectangular cameras: a view of the whole sphere has no plane of focus"));
+    }
     let bends = table.get("distortion");
     if let (Some(value), false) = (bends, matches!(camera.projection, Projection::Perspective(_))) {
         return Err(value.fault("\"distortion\" is for perspective cameras alone"));

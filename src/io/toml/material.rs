@@ -40,11 +40,11 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         ior: above_zero(table, "ior")?.unwrap_or(plain.ior),
         gloss: table.optional("gloss", |value| value.share())?,
         interface: interface(table, kind)?,
-        absorption: absorption(table)?,
+        absorption: absorption(table, transmission)?,
         unlit: kind == Kind::Unlit,
         normal_scale: table.optional("normal_scale", |value| value.number())?.unwrap_or(1.0) as f32,
         alpha: alpha(table)?,
-        opacity: unit(table, "opacity")?.unwrap_or(1.0),
+        opacity: opacity(table)?,
         emission,
         ..plain
     })
@@ -73,6 +73,18 @@ fn alpha(table: &mut Table<'_>) -> Read<Alpha> {
     }
 }
 
+/// `opacity`, of which nothing is seen where `alpha` is not given.
+fn opacity(table: &mut Table<'_>) -> Read<f32> {
+    let is_alone = table.get("alpha").is_none();
+    let opacity = unit(table, "opacity")?.unwrap_or(1.0);
+    match table.get("opacity") {
+        Some(value) if is_alone && opacity < 1.0 => {
+            Err(value.fault("\"opacity\" is seen with alpha = \"blend\" or \"mask\" alone; write one of them, too"))
+        }
+        _ => Ok(opacity),
+    }
+}
+
 /// A number from 0 to 1.
 fn unit(table: &mut Table<'_>, key: &'static str) -> Read<Option<f32>> {
     table.optional(key, |value| {
@@ -81,14 +93,17 @@ fn unit(table: &mut Table<'_>, key: &'static str) -> Read<Option<f32>> {
     })
 }
 
-/// `attenuation_color` and `attenuation_distance`, which stand together.
-fn absorption(table: &mut Table<'_>) -> Read<Option<Absorption>> {
+/// `attenuation_color` and `attenuation_distance`, which stand together, for what lets light through.
+fn absorption(table: &mut Table<'_>, transmission: Vec3) -> Read<Option<Absorption>> {
     let color = table.optional("attenuation_color", |value| {
         let color = value.color()?;
         if color.cmple(Vec3::ONE).all() { Ok(color) } else { Err(value.unlike("shares from 0 to 1")) }
     })?;
     let distance = above_zero(table, "attenuation_distance")?;
     match (color, distance) {
+        (Some(_), Some(_)) if transmission == Vec3::ZERO => {
+            Err(table.fault("\"attenuation_color\" is for what lets light through: give it a \"transmission\""))
+        }
         (Some(color), Some(distance)) => Ok(Some(Absorption { color, distance })),
         (None, None) => Ok(None),
         _ => Err(table.fault("\"attenuation_color\" and \"attenuation_distance\" go together; one of them is missing")),

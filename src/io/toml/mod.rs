@@ -195,6 +195,9 @@ impl Reader<'_> {
         material.diffuse_texture = self.texture(table.get("texture"))?;
         material.emission_texture = self.texture(table.get("emission_texture"))?;
         material.normal_texture = self.texture(table.get("normal_texture"))?;
+        if let (Some(scale), None) = (table.get("normal_scale"), material.normal_texture) {
+            return Err(scale.fault("\"normal_scale\" is for a \"normal_texture\", which is missing").into());
+        }
         table.finish()?;
         self.materials.insert(name.to_owned(), self.scene.materials.len() as u32);
         self.scene.materials.push(material);
