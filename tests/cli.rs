@@ -101,6 +101,7 @@ fn bad_usage_ends_with_2() {
         &["render", "x.glb", "-o", "x.png", "--explain"],
         &["render", "x.glb", "--pixel", "1,1", "--frames", "1-3", "--skip-existing"],
         &["render", "x.glb", "--pixel", "1,1", "--threshold", "0.1"],
+        &["render", "x.glb", "--pixel", "1,1", "--noise", "0.1"],
         &["render", "x.glb", "-o", "x.png", "--max-spp", "4"],
         #[cfg(feature = "embree")]
         &["render", "x.glb", "-o", "x.png", "--backend", "embree", "--build", "fast"],
@@ -111,6 +112,21 @@ fn bad_usage_ends_with_2() {
     ] {
         let (code, message) = fails(args);
         assert!(code == 2 && message.starts_with("error: "), "{args:?}: {code} {message}");
+    }
+}
+
+/// A number below what may be is told to be that, and not an unknown flag.
+#[test]
+fn numbers_below_zero_are_numbers() {
+    for (flag, value, words) in [
+        ("--spp", "-1", "-1 is not in 1..=65536"),
+        ("--noise", "-0.5", "-0.5"),
+        ("--crop", "-1,0,4x4", "expected X,Y,WIDTHxHEIGHT"),
+        ("--background", "-1,0,0", "-1,0,0"),
+        ("--threads", "-1", "expected a number from 0"),
+    ] {
+        let (code, message) = fails(&["render", "x.glb", "-o", "x.png", flag, value]);
+        assert!(code == 2 && message.contains(words) && !message.contains("unexpected"), "{flag}: {message}");
     }
 }
 
@@ -140,7 +156,7 @@ fn outputs_are_checked_before_the_scene_is_read() {
 #[test]
 fn what_a_scene_is_read_from_is_not_replaced() {
     use crate::io::{Files, obj};
-    let mesh = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let mesh = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
     let files = Files::one("a.obj", mesh)
         .and("a.mtl", "newmtl a\nmap_Kd a.png\n")
         .and("a.png", obj::picture())

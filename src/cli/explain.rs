@@ -18,7 +18,7 @@ use crate::trace::bvh::{Bvh, Steps};
 pub(super) struct ExplainArgs {
     /// Render this pixel alone and print its linear colour; column and row, from 0 at the top left
     #[arg(long, value_name = "X,Y", value_parser = parse_place,
-        conflicts_with_all = ["output", "stats", "reference", "print_camera", "crop", "display_server", "frames", "threshold"])]
+        conflicts_with_all = ["output", "stats", "reference", "print_camera", "crop", "noise", "display_server", "frames", "threshold"])]
     pixel: Option<[u32; 2]>,
 
     /// Print its rays, what they hit, every light's share, and how much of the native tree each ray enters

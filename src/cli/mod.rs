@@ -42,7 +42,7 @@ mod trial;
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::error::{Error, Result, Warning};
 
@@ -113,7 +113,12 @@ pub fn main() -> ! {
 
 /// Runs the program on these arguments, of which the first is its name, and returns its exit code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let outcome = match Cli::try_parse_from(arguments) {
+    // So that a number that is too small is told to be that, and not an unknown flag.
+    let takes_value = |arg: &Arg| !arg.is_positional() && arg.get_action().takes_values();
+    let numbers = |arg: Arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg };
+    let parser = Cli::command().mut_subcommands(|command| command.mut_args(numbers));
+    let parsed = parser.try_get_matches_from(arguments).and_then(|matches| Cli::from_arg_matches(&matches));
+    let outcome = match parsed {
         Ok(cli) => cli.command.run(),
         Err(error) => {
             // Nobody is left to be told that stderr is closed.

@@ -17,7 +17,7 @@ pub(super) struct PictureArgs {
     size: Option<Size>,
 
     /// Render this part alone: columns and rows to its left and above it, and its size; the same pixels as in the whole picture
-    #[arg(long, value_name = "X,Y,WxH", value_parser = parse_crop)]
+    #[arg(long, value_name = "X,Y,WxH", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Crop>,
 
     /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
@@ -71,7 +71,7 @@ pub(super) struct PictureArgs {
     tile_size: u32,
 
     /// Linear colour behind the scene, opaque (default: the scene's, transparent where it has none)
-    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_color, allow_hyphen_values = true)]
     background: Option<Vec3>,
 
     #[command(flatten)]
