@@ -37,6 +37,8 @@ impl Buffer {
         // SAFETY: the size is not zero.
         let data = unsafe { alloc_zeroed(layout) };
         if data.is_null() {
+            // What the monitor was told of is not taken.
+            device.account(-(bytes as isize), true)?;
             return Err(exhausted());
         }
         Ok(Self { device, data, bytes, layout: Some(layout) })

@@ -125,18 +125,11 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geom
     unsafe { modify(geometry, set) }
 }
 
-/// Curves of a minimal width on the screen are not built in, as in both Debians' Embree: nothing to scale.
+/// Curves of a minimal width on the screen are not built in, as in both Debians' Embree, which say so: programs ask by this whether they are.
 #[unsafe(no_mangle)]
-pub unsafe extern "C-unwind" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, scale: f32) {
-    let set = |_: &mut State| {
-        if scale >= 1.0 {
-            Ok(())
-        } else {
-            Err(Failure::argument("maximal radius scale has to be larger or equal to 1"))
-        }
-    };
+pub unsafe extern "C-unwind" fn rtcSetGeometryMaxRadiusScale(geometry: *const Geometry, _scale: f32) {
     // SAFETY: the interface's rules.
-    unsafe { modify(geometry, set) }
+    unsafe { modify(geometry, |_| Err(Failure::operation("min-width feature is not enabled"))) }
 }
 
 /// Sets a buffer.

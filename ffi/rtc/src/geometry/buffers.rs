@@ -11,11 +11,17 @@ use crate::failure::{Failure, Result};
 const MOST_VERTEX_BYTES: usize = 16 << 30;
 
 impl Geometry {
-    /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree.
+    /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree, while there are
+    /// as many primitives as before.
     pub fn set_buffer(&self, name: (u32, u32), buffer: Arc<Buffer>, items: Items) -> Result<()> {
         self.check(name, &items, buffer.data() as usize)?;
         let view = View::new(buffer, items)?;
-        *slot(self.kind, &mut self.state(), name)? = Some(view);
+        let count = view.count();
+        let mut state = self.state();
+        let before = slot(self.kind, &mut state, name)?.replace(view);
+        if name == self.kind.primitives() && before.is_none_or(|before| before.count() != count) {
+            state.is_committed = false;
+        }
         Ok(())
     }
 

@@ -63,6 +63,16 @@ impl Kind {
         })
     }
 
+    /// The buffer that says how many primitives there are, by type and slot; of what has none, a name that no buffer has.
+    fn primitives(self) -> (u32, u32) {
+        match self {
+            Self::Triangles | Self::Quads | Self::Linear(Shape::RoundCurve) => (buffer_type::INDEX, 0),
+            Self::Grids => (buffer_type::GRID, 0),
+            Self::Linear(Shape::Sphere | Shape::Disc | Shape::OrientedDisc) => (buffer_type::VERTEX, 0),
+            Self::User | Self::Instance | Self::InstanceArray | Self::Absent => (u32::MAX, 0),
+        }
+    }
+
     /// Whether it has vertices.
     fn is_mesh(self) -> bool {
         self.is_surface() || matches!(self, Self::Linear(_))

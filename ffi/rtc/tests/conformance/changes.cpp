@@ -124,6 +124,17 @@ static void uncommitted() {
   rtcCommitGeometry(floor);
   rtcCommitScene(w.scene);
   CHECK(near(height(w.scene), -4));
+  // One of another number of primitives waits for a commit.
+  static const unsigned twice[6] = {0, 1, 2, 0, 1, 2};
+  rtcSetSharedGeometryBuffer(floor, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, twice, 0, 12, 1);
+  rtcCommitScene(w.scene);
+  CHECK(rtcGetDeviceError(w.device) == RTC_ERROR_NONE && near(height(w.scene), -4));
+  rtcSetSharedGeometryBuffer(floor, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, twice, 0, 12, 2);
+  rtcCommitScene(w.scene);
+  CHECK(rtcGetDeviceError(w.device) == RTC_ERROR_INVALID_OPERATION);
+  rtcCommitGeometry(floor);
+  rtcCommitScene(w.scene);
+  CHECK(rtcGetDeviceError(w.device) == RTC_ERROR_NONE && near(height(w.scene), -4));
   // What is as it was.
   rtcSetGeometryTimeStepCount(floor, 1);
   rtcCommitScene(w.scene);

@@ -127,6 +127,10 @@ static void numbers() {
   RTCGeometry curves = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
   rtcSetGeometryTessellationRate(curves, 4);
   CHECK(take(w.device) == RTC_ERROR_NONE);
+  for (float scale : {2.0f, 0.5f}) {
+    rtcSetGeometryMaxRadiusScale(curves, scale);
+    CHECK(take(w.device) == RTC_ERROR_INVALID_OPERATION);
+  }
   rtcReleaseGeometry(curves);
   RTCGeometry points = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
   rtcSetGeometryTessellationRate(points, 4);
