@@ -61,8 +61,8 @@ pub trait Tracer: Sync {
 /// How a batch is traced. It changes the speed, never a native answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Batch {
-    /// Rays of a packet, for engines that trace packets; the native tracer goes ray by ray, or by bundles where
-    /// `coherent` promises some.
+    /// Rays of a packet, for engines that trace packets; the native tracer chooses by itself: bundles where `coherent` promises some, else
+    /// flights of single rays, and each ray alone where they are few.
     pub width: Width,
     /// Whether neighbours in the batch start and point alike.
     pub coherent: bool,

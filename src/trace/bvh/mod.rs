@@ -11,7 +11,7 @@
 //! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
 //! | `ready` | rays made ready eight at a time |
 //! | `batch`, `arrivals`, `query` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle; the two questions |
-//! | `flight` | single rays, several of them in turn |
+//! | `flight`, `set`, `addresses` | single rays, several of them in turn; which of them take a step; where what they need next lies in memory |
 //! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
 //! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
 //! | `level` | triangles and shapes of one coordinate system |
@@ -23,7 +23,7 @@
 //! | `alone` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
 //! | `boxes` | a tree over boxes of the caller's |
-//! | `certain`, `candidates` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
+//! | `certain`, `candidates`, `listed` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
 //! | `closest_point` | the point of all triangles that is nearest to a given one |

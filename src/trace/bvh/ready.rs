@@ -5,7 +5,7 @@
 use super::filter::{Filter, Filters};
 use super::place::Blur;
 use super::simd::{Array, Mask, Simd, Vector, everywhere, size};
-use super::slab::{SlabRay, Slabs, least_t};
+use super::slab::{MOST_T_SLACK, SlabRay, Slabs, least_t, most_t};
 use super::woop::Margin;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -65,14 +65,14 @@ impl ReadyRay {
         Self {
             rows: [
                 [rx, ry, rz, least_t(ray.tmin), nx, ny, nz, 0.0],
-                [fx, fy, fz, sx, sy, sz, ray.tmax, ray.tmax * (1.0 + 4.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE],
+                [fx, fy, fz, sx, sy, sz, ray.tmax, most_t(ray.tmax)],
                 [x, y, z, p, q, ax, ay, az],
                 [width, of_depth, of_size, against, shorten, begin, blur.origin, blur.direction],
             ],
         }
     }
 
-    /// The ray's tmax, and that or more: what [`Nearest::limit`](crate::trace::nearest::Nearest::limit) is at first.
+    /// The ray's tmax, and [`most_t`] of it.
     #[inline(always)]
     pub fn end(&self) -> [f32; 2] {
         let [.., tmax, limit] = self.rows[1];
@@ -173,8 +173,8 @@ pub(super) fn ready_blurred<S: Simd>(
     let [x, y, z] = filter.origin;
     let [p, q] = filter.shear;
     let [kx, ky, kz] = filter.axes;
-    // Rounded up, for t is rounded before it is held against it.
-    let limit = tmax.mul(splat(1.0 + 4.0 * UNIT_ROUNDOFF)).add(splat(f32::MIN_POSITIVE));
+    // As `most_t`.
+    let limit = tmax.mul(splat(1.0 + MOST_T_SLACK)).add(splat(f32::MIN_POSITIVE));
     let [sx, sy, sz] = sides;
     let Filters { against, shorten, begin, .. } = filter;
     let first = S::transpose([rx, ry, rz, least, nx, ny, nz, zero]);

@@ -169,6 +169,15 @@ pub(super) fn least_t(tmin: f32) -> f32 {
     (tmin * (1.0 - 4.0 * UNIT_ROUNDOFF) - f32::MIN_POSITIVE).max(0.0)
 }
 
+/// A most t, rounded up, for t is rounded before it is held against it.
+#[inline(always)]
+pub(super) fn most_t(tmax: f32) -> f32 {
+    tmax * (1.0 + MOST_T_SLACK) + f32::MIN_POSITIVE
+}
+
+/// By how much [`most_t`] is above.
+pub(super) const MOST_T_SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+
 #[inline(always)]
 fn lanes<S: Simd>(v: Vec3) -> S::V4 {
     S::V4::load(&[v.x, v.y, v.z, 0.0])

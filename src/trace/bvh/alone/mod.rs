@@ -30,10 +30,9 @@ use super::placements::FIXED;
 use super::query::{Closest, Occluded, Query};
 use super::ready::ReadyRay;
 use super::simd::Simd;
-use super::slab::SlabRay;
+use super::slab::{SlabRay, most_t};
 use super::triangles::TriangleTree;
 use super::walk::{self, Entered, Visit};
-use super::woop::SLACK;
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;
 pub use found::TriangleFound;
@@ -184,8 +183,7 @@ impl Noted {
     /// Nothing yet.
     #[inline(always)]
     pub fn nothing(ray: &SingleRay) -> Self {
-        // Rounded up, for t is rounded before it is held against it.
-        let limit = ray.tmax * (1.0 + SLACK) + f32::MIN_POSITIVE;
+        let limit = most_t(ray.tmax);
         // What lies so far that t overflows is in doubt, whose decision is that it is not hit.
         Self { sure: ray.tmax.min(f32::MAX), limit, id: NONE, place: FIXED, is_doubted: false }
     }

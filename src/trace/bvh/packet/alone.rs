@@ -9,20 +9,20 @@ use crate::trace::bvh::ready::{ReadyRay, ready};
 use crate::trace::bvh::simd::Simd;
 
 /// The nearest hits of those rays that `lanes` has a bit for.
-pub(super) struct ClosestApart<'a> {
+pub(super) struct ClosestAlone<'a> {
     pub bvh: &'a Bvh,
     pub packet: &'a Packet,
     pub lanes: u32,
     pub hits: &'a mut PacketHits,
 }
 
-impl Kernel for ClosestApart<'_> {
+impl Kernel for ClosestAlone<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { bvh, packet, lanes, hits } = self;
-        let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
+        let Alone { rays, ready, valid } = Alone::new::<S>(bvh, packet);
         let (mut found, mut doubted) = (TriangleFound::NONE, None);
         hits.lanes = 0;
         for lane in each(lanes & valid) {
@@ -34,19 +34,19 @@ impl Kernel for ClosestApart<'_> {
 }
 
 /// A bit for each of the rays with a bit in `lanes` that is occluded.
-pub(super) struct OccludedApart<'a> {
+pub(super) struct OccludedAlone<'a> {
     pub bvh: &'a Bvh,
     pub packet: &'a Packet,
     pub lanes: u32,
 }
 
-impl Kernel for OccludedApart<'_> {
+impl Kernel for OccludedAlone<'_> {
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
         let Self { bvh, packet, lanes } = self;
-        let Apart { rays, ready, valid } = Apart::new::<S>(bvh, packet);
+        let Alone { rays, ready, valid } = Alone::new::<S>(bvh, packet);
         let (mut occluded, mut doubted) = (0, None);
         for lane in each(lanes & valid) {
             occluded |= u32::from(bvh.occluded_ready::<S>(&rays[lane], &ready[lane], &mut doubted)) << lane;
@@ -56,14 +56,14 @@ impl Kernel for OccludedApart<'_> {
 }
 
 /// The rays of a packet, each by itself.
-struct Apart {
+struct Alone {
     rays: [SingleRay; RAYS],
     ready: [ReadyRay; RAYS],
     /// A bit for each that is valid.
     valid: u32,
 }
 
-impl Apart {
+impl Alone {
     #[inline(always)]
     fn new<S: Simd>(bvh: &Bvh, packet: &Packet) -> Self {
         let rows = packet.rows::<S>();

@@ -13,7 +13,7 @@
 //! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
 //! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
 
-mod apart;
+mod alone;
 mod beam;
 mod doubts;
 mod finish;
@@ -29,7 +29,7 @@ use super::query::{Closest, Occluded};
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::Vec3;
 use crate::ray::Ray;
-use apart::{ClosestApart, OccludedApart};
+use alone::{ClosestAlone, OccludedAlone};
 use beam::Beam;
 use doubts::Doubts;
 use octet::Octet;
@@ -247,7 +247,7 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
             return;
         }
         for (number, (packet, lanes)) in asked.packets.into_iter().zip(asked.lanes).enumerate() {
-            isa::dispatch(bvh.isa, ClosestApart { bvh, packet, lanes, hits: &mut scratch.hits[number] });
+            isa::dispatch(bvh.isa, ClosestAlone { bvh, packet, lanes, hits: &mut scratch.hits[number] });
         }
     }
 }
@@ -276,7 +276,7 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
             return;
         }
         for (occluded, (packet, lanes)) in occluded.iter_mut().zip(asked.packets.into_iter().zip(asked.lanes)) {
-            *occluded = isa::dispatch(bvh.isa, OccludedApart { bvh, packet, lanes });
+            *occluded = isa::dispatch(bvh.isa, OccludedAlone { bvh, packet, lanes });
         }
     }
 }

@@ -1,15 +1,16 @@
 //! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are no bundle in its coordinates.
 
-use super::found::Found;
+use super::found::BundleFound;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
-use crate::trace::bvh::bundle::{RAYS, SLACK};
-use crate::trace::bvh::found::{Found as Walked, NONE};
+use crate::trace::bvh::bundle::RAYS;
+use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::query::Closest;
 use crate::trace::bvh::range::Range;
 use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::slab::most_t;
 
 /// The closest hits of the rays of a bit mask in one placed object.
 #[inline(always)]
@@ -19,7 +20,7 @@ pub(super) fn trace<S: Simd>(
     rays: &[Ray; RAYS],
     mut open: u64,
     range: &mut Range,
-    found: &mut Found,
+    found: &mut BundleFound,
 ) {
     let mut ready = [ReadyRay::NONE; 8];
     while open != 0 {
@@ -47,16 +48,16 @@ fn trace_one<S: Simd>(
     i: usize,
     ready: Option<&ReadyRay>,
     range: &mut Range,
-    found: &mut Found,
+    found: &mut BundleFound,
 ) {
     let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));
     let (mut noted, mut doubted): (Noted, Doubted) = (Noted::nothing(&single), None);
     // Rounded up, as of a ray that has hit nothing yet.
-    noted.limit = range.limit.0[i] * (1.0 + SLACK) + f32::MIN_POSITIVE;
+    noted.limit = most_t(range.limit.0[i]);
     (noted.sure, noted.id, noted.place) = (range.sure.0[i], found.noted[i], found.place[i]);
     if noted.id == NONE && found.computed >> i & 1 != 0 {
         noted.is_doubted = true;
-        doubted.insert(Walked::NONE).take([noted.sure, noted.limit], found.nearest[i]);
+        doubted.insert(Found::NONE).take([noted.sure, noted.limit], found.nearest[i]);
     }
     let before = (noted.sure, noted.place, noted.id);
     match ready {

@@ -13,7 +13,7 @@ use crate::trace::bvh::simd::Simd;
 use crate::trace::nearest::Nearest;
 
 /// What the rays of a bundle have hit so far.
-pub(super) struct Found {
+pub(super) struct BundleFound {
     /// No hit beyond this t' is wanted; rounded up. Below every t' for a ray that is done.
     pub limit: PerRay,
     /// A hit nearer than this is the nearest for sure.
@@ -30,7 +30,7 @@ pub(super) struct Found {
 /// `sure` and `limit` of a ray that needs no more hits.
 pub(super) const DONE: f32 = f32::NEG_INFINITY;
 
-impl Found {
+impl BundleFound {
     pub fn new() -> Self {
         let nothing = Nearest::new(&Ray::new(Vec3::ZERO, Vec3::X));
         Self {
@@ -77,7 +77,7 @@ impl Found {
 /// Computes what is noted, and answers for the first `count` rays; `bundle` is theirs in the world.
 pub(super) struct Finish<'a, Q: Query> {
     pub bvh: &'a Bvh,
-    pub found: &'a Found,
+    pub found: &'a BundleFound,
     pub bundle: &'a Bundle,
     pub rays: &'a [Ray; RAYS],
     pub count: usize,
@@ -128,7 +128,7 @@ impl<Q: Query> Kernel for Finish<'_, Q> {
 /// Fours of neighbours in a bundle that have not all hit the same fixed triangle, a bit each.
 struct Mixed<'a, Q: Query> {
     bvh: &'a Bvh,
-    found: &'a Found,
+    found: &'a BundleFound,
     bundle: &'a Bundle,
     rays: &'a [Ray; RAYS],
     chunks: u32,

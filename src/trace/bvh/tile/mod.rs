@@ -13,11 +13,11 @@
 //!   and v of what was noted are computed four rays at a time
 //!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
 //! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
-//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`apart`]).
+//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`alone`]).
 //!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
 //!   ([`super::flight`]).
 
-mod apart;
+mod alone;
 mod found;
 mod meeting;
 mod octants;
@@ -32,12 +32,13 @@ use super::Bvh;
 use super::build::MAX_DEPTH;
 use super::bundle::{Bundle, Fill, Fit, RAYS};
 use super::flight::Visitors;
+use super::node::WIDTH;
 use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::range::Range;
 use super::simd::Simd;
 use crate::ray::Ray;
-use found::{Finish, Found};
+use found::{BundleFound, Finish};
 use octants::{Octants, Part};
 use placed::Tour;
 use walk::{Walk, few};
@@ -60,7 +61,7 @@ pub(super) struct Scratch {
 const GRAINS: f32 = 20.0;
 
 /// Places on a stack.
-const STACK: usize = MAX_DEPTH * 7 + 8;
+const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 
 /// One bundle and its way.
 struct One {
@@ -71,12 +72,12 @@ struct One {
     bundle: Bundle,
     local: Bundle,
     range: Range,
-    found: Found,
+    found: BundleFound,
 }
 
 impl Scratch {
     pub fn new() -> Self {
-        let found = Found::new();
+        let found = BundleFound::new();
         let stack = [Entry::root(!0); STACK];
         let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
         let one = One { upper: stack, stack, bundle, local, range, found };
@@ -187,7 +188,7 @@ impl One {
                 if Q::ANY {
                     visitors.push(Visitors { place, first: 0, rays: seeing });
                 } else {
-                    apart::trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
+                    alone::trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
                 }
                 continue;
             };

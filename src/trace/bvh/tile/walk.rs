@@ -3,7 +3,7 @@
 
 use std::marker::PhantomData;
 
-use super::found::{DONE, Found};
+use super::found::{BundleFound, DONE};
 use super::meeting::Meeting;
 use super::way::{Entry, Goal, Way};
 use crate::math::Vec3;
@@ -36,7 +36,7 @@ pub(super) struct Walk<'a, Q> {
     pub rays: &'a [Ray; RAYS],
     /// In the tree's coordinates.
     pub bundle: &'a Bundle,
-    pub found: &'a mut Found,
+    pub found: &'a mut BundleFound,
     /// As [`few`] says.
     pub few: u32,
     pub query: PhantomData<Q>,
