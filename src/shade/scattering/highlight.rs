@@ -25,7 +25,7 @@ impl Highlight {
         let n = material.shininess;
         let scale = material.energy_conserving.then(|| match material.model {
             Specular::Phong => (n + 2.0) / 2.0,
-            Specular::BlinnPhong => (n + 2.0) * (n + 4.0) / (8.0 * (libm::exp2f(-n / 2.0) + n)),
+            Specular::BlinnPhong => (n + 2.0) / 8.0 * ((n + 4.0) / (libm::exp2f(-n / 2.0) + n)),
         });
         Self { color: material.specular, shininess: n, model: material.model, scale }
     }
