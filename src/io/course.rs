@@ -14,16 +14,15 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::Placeless;
-use super::parts::Parts;
+use super::local_origin::DShape;
+use super::parts::{Parts, add_group};
 use super::statement::{Statement, statements};
 use super::suggest::suggestion;
 use super::text::{name, quoted};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3, can_place, is_invertible};
 use crate::memory::Mapped;
-use crate::scene::{
-    Attenuation, Camera, Geometry, Group, Instance, Integrator, Light, Material, Scene, Specular, Unlit,
-};
+use crate::scene::{Attenuation, Camera, Geometry, Instance, Integrator, Light, Material, Scene, Specular, Unlit};
 use crate::shape::{Shape, Sphere};
 
 /// Every statement as it should look; the first word is the keyword.
@@ -204,11 +203,11 @@ impl Reader {
         let material = self.material();
         if let Some(scale) = similarity(&self.transform.matrix3) {
             let centre = self.transform.transform_point3(centre);
-            self.parts.shape(material, ball(centre, radius * scale)?);
+            self.parts.shape(material, DShape::Sphere { centre, radius: radius * scale }.local()?);
             return Ok(());
         }
         // The same test, of what the file says.
-        ball(centre, radius)?;
+        DShape::Sphere { centre, radius }.check()?;
         let place = DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(radius)), centre);
         let transform = self.transform * place;
         if !can_place(&transform) {
@@ -251,21 +250,13 @@ impl Reader {
         // Of which the format's formula is the first terms.
         scene.request.integrator = Some(Integrator::Whitted);
         scene.unlit = Unlit::Darkness;
-        scene.geometries = self.parts.into_geometries();
-        let identity = DAffine3::IDENTITY;
-        if !scene.geometries.is_empty() {
-            scene.groups.push(Group { name: String::new(), geometries: 0..scene.geometries.len() as u32 });
-            scene.instances.push(Instance { name: String::new(), group: 0, transform: identity, transform_end: None });
-        }
+        self.parts.show(&mut scene);
         // One unit sphere for each material that needs it.
         let mut groups = HashMap::new();
         for Ball { line, material, transform } in self.balls {
             let group = *groups.entry(material).or_insert_with(|| {
                 let shapes = vec![Shape::Sphere(UNIT)];
-                let index = scene.geometries.len() as u32;
-                scene.geometries.push(Geometry::Shapes { shapes, material });
-                scene.groups.push(Group { name: "sphere".to_owned(), geometries: index..index + 1 });
-                scene.groups.len() as u32 - 1
+                add_group(&mut scene, "sphere", vec![Geometry::Shapes { shapes, material }])
             });
             scene.instances.push(Instance {
                 name: format!("sphere of line {line}"),
@@ -279,12 +270,6 @@ impl Reader {
 }
 
 const UNIT: Sphere = Sphere { centre: Vec3::ZERO, radius: 1.0 };
-
-fn ball(centre: DVec3, radius: f64) -> Placeless<Shape> {
-    let sphere = Shape::Sphere(Sphere { centre: centre.as_vec3(), radius: radius as f32 });
-    sphere.check().map_err(|problem| problem.to_string())?;
-    Ok(sphere)
-}
 
 fn attenuation(statement: &mut Statement<'_>) -> Placeless<Attenuation> {
     let (constant, linear, quadratic) = (statement.share()?, statement.share()?, statement.share()?);

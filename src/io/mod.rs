@@ -8,6 +8,7 @@
 mod compact;
 mod course;
 mod gltf;
+mod local_origin;
 mod nff;
 mod number;
 mod obj;

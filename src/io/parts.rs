@@ -2,18 +2,37 @@
 //!
 //! Such files mix materials freely. A geometry for each run of equal ones, in the order of the file, would give a file that
 //! alternates between two colours as many geometries as it has lines, and tracers a part for each.
+//!
+//! Shapes that have [local origins](super::local_origin) are sorted by these first, for each is a group.
 
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::Placeless;
+use super::local_origin::LocalShape;
 use super::weld::weld;
-use crate::math::{DVec3, Vec3};
-use crate::scene::{Geometry, Mesh};
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
 use crate::shape::Shape;
 
 /// Primitives in the coordinates of one group.
 #[derive(Default)]
-pub(super) struct Parts(Vec<Part>);
+pub(super) struct Parts {
+    /// By material.
+    near: Vec<Part>,
+    /// Shapes that have a local origin, by material; in the order in which their origins came first.
+    far: Vec<(DVec3, BTreeMap<u32, Vec<Shape>>)>,
+    /// Where an origin, by its bits, is in `far`.
+    origins: HashMap<[u64; 3], usize>,
+}
+
+/// Primitives, sorted.
+pub(super) struct Sorted {
+    /// What stands in the group's own coordinates, by rising material.
+    pub(super) near: Vec<Geometry>,
+    /// What is to be placed at local origins, likewise.
+    pub(super) far: Vec<(DVec3, Vec<Geometry>)>,
+}
 
 /// Those of one material.
 #[derive(Default)]
@@ -29,15 +48,23 @@ struct Part {
 impl Parts {
     fn of(&mut self, material: u32) -> &mut Part {
         let index = material as usize;
-        if self.0.len() <= index {
-            self.0.resize_with(index + 1, Part::default);
+        if self.near.len() <= index {
+            self.near.resize_with(index + 1, Part::default);
         }
-        &mut self.0[index]
+        &mut self.near[index]
     }
 
     /// Adds a shape of the material with this index.
-    pub(super) fn shape(&mut self, material: u32, shape: Shape) {
-        self.of(material).shapes.push(shape);
+    pub(super) fn shape(&mut self, material: u32, LocalShape { origin, shape }: LocalShape) {
+        if origin == DVec3::ZERO {
+            self.of(material).shapes.push(shape);
+            return;
+        }
+        let index = *self.origins.entry(origin.to_array().map(f64::to_bits)).or_insert_with(|| {
+            self.far.push((origin, BTreeMap::new()));
+            self.far.len() - 1
+        });
+        self.far[index].1.entry(material).or_default().push(shape);
     }
 
     /// Adds a flat triangle.
@@ -56,9 +83,9 @@ impl Parts {
     }
 
     /// Everything, by rising material.
-    pub(super) fn into_geometries(self) -> Vec<Geometry> {
+    pub(super) fn sorted(self) -> Sorted {
         let mut geometries = Vec::new();
-        for (part, material) in self.0.into_iter().zip(0..) {
+        for (part, material) in self.near.into_iter().zip(0..) {
             if !part.flat.is_empty() {
                 geometries.push(Geometry::Mesh(Mesh { material, ..flat_mesh(&part.flat) }));
             }
@@ -73,8 +100,29 @@ impl Parts {
                 geometries.push(Geometry::Shapes { shapes: part.shapes, material });
             }
         }
-        geometries
+        let shapes = |(material, shapes)| Geometry::Shapes { shapes, material };
+        let far = self.far.into_iter().map(|(origin, sorted)| (origin, sorted.into_iter().map(shapes).collect()));
+        Sorted { near: geometries, far: far.collect() }
     }
+
+    /// Adds everything to a scene whose coordinates these are.
+    pub(super) fn show(self, scene: &mut Scene) {
+        let Sorted { near, far } = self.sorted();
+        let near = (!near.is_empty()).then_some((DVec3::ZERO, near));
+        for (origin, geometries) in near.into_iter().chain(far) {
+            let group = add_group(scene, "", geometries);
+            let transform = DAffine3::from_translation(origin);
+            scene.instances.push(Instance { name: String::new(), group, transform, transform_end: None });
+        }
+    }
+}
+
+/// Adds a group of these to the scene, and gives its index.
+pub(super) fn add_group(scene: &mut Scene, name: &str, geometries: Vec<Geometry>) -> u32 {
+    let first = scene.geometries.len() as u32;
+    scene.geometries.extend(geometries);
+    scene.groups.push(Group { name: name.to_owned(), geometries: first..scene.geometries.len() as u32 });
+    scene.groups.len() as u32 - 1
 }
 
 fn check_count(corners: usize) -> Placeless<()> {

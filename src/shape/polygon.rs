@@ -43,10 +43,19 @@ impl Polygon {
     /// For fewer than three corners, corners without an area (collinear, or an outline that turns both ways alike),
     /// corners that are not in one plane, and what is not finite.
     pub fn new(corners: Vec<Vec3>) -> Result<Self, InvalidShape> {
+        Self::with_names(corners, None)
+    }
+
+    /// The same, and what corners are called in messages, where that is not where they are.
+    ///
+    /// # Errors
+    /// As [`Polygon::new`].
+    pub(crate) fn with_names(corners: Vec<Vec3>, names: Option<&[DVec3]>) -> Result<Self, InvalidShape> {
+        let name = |i: usize| names.map_or_else(|| corners[i].to_string(), |names| names[i].to_string());
         let count = corners.len();
         InvalidShape::unless(count >= 3, || format!("a polygon of {count} corners; it needs three at least"))?;
         for (i, &corner) in corners.iter().enumerate() {
-            InvalidShape::unless(is_traceable(corner), || format!("corner {i}, {corner}, is not finite"))?;
+            InvalidShape::unless(is_traceable(corner), || format!("corner {i}, {}, is not finite", name(i)))?;
         }
         let bounds = Aabb::around(corners.iter().copied());
         let first = corners[0].as_dvec3();
@@ -68,7 +77,7 @@ impl Polygon {
             format!(
                 "corner {farthest}, {}, is {distance:.3e} off the plane of the polygon, of which {tolerance:.3e} is let \
                  pass; divide it into triangles",
-                corners[farthest]
+                name(farthest)
             )
         })?;
         Ok(Self { corners, centre, normal, bounds })

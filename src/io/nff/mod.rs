@@ -15,10 +15,10 @@ mod view;
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use self::view::View;
 use super::Placeless;
+use super::local_origin::DShape;
 use super::parts::Parts;
 use super::polygon::triangulate;
 use super::statement::{Statement, statements};
@@ -27,7 +27,6 @@ use crate::error::{Error, Result, Warning};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
 use crate::scene::{Attenuation, Integrator, Light, Material, Scene, Specular, Unlit};
-use crate::shape::{Cone, Cylinder, Polygon, Shape, Sphere};
 
 /// What sets the material.
 const FILL: &str = "f r g b Kd Ks Shine T index";
@@ -160,9 +159,8 @@ impl Reader {
             }
             b"f" => self.fill(statement)?,
             b"s" => {
-                let (centre, radius) = (statement.vector()?.as_vec3(), statement.number()?);
-                let sphere = Sphere { centre, radius: radius.abs() as f32 };
-                self.shape(Shape::Sphere(sphere), radius < 0.0, line)?;
+                let (centre, radius) = (statement.vector()?, statement.number()?);
+                self.shape(&DShape::Sphere { centre, radius: radius.abs() }, radius < 0.0, line)?;
             }
             b"c" => {
                 statement.end()?;
@@ -234,8 +232,8 @@ impl Reader {
         self.material.ok_or_else(|| format!("a primitive before any {FILL:?}, which says what it is made of"))
     }
 
-    fn shape(&mut self, shape: Shape, is_inside_out: bool, line: usize) -> Placeless<()> {
-        shape.check().map_err(|problem| problem.to_string())?;
+    fn shape(&mut self, shape: &DShape, is_inside_out: bool, line: usize) -> Placeless<()> {
+        let shape = shape.local()?;
         let material = self.material()?;
         if is_inside_out && self.scene.materials[material as usize].transmission != Vec3::ZERO {
             self.inside_out.add(line, || "surfaces of glass are inside out; they refract like others".to_owned());
@@ -245,19 +243,21 @@ impl Reader {
     }
 
     fn cone(&mut self, ends: [[f64; 4]; 2], line: usize) -> Placeless<()> {
-        let [base, apex] = ends.map(|[x, y, z, _]| DVec3::new(x, y, z).as_vec3());
-        let [base_radius, apex_radius] = ends.map(|[.., radius]| radius);
+        let radii = ends.map(|[.., radius]| radius);
+        let ends = ends.map(|[x, y, z, _]| DVec3::new(x, y, z));
+        let [base_radius, apex_radius] = radii;
         if base_radius * apex_radius < 0.0 {
             return Err(format!("radii {base_radius} and {apex_radius}; both must have one sign"));
         }
         let is_inside_out = base_radius + apex_radius < 0.0;
-        let [base_radius, apex_radius] = [base_radius, apex_radius].map(|radius| radius.abs() as f32);
-        let shape = if base_radius == apex_radius {
-            Shape::Cylinder(Cylinder { base, apex, radius: base_radius, capped: false })
+        let radii = radii.map(f64::abs);
+        // As what they become.
+        let shape = if radii[0] as f32 == radii[1] as f32 {
+            DShape::Cylinder { ends, radius: radii[0], capped: false }
         } else {
-            Shape::Cone(Cone { base, base_radius, apex, apex_radius, capped: false })
+            DShape::Cone { ends, radii, capped: false }
         };
-        self.shape(shape, is_inside_out, line)
+        self.shape(&shape, is_inside_out, line)
     }
 
     fn polygon(&mut self, corners: Vec<DVec3>, line: usize) -> Placeless<()> {
@@ -265,11 +265,13 @@ impl Reader {
         if let &[a, b, c] = corners.as_slice() {
             return self.parts.triangle(material, [a, b, c]);
         }
-        match Polygon::new(corners.iter().map(|p| p.as_vec3()).collect()) {
-            Ok(polygon) => self.parts.shape(material, Shape::Polygon(Arc::new(polygon))),
+        let polygon = DShape::Polygon { corners };
+        match polygon.local() {
+            Ok(shape) => self.parts.shape(material, shape),
             Err(problem) => {
                 self.divided.add(line, || format!("polygons are divided into triangles; the first: {problem}"));
-                for triangle in triangles(&corners)? {
+                let corners = polygon.points();
+                for triangle in triangles(corners)? {
                     self.parts.triangle(material, triangle.map(|i| corners[i as usize]))?;
                 }
             }
@@ -288,12 +290,11 @@ impl Reader {
 
     /// The scene, once everything is read.
     fn finish(self) -> Scene {
-        let Scene { materials, cameras, background, request, .. } = self.scene;
-        let mut scene = Scene::from_geometries(self.parts.into_geometries(), materials);
-        (scene.cameras, scene.request) = (cameras, request);
+        let mut scene = self.scene;
+        self.parts.show(&mut scene);
         scene.request.integrator = Some(Integrator::Whitted);
         // A picture of this format is opaque.
-        scene.background = background.or(Some(Vec3::ZERO));
+        scene.background = scene.background.or(Some(Vec3::ZERO));
         let share = 1.0 / (self.lights.len() as f32).sqrt();
         let light = |(position, color): (DVec3, Option<Vec3>)| {
             let (color, attenuation) = (color.unwrap_or(Vec3::splat(share)), Attenuation::NONE);

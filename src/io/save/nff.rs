@@ -3,9 +3,10 @@
 use std::io::{self, Write};
 
 use super::{Unsayable, placed, spaced, spaced_f64};
-use crate::math::{DAffine3, DMat3, DVec2, Vec3};
+use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use crate::scene::{
     Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
+    choose_origin,
 };
 use crate::shape::Shape;
 
@@ -109,7 +110,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
             Geometry::Mesh(mesh) => write_mesh(mesh, transform, out)?,
             Geometry::Shapes { shapes, .. } => {
                 for shape in shapes {
-                    write_shape(&shape.translated(transform.translation), out)?;
+                    write_shape(shape, transform.translation, out)?;
                 }
             }
         }
@@ -136,7 +137,12 @@ fn fill(material: &Material, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn write_mesh(mesh: &Mesh, transform: &DAffine3, out: &mut dyn Write) -> io::Result<()> {
-    let place = |i: u32| spaced(transform.transform_point3(mesh.point(mesh.positions[i as usize])).as_vec3());
+    // As loaders decide whether f32 holds it.
+    let is_far = choose_origin(&mesh.bounds(transform)) != DVec3::ZERO;
+    let place = |i: u32| {
+        let point = transform.transform_point3(mesh.point(mesh.positions[i as usize]));
+        if is_far { spaced_f64(point) } else { spaced(point.as_vec3()) }
+    };
     let for_normals = transform.matrix3.inverse().transpose();
     for corners in mesh.triangles.iter() {
         writeln!(out, "{} 3", if mesh.normals.is_empty() { "p" } else { "pp" })?;
@@ -153,18 +159,20 @@ fn write_mesh(mesh: &Mesh, transform: &DAffine3, out: &mut dyn Write) -> io::Res
     Ok(())
 }
 
-fn write_shape(shape: &Shape, out: &mut dyn Write) -> io::Result<()> {
+/// A shape that is moved by `offset`, which may be farther than f32 takes it without a change.
+fn write_shape(shape: &Shape, offset: DVec3, out: &mut dyn Write) -> io::Result<()> {
+    let place = |p: Vec3| if offset == DVec3::ZERO { spaced(p) } else { spaced_f64(p.as_dvec3() + offset) };
     match shape {
-        Shape::Sphere(sphere) => writeln!(out, "s {} {}", spaced(sphere.centre), sphere.radius),
+        Shape::Sphere(sphere) => writeln!(out, "s {} {}", place(sphere.centre), sphere.radius),
         Shape::Cylinder(c) => {
-            writeln!(out, "c\n{} {}\n{} {}", spaced(c.base), c.radius, spaced(c.apex), c.radius)
+            writeln!(out, "c\n{} {}\n{} {}", place(c.base), c.radius, place(c.apex), c.radius)
         }
         Shape::Cone(c) => {
-            writeln!(out, "c\n{} {}\n{} {}", spaced(c.base), c.base_radius, spaced(c.apex), c.apex_radius)
+            writeln!(out, "c\n{} {}\n{} {}", place(c.base), c.base_radius, place(c.apex), c.apex_radius)
         }
         Shape::Polygon(polygon) => {
             writeln!(out, "p {}", polygon.corners().len())?;
-            polygon.corners().iter().try_for_each(|corner| writeln!(out, "{}", spaced(*corner)))
+            polygon.corners().iter().try_for_each(|corner| writeln!(out, "{}", place(*corner)))
         }
         // Refused by the check.
         Shape::Plane(_) | Shape::Disk(_) | Shape::Cuboid(_) | Shape::Ellipsoid(_) => Ok(()),

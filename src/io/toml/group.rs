@@ -18,6 +18,8 @@ const MOST: u64 = 10_000_000;
 pub(super) struct Body {
     /// Index into [`Scene::groups`] of its own primitives, if it has any.
     pub(super) own: Option<u32>,
+    /// Groups of those that have local origins, with these.
+    pub(super) far: Vec<(DVec3, u32)>,
     pub(super) children: Vec<Child>,
 }
 
@@ -44,6 +46,11 @@ impl Place {
     pub(super) fn read(table: &mut Table<'_>) -> Read<Self> {
         let start = table.optional("transform", transform)?.unwrap_or(DAffine3::IDENTITY);
         Ok(Self { start, end: table.optional("transform_end", transform)? })
+    }
+
+    /// Of what is relative to a local origin.
+    fn at(origin: DVec3) -> Self {
+        Self { start: DAffine3::from_translation(origin), end: None }
     }
 
     /// Of something within what stands here.
@@ -105,7 +112,7 @@ impl Groups<'_> {
         path: &mut Vec<&'s str>,
         known: &mut BTreeMap<&'s str, Extent>,
     ) -> Read<Extent> {
-        let mut sum = Extent { count: 1, depth: 0 };
+        let mut sum = Extent { count: 1 + body.far.len() as u64, depth: 0 };
         for child in &body.children {
             let fault = |message| Fault { at: child.at, message };
             let inner = match &child.target {
@@ -148,6 +155,10 @@ impl Groups<'_> {
     fn place(&self, body: &Body, path: &str, place: &Place, scene: &mut Scene) -> Read<()> {
         if let Some(group) = body.own {
             scene.instances.push(place.instance(path.to_owned(), group));
+        }
+        // Under the same name: that they have groups of their own is nothing that the file says.
+        for &(origin, group) in &body.far {
+            scene.instances.push(place.of(&Place::at(origin)).instance(path.to_owned(), group));
         }
         for child in &body.children {
             let (name, place) = (joined(path, &child.name), place.of(&child.place));

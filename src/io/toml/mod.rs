@@ -29,12 +29,13 @@ use self::include::{Include, Includes};
 use self::look::{Render, Shading};
 use self::pieces::Cut;
 use self::table::{Fault, Read, Table, Value};
+use super::parts::{Sorted, add_group};
 use super::suggest::suggestion;
 use super::texture;
 use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Geometry, Group, Light, Material, Scene, Texture, Unlit};
+use crate::scene::{Attenuation, Geometry, Light, Material, Scene, Texture, Unlit};
 use crate::shape::Shape;
 
 /// What stops the reading of a file: something in it, or in a file it names.
@@ -217,28 +218,26 @@ impl Reader<'_> {
 
     /// What stands in a group, or at the top of the file.
     fn body(&mut self, name: &str, table: &mut Table<'_>) -> std::result::Result<Body, Stop> {
-        let mut geometries = primitives::singles(table, &mut |table| self.material_of(table))?;
-        for geometry in &mut geometries {
+        let Sorted { mut near, far } = primitives::singles(table, &mut |table| self.material_of(table))?;
+        for geometry in &mut near {
             if let Geometry::Mesh(mesh) = geometry
                 && self.scene.materials[mesh.material as usize].textures().next().is_some()
             {
                 *mesh = primitives::with_parameters(mesh);
             }
         }
-        geometries.extend(primitives::meshes(table, &mut |table| self.material_of(table))?);
+        near.extend(primitives::meshes(table, &mut |table| self.material_of(table))?);
         let mut body = Body::default();
         for mut file in table.tables("file")? {
             body.children.push(self.file(&mut file)?);
             file.finish()?;
         }
         body.children.extend(instances(table)?);
-        if !geometries.is_empty() {
-            let first = self.scene.geometries.len() as u32;
-            self.scene.geometries.extend(geometries);
-            body.own = Some(self.scene.groups.len() as u32);
-            let geometries = first..self.scene.geometries.len() as u32;
-            self.scene.groups.push(Group { name: name.to_owned(), geometries });
+        if !near.is_empty() {
+            body.own = Some(add_group(&mut self.scene, name, near));
         }
+        let add = |(origin, geometries)| (origin, add_group(&mut self.scene, name, geometries));
+        body.far = far.into_iter().map(add).collect();
         Ok(body)
     }
 

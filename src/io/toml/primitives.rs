@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use super::table::{Fault, Read, Table, Value};
-use crate::io::parts::Parts;
-use crate::math::{DVec3, Mat3, Vec2, Vec3};
+use crate::io::local_origin::DShape;
+use crate::io::parts::{Parts, Sorted};
+use crate::math::{DMat3, DVec3, Vec2};
 use crate::scene::{Geometry, Mesh};
-use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Shape, Sphere};
 
 /// Material of a primitive by its name.
 pub(super) type Materials<'a> = dyn FnMut(&mut Table<'_>) -> Read<u32> + 'a;
 
 /// Reads a shape of its table; material and unknown keys are left to the caller.
-type ReadShape = fn(&mut Table<'_>) -> Read<Shape>;
+type ReadShape = fn(&mut Table<'_>) -> Read<DShape>;
 
 /// Each shape by its key.
 const SHAPES: [(&str, ReadShape); 8] = [
@@ -27,12 +27,12 @@ const SHAPES: [(&str, ReadShape); 8] = [
 ];
 
 /// Single primitives of a body, sorted by material.
-pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
+pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Sorted> {
     let mut parts = Parts::default();
     for (key, read) in SHAPES {
         for mut table in body.tables(key)? {
-            let shape = read(&mut table)?;
-            shape.check().map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
+            let shape = read(&mut table)?.local();
+            let shape = shape.map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
             parts.shape(material(&mut table)?, shape);
             table.finish()?;
         }
@@ -45,7 +45,7 @@ pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Rea
         parts.triangle(material, corners).map_err(|message| table.fault(message))?;
         table.finish()?;
     }
-    Ok(parts.into_geometries())
+    Ok(parts.sorted())
 }
 
 /// The meshes of a body.
@@ -76,65 +76,63 @@ fn list<'t, T>(value: Value<'t>, read: impl Fn(Value<'t>) -> Read<T>) -> Read<Ve
     value.items()?.map(read).collect()
 }
 
-fn point(table: &mut Table<'_>, key: &'static str) -> Read<Vec3> {
-    Ok(table.need(key)?.vector()?.as_vec3())
+fn point(table: &mut Table<'_>, key: &'static str) -> Read<DVec3> {
+    table.need(key)?.vector()
 }
 
-fn length(table: &mut Table<'_>, key: &'static str) -> Read<f32> {
-    Ok(table.need(key)?.number()? as f32)
+fn length(table: &mut Table<'_>, key: &'static str) -> Read<f64> {
+    table.need(key)?.number()
 }
 
 fn capped(table: &mut Table<'_>) -> Read<bool> {
     Ok(table.optional("capped", Value::flag)?.unwrap_or(true))
 }
 
-fn sphere(table: &mut Table<'_>) -> Read<Shape> {
-    Ok(Shape::Sphere(Sphere { centre: point(table, "centre")?, radius: length(table, "radius")? }))
+fn sphere(table: &mut Table<'_>) -> Read<DShape> {
+    Ok(DShape::Sphere { centre: point(table, "centre")?, radius: length(table, "radius")? })
 }
 
-fn plane(table: &mut Table<'_>) -> Read<Shape> {
-    Ok(Shape::Plane(Plane { point: point(table, "point")?, normal: point(table, "normal")? }))
+fn plane(table: &mut Table<'_>) -> Read<DShape> {
+    Ok(DShape::Plane { point: point(table, "point")?, normal: point(table, "normal")? })
 }
 
-fn disk(table: &mut Table<'_>) -> Read<Shape> {
+fn disk(table: &mut Table<'_>) -> Read<DShape> {
     let (centre, normal) = (point(table, "centre")?, point(table, "normal")?);
-    Ok(Shape::Disk(Disk { centre, normal, radius: length(table, "radius")? }))
+    Ok(DShape::Disk { centre, normal, radius: length(table, "radius")? })
 }
 
-fn cuboid(table: &mut Table<'_>) -> Read<Shape> {
-    Ok(Shape::Cuboid(Cuboid { min: point(table, "min")?, max: point(table, "max")? }))
+fn cuboid(table: &mut Table<'_>) -> Read<DShape> {
+    Ok(DShape::Cuboid { corners: [point(table, "min")?, point(table, "max")?] })
 }
 
-fn cylinder(table: &mut Table<'_>) -> Read<Shape> {
-    let (base, apex, radius) = (point(table, "base")?, point(table, "apex")?, length(table, "radius")?);
-    Ok(Shape::Cylinder(Cylinder { base, apex, radius, capped: capped(table)? }))
+fn cylinder(table: &mut Table<'_>) -> Read<DShape> {
+    let (ends, radius) = ([point(table, "base")?, point(table, "apex")?], length(table, "radius")?);
+    Ok(DShape::Cylinder { ends, radius, capped: capped(table)? })
 }
 
-fn cone(table: &mut Table<'_>) -> Read<Shape> {
+fn cone(table: &mut Table<'_>) -> Read<DShape> {
     let (base, base_radius) = (point(table, "base")?, length(table, "base_radius")?);
     let (apex, apex_radius) = (point(table, "apex")?, table.optional("apex_radius", Value::number)?);
-    let apex_radius = apex_radius.unwrap_or(0.0) as f32;
-    Ok(Shape::Cone(Cone { base, base_radius, apex, apex_radius, capped: capped(table)? }))
+    let radii = [base_radius, apex_radius.unwrap_or(0.0)];
+    Ok(DShape::Cone { ends: [base, apex], radii, capped: capped(table)? })
 }
 
-fn ellipsoid(table: &mut Table<'_>) -> Read<Shape> {
+fn ellipsoid(table: &mut Table<'_>) -> Read<DShape> {
     let centre = point(table, "centre")?;
     let radii = table.optional("radii", Value::vector)?;
     let axes = table.optional("axes", |value| list(value, Value::vector))?;
     let axes = match (radii, axes.as_deref()) {
-        (Some(radii), None) => Mat3::from_diagonal(radii.as_vec3()),
-        (None, Some(&[x, y, z])) => Mat3::from_cols(x.as_vec3(), y.as_vec3(), z.as_vec3()),
+        (Some(radii), None) => DMat3::from_diagonal(radii),
+        (None, Some(&[x, y, z])) => DMat3::from_cols(x, y, z),
         _ => {
             return Err(table.fault("an [[ellipsoid]] has either \"radii\", three numbers, or \"axes\", three vectors"));
         }
     };
-    Ok(Shape::Ellipsoid(Ellipsoid { centre, axes }))
+    Ok(DShape::Ellipsoid { centre, axes })
 }
 
-fn polygon(table: &mut Table<'_>) -> Read<Shape> {
-    let corners = list(table.need("corners")?, Value::vector)?;
-    let polygon = Polygon::new(corners.into_iter().map(|p| p.as_vec3()).collect());
-    polygon.map(|polygon| Shape::Polygon(Arc::new(polygon))).map_err(|problem| table.fault(problem.to_string()))
+fn polygon(table: &mut Table<'_>) -> Read<DShape> {
+    Ok(DShape::Polygon { corners: list(table.need("corners")?, Value::vector)? })
 }
 
 /// `[[mesh]]`, without its material.
