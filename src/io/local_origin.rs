@@ -124,9 +124,10 @@ impl DShape {
             return self.relative_to(DVec3::ZERO);
         }
         if let Self::Plane { point, .. } = self {
-            // It has neighbours of every size, and no box to find them in; there are few. So it gets the closest origin, which keeps its
-            // distance to 2^-48 of the way to zero, and its point, where its parameters start.
-            return self.relative_to(point.as_vec3().as_dvec3());
+            // It has neighbours of every size, and there are few planes. So its point, where its parameters start, is its own origin:
+            // nothing is rounded. A point nearer to zero would be no better, for it is the scene's middle that matters, which nobody
+            // knows yet, and who writes such a scene takes a point that is there.
+            return self.relative_to(*point);
         }
         let bounds = points.iter().fold(DAabb::EMPTY, |all, &p| all.include(p));
         let middle = bounds.centre();

@@ -6,6 +6,7 @@ mod gltf_look;
 pub mod gltf_maker;
 mod gltf_packed;
 mod gltf_pose;
+mod local_origins;
 mod models;
 pub mod nff;
 pub mod obj;
