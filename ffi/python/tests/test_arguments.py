@@ -125,6 +125,10 @@ GOOD = np.zeros((2, 3))
         (TypeError, "width_px", lambda: pinhole(np.eye(3), np.eye(4))),
         (TypeError, "width_px", lambda: pinhole(intrinsic_matrix=np.eye(3), extrinsic_matrix=np.eye(4))),
         (TypeError, "height_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 4.5)),
+        (TypeError, "height_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, "4")),
+        (TypeError, "height_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, None)),
+        (ValueError, "height_px", lambda: pinhole(60, [0, 0, 0], [0, 0, 1], [0, 1, 0], 4, 0)),
+        (ValueError, "height_px", lambda: pinhole(np.eye(3), np.eye(4), 4, 0)),
         (TypeError, "indices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, 1.5]])),
         (TypeError, "indices", lambda: mesh_construction.TriangleMesh(rtcore_scene.EmbreeScene(), TRIANGLE[0], [[0, 1, np.nan]])),
         (ValueError, "spp", lambda: twincast.render(TRIANGLE, spp=-1)),
@@ -191,6 +195,26 @@ def test_arrays_of_all_kinds():
         [[Fraction(1, 4), 0.25, 1, 0, np.int8(0), -1]],
     ):
         assert scene().cast_rays(rays)["primitive_ids"].tolist() == [0]
+
+
+@pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
+def test_either_byte_order_has_the_same_answers(dtype):
+    rays = np.array([[0.25, 0.25, 1, 0, 0, -1], [2, 2, 1, 0, 0, -1]], dtype)
+    native = rays.astype(rays.dtype.newbyteorder("="))
+    assert _arrays.floats("x", rays).dtype == native.dtype and _arrays.floats("x", rays).dtype.isnative
+    one = twincast.RaycastingScene()
+    one.add_triangles(TRIANGLE[0].astype(dtype), TRIANGLE[1].astype(">u4"))
+    for key, answer in one.cast_rays(rays).items():
+        expected = one.cast_rays(native)[key]
+        assert answer.dtype == expected.dtype and np.array_equal(answer, expected), key
+    assert one.compute_distance(rays[:, :3]).dtype == native.dtype
+    reach = np.array([0.5, 8], dtype)
+    distances = embree().run(rays[:, :3], rays[:, 3:], dists=reach, query="DISTANCE")
+    assert distances.tolist() == [0.5, 8]
+    # Where it is of their type, it is overwritten.
+    reach[:] = 8
+    embree().run(rays[:, :3], rays[:, 3:], dists=reach, query="DISTANCE")
+    assert reach.tolist() == ([1, 8] if native.dtype == np.float32 else [8, 8])
 
 
 def test_dlpack():

@@ -151,6 +151,22 @@ def test_copies(scene, duplicate):
         assert duplicate(scene).cast_rays(ray)["t_hit"].tolist() == [8]
 
 
+def test_deep_copies_of_a_subclass_have_its_attributes_for_themselves(scene):
+    class Named(twincast.RaycastingScene):
+        pass
+
+    named = Named()
+    named.add_triangles(*cube())
+    named.notes, named.itself, named.name = {"of": [1]}, named, "cube"
+    shallow, deep = copy.copy(named), copy.deepcopy(named)
+    assert type(shallow) is type(deep) is Named and deep.name == "cube"
+    named.notes["of"].append(2)
+    assert shallow.notes is named.notes and deep.notes == {"of": [1]} and deep.itself is deep
+    assert deep._meshes[0] is named._meshes[0], "nobody changes them"
+    both = copy.deepcopy([named, named])
+    assert both[0] is both[1] and both[0] is not named
+
+
 def test_arrays_of_the_caller_stay_the_callers(scene):
     corners, faces = cube()
     other = twincast.RaycastingScene()

@@ -11,7 +11,7 @@ import numpy as np
 def floats(name: str, value: Any, columns: int | None = None, shape: str | None = None) -> np.ndarray:
     """``value`` as an array of float32 or float64, of shape (..., columns), which is told as ``shape`` where it is another.
 
-    float32 and float64 stay what they are, and stay where they are; other real numbers become float64, also Python's in an array of objects. Anything that
+    float32 and float64 stay what they are, in whichever byte order, and in this machine's stay where they are; other real numbers become float64, also Python's in an array of objects. Anything that
     answers ``__dlpack__`` and is on the CPU, or ``__array__``, is an array.
 
     Raises
@@ -22,7 +22,8 @@ def floats(name: str, value: Any, columns: int | None = None, shape: str | None 
         Where its last dimension is not ``columns``, with its name.
     """
     array = _array(name, value)
-    if array.dtype not in (np.float32, np.float64):
+    # In either byte order.
+    if array.dtype.newbyteorder("=") not in (np.float32, np.float64):
         if array.dtype.kind == "O":
             _check_objects(name, array, (numbers.Real, np.bool_), "real numbers")
         elif array.dtype.kind not in "fiub":

@@ -10,11 +10,15 @@ import numpy as np
 from . import _arguments, _native
 
 
+#: Attributes that deep copies have in common, or have of their own as it is.
+_SHARED = {"_threads", "_meshes", "_built"}
+
+
 class Meshes:
     """Meshes in the order in which they came, and the tree over them, which is built at the first query after the last of them.
 
-    Copies share the arrays, which nobody changes, and the tree, but what is added to one is not in the other. The tree is not pickled:
-    it is built again at the first query.
+    Copies share the arrays, which nobody changes, and the tree, but what is added to one is not in the other. What else a subclass has
+    is shared by copies, and not by deep ones. The tree is not pickled: it is built again at the first query.
     """
 
     def __init__(self, threads: Any = 0) -> None:
@@ -54,4 +58,7 @@ class Meshes:
         return twin
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Meshes:
-        return copy.copy(self)
+        twin = memo[id(self)] = Meshes.__copy__(self)
+        for name in twin.__dict__.keys() - _SHARED:
+            twin.__dict__[name] = copy.deepcopy(twin.__dict__[name], memo)
+        return twin

@@ -14,7 +14,8 @@ def rays_looking_at(
     fov_deg: float, center: Any, eye: Any, up: Any, width_px: int, height_px: int
 ) -> np.ndarray:
     """See :meth:`twincast.RaycastingScene.create_rays_pinhole`."""
-    fov_deg, width_px = _arguments.real("fov_deg", fov_deg), _arguments.whole("width_px", width_px, least=1)
+    fov_deg = _arguments.real("fov_deg", fov_deg)
+    width_px, height_px = _size(width_px, height_px)
     if not 0 < fov_deg < 180:
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
     center, eye, up = (_arrays.vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
@@ -38,8 +39,7 @@ def rays_from_matrices(
     """See :meth:`twincast.RaycastingScene.create_rays_pinhole`."""
     intrinsic = _arrays.matrix("intrinsic_matrix", intrinsic_matrix, 3)
     extrinsic = _arrays.matrix("extrinsic_matrix", extrinsic_matrix, 4)
-    width_px = _arguments.whole("width_px", width_px, least=1)
-    height_px = _arguments.whole("height_px", height_px, least=1)
+    width_px, height_px = _size(width_px, height_px)
     try:
         to_camera = np.linalg.inv(intrinsic)
     except np.linalg.LinAlgError:
@@ -51,6 +51,10 @@ def rays_from_matrices(
     rays[..., :3] = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
     rays[..., 3:] = np.stack([x, y, np.ones_like(x)], axis=-1) @ to_world.T
     return rays
+
+
+def _size(width_px: Any, height_px: Any) -> tuple[int, int]:
+    return _arguments.whole("width_px", width_px, least=1), _arguments.whole("height_px", height_px, least=1)
 
 
 # What Python says of an argument that neither has is said of the method.

@@ -102,7 +102,8 @@ def _reach(dists: Any, count: int) -> tuple[float | np.ndarray, np.ndarray | Non
     reach = _arrays.floats("dists", dists)
     if reach.shape != (count,):
         raise ValueError(f"dists must have the shape ({count},), not {reach.shape}")
-    return reach, dists if isinstance(dists, np.ndarray) and dists.dtype == np.float32 else None
+    is_theirs = isinstance(dists, np.ndarray) and dists.dtype.newbyteorder("=") == np.float32
+    return reach, dists if is_theirs else None
 
 
 def _distances(t: np.ndarray, reach: float | np.ndarray, overwrite: np.ndarray | None) -> np.ndarray:
