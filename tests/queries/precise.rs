@@ -336,3 +336,42 @@ fn nothing_is_within_a_clearance() {
         }
     }
 }
+
+/// Of triangles that a mesh holds twice, in the same winding, the first counts; flipped ones and those of another mesh count for themselves.
+#[test]
+fn repeats_are_left_out_of_what_is_distinct() {
+    let whole = tetrahedron();
+    let precise = Precise::new(vec![whole.clone()]).expect("a tetrahedron");
+    assert!(!precise.knows_distinct());
+    assert!(std::ptr::eq(precise.distinct(), &precise) && precise.knows_distinct(), "no second tree for nothing");
+
+    let mut twice = whole.clone();
+    let turned: Vec<[u32; 3]> = whole.triangles.iter().map(|&[a, b, c]| [c, a, b]).collect();
+    twice.triangles.splice(2..2, turned);
+    let mut signed = twice.positions.clone();
+    signed.iter_mut().for_each(|p| *p = p.map(|x| if x == 0.0 { -0.0 } else { x }));
+    twice.positions.extend(signed);
+    twice.triangles[3] = twice.triangles[3].map(|i| i + 12);
+    let flipped = PreciseMesh {
+        positions: whole.positions.clone(),
+        triangles: whole.triangles.iter().map(|&[a, b, c]| [b, a, c]).collect(),
+    };
+    let count = |meshes: &[PreciseMesh]| {
+        let precise = Precise::new(meshes.to_vec()).expect("meshes");
+        let (mut ends, mut names) = (Vec::new(), Vec::new());
+        // In through the side in the plane of y and z, and out through the slanted one.
+        let ray = PreciseRay::new(DVec3::new(-1.0, 0.2, 0.3), DVec3::X);
+        precise.distinct().all_names_batch(&[ray], &mut ends, &mut names);
+        let mut counts = [0];
+        precise.distinct().count_batch(&[ray], &mut counts);
+        assert_eq!(counts[0] as usize, names.len());
+        names
+    };
+    assert_eq!(count(std::slice::from_ref(&whole)), [(0, 2), (0, 3)]);
+    // The first two, then all four in another turn, then the others.
+    assert_eq!(count(std::slice::from_ref(&twice)), [(0, 4), (0, 5)]);
+    let doubled = Precise::new(vec![twice.clone()]).expect("a mesh");
+    assert!(doubled.is_closed() && doubled.distinct().is_closed(), "four at an edge, or two of them");
+    assert_eq!(count(&[twice, flipped]).len(), 4);
+    assert_eq!(count(&[whole.clone(), whole]).len(), 4);
+}

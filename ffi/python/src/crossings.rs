@@ -39,12 +39,13 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let counted = self.counted(py, threads)?;
         let answers = zeros(py, rays.len())?;
         let mut counts = answers.readwrite();
         let counts = counts.as_slice_mut()?;
         pool::each(py, threads, counts.par_chunks_mut(CHUNK).enumerate(), |(chunk, counts)| {
             let mut found = [0; CHUNK];
-            self.precise.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
+            counted.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
             counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
         })?;
         Ok(answers)
@@ -67,9 +68,10 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Crossings<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
+        let counted = self.counted(py, threads)?;
         let (ray, primitive, location) = pool::interruptible(py, threads, |cancel| {
             let found = if locations {
-                self.found(&rays, cancel, Precise::all_hits_batch, |task| {
+                found(counted, &rays, cancel, Precise::all_hits_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, hits) in task.by_ray() {
                         let PreciseRay { origin, direction, .. } = task.rays[i];
@@ -81,7 +83,7 @@ impl Scene {
                     columns
                 })
             } else {
-                self.found(&rays, cancel, Precise::all_names_batch, |task| {
+                found(counted, &rays, cancel, Precise::all_names_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, names) in task.by_ray() {
                         for &(_, primitive) in &names[..names.len().min(most)] {
@@ -150,24 +152,24 @@ impl<H> Task<'_, H> {
     }
 }
 
-impl Scene {
-    /// What `keep` keeps of all hits, as `ask` gives them, task by task; of no rays once it is called off.
-    fn found<H: Send, T: Send>(
-        &self,
-        rays: &Rays<'_>,
-        cancel: &AtomicBool,
-        ask: fn(&Precise, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
-        keep: impl Fn(&Task<'_, H>) -> T + Sync,
-    ) -> Vec<T> {
-        let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
-        let found = chunks.map_init(<(Vec<usize>, Vec<H>)>::default, |(ends, hits), chunk| {
-            let rays = if cancel.load(Ordering::Relaxed) { Vec::new() } else { rays.some(rays.chunk(chunk)) };
-            ask(&self.precise, &rays, ends, hits);
-            keep(&Task { first: chunk * CHUNK, rays: &rays, ends, hits })
-        });
-        found.collect()
-    }
+/// What `keep` keeps of all hits, as `ask` gives them, task by task; of no rays once it is called off.
+fn found<H: Send, T: Send>(
+    precise: &Precise,
+    rays: &Rays<'_>,
+    cancel: &AtomicBool,
+    ask: fn(&Precise, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
+    keep: impl Fn(&Task<'_, H>) -> T + Sync,
+) -> Vec<T> {
+    let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
+    let found = chunks.map_init(<(Vec<usize>, Vec<H>)>::default, |(ends, hits), chunk| {
+        let rays = if cancel.load(Ordering::Relaxed) { Vec::new() } else { rays.some(rays.chunk(chunk)) };
+        ask(precise, &rays, ends, hits);
+        keep(&Task { first: chunk * CHUNK, rays: &rays, ends, hits })
+    });
+    found.collect()
+}
 
+impl Scene {
     /// [`Self::list`], with t, u and v as `real` has them.
     fn list_in<'py, F: Element + Copy + Default + Sync>(
         &self,
@@ -176,8 +178,9 @@ impl Scene {
         threads: usize,
         real: impl Fn(f64) -> F + Sync,
     ) -> PyResult<List<'py>> {
+        let counted = self.counted(py, threads)?;
         let (splits, [ray, primitive, geometry], t, uv) = pool::interruptible(py, threads, |cancel| {
-            let found = self.found(rays, cancel, Precise::all_hits_batch, |task| {
+            let found = found(counted, rays, cancel, Precise::all_hits_batch, |task| {
                 let (mut ids, mut t, mut uv) = ([const { Vec::new() }; 3], Vec::new(), Vec::new());
                 for (i, hits) in task.by_ray() {
                     for hit in hits {

@@ -1,7 +1,7 @@
 //! Which points are inside, by rays that are counted.
 
 use twincast::math::DVec3;
-use twincast::trace::precise::PreciseRay;
+use twincast::trace::precise::{Precise, PreciseRay};
 
 use crate::scene::Scene;
 
@@ -17,9 +17,9 @@ fn direction(sample: usize) -> DVec3 {
 }
 
 impl Scene {
-    /// Whether each point is inside of meshes that are closed; `squares` are the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or all outside,
+    /// Whether each point is inside of meshes that are closed when they are [`counted`](Scene::counted); `squares` are the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or all outside,
     /// so of points along a curve few need be asked.
-    pub fn are_inside_closed(&self, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
+    pub fn are_inside_closed(&self, counted: &Precise, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
         // Points that are asked, and of each point which of them tells.
         let (mut asked, mut tells) = (Vec::new(), Vec::with_capacity(points.len()));
         let mut last = (DVec3::NAN, 0.0);
@@ -33,32 +33,33 @@ impl Scene {
             tells.push(asked.len() - 1);
             last = (point, clearance);
         }
-        let odd = self.are_odd(&asked, direction(0));
+        let odd = are_odd(counted, &asked, direction(0));
         inside.iter_mut().zip(tells).for_each(|(inside, tells)| *inside = odd[tells]);
     }
+}
 
-    pub fn are_inside(&self, points: &[DVec3], samples: usize, both_ways: bool, inside: &mut [bool]) {
-        let mut votes = vec![0; points.len()];
-        for sample in 0..samples {
-            let mut odd = self.are_odd(points, direction(sample));
-            if both_ways {
-                // Only of those that may still be inside.
-                let open: Vec<usize> = (0..points.len()).filter(|&i| odd[i]).collect();
-                let some: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
-                for (i, is_odd) in open.into_iter().zip(self.are_odd(&some, -direction(sample))) {
-                    odd[i] = is_odd;
-                }
+/// Whether each point is inside, by the vote of so many rays; see [`Scene`]'s `inside`.
+pub fn are_inside(counted: &Precise, points: &[DVec3], samples: usize, both_ways: bool, inside: &mut [bool]) {
+    let mut votes = vec![0; points.len()];
+    for sample in 0..samples {
+        let mut odd = are_odd(counted, points, direction(sample));
+        if both_ways {
+            // Only of those that may still be inside.
+            let open: Vec<usize> = (0..points.len()).filter(|&i| odd[i]).collect();
+            let some: Vec<DVec3> = open.iter().map(|&i| points[i]).collect();
+            for (i, is_odd) in open.into_iter().zip(are_odd(counted, &some, -direction(sample))) {
+                odd[i] = is_odd;
             }
-            votes.iter_mut().zip(odd).for_each(|(votes, odd)| *votes += usize::from(odd));
         }
-        inside.iter_mut().zip(votes).for_each(|(inside, votes)| *inside = 2 * votes > samples);
+        votes.iter_mut().zip(odd).for_each(|(votes, odd)| *votes += usize::from(odd));
     }
+    inside.iter_mut().zip(votes).for_each(|(inside, votes)| *inside = 2 * votes > samples);
+}
 
-    /// Whether a ray from each point crosses the meshes an odd number of times.
-    fn are_odd(&self, points: &[DVec3], direction: DVec3) -> Vec<bool> {
-        let rays: Vec<PreciseRay> = points.iter().map(|&point| PreciseRay::new(point, direction)).collect();
-        let mut counts = vec![0; rays.len()];
-        self.precise.count_batch(&rays, &mut counts);
-        counts.iter().map(|count| count % 2 == 1).collect()
-    }
+/// Whether a ray from each point crosses the meshes an odd number of times.
+fn are_odd(counted: &Precise, points: &[DVec3], direction: DVec3) -> Vec<bool> {
+    let rays: Vec<PreciseRay> = points.iter().map(|&point| PreciseRay::new(point, direction)).collect();
+    let mut counts = vec![0; rays.len()];
+    counted.count_batch(&rays, &mut counts);
+    counts.iter().map(|count| count % 2 == 1).collect()
 }

@@ -8,6 +8,7 @@ use twincast::math::DVec3;
 use twincast::trace::precise::NearestPoint;
 
 use crate::arrays::{CHUNK, Points, Rows};
+use crate::inside::are_inside;
 use crate::order::{self, Order};
 use crate::pool;
 use crate::scene::{INVALID, Scene, table};
@@ -81,14 +82,16 @@ impl Scene {
         let rows = points.rows("points")?;
         let distances = pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
-            let is_closed = samples > 0 && self.precise.is_closed();
+            // Distances alone need no more than they did.
+            let counted = if samples > 0 { self.precise.distinct() } else { &self.precise };
+            let is_closed = samples > 0 && counted.is_closed();
             along(&rows, cancel, f64::NAN, |points, distances| {
                 let mut inside = vec![false; points.len()];
                 self.precise.distance_squared_batch(points, distances);
                 if is_closed {
-                    self.are_inside_closed(points, distances, &mut inside);
+                    self.are_inside_closed(counted, points, distances, &mut inside);
                 } else if samples > 0 {
-                    self.are_inside(points, samples, false, &mut inside);
+                    are_inside(counted, points, samples, false, &mut inside);
                 }
                 for (distance, inside) in distances.iter_mut().zip(inside) {
                     *distance = if inside { -distance.sqrt() } else { distance.sqrt() };
@@ -111,7 +114,8 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rows = points.rows("points")?;
         let inside = pool::interruptible(py, threads, |cancel| {
-            along(&rows, cancel, false, |points, inside| self.are_inside(points, samples, both_ways, inside))
+            let counted = self.precise.distinct();
+            along(&rows, cancel, false, |points, inside| are_inside(counted, points, samples, both_ways, inside))
         })?;
         Ok(inside.into_pyarray(py))
     }

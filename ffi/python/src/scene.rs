@@ -227,6 +227,15 @@ fn normal([a, b, c]: [DVec3; 3], normalize: bool) -> DVec3 {
 }
 
 impl Scene {
+    /// What counts are taken of: the meshes without triangles that repeat others. When it is first asked it is looked for these, on so many threads, without
+    /// the interpreter's lock.
+    pub fn counted(&self, py: Python<'_>, threads: usize) -> PyResult<&Precise> {
+        if self.precise.knows_distinct() {
+            return Ok(self.precise.distinct());
+        }
+        pool::run(py, threads, || self.precise.distinct())
+    }
+
     /// That of a triangle of the meshes.
     pub fn normal(&self, geometry: u32, primitive: u32, normalize: bool) -> DVec3 {
         normal(self.precise.corners(geometry, primitive), normalize)

@@ -52,7 +52,7 @@ def test_few_pools_are_kept():
 def test_a_ray_by_itself_starts_no_thread():
     """Each kind of query of rays."""
     program = (
-        "one = scene(); one.compute_distance(RAYS[:, :3])\n"
+        "one = scene(); one.compute_distance(RAYS[:, :3]); one.count_intersections(RAYS)\n"
         "before = len(os.listdir(TASKS))\n"
         "for ask in (one._scene.first, one._scene.occluded, one._scene.cast, one._scene.closest, one._scene.count):\n"
         "    for dtype in (np.float32, np.float64): ask(RAY[:, :3].astype(dtype), RAY[:, 3:].astype(dtype), threads=7)\n"

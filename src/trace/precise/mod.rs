@@ -15,6 +15,7 @@ mod closed;
 mod frame;
 mod nearest_point;
 mod query;
+mod repeats;
 
 use std::fmt;
 use std::sync::OnceLock;
@@ -125,6 +126,8 @@ pub struct Precise {
     discs: OnceLock<Discs>,
     /// Found out when it is first asked.
     closed: OnceLock<bool>,
+    /// Found out when it is first asked; nothing where no triangle is repeated.
+    distinct: OnceLock<Option<Box<Precise>>>,
     frame: Frame,
 }
 
@@ -162,7 +165,8 @@ impl Precise {
         let world = World::new(&scene)?;
         debug_assert_eq!(world.centre, DVec3::ZERO, "the frame lies around zero");
         // Not the high preset: a piece of a triangle is off by what its corners are, and boxes know only of their own coordinates.
-        Ok(Self { bvh: Bvh::build(&world), bounds, discs: OnceLock::new(), closed: OnceLock::new(), meshes, frame })
+        let (discs, closed, distinct) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Ok(Self { bvh: Bvh::build(&world), bounds, discs, closed, distinct, meshes, frame })
     }
 
     /// The meshes as they were given.

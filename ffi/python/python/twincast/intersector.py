@@ -82,7 +82,8 @@ class RayMeshIntersector:
         All hits come from one traversal. A ray through an edge or a corner that several triangles share crosses there once, so a
         closed mesh is hit an even number of times from outside. Of the border of an open mesh half counts, by a rule that makes meshes that
         continue each other be crossed once where they meet; a ray that hits it elsewhere hits nothing here. The first hit alone
-        (``multiple_hits=False``) is what :meth:`intersects_first` tells, crossing or not.
+        (``multiple_hits=False``) is what :meth:`intersects_first` tells, crossing or not. Of faces that the mesh holds twice, in the same
+        winding, the first alone is hit.
 
         Parameters
         ----------

@@ -136,7 +136,7 @@ class RaycastingScene(Meshes):
         """How often each ray crosses a triangle: (...) int32. A shared edge or corner is crossed once.
 
         The border of an open mesh is crossed on half of its sides, by a rule that makes meshes that continue each other be crossed once
-        where they meet. A ray that hits it elsewhere crosses nothing, though it hits.
+        where they meet. A ray that hits it elsewhere crosses nothing, though it hits. Faces that a mesh holds twice, in the same winding, count once.
 
         Parameters
         ----------
