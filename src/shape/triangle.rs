@@ -29,12 +29,39 @@ pub struct TriangleHit {
     pub v: f64,
 }
 
+impl TriangleHit {
+    /// With weights of which rounding makes none negative.
+    #[inline]
+    pub(crate) fn within(self) -> Self {
+        let [u, v] = weights_within(self.u, self.v);
+        Self { u, v, ..self }
+    }
+}
+
+/// The weights of the second and the third corner, off by rounding, so that none of the three is negative: these are not below 0, and their sum, unrounded, is not above 1.
+#[inline]
+pub(crate) fn weights_within(u: f64, v: f64) -> [f64; 2] {
+    // Of the two zeros the one without a sign.
+    let (u, v) = (u.clamp(0.0, 1.0) + 0.0, v.clamp(0.0, 1.0) + 0.0);
+    let (large, small) = (u.max(v), u.min(v));
+    // From a half on the difference is not rounded, and below there is no doubt.
+    if small <= 1.0 - large {
+        return [u, v];
+    }
+    // The larger one gives way, by some of its last digits, so that the smaller one keeps all of its own.
+    let most = 1.0 - small;
+    let large = if small > 1.0 - most { most.next_down() } else { most };
+    if u < v { [small, large] } else { [large, small] }
+}
+
 /// Three corners in world coordinates.
 pub(crate) trait Corners {
     /// Whether `rounded` has an error at all.
     const IS_ROUNDED: bool;
     /// The relative error of t that is let pass before exact arithmetic is asked.
     const T_PRECISION: f64 = T_PRECISION;
+    /// How far u and v may be off before they are computed anew.
+    const WEIGHT_PRECISION: f64 = f64::INFINITY;
     /// The corners, each component off by at most `gamma64(8)` times its [`slack`](Corners::slack).
     fn rounded(&self) -> [DVec3; 3];
     /// What the error of `rounded` is relative to; zero where it has none.
@@ -72,6 +99,7 @@ impl Corners for [Vec3; 3] {
 impl Corners for [DVec3; 3] {
     const IS_ROUNDED: bool = false;
     const T_PRECISION: f64 = 1.0 / (1u64 << 40) as f64;
+    const WEIGHT_PRECISION: f64 = 1.0 / (1u64 << 34) as f64;
     #[inline]
     fn rounded(&self) -> [DVec3; 3] {
         *self
@@ -183,10 +211,23 @@ pub fn intersect_line<Co: Corners>(origin: DVec3, d: DVec3, corners: &Co) -> Opt
     let (normal, normal_error) = (permanent_cross(eb.size, ec.size), eb.cross_error(&ec, is_rounded));
     // |t| (relative error of both) against an eighth of f32's precision; false for NaN too.
     let height_error = a.size.dot(normal_error) + a.slack.dot(normal + ROUNDING * normal_error);
-    let t_error = ROUNDING * (height_error + absolute.dot(normal_error) * (seen.height / seen.slope).abs());
+    let slope_error = absolute.dot(normal_error);
+    let t_error = ROUNDING * (height_error + slope_error * (seen.height / seen.slope).abs());
     let is_precise = t_error <= seen.height.abs() * Co::T_PRECISION;
-    if is_precise && !undecided { Some(seen.hit()) } else { intersect_exactly(origin, d, corners) }
+    if !is_precise || undecided {
+        return intersect_exactly(origin, d, corners);
+    }
+    if Co::WEIGHT_PRECISION < f64::INFINITY {
+        let weight_error = bounds[1].max(bounds[2]) + ROUNDING * slope_error;
+        if weight_error > seen.slope.abs() * Co::WEIGHT_PRECISION {
+            return seen.hit_of_sliver(d).or_else(|| intersect_exactly(origin, d, corners));
+        }
+    }
+    Some(seen.hit())
 }
+
+/// What u and v of a sliver, or of a triangle that is small for its distance, may be off by: then they are computed exactly.
+const SLIVER_PRECISION: f64 = 1.0 / (1u64 << 20) as f64;
 
 /// The magnitude of a difference of corners, or of a corner and the origin, and of what its error is relative to besides: with
 /// u = 2^-53 it errs by 9 u (size + slack) at most, 8 for the corners and 1 for the subtraction.
@@ -249,6 +290,24 @@ impl Seen {
         let &Self { volumes, slope, height, .. } = self;
         let inverse = 1.0 / slope;
         TriangleHit { t: height * inverse, u: volumes[1] * inverse, v: volumes[2] * inverse }
+    }
+
+    /// The same hit with u and v that a corner which is much farther away than another does not spoil: each volume is that of the nearer end of its edge, and the
+    /// slope is their sum. None where that is not enough.
+    #[cold]
+    #[inline(never)]
+    fn hit_of_sliver(&self, d: DVec3) -> Option<TriangleHit> {
+        let ([a, b, c], [ea, eb, ec]) = (self.corners, self.edges);
+        let far = [a, b, c].map(|p| p.abs().max_element());
+        let nearer = |p: (DVec3, f64), q: (DVec3, f64)| if p.1 <= q.1 { p.0 } else { q.0 };
+        let [a, b, c] = [(a, far[0]), (b, far[1]), (c, far[2])];
+        let ends = [(nearer(b, c), ea), (nearer(c, a), eb), (nearer(a, b), ec)];
+        // All of one sign, or zero for what rounding makes of the smallest.
+        let [x, y, z] = ends.map(|(p, e)| (d.dot(p.cross(e)) * self.slope.signum()).max(0.0));
+        let error = ends.iter().map(|(p, e)| d.abs().dot(permanent_cross(p.abs(), e.abs()))).fold(0.0, f64::max);
+        let sum = x + y + z;
+        let is_enough = ROUNDING * error <= sum * SLIVER_PRECISION;
+        is_enough.then(|| TriangleHit { u: y / sum, v: z / sum, ..self.hit() })
     }
 }
 
@@ -315,6 +374,26 @@ mod tests {
                 f64::from(origin.y) + f64::from(direction.y) * (f64::from(origin.z) / f64::from(-direction.z));
             let hit = intersect(&Ray::new(origin, direction), &corners);
             assert_eq!(hit.is_some(), exact_y >= 0.0, "scale {scale}");
+        }
+    }
+
+    /// Sums are compared without rounding: 1 less what is from a half on is exact.
+    #[test]
+    fn weights_stay_within() {
+        let steps = [0.0, 5e-324, 1e-20, f64::EPSILON / 4.0, f64::EPSILON, 0.1, 1.0 / 3.0, 0.5];
+        for (share, more) in steps.iter().flat_map(|&share| steps.map(|more| (share, more * 1e-6))) {
+            for (u, v) in
+                [(1.0 - share + more, share), (share, 1.0 - share + more), (1.0 + more, share), (-more, share)]
+            {
+                let [x, y] = weights_within(u, v);
+                let (large, small) = (x.max(y), x.min(y));
+                assert!(small >= 0.0 && small.is_sign_positive() && small <= 1.0 - large, "{u} {v}: {x} {y}");
+                let off = (u + v - 1.0).max(0.0) + (-u).max(0.0) + f64::EPSILON;
+                assert!((x - u).abs() <= off && (y - v).abs() <= off, "{u} {v}: {x} {y}");
+            }
+        }
+        for [u, v] in [[0.25, 0.75], [0.1, 0.2], [0.0, 1.0], [1.0, 0.0], [0.3, 0.7]] {
+            assert_eq!(weights_within(u, v), [u, v]);
         }
     }
 

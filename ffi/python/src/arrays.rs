@@ -33,6 +33,20 @@ pub fn finite_f32(x: f64) -> f32 {
     (x as f32).min(f32::MAX)
 }
 
+/// The weights of a hit's second and third corner in f32, none below 0, and their sum, unrounded, not above 1.
+#[inline]
+pub fn weights_f32(u: f64, v: f64) -> [f32; 2] {
+    let (u, v) = (u.clamp(0.0, 1.0) as f32 + 0.0, v.clamp(0.0, 1.0) as f32 + 0.0);
+    let (large, small) = (u.max(v), u.min(v));
+    // From a half on the difference is not rounded, and below there is no doubt.
+    if small <= 1.0 - large {
+        return [u, v];
+    }
+    let most = 1.0 - small;
+    let large = if small > 1.0 - most { most.next_down() } else { most };
+    if u < v { [small, large] } else { [large, small] }
+}
+
 /// An array of three columns.
 #[derive(FromPyObject)]
 pub enum Points<'py> {

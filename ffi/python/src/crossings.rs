@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::trace::precise::{Precise, PreciseRay};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, zeros};
+use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, weights_f32, zeros};
 use crate::pool;
 use crate::scene::{Scene, table};
 
@@ -112,9 +112,9 @@ impl Scene {
     ) -> PyResult<List<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         if rays.are_f32() {
-            self.list_in(py, &rays, threads, finite_f32)
+            self.list_in(py, &rays, threads, finite_f32, weights_f32)
         } else {
-            self.list_in(py, &rays, threads, |x| x)
+            self.list_in(py, &rays, threads, |t| t, |u, v| [u, v])
         }
     }
 }
@@ -170,13 +170,14 @@ fn found<H: Send, T: Send>(
 }
 
 impl Scene {
-    /// [`Self::list`], with t, u and v as `real` has them.
+    /// [`Self::list`], with t, and u and v, as these two have them.
     fn list_in<'py, F: Element + Copy + Default + Sync>(
         &self,
         py: Python<'py>,
         rays: &Rays<'_>,
         threads: usize,
-        real: impl Fn(f64) -> F + Sync,
+        distance: impl Fn(f64) -> F + Sync,
+        weights: impl Fn(f64, f64) -> [F; 2] + Sync,
     ) -> PyResult<List<'py>> {
         let counted = self.counted(py, threads)?;
         let (splits, [ray, primitive, geometry], t, uv) = pool::interruptible(py, threads, |cancel| {
@@ -188,8 +189,8 @@ impl Scene {
                         ray.push((task.first + i) as u32);
                         primitive.push(hit.primitive);
                         geometry.push(hit.geometry);
-                        t.push(real(hit.t));
-                        uv.extend([real(hit.u), real(hit.v)]);
+                        t.push(distance(hit.t));
+                        uv.extend(weights(hit.u, hit.v));
                     }
                 }
                 (task.ends.to_vec(), ids, t, uv)

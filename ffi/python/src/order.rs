@@ -66,6 +66,17 @@ impl Order {
         Self { which: which.into_iter().map(AtomicU32::into_inner).collect(), places }
     }
 
+    /// Where a number is.
+    #[inline]
+    pub fn place(&self, number: usize) -> usize {
+        self.places[number] as usize
+    }
+
+    /// Answers that come [`along`] it, in the order of the numbers.
+    pub fn undone<T: Copy + Send + Sync>(&self, answers: &[T], chunk: usize) -> Vec<T> {
+        self.places.par_iter().with_min_len(chunk).map(|&place| answers[place as usize]).collect()
+    }
+
     /// That of points; none where sorting is not worth it.
     pub fn of_points(rows: &Rows<'_>) -> Option<Self> {
         let count = u32::try_from(rows.len()).ok().filter(|&count| count as usize > FEW)?;
@@ -79,7 +90,7 @@ impl Order {
     }
 }
 
-/// Answers to so many questions, in their order; `ask` gets the numbers of up to `chunk` at a time, as `order` has them, and answers that say `none`.
+/// Answers to so many questions, as they come in `order`; `ask` gets the numbers of up to `chunk` at a time, and answers that say `none`.
 pub fn along<T: Copy + Send + Sync>(
     count: usize,
     order: Option<&Order>,
@@ -93,10 +104,7 @@ pub fn along<T: Copy + Send + Sync>(
         let which: Vec<usize> = (i * chunk..i * chunk + answers.len()).map(number).collect();
         ask(&which, answers);
     });
-    match order {
-        None => answers,
-        Some(order) => order.places.par_iter().with_min_len(chunk).map(|&place| answers[place as usize]).collect(),
-    }
+    answers
 }
 
 /// A box, divided into cells that are numbered along the curve.

@@ -2,16 +2,17 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::NearestPoint;
 
-use crate::arrays::{CHUNK, Points, Rows};
+use crate::arrays::{CHUNK, Points, Rows, weights_f32, zeros};
 use crate::inside::are_inside;
 use crate::order::{self, Order};
 use crate::pool;
-use crate::scene::{INVALID, Scene, table};
+use crate::scene::{INVALID, Scene};
 
 /// The nearest points: where they are, primitive, geometry, (u, v), unit normal, distance.
 type Nearest<'py> = (
@@ -32,7 +33,22 @@ fn along<T: Copy + Send + Sync>(
     ask: impl Fn(&[DVec3], &mut [T]) + Sync,
 ) -> Vec<T> {
     let order = Order::of_points(rows);
-    order::along(rows.len(), order.as_ref(), CHUNK, none, |which, answers| {
+    let answers = along_order(rows, order.as_ref(), cancel, none, ask);
+    match order {
+        None => answers,
+        Some(order) => order.undone(&answers, CHUNK),
+    }
+}
+
+/// The same as they come in this order.
+fn along_order<T: Copy + Send + Sync>(
+    rows: &Rows<'_>,
+    order: Option<&Order>,
+    cancel: &AtomicBool,
+    none: T,
+    ask: impl Fn(&[DVec3], &mut [T]) + Sync,
+) -> Vec<T> {
+    order::along(rows.len(), order, CHUNK, none, |which, answers| {
         if !cancel.load(Ordering::Relaxed) {
             let points: Vec<DVec3> = which.iter().map(|&i| rows.at(i)).collect();
             ask(&points, answers);
@@ -47,26 +63,51 @@ impl Scene {
     fn nearest<'py>(&self, py: Python<'py>, points: Points<'py>, threads: usize) -> PyResult<Nearest<'py>> {
         let rows = points.rows("points")?;
         let count = rows.len();
-        let found: Vec<Option<NearestPoint>> = pool::interruptible(py, threads, |cancel| {
+        let (all_points, all_uv, all_normals) = (zeros(py, 3 * count)?, zeros(py, 2 * count)?, zeros(py, 3 * count)?);
+        let (primitives, geometries, distances) = (zeros(py, count)?, zeros(py, count)?, zeros(py, count)?);
+        let (mut point, mut uv, mut normal) = (all_points.readwrite(), all_uv.readwrite(), all_normals.readwrite());
+        let (mut primitive, mut geometry, mut distance) =
+            (primitives.readwrite(), geometries.readwrite(), distances.readwrite());
+        let (point, uv, normal) = (point.as_slice_mut()?, uv.as_slice_mut()?, normal.as_slice_mut()?);
+        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
+        let distance = distance.as_slice_mut()?;
+        let is_f32 = rows.is_f32();
+        pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
-            along(&rows, cancel, None, |points, found| self.precise.nearest_point_batch(points, found))
+            let order = Order::of_points(&rows);
+            let found = along_order(&rows, order.as_ref(), cancel, None, |points, found| {
+                self.precise.nearest_point_batch(points, found)
+            });
+            let tasks =
+                (point.par_chunks_mut(3 * CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
+            let others =
+                (primitive.par_chunks_mut(CHUNK), geometry.par_chunks_mut(CHUNK), distance.par_chunks_mut(CHUNK));
+            let tasks = tasks.into_par_iter().zip(others.into_par_iter()).enumerate();
+            tasks.for_each(|(chunk, ((point, uv, normal), (primitive, geometry, distance)))| {
+                if cancel.load(Ordering::Relaxed) {
+                    return;
+                }
+                for i in 0..distance.len() {
+                    let number = chunk * CHUNK + i;
+                    let found: &Option<NearestPoint> =
+                        &found[order.as_ref().map_or(number, |order| order.place(number))];
+                    point[3 * i..3 * i + 3].fill(f64::NAN);
+                    (primitive[i], geometry[i], distance[i]) = (INVALID, INVALID, f64::NAN);
+                    if let Some(found) = found {
+                        point[3 * i..3 * i + 3].copy_from_slice(&found.point.to_array());
+                        (primitive[i], geometry[i]) = (found.primitive, found.geometry);
+                        // Who asks in f32 has them rounded so.
+                        let (u, v) = (found.u, found.v);
+                        let weights = if is_f32 { weights_f32(u, v).map(f64::from) } else { [u, v] };
+                        uv[2 * i..2 * i + 2].copy_from_slice(&weights);
+                        distance[i] = found.distance_squared.sqrt();
+                    }
+                }
+                self.normals_of(primitive, geometry, true, normal, |x| x);
+            });
         })?;
-        let id = |id: fn(&NearestPoint) -> u32| -> Vec<u32> {
-            found.iter().map(|found| found.as_ref().map_or(INVALID, id)).collect()
-        };
-        let (primitive, geometry) = (id(|found| found.primitive), id(|found| found.geometry));
-        let (mut point, mut uv) = (Vec::with_capacity(3 * count), Vec::with_capacity(2 * count));
-        let (mut normal, mut distance) = (Vec::with_capacity(3 * count), Vec::with_capacity(count));
-        for found in &found {
-            let n = found.map_or(DVec3::ZERO, |found| self.normal(found.geometry, found.primitive, true));
-            point.extend(found.map_or(DVec3::NAN, |found| found.point).to_array());
-            uv.extend(found.map_or([0.0; 2], |found| [found.u, found.v]));
-            normal.extend(n.to_array());
-            distance.push(found.map_or(f64::NAN, |found| found.distance_squared.sqrt()));
-        }
-        let ids = (primitive.into_pyarray(py), geometry.into_pyarray(py));
-        let (point, uv, normal) = (table(py, point, 3)?, table(py, uv, 2)?, table(py, normal, 3)?);
-        Ok((point, ids.0, ids.1, uv, normal, distance.into_pyarray(py)))
+        let (point, uv) = (all_points.reshape([count, 3])?, all_uv.reshape([count, 2])?);
+        Ok((point, primitives, geometries, uv, all_normals.reshape([count, 3])?, distances))
     }
 
     /// How far each point is from the nearest triangle; NaN where there is none. With `samples` above 0, negative where

@@ -1,13 +1,14 @@
 //! Meshes, and what rays can ask of them.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
 use twincast::{Batch, Hit, Tracer};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, zeros};
+use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, weights_f32, zeros};
 use crate::{pool, value_error};
 
 /// No triangle, or no mesh, in arrays of unsigned numbers.
@@ -55,7 +56,7 @@ impl Scene {
             let triangles = triangles.as_array();
             if triangles.ncols() != 3 {
                 let message = format!("triangles must have the shape (n, 3), not {:?}", triangles.shape());
-                return Err(pyo3::exceptions::PyValueError::new_err(message));
+                return Err(PyValueError::new_err(message));
             }
             Ok(PreciseMesh {
                 positions: (0..vertices.len()).map(|i| vertices.at(i)).collect(),
@@ -153,11 +154,11 @@ impl Scene {
                 if let Some(hit) = hit {
                     // Of the two zeros the one without a sign.
                     t[i] = hit.t + 0.0;
-                    uv[2 * i..2 * i + 2].copy_from_slice(&[hit.u, hit.v]);
+                    uv[2 * i..2 * i + 2].copy_from_slice(&weights_f32(hit.u.into(), hit.v.into()));
                     (primitive[i], geometry[i]) = (hit.primitive, hit.geometry);
                 }
             }
-            self.normals_of(primitive, geometry, normalize, normal);
+            self.normals_of(primitive, geometry, normalize, normal, |x| x as f32);
         })?;
         Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries, all_normals.reshape([count, 3])?))
     }
@@ -197,25 +198,42 @@ impl Scene {
         Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries))
     }
 
-    /// The normals of triangles, of unit length; zero for `INVALID`, and for triangles without an area.
+    /// The normals of triangles, of unit length; zero for `INVALID`, for what is not there, and for triangles without an area.
+    #[pyo3(signature = (geometry, primitive, threads = 0))]
     fn normals<'py>(
         &self,
         py: Python<'py>,
         geometry: PyReadonlyArray1<'py, u32>,
         primitive: PyReadonlyArray1<'py, u32>,
+        threads: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (geometry, primitive) = (geometry.as_array(), primitive.as_array());
+        let count = geometry.len();
+        if primitive.len() != count {
+            return Err(PyValueError::new_err(format!(
+                "primitive: {} of them, but {count} geometries",
+                primitive.len()
+            )));
+        }
         let meshes = self.precise.meshes();
         let exists = |geometry: u32, primitive: u32| {
             meshes.get(geometry as usize).is_some_and(|mesh| (primitive as usize) < mesh.triangles.len())
         };
-        let (geometry, primitive) = (geometry.as_array(), primitive.as_array());
-        let normal = |(&geometry, &primitive): (&u32, &u32)| {
-            let is_there = exists(geometry, primitive);
-            let normal = if is_there { self.normal(geometry, primitive, true) } else { DVec3::ZERO };
-            normal.to_array()
-        };
-        let flat: Vec<f64> = geometry.iter().zip(primitive).flat_map(normal).collect();
-        table(py, flat, 3)
+        let answers = zeros(py, 3 * count)?;
+        let mut normals = answers.readwrite();
+        let normals = normals.as_slice_mut()?;
+        pool::each(py, threads, normals.par_chunks_mut(3 * CHUNK).enumerate(), |(chunk, normals)| {
+            let (mut geometries, mut primitives) = ([INVALID; CHUNK], [INVALID; CHUNK]);
+            let count = normals.len() / 3;
+            for i in 0..count {
+                let (geometry, primitive) = (geometry[chunk * CHUNK + i], primitive[chunk * CHUNK + i]);
+                if exists(geometry, primitive) {
+                    (geometries[i], primitives[i]) = (geometry, primitive);
+                }
+            }
+            self.normals_of(&primitives[..count], &geometries[..count], true, normals, |x| x);
+        })?;
+        answers.reshape([count, 3])
     }
 }
 
@@ -236,14 +254,16 @@ impl Scene {
         pool::run(py, threads, || self.precise.distinct())
     }
 
-    /// That of a triangle of the meshes.
-    pub fn normal(&self, geometry: u32, primitive: u32, normalize: bool) -> DVec3 {
-        normal(self.precise.corners(geometry, primitive), normalize)
-    }
-
-    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers. In steps, in each of which the
+    /// The normals of triangles, of which all but the `INVALID` ones exist, into three times as many numbers, as `real` has them. In steps, in each of which the
     /// processor waits for many cache lines together: the indices of some triangles, then their corners, and only then is anything computed.
-    fn normals_of(&self, primitive: &[u32], geometry: &[u32], normalize: bool, normals: &mut [f32]) {
+    pub fn normals_of<F>(
+        &self,
+        primitive: &[u32],
+        geometry: &[u32],
+        normalize: bool,
+        normals: &mut [F],
+        real: impl Fn(f64) -> F,
+    ) {
         const TOGETHER: usize = 64;
         let meshes = self.precise.meshes();
         let ids = primitive.chunks(TOGETHER).zip(geometry.chunks(TOGETHER));
@@ -262,7 +282,8 @@ impl Scene {
             }
             for (three, corners) in normals.chunks_exact_mut(3).zip(corners) {
                 // Zero where there is no triangle.
-                three.copy_from_slice(&normal(corners, normalize).as_vec3().to_array());
+                let normal = normal(corners, normalize).to_array();
+                three.iter_mut().zip(normal).for_each(|(to, from)| *to = real(from));
             }
         }
     }

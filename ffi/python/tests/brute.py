@@ -6,6 +6,8 @@ products of three of them, then fit into 53 bits: volumes have the right sign, a
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 #: Coordinates are whole numbers from -GRID to GRID.
@@ -53,6 +55,31 @@ def intersect(
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.sum(a * np.cross(b - a, c - a), axis=-1) / total
     return hit & (t >= 0), interior & (t >= 0), np.where(hit, t, np.nan)
+
+
+def exactly(
+    corners: np.ndarray, origin: np.ndarray, direction: np.ndarray
+) -> tuple[Fraction, Fraction, Fraction] | None:
+    """t, u and v of one ray and one triangle, whatever their numbers are; none for a miss, or where all is in one plane."""
+    a, b, c, o, d = ([Fraction(float(x)) for x in row] for row in (*corners, origin, direction))
+
+    def minus(p, q):
+        return [x - y for x, y in zip(p, q)]
+
+    def cross(p, q):
+        return [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+
+    def dot(p, q):
+        return sum(x * y for x, y in zip(p, q))
+
+    second, third, start = minus(b, a), minus(c, a), minus(o, a)
+    across = cross(d, third)
+    slope = dot(across, second)
+    if slope == 0:
+        return None
+    around = cross(start, second)
+    t, u, v = dot(around, third) / slope, dot(start, across) / slope, dot(d, around) / slope
+    return (t, u, v) if min(t, u, v, 1 - u - v) >= 0 else None
 
 
 def nearest(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:

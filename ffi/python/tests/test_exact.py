@@ -166,6 +166,118 @@ def test_origins_far_away(rng):
         assert not away.any()
 
 
+def one_triangle(corners):
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(corners, [[0, 1, 2]])
+    return scene
+
+
+def verdicts(scene, rays):
+    """What each kind of query says of rays at one triangle, all of them the same."""
+    any_hit = scene.test_occlusions(rays).tolist()
+    cast = scene.cast_rays(rays)
+    assert np.isfinite(cast["t_hit"]).tolist() == any_hit and (cast["primitive_ids"] == 0).tolist() == any_hit
+    assert np.isfinite(cast["primitive_uvs"]).all() and np.isfinite(cast["primitive_normals"]).all()
+    assert scene.count_intersections(rays).tolist() == any_hit
+    assert scene.list_intersections(rays)["ray_ids"].tolist() == np.flatnonzero(any_hit).tolist()
+    assert (scene._scene.first(rays[:, :3], rays[:, 3:]) == 0).tolist() == any_hit
+    return any_hit
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-20, 1e15])
+def test_origins_up_to_the_farthest(rng, size):
+    """Where a ray starts up to 1e80 away decides as exactly as from near."""
+    hits = 0
+    for power in (30, 45, 53, 54, 55, 58, 61, 64, 70, 75, 80):
+        for _ in range(12):
+            corners = rng.normal(size=(3, 3)) * size
+            target = rng.dirichlet([1, 1, 1]) @ corners + rng.normal(size=3) * rng.choice([0, 0.3]) * size
+            rays = np.zeros((8, 6))
+            for i in range(3):
+                # Along an axis, so that what is far takes no digits of what is near.
+                rays[i, :3], rays[i, 3 + i] = target, 10.0 ** rng.integers(-3, 4) * rng.choice([-1, 1])
+                rays[i, i] = -np.sign(rays[i, 3 + i]) * 10.0**power
+            # Aslant, where the line goes through zero or far by it; and away.
+            way = rng.integers(-9, 10, 3) * 2 + 1.0
+            rays[3] = [*(-way * 2.0 ** int(power * 3.2)), *way]
+            rays[4] = [*(-way * 2.0 ** int(power * 3.2) * [1, 1, 1 + 1e-15]), *way]
+            rays[5] = [*(way * 2.0 ** int(power * 3.2)), *way]
+            rays[6], rays[7] = rays[0] * [1, 1, 1, -1, -1, -1], rays[1] * [1, 1, 1, 1e140, 1e140, 1e140]
+            rays[:3, 3:] *= rng.choice([1e-130, 1, 1e130])
+            rays[7, 3:] = np.clip(rays[7, 3:], -1e140, 1e140)
+            exact = [brute.exactly(corners, ray[:3], ray[3:]) for ray in rays]
+            scene = one_triangle(corners)
+            assert verdicts(scene, rays) == [hit is not None for hit in exact], (power, corners.tolist(), rays.tolist())
+            for hit, t in zip(exact, scene.cast_rays(rays)["t_hit"]):
+                assert hit is None or abs(t - float(hit[0])) <= 1e-11 * float(hit[0])
+                hits += hit is not None
+    assert hits > 150
+
+
+@pytest.mark.parametrize("length", [1e-140, 1.0, 1e140])
+def test_origins_beyond_the_farthest_miss(length):
+    scene = one_triangle(np.float64([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    for away in (1e80, np.nextafter(1e80, np.inf), 1e81, 1e150, 1e308):
+        rays = np.float64([[0.25, 0.25, away, 0, 0, -length], [0.25, 0.25, -away, 0, 0, length]])
+        rays = np.vstack([rays, [[0.75, 0.75, away, 0, 0, -length], [0.25, 0.25, away, 0, 0, length]]])
+        assert verdicts(scene, rays) == [away <= 1e80] * 2 + [False] * 2
+    assert scene.compute_occupancy(np.full((1, 3), 1e90)).tolist() == [0]
+
+
+def check_weights(uv):
+    """None of the three is negative, without rounding: 1 less what is from a half on is exact."""
+    assert (uv >= 0).all() and not np.signbit(uv).any()
+    assert (uv.min(axis=-1) <= 1 - uv.max(axis=-1)).all(), uv[uv.min(axis=-1) > 1 - uv.max(axis=-1)]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("far", [0, 1, 2])
+def test_weights_of_slivers(rng, dtype, far):
+    """One corner is far away; the ray goes by the edge between the others, or anywhere near it."""
+    hits = 0
+    for power in [*range(2, 15)] * 12:
+        corners = rng.normal(size=(3, 3))
+        corners[far] *= 10.0**power
+        corners = corners.astype(dtype)
+        shares = rng.dirichlet([1, 1, 1])
+        if rng.random() < 0.5:
+            shares[(far + 1) % 3] = abs(rng.normal()) * 10.0 ** -rng.integers(1, 17)
+        shares[far] *= 10.0**-power
+        others = np.arange(3) != far
+        shares[others] *= (1 - shares[far]) / shares[others].sum()
+        way = rng.normal(size=3)
+        origin = (shares @ corners.astype(np.float64) - way).astype(dtype)
+        ray = np.concatenate([origin, (shares @ corners.astype(np.float64) - origin).astype(dtype)])[None]
+        scene = one_triangle(corners)
+        exact = brute.exactly(corners, ray[0, :3], ray[0, 3:])
+        cast, listed = scene.cast_rays(ray), scene.list_intersections(ray)
+        nearest = scene.compute_closest_points(ray[:, :3])["primitive_uvs"]
+        assert nearest.dtype == dtype
+        check_weights(nearest)
+        check_weights(cast["primitive_uvs"])
+        check_weights(listed["primitive_uvs"])
+        assert np.isfinite(cast["t_hit"])[0] == (exact is not None)
+        if exact is None:
+            continue
+        hits += 1
+        if dtype == np.float64:
+            for uv in (cast["primitive_uvs"], listed["primitive_uvs"]):
+                assert np.abs(uv[0] - [float(exact[1]), float(exact[2])]).max() < 1e-9, (power, uv, exact)
+    assert hits > 60
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_weights_of_all_hits(near_case, dtype):
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(near_case.vertices / 3, near_case.faces)
+    rays = np.hstack([near_case.origins / 3, near_case.directions / 7]).astype(dtype)
+    check_weights(scene.cast_rays(rays)["primitive_uvs"])
+    check_weights(scene.list_intersections(rays)["primitive_uvs"])
+    # On corners and edges, too.
+    points = np.concatenate([scene._meshes[0][0], rays[:, :3]]).astype(dtype)
+    check_weights(scene.compute_closest_points(points)["primitive_uvs"])
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_rays_that_are_not_finite_miss(bad):
     scene = twincast.RaycastingScene()

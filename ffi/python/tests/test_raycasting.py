@@ -73,7 +73,7 @@ def test_results_answer_as_tensors_do(scene):
 
 
 def test_no_memory_is_an_error():
-    """Of answers for each ray, in a process that may have little."""
+    """Of answers for each ray or point, and of normals, in a process that may have little."""
     if not os.path.exists("/proc/self/statm"):
         pytest.skip("nobody says how much memory there is")
     program = (
@@ -83,15 +83,38 @@ def test_no_memory_is_an_error():
         "rays = np.broadcast_to(np.float32([0.25, 0.25, 1, 0, 0, -1]), (2**31, 6))\n"
         "origins, directions = rays[:, :3], rays[:, 3:]\n"
         "scene.cast_rays(rays[:5000])\n"
+        "scene.compute_closest_points(rays[:5000, :3])\n"
+        "none = np.broadcast_to(np.uint32(0), 2**31)\n"
         "size = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (size + 2**30,) * 2)\n"
         "for ask in (scene._scene.first, scene._scene.occluded, scene._scene.cast, scene._scene.closest, scene._scene.count):\n"
         "    try: ask(origins, directions)\n"
         "    except MemoryError: continue\n"
         "    raise SystemExit(f'{ask} found room')\n"
+        "for ask, arrays in ((scene._scene.normals, (none, none)), (scene._scene.nearest, (origins,))):\n"
+        "    try: ask(*arrays)\n"
+        "    except MemoryError: continue\n"
+        "    raise SystemExit(f'{ask} found room')\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_normals_of_what_is_there_and_what_is_not(scene):
+    scene.cast_rays(np.zeros((1, 6), np.float32))
+    geometry = np.uint32([0, 1, 0, 2, scene.INVALID_ID, 1] * 500)
+    primitive = np.uint32([0, 11, 12, 0, 0, scene.INVALID_ID] * 500)
+    normals = scene._scene.normals(geometry, primitive)
+    corners, faces = cube()
+    a, b, c = (corners[faces[[0, 11], k]].astype(np.float64) for k in range(3))
+    expected = np.zeros((6, 3))
+    expected[:2] = np.cross(b - a, c - a)
+    expected[:2] /= np.linalg.norm(expected[:2], axis=1)[:, None]
+    assert normals.dtype == np.float64 and np.array_equal(normals, np.tile(expected, (500, 1)))
+    assert np.array_equal(scene._scene.normals(geometry[::2], primitive[::2], threads=1), normals[::2])
+    assert scene._scene.normals(geometry[:0], primitive[:0]).shape == (0, 3)
+    with pytest.raises(ValueError, match="primitive"):
+        scene._scene.normals(geometry, primitive[1:])
 
 
 def test_a_mesh_may_be_named():

@@ -95,6 +95,31 @@ def test_a_query_can_be_interrupted(ask):
     subprocess.run([sys.executable, "-c", program, ask], check=True)
 
 
+@pytest.mark.parametrize("ask", ["normals", "nearest"])
+def test_others_go_on_while_there_is_something_to_compute(ask):
+    """The interpreter's lock is not held for longer than a small part of the time."""
+    program = (
+        "import threading\n"
+        "one = scene()\n"
+        "count = 10_000_000 if sys.argv[2] == 'normals' else 1_000_000\n"
+        "ids, points = np.zeros(count, np.uint32), np.random.default_rng(1).random((count, 3))\n"
+        "arrays = (ids, ids) if sys.argv[2] == 'normals' else (points,)\n"
+        "ask = getattr(one._scene, sys.argv[2])\n"
+        "ask(*(array[:5000] for array in arrays))\n"
+        "gaps, is_over = [], False\n"
+        "def tick():\n"
+        "    last = time.monotonic()\n"
+        "    while not is_over:\n"
+        "        time.sleep(0.001); now = time.monotonic(); gaps.append(now - last); last = now\n"
+        "thread = threading.Thread(target=tick); thread.start()\n"
+        "start = time.monotonic(); ask(*arrays, threads=1); took = time.monotonic() - start\n"
+        "is_over = True; thread.join()\n"
+        "assert max(gaps) < took / 2, (max(gaps), took)\n"
+    )
+    here = "import sys; sys.path.insert(0, sys.argv[1]); from test_threads import *\n"
+    subprocess.run([sys.executable, "-c", here + program, os.path.dirname(__file__), ask], check=True)
+
+
 def test_a_thread_of_little_stack_may_ask():
     program = (
         "import threading\n"

@@ -36,6 +36,8 @@ pub(super) struct LocalRay {
     pub is_common: bool,
     /// By how much it is off for what f64 rounds of its way from where it is moved.
     pub off: f64,
+    /// Whether that is so much that f32 has no numbers for it, and every triangle may be hit.
+    pub is_lost: bool,
     /// t is that of the local ray and this,
     start: f64,
     /// times this.
@@ -51,6 +53,10 @@ const CORNERS: f32 = 3.03 * UNIT_ROUNDOFF;
 /// By what a ray is off at most that is [common](LocalRay::is_common), relative to R, of what f64 rounds of its way from where it is moved. Those that come from farther
 /// away than some ten million R would make all others coarse.
 const MOVED: f64 = 0.25 / (1u64 << 24) as f64;
+
+/// Rays that are farther [off](LocalRay::off) than this are held against every triangle: they come from some 1e30 R away, and what is much larger, or the square of it, has no room in
+/// f32.
+const LOST: f64 = 1e15;
 
 /// Less than this many times R is a ray's origin away, or it is moved.
 const NEAR: f64 = 4.0;
@@ -178,10 +184,15 @@ impl Frame {
             time: 0.0,
         };
         let off = 8.0 * UNIT_ROUNDOFF_64 * (far + start);
+        let is_lost = off > LOST;
+        // Even where it is nearest to zero, or it starts, it is far from everything.
+        if is_lost && origin.abs().max_element() > 8.0 * self.reach + 4.0 * off {
+            return None;
+        }
         let is_common = off <= MOVED * self.reach && local.is_valid();
         let mut blur = self.blur(off);
         blur.origin += blur.direction * local.origin.abs().max_element();
-        Some(LocalRay { ray: local, blur, is_common, off, start, stretch })
+        Some(LocalRay { ray: local, blur, is_common, off, is_lost, start, stretch })
     }
 }
 

@@ -30,6 +30,9 @@ use crate::trace::bvh::{Bvh, Discs};
 use frame::Frame;
 pub use nearest_point::NearestPoint;
 
+/// Rays that start farther away, on any axis, miss.
+pub const FARTHEST_ORIGIN: f64 = 1e80;
+
 /// A half-line in f64 with a valid range. A hit counts for `tmin <= t <= tmax`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreciseRay {
@@ -66,11 +69,12 @@ impl PreciseRay {
         Self { origin, direction, tmin: 0.0, tmax: f64::INFINITY }
     }
 
-    /// Whether it can hit anything: finite origin, a direction whose largest component is neither below 1e-140 nor above 1e140, so that
-    /// products with it hold in f64, and a range that is not empty. Any other ray misses.
+    /// Whether it can hit anything: an origin whose largest component is not above 1e80 ([`FARTHEST_ORIGIN`]), a direction whose largest component is neither below
+    /// 1e-140 nor above 1e140, so that the square of one times the other holds in f64, and a range that is not empty. Any other ray misses.
     pub fn is_valid(&self) -> bool {
+        let placed = self.origin.abs().max_element() <= FARTHEST_ORIGIN && !self.origin.is_nan();
         let directed = (1e-140..=1e140).contains(&self.direction.abs().max_element()) && !self.direction.is_nan();
-        self.origin.is_finite() && directed && self.tmin >= 0.0 && self.tmin <= self.tmax
+        placed && directed && self.tmin >= 0.0 && self.tmin <= self.tmax
     }
 
     fn has(&self, t: f64) -> bool {

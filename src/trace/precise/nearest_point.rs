@@ -5,6 +5,7 @@
 use super::{Precise, is_traceable, made_outside};
 use crate::math::DVec3;
 use crate::shape::closest::{TrianglePoint, closest_point};
+use crate::shape::triangle::weights_within;
 use crate::trace::bvh::{Bvh, Discs, NearestTriangle, Sought, Surveyor};
 
 /// A point on a triangle.
@@ -38,6 +39,7 @@ impl NearestPoint {
 
     fn new(point: DVec3, on: TrianglePoint, geometry: u32, primitive: u32) -> Self {
         let TrianglePoint { offset, distance_squared, u, v } = on;
+        let [u, v] = weights_within(u, v);
         Self { point: point + offset, distance_squared, u, v, primitive, geometry }
     }
 }

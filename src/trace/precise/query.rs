@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::frame::{self, LocalRay};
-use super::{Precise, PreciseHit, PreciseRay};
+use super::{Precise, PreciseHit, PreciseRay, is_traceable};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 use crate::shape::crossing::{Crossing, crossing_line};
@@ -288,11 +288,26 @@ impl Precise {
         hit_of(ray, &self.corners(geometry, primitive), geometry, primitive)
     }
 
+    /// Offers every triangle that the ray may hit, as [`Bvh::candidates`](super::super::bvh::Bvh) does; all of them where the ray is lost in the frame.
+    fn candidates(&self, local: &LocalRay, offer: &mut dyn FnMut(u32, u32) -> Option<f32>) {
+        if !local.is_lost {
+            return self.bvh.candidates(&local.ray, local.blur, offer);
+        }
+        for (mesh, geometry) in self.meshes.iter().zip(0..) {
+            for (triangle, primitive) in mesh.triangles.iter().zip(0..) {
+                let is_there = triangle.iter().all(|&i| is_traceable(mesh.positions[i as usize]));
+                if is_there && offer(geometry, primitive).is_none() {
+                    return;
+                }
+            }
+        }
+    }
+
     /// The nearest hit, every candidate decided.
     fn closest(&self, ray: &PreciseRay) -> Option<PreciseHit> {
         let local = self.frame.ray(ray)?;
         let (mut best, mut limit) = (None::<PreciseHit>, local.ray.tmax.next_up());
-        self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+        self.candidates(&local, &mut |geometry, primitive| {
             if let Some(hit) = self.hit_of(ray, geometry, primitive)
                 && best.is_none_or(|best| hit.order(&best).is_lt())
             {
@@ -308,7 +323,7 @@ impl Precise {
     fn occluded(&self, ray: &PreciseRay) -> bool {
         let Some(local) = self.frame.ray(ray) else { return false };
         let (mut is_hit, limit) = (false, local.ray.tmax.next_up());
-        self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+        self.candidates(&local, &mut |geometry, primitive| {
             is_hit = self.hit_of(ray, geometry, primitive).is_some();
             (!is_hit).then_some(limit)
         });
@@ -320,12 +335,12 @@ impl Precise {
         crossings.clear();
         if let Some(local) = self.frame.ray(ray) {
             let limit = local.ray.tmax.next_up();
-            self.bvh.candidates(&local.ray, local.blur, &mut |geometry, primitive| {
+            self.candidates(&local, &mut |geometry, primitive| {
                 let corners = self.corners(geometry, primitive);
-                if let Some(crossing) = crossing_line(ray.origin, ray.direction, &corners)
-                    && ray.has(crossing.hit.t)
+                if let Some(Crossing { hit, touch }) = crossing_line(ray.origin, ray.direction, &corners)
+                    && ray.has(hit.t)
                 {
-                    crossings.take(&corners, crossing, (primitive, geometry, 0));
+                    crossings.take(&corners, Crossing { hit: hit.within(), touch }, (primitive, geometry, 0));
                 }
                 Some(limit)
             });
@@ -431,7 +446,7 @@ fn hit_of(ray: &PreciseRay, corners: &[DVec3; 3], geometry: u32, primitive: u32)
 
 #[inline]
 fn in_range(ray: &PreciseRay, hit: TriangleHit, geometry: u32, primitive: u32) -> Option<PreciseHit> {
-    let hit = PreciseHit::new(hit, (primitive, geometry, 0));
+    let hit = PreciseHit::new(hit.within(), (primitive, geometry, 0));
     ray.has(hit.t).then_some(hit)
 }
 

@@ -109,7 +109,7 @@ class RaycastingScene(Meshes):
             t, uv, primitive, geometry = self._scene.closest(origins, directions, threads=nthreads)
             # -1 becomes INVALID_ID.
             primitive, geometry = primitive.astype(np.uint32), geometry.astype(np.uint32)
-            normal = self._scene.normals(geometry, primitive)
+            normal = self._scene.normals(geometry, primitive, threads=nthreads)
         return {
             "t_hit": _result(t, *shape),
             "geometry_ids": _result(geometry, *shape),
