@@ -203,8 +203,7 @@ impl Reader {
         let material = self.material();
         if let Some(scale) = similarity(&self.transform.matrix3) {
             let centre = self.transform.transform_point3(centre);
-            self.parts.shape(material, DShape::Sphere { centre, radius: radius * scale }.local()?);
-            return Ok(());
+            return self.parts.shape(material, DShape::Sphere { centre, radius: radius * scale });
         }
         // The same test, of what the file says.
         DShape::Sphere { centre, radius }.check()?;

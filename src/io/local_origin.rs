@@ -1,28 +1,24 @@
 //! Shapes as scene files give them, in f64, and the local origins that they are rounded relative to.
 //!
-//! Tracers take shapes in f32. Near zero nobody sees what that rounds; at 4500000.3, a northing in metres, it is 0.2 m. So a shape that
-//! rounding would move by more than its size allows is kept relative to a local origin, an f64 point near it that an instance
-//! translates it by, as a [`Mesh`](crate::scene::Mesh) is kept relative to its own. [`World`](crate::World) adds both up in f64 once it
-//! knows where the scene's middle is.
+//! Tracers take shapes in f32. Near zero nobody sees what that rounds; at 4500000.3, a northing in metres, it is 0.2 m. So where rounding
+//! moves a shape by more than its size allows, and all that stands with it is far from zero, the shapes are kept relative to a local origin, an f64
+//! point in their middle that an instance translates them by, as a [`Mesh`](crate::scene::Mesh) is kept relative to its own. [`World`](crate::World) adds both up in
+//! f64 once it knows where the scene's middle is.
 //!
-//! Local origins lie on grids whose edges are powers of two, so that neighbours of like size share one, and an origin and what is left
-//! of a coordinate are exact. An origin for each shape, the simpler way, would make a group and a part for each; f64 coordinates in
-//! [`Shape`], the plainer one, would cost every scene twice the memory, and every test of a ray the conversion, for the few that lie
-//! far from zero.
+//! All shapes of a group have one, so that polygons which share a corner share it after rounding, too, and that a group of small things about zero, which is
+//! rounded to f32 there anyway, stays one. f64 coordinates in [`Shape`], the plainer way, would cost every scene twice the memory, and every test of a ray the
+//! conversion, for the few that lie far from zero.
 
 use std::slice;
 use std::sync::Arc;
 
 use super::Placeless;
 use crate::math::{DAabb, DMat3, DVec3, LARGEST_COORDINATE, Vec3};
+use crate::scene::choose_origin;
 use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Shape, Sphere};
 
 /// How far rounding may move a shape from where its file has it, in units of its size: what f32 is off by at most 4096 sizes from zero.
 const TOLERANCE: f64 = 1.0 / 8192.0;
-/// Most edges of a grid, in units of a shape's size: whatever shares its origin is then off by at most 2^-17 of its size on each axis.
-const EDGE: f64 = 512.0;
-/// The same in units of how far a shape reaches: closer origins would not have less to round.
-const EDGE_BY_REACH: f64 = 8.0;
 
 /// A shape in f64, with the fields of the [`Shape`] that it becomes.
 #[derive(Clone, Debug)]
@@ -66,20 +62,26 @@ pub(super) enum DShape {
     },
 }
 
-/// A shape in f32, relative to a local origin.
-#[derive(Clone, Debug)]
-pub(super) struct LocalShape {
-    /// Zero where f32 holds the shape as it stands.
-    pub(super) origin: DVec3,
-    pub(super) shape: Shape,
+/// The local origin of shapes that stand together: zero where f32 holds them as they are, or a middle would not serve them better. Planes, which are everywhere,
+/// have no say.
+pub(super) fn choose<'a>(shapes: impl Iterator<Item = &'a DShape> + Clone) -> DVec3 {
+    let mut bounded = shapes.filter(|shape| !matches!(shape, DShape::Plane { .. }));
+    let bounds = bounded.clone().flat_map(DShape::points).fold(DAabb::EMPTY, |all, &p| all.include(p));
+    if bounds.is_empty() || !bounded.any(DShape::is_moved) { DVec3::ZERO } else { choose_origin(&bounds) }
 }
 
 impl DShape {
-    /// Whether it can be hit, as the file has it. What does not depend on where it stands is left to [`Shape::check`].
+    /// Whether it can be hit: as the file has it, and in f32.
     ///
     /// # Errors
     /// What is wrong with it, with its numbers as they were written, and what would be right.
     pub(super) fn check(&self) -> Placeless<()> {
+        self.check_numbers()?;
+        self.relative_to(if self.is_moved() { self.middle() } else { DVec3::ZERO }).map(drop)
+    }
+
+    /// What does not depend on where it stands is left to [`Shape::check`].
+    fn check_numbers(&self) -> Placeless<()> {
         // Written so that NaN is refused, which transforms can give.
         let is_near_enough = |p: &&DVec3| p.abs().max_element() <= LARGEST_COORDINATE.into() && !p.is_nan();
         if let Some(point) = self.points().iter().find(|p| !is_near_enough(p)) {
@@ -110,30 +112,26 @@ impl DShape {
         }
     }
 
-    /// The shape in f32: relative to zero where that moves it by next to nothing, else to a local origin.
+    /// The shape in f32, relative to `origin`; or to a point in its own middle, which is then given, where nothing of it is left there.
     ///
     /// # Errors
-    /// Those of [`DShape::check`], and what f32 cannot hold anywhere.
-    pub(super) fn local(&self) -> Placeless<LocalShape> {
-        self.check()?;
-        let points = self.points();
+    /// Those of [`DShape::check`].
+    pub(super) fn local(&self, origin: DVec3) -> Placeless<(DVec3, Shape)> {
+        // At the last two it was checked, at one of them or the other.
+        let there = |place: DVec3| self.relative_to(place).map(|shape| (place, shape));
+        there(origin).or_else(|_| there(self.middle())).or_else(|_| there(DVec3::ZERO))
+    }
+
+    /// Whether rounding where it stands would move it by more than its size allows.
+    fn is_moved(&self) -> bool {
         let rounding = |p: &DVec3| (*p - p.as_vec3().as_dvec3()).abs().max_element();
         // No size is less than what f32 holds, or it would be refused.
         let size = self.size().max(f32::MIN_POSITIVE.into());
-        if points.iter().map(rounding).fold(0.0, f64::max) <= size * TOLERANCE {
-            return self.relative_to(DVec3::ZERO);
-        }
-        if let Self::Plane { point, .. } = self {
-            // It has neighbours of every size, and there are few planes. So its point, where its parameters start, is its own origin:
-            // nothing is rounded. A point nearer to zero would be no better, for it is the scene's middle that matters, which nobody
-            // knows yet, and who writes such a scene takes a point that is there.
-            return self.relative_to(*point);
-        }
-        let bounds = points.iter().fold(DAabb::EMPTY, |all, &p| all.include(p));
-        let middle = bounds.centre();
-        let shared = on_grid(middle, (EDGE * size).max(EDGE_BY_REACH * bounds.radius()));
-        // What is so thin that even there nothing of it is left stands by itself.
-        self.relative_to(shared).or_else(|_| self.relative_to(on_grid(middle, size)))
+        self.points().iter().any(|p| rounding(p) > size * TOLERANCE)
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.points().iter().fold(DAabb::EMPTY, |all, &p| all.include(p)).centre()
     }
 
     /// What is rounded: all that depends on where it stands.
@@ -171,7 +169,7 @@ impl DShape {
     }
 
     /// Rounded once, after `origin` is taken off.
-    fn relative_to(&self, origin: DVec3) -> Placeless<LocalShape> {
+    fn relative_to(&self, origin: DVec3) -> Placeless<Shape> {
         let place = |p: DVec3| (p - origin).as_vec3();
         let shape = match self {
             Self::Sphere { centre, radius } => Shape::Sphere(Sphere { centre: place(*centre), radius: *radius as f32 }),
@@ -201,7 +199,7 @@ impl DShape {
             }
         };
         shape.check().map_err(|problem| problem.to_string())?;
-        Ok(LocalShape { origin, shape })
+        Ok(shape)
     }
 }
 
@@ -226,12 +224,4 @@ fn direction(v: DVec3) -> Vec3 {
     // Where f32 has no such length, any other serves.
     let is_held = rounded.is_finite() && rounded.abs().max_element() >= f32::MIN_POSITIVE;
     if is_held || longest == 0.0 { rounded } else { (v / longest).as_vec3() }
-}
-
-/// The nearest point of the grid whose edge is the largest power of two up to `edge`. Nothing is rounded but to the grid.
-fn on_grid(p: DVec3, edge: f64) -> DVec3 {
-    // The bits of the exponent alone.
-    let edge = f64::from_bits(edge.to_bits() & f64::INFINITY.to_bits());
-    // Adding 0 makes one zero of the two.
-    (p / edge).round() * edge + 0.0
 }

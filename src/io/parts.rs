@@ -3,28 +3,19 @@
 //! Such files mix materials freely. A geometry for each run of equal ones, in the order of the file, would give a file that
 //! alternates between two colours as many geometries as it has lines, and tracers a part for each.
 //!
-//! Shapes that have [local origins](super::local_origin) are sorted by these first, for each is a group.
+//! Shapes that have a [local origin](super::local_origin) are a group of their own.
 
-use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::Placeless;
-use super::local_origin::LocalShape;
+use super::local_origin::{self, DShape};
 use super::weld::weld;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
-use crate::shape::Shape;
 
-/// Primitives in the coordinates of one group.
+/// Primitives in the coordinates of one group, by material.
 #[derive(Default)]
-pub(super) struct Parts {
-    /// By material.
-    near: Vec<Part>,
-    /// Shapes that have a local origin, by material; in the order in which their origins came first.
-    far: Vec<(DVec3, BTreeMap<u32, Vec<Shape>>)>,
-    /// Where an origin, by its bits, is in `far`.
-    origins: HashMap<[u64; 3], usize>,
-}
+pub(super) struct Parts(Vec<Part>);
 
 /// Primitives, sorted.
 pub(super) struct Sorted {
@@ -42,29 +33,26 @@ struct Part {
     smooth: Vec<DVec3>,
     /// One for each corner in `smooth`.
     normals: Vec<Vec3>,
-    shapes: Vec<Shape>,
+    shapes: Vec<DShape>,
 }
 
 impl Parts {
     fn of(&mut self, material: u32) -> &mut Part {
         let index = material as usize;
-        if self.near.len() <= index {
-            self.near.resize_with(index + 1, Part::default);
+        if self.0.len() <= index {
+            self.0.resize_with(index + 1, Part::default);
         }
-        &mut self.near[index]
+        &mut self.0[index]
     }
 
     /// Adds a shape of the material with this index.
-    pub(super) fn shape(&mut self, material: u32, LocalShape { origin, shape }: LocalShape) {
-        if origin == DVec3::ZERO {
-            self.of(material).shapes.push(shape);
-            return;
-        }
-        let index = *self.origins.entry(origin.to_array().map(f64::to_bits)).or_insert_with(|| {
-            self.far.push((origin, BTreeMap::new()));
-            self.far.len() - 1
-        });
-        self.far[index].1.entry(material).or_default().push(shape);
+    ///
+    /// # Errors
+    /// Those of [`DShape::check`].
+    pub(super) fn shape(&mut self, material: u32, shape: DShape) -> Placeless<()> {
+        shape.check()?;
+        self.of(material).shapes.push(shape);
+        Ok(())
     }
 
     /// Adds a flat triangle.
@@ -84,8 +72,9 @@ impl Parts {
 
     /// Everything, by rising material.
     pub(super) fn sorted(self) -> Sorted {
-        let mut geometries = Vec::new();
-        for (part, material) in self.near.into_iter().zip(0..) {
+        let origin = local_origin::choose(self.0.iter().flat_map(|part| &part.shapes));
+        let (mut geometries, mut far, mut alone) = (Vec::new(), Vec::new(), Vec::new());
+        for (part, material) in self.0.into_iter().zip(0..) {
             if !part.flat.is_empty() {
                 geometries.push(Geometry::Mesh(Mesh { material, ..flat_mesh(&part.flat) }));
             }
@@ -96,13 +85,21 @@ impl Parts {
                 mesh.set_positions(&part.smooth);
                 geometries.push(Geometry::Mesh(mesh));
             }
-            if !part.shapes.is_empty() {
-                geometries.push(Geometry::Shapes { shapes: part.shapes, material });
+            let mut together = Vec::with_capacity(part.shapes.len());
+            for (place, shape) in part.shapes.iter().map(|shape| shape.local(origin).expect("it was checked")) {
+                if place == origin {
+                    together.push(shape);
+                } else {
+                    alone.push((place, vec![Geometry::Shapes { shapes: vec![shape], material }]));
+                }
+            }
+            if !together.is_empty() {
+                let list = if origin == DVec3::ZERO { &mut geometries } else { &mut far };
+                list.push(Geometry::Shapes { shapes: together, material });
             }
         }
-        let shapes = |(material, shapes)| Geometry::Shapes { shapes, material };
-        let far = self.far.into_iter().map(|(origin, sorted)| (origin, sorted.into_iter().map(shapes).collect()));
-        Sorted { near: geometries, far: far.collect() }
+        let far = (!far.is_empty()).then_some((origin, far));
+        Sorted { near: geometries, far: far.into_iter().chain(alone).collect() }
     }
 
     /// Adds everything to a scene whose coordinates these are.

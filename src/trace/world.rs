@@ -314,10 +314,6 @@ fn transformed(mesh: &Mesh, transform: &DAffine3) -> Arc<Vec<Vec3>> {
 /// the largest mesh, which then need not be copied; else in the middle of the bounds.
 fn choose_centre(scene: &Scene) -> DVec3 {
     let bounds = scene.bounds();
-    if bounds.is_empty() {
-        // Planes have none: then where the first of them is far.
-        return far_point(scene).unwrap_or(DVec3::ZERO);
-    }
     if choose_origin(&bounds) == DVec3::ZERO {
         return DVec3::ZERO;
     }
@@ -329,23 +325,6 @@ fn choose_centre(scene: &Scene) -> DVec3 {
     });
     let largest = meshes.max_by_key(|(triangles, _)| *triangles).map(|(_, origin)| origin);
     largest.filter(|o| (*o - bounds.centre()).length() <= 8.0 * bounds.radius()).unwrap_or_else(|| bounds.centre())
-}
-
-/// The point of the first plane that lies where f32 is off by more than a tenth of a millimetre.
-fn far_point(scene: &Scene) -> Option<DVec3> {
-    let points = scene.instances.iter().flat_map(|instance| {
-        scene.group_geometries(instance.group).flat_map(move |(_, geometry)| {
-            let shapes = match geometry {
-                Geometry::Mesh(_) => &[][..],
-                Geometry::Shapes { shapes, .. } => shapes,
-            };
-            shapes.iter().filter_map(move |shape| match shape {
-                Shape::Plane(plane) => Some(instance.transform.transform_point3(plane.point.as_dvec3())),
-                _ => None,
-            })
-        })
-    });
-    points.into_iter().find(|point| point.abs().max_element() > 4096.0)
 }
 
 /// The origin of an object's own coordinates, by the same rule.

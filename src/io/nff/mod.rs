@@ -160,7 +160,7 @@ impl Reader {
             b"f" => self.fill(statement)?,
             b"s" => {
                 let (centre, radius) = (statement.vector()?, statement.number()?);
-                self.shape(&DShape::Sphere { centre, radius: radius.abs() }, radius < 0.0, line)?;
+                self.shape(DShape::Sphere { centre, radius: radius.abs() }, radius < 0.0, line)?;
             }
             b"c" => {
                 statement.end()?;
@@ -232,14 +232,12 @@ impl Reader {
         self.material.ok_or_else(|| format!("a primitive before any {FILL:?}, which says what it is made of"))
     }
 
-    fn shape(&mut self, shape: &DShape, is_inside_out: bool, line: usize) -> Placeless<()> {
-        let shape = shape.local()?;
+    fn shape(&mut self, shape: DShape, is_inside_out: bool, line: usize) -> Placeless<()> {
         let material = self.material()?;
         if is_inside_out && self.scene.materials[material as usize].transmission != Vec3::ZERO {
             self.inside_out.add(line, || "surfaces of glass are inside out; they refract like others".to_owned());
         }
-        self.parts.shape(material, shape);
-        Ok(())
+        self.parts.shape(material, shape)
     }
 
     fn cone(&mut self, ends: [[f64; 4]; 2], line: usize) -> Placeless<()> {
@@ -257,7 +255,7 @@ impl Reader {
         } else {
             DShape::Cone { ends, radii, capped: false }
         };
-        self.shape(&shape, is_inside_out, line)
+        self.shape(shape, is_inside_out, line)
     }
 
     fn polygon(&mut self, corners: Vec<DVec3>, line: usize) -> Placeless<()> {
@@ -265,16 +263,12 @@ impl Reader {
         if let &[a, b, c] = corners.as_slice() {
             return self.parts.triangle(material, [a, b, c]);
         }
-        let polygon = DShape::Polygon { corners };
-        match polygon.local() {
-            Ok(shape) => self.parts.shape(material, shape),
-            Err(problem) => {
-                self.divided.add(line, || format!("polygons are divided into triangles; the first: {problem}"));
-                let corners = polygon.points();
-                for triangle in triangles(corners)? {
-                    self.parts.triangle(material, triangle.map(|i| corners[i as usize]))?;
-                }
-            }
+        let Err(problem) = self.parts.shape(material, DShape::Polygon { corners: corners.clone() }) else {
+            return Ok(());
+        };
+        self.divided.add(line, || format!("polygons are divided into triangles; the first: {problem}"));
+        for triangle in triangles(&corners)? {
+            self.parts.triangle(material, triangle.map(|i| corners[i as usize]))?;
         }
         Ok(())
     }

@@ -31,9 +31,10 @@ pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Rea
     let mut parts = Parts::default();
     for (key, read) in SHAPES {
         for mut table in body.tables(key)? {
-            let shape = read(&mut table)?.local();
-            let shape = shape.map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
-            parts.shape(material(&mut table)?, shape);
+            let shape = read(&mut table)?;
+            let material = material(&mut table)?;
+            let added = parts.shape(material, shape);
+            added.map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
             table.finish()?;
         }
     }
