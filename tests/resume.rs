@@ -114,6 +114,8 @@ fn a_checkpoint_replaces_nothing_else() {
     let before = std::fs::read(&kept).unwrap();
     let (code, said) = run(&scene, &often);
     assert!(code == Some(4) && said.contains("is no checkpoint"), "{code:?}: {said}");
+    let (code, said) = run(&scene, &["-o", &picture, "--resume"]);
+    assert!(code == Some(3) && said.contains("leave out --resume"), "{code:?}: {said}");
     let sky = format!("[environment]\nimage = \"a.checkpoint.exr\"\n{plain}");
     std::fs::write(path("sky.toml"), sky).unwrap();
     let (code, said) = run(&path("sky.toml"), &often);

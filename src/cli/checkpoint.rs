@@ -71,6 +71,10 @@ impl CheckpointArgs {
             return Err(Error::Usage(message));
         }
         if path.exists() && !is_checkpoint(&path) {
+            if self.resume {
+                let message = "is no checkpoint, or a damaged one: leave out --resume to begin anew, and move it away";
+                return Err(Error::input(path, "", message));
+            }
             let message =
                 "is no checkpoint, and would be replaced by one; move it away, or give the picture another name";
             return Err(Error::output(&path, message.to_owned()));

@@ -38,7 +38,7 @@ use self::weld::weld;
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3, Vec2};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Mesh, Scene, fault};
+use crate::scene::{Geometry, Material, Mesh, Scene, fault};
 
 /// How a file is understood.
 #[derive(Clone, Debug, Default)]
@@ -199,13 +199,9 @@ pub fn load_watched(
         );
         warnings.push(Warning::new(path, "", message));
     }
-    // glTF's reader, which knows of sets of coordinates, tells itself.
-    let bare = meshes(&scene).filter(|mesh| mesh.uvs.is_empty() && has_texture(&scene, mesh)).count();
-    if bare > 0 && !is_gltf {
-        let message = format!(
-            "{bare} meshes lack texture coordinates that their materials want: one point of each texture is seen"
-        );
-        warnings.push(Warning::new(path, "", message));
+    // glTF's reader knows of sets of coordinates, and that of scenes which meshes are its own: they tell themselves.
+    if !is_gltf && suffix != "toml" {
+        warnings.extend(doubt_bare(path, bare(&scene.geometries, &scene.materials)));
     }
     let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
     if bad > 0 {
@@ -281,10 +277,21 @@ fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
     })
 }
 
-/// Whether a mesh's material looks anything up by its texture coordinates.
-fn has_texture(scene: &Scene, mesh: &Mesh) -> bool {
-    let material = scene.materials.get(mesh.material as usize);
-    material.is_some_and(|material| material.textures().next().is_some())
+/// How many meshes lack the texture coordinates that their materials want.
+fn bare(geometries: &[Geometry], materials: &[Material]) -> usize {
+    let has_texture = |material: u32| materials.get(material as usize).is_some_and(|m| m.textures().next().is_some());
+    let is_bare = |geometry: &&Geometry| match geometry {
+        Geometry::Mesh(mesh) => mesh.uvs.is_empty() && has_texture(mesh.material),
+        Geometry::Shapes { .. } => false,
+    };
+    geometries.iter().filter(is_bare).count()
+}
+
+/// What is said of them, if there are any.
+fn doubt_bare(path: &Path, bare: usize) -> Option<Warning> {
+    let message =
+        format!("{bare} meshes lack texture coordinates that their materials want: one point of each texture is seen");
+    (bare > 0).then(|| Warning::new(path, "", message))
 }
 
 /// What the system says about a file, as a message.

@@ -53,11 +53,12 @@ impl<'a> Lines<'a> {
 impl<'a> Iterator for Lines<'a> {
     type Item = (usize, Cow<'a, [u8]>);
 
-    /// The next line and its number; lines that end in a backslash are joined with what follows, but for comments, which may end in a Windows path.
+    /// The next line and its number; lines that end in a backslash are joined with what follows, but where they end in a comment, which may be a path of Windows.
     fn next(&mut self) -> Option<Self::Item> {
         let line = self.physical()?;
         let number = self.line;
-        let continued = line.strip_suffix(b"\\").filter(|_| !line.trim_ascii_start().starts_with(b"#"));
+        let has_comment = || Words::new(line, number).any(|word| word.starts_with(b"#"));
+        let continued = line.strip_suffix(b"\\").filter(|_| !has_comment());
         let Some(begin) = continued else {
             return Some((number, Cow::Borrowed(line)));
         };
@@ -206,8 +207,8 @@ mod tests {
         assert_eq!(text, [(1, "a"), (2, "b  c  d"), (5, ""), (6, "e")]);
         assert_eq!(Lines::new(b"x\\").next().unwrap(), (1, Cow::Borrowed(&b"x"[..])));
         assert_eq!(Lines::new(b"").next(), None);
-        let lines: Vec<_> = Lines::new(b" # C:\\\nv 1\n").map(|(n, l)| (n, l.into_owned())).collect();
-        assert_eq!(lines, [(1, b" # C:\\".to_vec()), (2, b"v 1".to_vec())]);
+        let lines: Vec<_> = Lines::new(b" # C:\\\nv 1 # D:\\\n").map(|(n, l)| (n, l.into_owned())).collect();
+        assert_eq!(lines, [(1, b" # C:\\".to_vec()), (2, b"v 1 # D:\\".to_vec())]);
         let lines: Vec<_> = Lines::new(b"a\rb \\\rc\r\rd\n\re\r").map(|(n, l)| (n, l.into_owned())).collect();
         assert_eq!(
             lines,

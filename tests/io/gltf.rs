@@ -348,7 +348,7 @@ fn lights_that_are_not_quite_right() {
     let Light::Spot { inner_angle, outer_angle, .. } = scene.lights[0] else { panic!("{:?}", scene.lights) };
     assert!(inner_angle < outer_angle && inner_angle > 0.4999 && outer_angle == 0.5);
     for (inner, outer) in [(0.6, 0.5), (0.0, 0.0), (0.1, 1.6)] {
-        refused(&angles(inner, outer), "a.gltf", &format!("{LIGHTS}/2"), "0 <= inner < outer");
+        refused(&angles(inner, outer), "a.gltf", &format!("{LIGHTS}/2"), "0 <= inner <= outer");
     }
     let range = (format!("{LIGHTS}/1/range"), json!(0));
     refused(&changed(&[(&range.0, range.1.clone())]), "a.gltf", &format!("{LIGHTS}/1"), "a range of 0");

@@ -205,9 +205,19 @@ fn colours_in_xyz_and_options_without_effect() {
     assert!(warnings.len() == 1 && warnings[0].message.contains("option \"-mm\""), "{warnings:?}");
     // A picture, but nothing that lies it over the surface.
     let bare = obj.replace("/1", "");
-    let files = Files::one("a.obj", bare).and("a.mtl", "newmtl a\nmap_Kd a.png\n").and("a.png", picture());
-    let (_, warnings) = files.load("a.obj");
-    assert!(warnings.len() == 1 && warnings[0].message.contains("lack texture coordinates"), "{warnings:?}");
+    let mesh = "[[mesh]]\npositions = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\nmaterial = \"a\"\n[material.a]\ntexture = \"a.png\"\n";
+    let files = Files::one("a.obj", bare)
+        .and("a.mtl", "newmtl a\nmap_Kd a.png\n")
+        .and("a.png", picture())
+        .and("file.toml", "[[file]]\npath = \"a.obj\"\n")
+        .and("mesh.toml", mesh);
+    for name in ["a.obj", "file.toml", "mesh.toml"] {
+        let (_, warnings) = files.load(name);
+        assert!(
+            warnings.len() == 1 && warnings[0].message.contains("lack texture coordinates"),
+            "{name}: {warnings:?}"
+        );
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub(super) fn light(document: &Document<'_>, index: usize, source: &Source) -> R
             let (inner_angle, outer_angle) = (source.spot.inner_cone_angle, source.spot.outer_cone_angle);
             let is_cone = outer_angle > 0.0 && outer_angle <= std::f32::consts::FRAC_PI_2;
             if !(is_cone && inner_angle >= 0.0 && inner_angle <= outer_angle) {
-                return Err(fail("cone angles have to be 0 <= inner < outer <= pi / 2".into()));
+                return Err(fail("cone angles have to be 0 <= inner <= outer and 0 < outer <= pi / 2".into()));
             }
             // Exporters write cones with a hard edge so, although the extension has them apart.
             let inner_angle = inner_angle.min(outer_angle.next_down());

@@ -59,6 +59,9 @@ impl Library {
     /// Reads the file (or, where no file has the whole name, the files) that `mtllib` on `line` of `obj` names.
     /// A missing one is a warning.
     pub(super) fn read(&mut self, obj: &Path, line: usize, names: &str, warnings: &mut Vec<Warning>) -> Result<()> {
+        if names.trim().is_empty() {
+            return Ok(());
+        }
         let whole = beside(obj, names);
         // A name may contain spaces; the format also lets several names stand in a line.
         let files: Vec<PathBuf> = if whole.is_file() {

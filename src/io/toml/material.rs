@@ -26,6 +26,7 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
     let reflection = color("reflection")?.unwrap_or(plain.reflection);
     let transmission = color("transmission")?.unwrap_or(plain.transmission);
     let emission = color("emission")?.unwrap_or_default();
+    let alpha = alpha(table)?;
     let models = [("phong", Specular::Phong), ("blinn-phong", Specular::BlinnPhong)];
     Ok(Material {
         name: name.to_owned(),
@@ -43,8 +44,8 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         absorption: absorption(table, transmission)?,
         unlit: kind == Kind::Unlit,
         normal_scale: table.optional("normal_scale", |value| value.number())?.unwrap_or(1.0) as f32,
-        alpha: alpha(table)?,
-        opacity: opacity(table)?,
+        alpha,
+        opacity: opacity(table, alpha)?,
         emission,
         ..plain
     })
@@ -73,12 +74,11 @@ fn alpha(table: &mut Table<'_>) -> Read<Alpha> {
     }
 }
 
-/// `opacity`, of which nothing is seen where `alpha` is not given.
-fn opacity(table: &mut Table<'_>) -> Read<f32> {
-    let is_alone = table.get("alpha").is_none();
+/// `opacity`, of which nothing is seen where `alpha` is opaque.
+fn opacity(table: &mut Table<'_>, alpha: Alpha) -> Read<f32> {
     let opacity = unit(table, "opacity")?.unwrap_or(1.0);
     match table.get("opacity") {
-        Some(value) if is_alone && opacity < 1.0 => {
+        Some(value) if alpha == Alpha::Opaque && opacity < 1.0 => {
             Err(value.fault("\"opacity\" is seen with alpha = \"blend\" or \"mask\" alone; write one of them, too"))
         }
         _ => Ok(opacity),

@@ -75,11 +75,13 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         materials: BTreeMap::new(),
         plain: None,
         includes: Includes::default(),
+        bare: 0,
     };
     let read = || placements(text, pieces).map_err(Stop::Here);
     match read().and_then(|placed| reader.read(Table::new(document.get_ref(), 0, "the file"), placed)) {
         Ok(()) => {
-            let scene = reader.scene;
+            let (scene, bare) = (reader.scene, reader.bare);
+            warnings.extend(super::doubt_bare(path, bare));
             warnings.extend(fog::doubt(&scene).map(|doubt| Warning::new(path, "[fog]", doubt)));
             file.done(file);
             Ok(scene)
@@ -148,6 +150,8 @@ struct Reader<'a> {
     /// The index of the material of primitives that name none, once there is one.
     plain: Option<u32>,
     includes: Includes,
+    /// Meshes of this file without the texture coordinates that their materials want.
+    bare: usize,
 }
 
 impl Reader<'_> {
@@ -226,7 +230,9 @@ impl Reader<'_> {
                 *mesh = primitives::with_parameters(mesh);
             }
         }
-        near.extend(primitives::meshes(table, &mut |table| self.material_of(table))?);
+        let meshes = primitives::meshes(table, &mut |table| self.material_of(table))?;
+        self.bare += super::bare(&meshes, &self.scene.materials);
+        near.extend(meshes);
         let mut body = Body::default();
         for mut file in table.tables("file")? {
             body.children.push(self.file(&mut file)?);
