@@ -165,13 +165,19 @@ fn down(x: f32, y: f32) -> Ray {
     Ray::new(Vec3::new(x, y, 5.0), -Vec3::Z)
 }
 
+/// Whether a number of Embree's is the one that is expected. Where that divides it multiplies by an approximate reciprocal, which after a step of Newton's is off in the
+/// last place on some processors (AMD's without AVX-512).
+fn rounds_to(found: f32, expected: f32) -> bool {
+    (found - expected).abs() <= 2.0 * f32::EPSILON * expected
+}
+
 #[test]
 fn ids_and_parameters_are_the_scenes() {
     let tracer = build(&world(vec![Geometry::Shapes { shapes: vec![], material: 0 }, Geometry::Mesh(square())]));
     // Between corners 0, 2 and 3: a quarter of the way from corner 0 to corner 3, and no part of corner 2.
     let hit = tracer.closest(&down(-0.75, -0.25)).unwrap();
     assert_eq!((hit.primitive, hit.geometry, hit.instance), (1, 1, 0));
-    assert_eq!((hit.t, hit.u, hit.v), (5.0, 0.125, 0.25));
+    assert!(rounds_to(hit.t, 5.0) && rounds_to(hit.u, 0.125) && rounds_to(hit.v, 0.25), "{hit:?}");
     let short = Ray { tmax: 4.5, ..down(-0.75, -0.25) };
     let late = Ray { tmin: 5.5, ..down(-0.75, -0.25) };
     assert!(tracer.occluded(&down(-0.75, -0.25)));
@@ -478,7 +484,7 @@ fn shapes_and_triangles_hide_each_other() {
     let up = Ray::new(Vec3::new(0.5, 0.0, -5.0), Vec3::Z);
     for (ray, geometry, t) in [(down(0.5, 0.0), 1, 4.75), (up, 1, 4.75), (down(-0.5, 0.1), 0, 5.0)] {
         let hit = tracer.closest(&ray).unwrap();
-        assert_eq!((hit.geometry, hit.t), (geometry, t));
+        assert!(hit.geometry == geometry && rounds_to(hit.t, t), "{hit:?}");
     }
     let from_inside = Ray::new(Vec3::new(0.5, 0.0, 0.1), -Vec3::Z);
     assert_eq!(tracer.closest(&from_inside).map(|hit| (hit.geometry, hit.t)), Some((0, 0.1)));

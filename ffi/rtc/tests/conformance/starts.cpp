@@ -48,12 +48,14 @@ static void at_the_start(bool robust, RTCGeometryType type, bool placed) {
   w.add(w.mesh(RTC_GEOMETRY_TYPE_TRIANGLE, {{{0, 0, -1}, {3, 0, -1}, {0, 3, -1}}}, {0, 1, 2}));
   rtcCommitScene(w.scene);
   for (float tnear : {0.f, 0.5f, 2.f}) {
+    // Where t is rounded, what lies at the start may be before it.
+    if (tnear > 0 && !is_exact()) continue;
     // On the first, with the second below; or with nothing below within reach.
     const Vec at{0.3f, 0.4f, tnear};
     CHECK(hits(w.scene, from(at, tnear)));
     RTCRayHit r = from(at, tnear);
     intersect(w.scene, r);
-    CHECK(r.ray.tfar == (robust ? tnear : tnear + 1));
+    CHECK(near(r.ray.tfar, robust ? tnear : tnear + 1));
     CHECK(hits(w.scene, from(at, tnear, tnear + 0.5f)) == robust);
     if (tnear > 0) CHECK(hits(w.scene, from(at, tnear - 0.25f, tnear + 0.5f)));
   }
@@ -116,7 +118,7 @@ static void missing_arrays() {
   r.hit.u = u.data(), r.hit.v = v.data(), r.hit.primID = prim.data(), r.hit.geomID = geom.data();
   Query query;
   rtcIntersectNp(w.scene, &query.context, &r, n);
-  for (unsigned i = 0; i < n; i++) CHECK(geom[i] == 0 && prim[i] == 0 && far[i] == 5 && near(u[i], 0.25f));
+  for (unsigned i = 0; i < n; i++) CHECK(geom[i] == 0 && prim[i] == 0 && near(far[i], 5) && near(u[i], 0.25f));
   std::fill(far.begin(), far.end(), 100.f);
   rtcOccludedNp(w.scene, &query.context, &r.ray, n);
   for (unsigned i = 0; i < n; i++) CHECK(far[i] < 0);
