@@ -35,12 +35,18 @@ struct Singles {
 /// quarter; it takes many more, far away, to get here. Bundles of closest hits are faster with any number.
 const MOST_PLACES: u32 = 10;
 
-/// As many times a placed object is left to some of a bundle's rays before these set out: enough for a flight.
+/// Visits of single rays to placed objects that are kept waiting until they are traced together: enough for a flight.
 const VISITORS: usize = 64;
 
 thread_local! {
     /// Taken while a batch is traced: a batch within a batch gets one of its own.
     static WORKSPACE: Cell<Option<Box<Workspace>>> = const { Cell::new(None) };
+}
+
+/// Gets this thread ready for batches: the first use of what it keeps between them takes a lock of the dynamic loader, which is held as long as a library is
+/// being loaded.
+pub(crate) fn prepare_thread() {
+    WORKSPACE.with(|_| ());
 }
 
 impl Workspace {

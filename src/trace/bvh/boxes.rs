@@ -8,7 +8,7 @@ use std::fmt;
 
 use super::alone::Search;
 use super::build::{self, Record};
-use super::isa::{self, Isa, Kernel};
+use super::isa::{self, Kernel, Present};
 use super::node::{Child, Tree};
 use super::place::Blur;
 use super::preset::Options;
@@ -24,7 +24,7 @@ pub struct BoxTree {
     tree: Tree,
     /// Which box each item of a leaf is.
     items: Vec<u32>,
-    isa: Isa,
+    isa: Present,
 }
 
 impl fmt::Debug for BoxTree {
@@ -45,13 +45,13 @@ impl BoxTree {
     /// # Panics
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> Self {
-        options.isa.demand();
+        let isa = options.isa.demand();
         let is_kept =
             |bounds: &Aabb| bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite();
         let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_kept(bounds));
         let mut items: Vec<Record> = kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect();
         let tree = build::build(&mut items, 1, Child::MOST, &options);
-        Self { tree, items: items.iter().map(Record::primitive).collect(), isa: options.isa }
+        Self { tree, items: items.iter().map(Record::primitive).collect(), isa }
     }
 
     /// The box around all of them, a millionth of its coordinates wider.

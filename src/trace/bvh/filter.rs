@@ -226,7 +226,7 @@ mod tests {
     use super::*;
     use crate::math::UNIT_ROUNDOFF;
     use crate::shape::triangle;
-    use crate::trace::bvh::isa::{self, Isa, Kernel};
+    use crate::trace::bvh::isa::{self, Kernel, Present};
     use crate::trace::bvh::noted::{Rays, widen};
     use crate::trace::bvh::quad::Quad;
     use crate::trace::bvh::random::Random;
@@ -293,7 +293,7 @@ mod tests {
             }
             let filter = Filter::new(&ray, Blur::NONE);
             let limit = ray.tmax.next_up();
-            for (set, isa) in Isa::ALL.into_iter().enumerate().filter(|(_, isa)| isa.is_available()) {
+            for (set, isa) in Present::all().enumerate() {
                 let Candidates { lanes, sure, low, high } = isa::dispatch(isa, Test(&filter, &block, limit));
                 for lane in 0..LANES {
                     let hit = triangle::intersect(&ray, &block.triangle(lane));
@@ -318,7 +318,7 @@ mod tests {
                 }
             }
         }
-        for (set, _) in Isa::ALL.into_iter().enumerate().filter(|(_, isa)| isa.is_available()) {
+        for (set, _) in Present::all().enumerate() {
             let [hits, sures, slender, small] = [hits[set], sures[set], slender[set], small[set]];
             let found = format!("{hits} hits, {sures} sure, {slender} of them slender, {small} small");
             assert!(hits > 10_000 && sures > 5000 && slender > 300 && small > 200, "{found}");
@@ -363,7 +363,7 @@ mod tests {
             let mut block = Block::EMPTY;
             block.push(corners, 0, 0);
             let filter = Filter::new(&ray, Blur::NONE);
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 let Candidates { lanes, sure, .. } = isa::dispatch(isa, Test(&filter, &block, f32::INFINITY));
                 let hit = triangle::intersect(&ray, &corners);
                 assert!(lanes & sure == 0 || hit.is_some(), "{isa:?} {ray:?} {corners:?}");
@@ -387,7 +387,7 @@ mod tests {
             let target = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
             let ray = Ray::new(Vec3::ZERO, target);
             let Candidates { sure, low, high, .. } =
-                isa::dispatch(Isa::Portable, Test(&Filter::new(&ray, Blur::NONE), &block, f32::INFINITY));
+                isa::dispatch(Present::PORTABLE, Test(&Filter::new(&ray, Blur::NONE), &block, f32::INFINITY));
             assert_eq!(sure, 1, "{case}");
             assert!(high[0] - low[0] < 4096.0 * UNIT_ROUNDOFF, "{case}: {} to {}", low[0], high[0]);
         }

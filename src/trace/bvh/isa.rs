@@ -37,9 +37,13 @@ impl Isa {
         }
     }
 
-    /// Panics where this processor does not have it.
-    pub(super) fn demand(self) {
+    /// As what kernels are run with.
+    ///
+    /// # Panics
+    /// Where this processor does not have it.
+    pub(super) fn demand(self) -> Present {
         assert!(self.is_available(), "{self:?} is not available on this processor");
+        Present(self)
     }
 
     /// Whether this processor has it.
@@ -64,6 +68,25 @@ impl Isa {
     }
 }
 
+/// An instruction set that this processor has: it was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Present(Isa);
+
+impl Present {
+    pub(super) const fn isa(self) -> Isa {
+        self.0
+    }
+
+    #[cfg(test)]
+    pub(super) const PORTABLE: Self = Self(Isa::Portable);
+
+    /// All that there are, the best last.
+    #[cfg(test)]
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        Isa::available().map(Self)
+    }
+}
+
 /// Work that is compiled for each instruction set: everything below `run` is `inline(always)`, so that it ends up in one
 /// function per instruction set, but for what runs [apart](Simd::apart). What is [narrow](dispatch_narrow) has one for AVX2 and AVX-512.
 pub(super) trait Kernel {
@@ -71,11 +94,11 @@ pub(super) trait Kernel {
     fn run<S: Simd>(self) -> Self::Output;
 }
 
-/// Runs `kernel` compiled for `isa`, which must be available.
+/// Runs `kernel` compiled for `isa`.
 #[inline(always)]
-pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
+pub(super) fn dispatch<K: Kernel>(Present(isa): Present, kernel: K) -> K::Output {
     match isa {
-        // SAFETY: `Bvh::build_with` keeps only an instruction set that this processor has.
+        // SAFETY: `Present` is made of what this processor has.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { with_avx2(kernel) },
         // SAFETY: as above.
@@ -85,10 +108,11 @@ pub(super) fn dispatch<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
     }
 }
 
-/// Runs `kernel`, in which nothing is wider than eight lanes, with AVX2 where `isa` is AVX-512, whose masks come later to whom they concern: on a Zen 4, rays in flight and
-/// distances run at 0.93 to 0.95 of that rate. What walks alone needs more registers than AVX2 has, and runs at 0.95 to 0.98 with it.
+/// Runs `kernel`, in which nothing is wider than eight lanes, compiled for AVX2 where `isa` is AVX-512: AVX-512's masks have a latency that AVX2's vectors do
+/// not. On a Zen 4, rays in flight and distances compiled for AVX-512 reach 0.93 to 0.95 of their rate with AVX2. Not for single rays, which use AVX-512's 32 registers:
+/// with AVX2 they reach 0.95 to 0.98 of their rate with AVX-512.
 #[inline(always)]
-pub(super) fn dispatch_narrow<K: Kernel>(isa: Isa, kernel: K) -> K::Output {
+pub(super) fn dispatch_narrow<K: Kernel>(Present(isa): Present, kernel: K) -> K::Output {
     match isa {
         // SAFETY: as in `dispatch`; a processor that has AVX-512, as `Isa::is_available` asks, has AVX2.
         #[cfg(target_arch = "x86_64")]

@@ -2,7 +2,7 @@
 
 use super::farthest::Waiting;
 use super::filter::Filter;
-use super::isa::{self, Isa, Kernel};
+use super::isa::{self, Kernel, Present};
 use super::place::{Blur, Place};
 use super::preset::Options;
 use super::query::Query;
@@ -58,7 +58,7 @@ impl Level {
 
     /// At least the scalar product of each of `ways` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it: best in an
     /// order in which neighbours differ little.
-    pub fn farthest(&self, isa: Isa, ways: &[Vec3], visits: usize, values: &mut [f64]) {
+    pub fn farthest(&self, isa: Present, ways: &[Vec3], visits: usize, values: &mut [f64]) {
         isa::dispatch_narrow(isa, Farthest { level: self, ways, visits, values });
     }
 

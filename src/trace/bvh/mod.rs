@@ -98,6 +98,7 @@ mod walk;
 mod woop;
 
 pub use alone::{Search, SingleRay, Travel, TriangleFound};
+pub(crate) use batch::prepare_thread;
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
 pub(super) use discs::Discs;
@@ -121,6 +122,7 @@ use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
+use isa::Present;
 use level::Level;
 use moving::MovingTree;
 use placements::PlacementTree;
@@ -135,7 +137,7 @@ pub struct Bvh {
     moving: MovingTree,
     unbounded: Unbounded,
     preset: Preset,
-    isa: Isa,
+    isa: Present,
     travel: Travel,
 }
 
@@ -145,7 +147,7 @@ impl fmt::Debug for Bvh {
         let (objects, bytes) = (&self.objects.len(), &self.bytes());
         f.debug_struct("Bvh")
             .field("preset", preset)
-            .field("isa", isa)
+            .field("isa", &isa.isa())
             .field("objects", objects)
             .field("bytes", bytes)
             .finish_non_exhaustive()
@@ -193,7 +195,7 @@ impl Bvh {
     /// Of the trees over the triangles of each of [`levels`]; the others are built.
     fn over(triangles: Vec<TriangleTree>, world: &World, options: &Options<'_>) -> Self {
         let Options { preset, isa, .. } = *options;
-        isa.demand();
+        let isa = isa.demand();
         let parts = levels(world);
         assert_eq!(triangles.len(), parts.len(), "a tree a level");
         let level = |(triangles, parts)| Level::new(triangles, parts, options);
@@ -254,7 +256,7 @@ impl Bvh {
 
     /// The most that its kernels may use of the processor's instructions.
     pub fn isa(&self) -> Isa {
-        self.isa
+        self.isa.isa()
     }
 }
 

@@ -314,7 +314,7 @@ mod tests {
     use crate::math::expansion::Expansion;
     use crate::math::number::{cross, dot};
     use crate::math::{DVec3, Mat3};
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::ready::columns;
     use crate::trace::bvh::simd::Portable;
@@ -383,7 +383,7 @@ mod tests {
                 let ray = Ray::new(random.vec3() * case.away.max(3.0), random.vec3());
                 Ray { tmin: random.unit().abs(), tmax: 1.0 + random.unit().abs(), ..ray }
             });
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 let [together, alone] = dispatch(isa, Each(cases.each_ref().map(|case| &case.place), rays.each_ref()));
                 for (i, ((numbers, is_known), (expected, is_expected))) in together.into_iter().zip(alone).enumerate() {
                     assert_eq!(is_known, is_expected, "{group} {i} {isa:?}");

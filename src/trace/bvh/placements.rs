@@ -34,7 +34,8 @@ pub(super) fn tree_over(
     objects: &[Level],
     options: &Options<'_>,
 ) -> (Tree, Vec<usize>) {
-    let outlines = Outlines::new(objects, options.isa, placements.iter().filter(|placement| is_wanted(placement)));
+    let outlines =
+        Outlines::new(objects, options.isa.demand(), placements.iter().filter(|placement| is_wanted(placement)));
     let item = |(i, placement): (usize, &Placement)| {
         let bounds = outlines.around(placement);
         (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))

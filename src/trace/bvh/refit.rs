@@ -27,7 +27,7 @@ impl Bvh {
         if self.objects.len() != world.objects.len() {
             return Err(changed(&format!("{} objects, not {}", world.objects.len(), self.objects.len())));
         }
-        let options = Options { preset: self.preset, isa: self.isa, progress: None };
+        let options = Options { preset: self.preset, isa: self.isa(), progress: None };
         self.fixed.refit(&world.parts[world.fixed.clone()], &options)?;
         for (level, parts) in self.objects.iter_mut().zip(&world.objects) {
             level.refit(&world.parts[parts.clone()], &options)?;

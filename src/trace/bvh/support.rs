@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::isa::{self, Isa, Kernel};
+use super::isa::{self, Kernel, Present};
 use super::level::Level;
 use super::simd::{Doubles, Simd};
 use crate::math::{Aabb, DMat3, DVec3, Vec3};
@@ -27,7 +27,7 @@ const LEAST_VISITS: usize = 16;
 /// The boxes around objects where they are placed.
 pub(super) struct Outlines<'a> {
     objects: &'a [Level],
-    isa: Isa,
+    isa: Present,
     /// One for each object that is placed often.
     tables: Vec<Option<Table>>,
     /// For each search of other objects.
@@ -36,7 +36,7 @@ pub(super) struct Outlines<'a> {
 
 impl<'a> Outlines<'a> {
     /// For `placements` of `objects`.
-    pub fn new<'b>(objects: &'a [Level], isa: Isa, placements: impl Iterator<Item = &'b Placement>) -> Self {
+    pub fn new<'b>(objects: &'a [Level], isa: Present, placements: impl Iterator<Item = &'b Placement>) -> Self {
         // What moves has two boxes, at its start and at its end.
         let mut boxes = vec![0; objects.len()];
         for placement in placements.filter(|placement| !objects[placement.object as usize].bounds().is_empty()) {
@@ -358,7 +358,7 @@ mod tests {
             level.farthest(isa, ways, visits, &mut found);
             found
         };
-        let found: Vec<Vec<f64>> = Isa::available().map(on).collect();
+        let found: Vec<Vec<f64>> = Present::all().map(on).collect();
         assert!(found.iter().all(|farthest| *farthest == found[0]), "{found:?} along {ways:?}, {visits} visits");
         found.into_iter().next().expect("the portable one")
     }
@@ -386,7 +386,7 @@ mod tests {
             let mut rows = [DVec3::new(-2.0, 3.0, 5.0), DVec3::new(7.0, 3.0, -1.0), DVec3::new(0.0, -0.5, 0.0)];
             rows[row] = way;
             let rows = DMat3::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose();
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 found.push(isa::dispatch(isa, Extents(table, rows)).map(|extents| extents[row]));
             }
         }
@@ -469,7 +469,7 @@ mod tests {
             let bvh = Bvh::build(&world);
             let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             let outlines = |isa| Outlines::new(&bvh.objects, isa, world.placements.iter());
-            let again: Vec<Outlines<'_>> = Isa::available().map(|isa| pool(1).install(|| outlines(isa))).collect();
+            let again: Vec<Outlines<'_>> = Present::all().map(|isa| pool(1).install(|| outlines(isa))).collect();
             let outlines = pool(4).install(|| outlines(bvh.isa));
             let mut tables = 0;
             for placement in &world.placements {

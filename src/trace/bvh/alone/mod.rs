@@ -152,7 +152,8 @@ impl Bvh {
                 for index in leaf.blocks() {
                     let mut scratch = None;
                     let block = triangles.block(index, &mut scratch);
-                    // The black box is for the same as at nodes: `Enter` of a single ray.
+                    // The black box keeps the filter in memory, as it does the slabs of a single ray where nodes are entered (`walk::Enter`): without it the
+                    // compiler spreads each number over a vector before the walk, and spills them.
                     let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);
                     if candidates.lanes != 0 && noted.offer::<Q>(self, doubted, place, index, block, &candidates, ray) {
                         return Visit::Stop;

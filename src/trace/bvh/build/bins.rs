@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use crate::math::{Aabb, Vec3};
     use crate::trace::bvh::build::record::aabb;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     struct Fill<'a>(&'a mut Bins<8>, &'a [Record], Grid);
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn bins_hold_what_falls_into_them() {
         let mut random = Random::new(9);
-        for isa in Isa::available() {
+        for isa in Present::all() {
             let mut bins = Bins::<8>::ANY;
             for count in [101, 1, 2, 3, 50, 0] {
                 let item = |i| {
@@ -236,7 +236,7 @@ mod tests {
             let ((p, q), (r, s)) = (sides[(k + 1) % sides.len()], sides[(k + 2) % sides.len()]);
             let ids = [f32::from_bits(7), f32::from_bits(u32::MAX)];
             let centres = [0.0 - min, 0.0 - p, 0.0 - r, ids[0], max, q, s, ids[1]];
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 let grid = dispatch(isa, Grids(&centres));
                 for (axis, (min, max)) in [(min, max), (p, q), (r, s)].into_iter().enumerate() {
                     let scale = if max > min { 8.0 / (max - min) } else { 0.0 };

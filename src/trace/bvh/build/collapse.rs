@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use crate::math::Aabb;
     use crate::trace::bvh::build::record::aabb;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
 
@@ -258,7 +258,7 @@ mod tests {
         for ends in (2..15).flat_map(|ends| [ends; 24]).chain([2; 500]) {
             let mut expected = None;
             let shape = Shape::random(&mut random, ends);
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 let mut binary = shape.binary();
                 dispatch(isa, Weigh(&mut binary));
                 let nodes = binary.nodes(&RULE, 9);

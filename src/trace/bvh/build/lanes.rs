@@ -67,8 +67,8 @@ mod x86 {
     use super::{Boxes, RANKED};
     use crate::trace::bvh::simd::V8;
 
-    /// SAFETY of every block below: these vectors are made only in kernels that `isa::dispatch` runs, which asks the
-    /// processor for AVX2 first; loads and stores go through references to arrays of the vector's size.
+    /// SAFETY of every block below: these vectors are made only in kernels that `isa::dispatch` runs, of a `Present`
+    /// instruction set; loads and stores go through references to arrays of the vector's size.
     impl Boxes for V8 {
         #[inline(always)]
         fn swap_halves(self) -> Self {
@@ -147,7 +147,7 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn both_give_the_same_bits() {
-        use crate::trace::bvh::isa::{self, Isa, Kernel};
+        use crate::trace::bvh::isa::{self, Kernel, Present};
         use crate::trace::bvh::simd::{Array, Simd};
         struct All([[f32; 8]; 3], [f32; RANKED]);
         impl Kernel for All {
@@ -166,12 +166,11 @@ mod tests {
                 )
             }
         }
-        if !Isa::Avx2.is_available() {
-            return;
-        }
         for seed in 0..100 {
             let all = || All([numbers(seed), numbers(seed + 1000), numbers(seed + 2000)], numbers(seed + 3000));
-            assert_eq!(isa::dispatch(Isa::Avx2, all()), isa::dispatch(Isa::Portable, all()));
+            for isa in Present::all() {
+                assert_eq!(isa::dispatch(isa, all()), isa::dispatch(Present::PORTABLE, all()), "{isa:?}");
+            }
         }
     }
 

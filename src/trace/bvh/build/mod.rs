@@ -88,7 +88,7 @@ enum Built {
 /// [`Child::MOST`].
 ///
 /// # Panics
-/// With more than [`Child::NAMES`] items.
+/// With more than [`Child::NAMES`] items, and where this processor does not have `options.isa`.
 pub(super) fn build(items: &mut [Record], block: u32, most: u32, options: &Options<'_>) -> Tree {
     build_beside(0, items, block, most, options)
 }
@@ -105,7 +105,7 @@ pub(super) fn build_beside(others: usize, items: &mut [Record], block: u32, most
     let threads = rayon::current_num_threads();
     let is_small = threads > 1 && items.len().saturating_mul(1 + others) < threads * FEW * TASK as usize;
     let builder = Builder { rule: &Rule { block, leaf: block * most }, is_small, options };
-    let whole = top::whole(items, options.isa);
+    let whole = top::whole(items, options.isa.demand());
     Tree::new(in_order(builder.build(whole, items, 0)))
 }
 
@@ -122,7 +122,7 @@ impl Builder<'_> {
     /// Of `items`, which are those of `range`, with so many levels above them.
     fn build(self, range: Range, items: &mut [Record], depth: usize) -> Built {
         let Self { rule, is_small, options } = self;
-        let isa = options.isa;
+        let isa = options.isa.demand();
         if range.len <= TASK || depth == TOP_LEVELS {
             let subtree = Subtree { rule, items, range, levels: LEVELS - depth };
             let nodes = if is_small { subtree.nodes_by_all(isa) } else { subtree.nodes(isa) };

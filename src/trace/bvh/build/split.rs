@@ -240,7 +240,7 @@ mod tests {
     use crate::math::Aabb;
     use crate::trace::bvh::build::record::aabb;
     use crate::trace::bvh::build::top::PartitionKernel;
-    use crate::trace::bvh::isa::{Isa, dispatch};
+    use crate::trace::bvh::isa::{Present, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
 
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn sides_are_those_of_the_plane() {
         let mut random = Random::new(5);
-        for (isa, axis) in Isa::available().flat_map(|isa| [(isa, 0), (isa, 1), (isa, 2)]) {
+        for (isa, axis) in Present::all().flat_map(|isa| [(isa, 0), (isa, 1), (isa, 2)]) {
             for at in [-9.0, -0.5, 0.0, 0.75, 9.0] {
                 let item = |i| {
                     let corner = random.vec3();

@@ -5,7 +5,7 @@ use super::bins::{self, Bins, Grid};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::sweep;
-use crate::trace::bvh::isa::{self, Isa, Kernel};
+use crate::trace::bvh::isa::{self, Kernel, Present};
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
 
@@ -23,7 +23,7 @@ pub(super) struct Subtree<'a> {
 
 impl Subtree<'_> {
     /// The nodes over the range's items, the root first. Leaves name ranges of items by their index in the whole.
-    pub fn nodes(self, isa: Isa) -> Vec<Node> {
+    pub fn nodes(self, isa: Present) -> Vec<Node> {
         let Self { rule, items, range, levels } = self;
         let binary =
             isa::dispatch(isa, BinaryKernel { is_root: true, ..BinaryKernel::new(rule, items, range, levels) });
@@ -31,7 +31,7 @@ impl Subtree<'_> {
     }
 
     /// The same, for threads that have nothing else to do.
-    pub fn nodes_by_all(self, isa: Isa) -> Vec<Node> {
+    pub fn nodes_by_all(self, isa: Present) -> Vec<Node> {
         if self.range.len <= PIECE {
             return self.nodes(isa);
         }
@@ -60,7 +60,7 @@ impl<'a> BinaryKernel<'a> {
     }
 
     /// Adds its pieces, each branch before its first side, and all of that before its second.
-    fn pieces(self, isa: Isa, pieces: &mut Vec<Piece>) {
+    fn pieces(self, isa: Present, pieces: &mut Vec<Piece>) {
         let Self { rule, items, range, levels, .. } = self;
         let side = |range, levels, items| BinaryKernel { rule, items, range, levels, is_root: false };
         let sides = (range.len > PIECE)

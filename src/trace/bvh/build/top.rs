@@ -8,14 +8,14 @@ use super::bins::{Bins, MANY};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::subtree::binned;
-use crate::trace::bvh::isa::{self, Isa, Kernel};
+use crate::trace::bvh::isa::{self, Kernel, Present};
 use crate::trace::bvh::simd::{Portable, Simd, Vector};
 
 /// Items in a chunk.
 const CHUNK: usize = 1 << 15;
 
 /// The range of all `items`.
-pub(super) fn whole(items: &[Record], isa: Isa) -> Range {
+pub(super) fn whole(items: &[Record], isa: Present) -> Range {
     let chunk = |items| isa::dispatch(isa, RangeKernel(items));
     let whole = items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
     Range { len: items.len() as u32, ..whole }
@@ -26,7 +26,7 @@ pub(super) struct Shared<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
     pub base: u32,
-    pub isa: Isa,
+    pub isa: Present,
 }
 
 impl Shared<'_> {

@@ -290,7 +290,7 @@ impl Traveller {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     struct Shorten<'a>(&'a mut Traveller);
@@ -315,7 +315,7 @@ mod tests {
                     .collect();
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
-                for isa in Isa::available() {
+                for isa in Present::all() {
                     let mut traveller = Traveller { len, ..Traveller::NONE };
                     traveller.found.limit = limit;
                     for (i, &(near, child)) in entries.iter().enumerate() {

@@ -134,7 +134,7 @@ impl<D: Doubles> Measured<D> {
 mod tests {
     use super::*;
     use crate::shape::closest::closest_point;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     struct Measure(DVec3, [DVec3; 3], f64);
@@ -174,7 +174,7 @@ mod tests {
             }
             let expected = closest_point(point, corners);
             foots += usize::from(expected.u > 0.0 && expected.v > 0.0 && expected.u + expected.v < 1.0);
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 // Also where products of four lengths would vanish, or overflow.
                 for size in [1.0, 2f64.powi(-400), 2f64.powi(300)] {
                     let found = dispatch(isa, Measure(point * size, corners.map(|corner| corner * size), size.recip()));

@@ -82,7 +82,7 @@ impl Waiting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::isa::{Isa, Kernel, dispatch};
+    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     struct Shorten<'a>(&'a mut Waiting, f32);
@@ -107,7 +107,7 @@ mod tests {
                     .collect();
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
-                for isa in Isa::available() {
+                for isa in Present::all() {
                     let mut waiting = Waiting { len, ..Waiting::NOBODY };
                     for (i, &(near, child)) in entries.iter().enumerate() {
                         (waiting.near[i + 1], waiting.children[i + 1]) = (near, child);

@@ -200,7 +200,7 @@ pub(super) trait Group: Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::isa::{Isa, dispatch};
+    use crate::trace::bvh::isa::{Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     #[derive(Clone, Copy)]
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn children_are_sorted_alike() {
         for case in cases() {
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 assert_eq!(dispatch(isa, Sort(case)), case.sorted(), "{isa:?}: {:08b} of {:?}", case.named, case.near);
             }
         }
@@ -305,10 +305,10 @@ mod tests {
         for case in cases() {
             let mut expected = case.sorted();
             let nearest = expected.pop();
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 let context = format!("{isa:?}: {:08b} of {:?}", case.named, case.near);
                 let (child, mut others) = dispatch(isa, Nearest(case));
-                assert_eq!(others, dispatch(Isa::Portable, Nearest(case)).1, "{context}");
+                assert_eq!(others, dispatch(Present::PORTABLE, Nearest(case)).1, "{context}");
                 assert!(nearest.is_none_or(|(_, expected)| child == expected), "{context}");
                 if others.len() > 2 {
                     others.sort_by_key(|&(near, _)| std::cmp::Reverse(near));
@@ -328,7 +328,7 @@ mod tests {
             let (limit, count) = (f32::from_bits(entries[case.named as usize % 8].0 & !7), case.named as usize % 13);
             let is_near = |(near, _): &(u32, Child)| f32::from_bits(near & !7) <= limit;
             let expected: Vec<_> = entries.into_iter().take(count).filter(is_near).collect();
-            for isa in Isa::available() {
+            for isa in Present::all() {
                 assert_eq!(
                     dispatch(isa, Within { limit, entries, count }),
                     expected,
