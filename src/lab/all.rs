@@ -206,7 +206,7 @@ impl Row {
                 classify_closest(world, ray, &Answers { native, embree, brute: None })
             }
             (Query::Occluded(ray), Answer::Occluded(native), Answer::Occluded(embree)) => {
-                // Brute force's nearest hit is what its any-hit answer rests on.
+                // Where what the entrant names explains neither answer, every primitive is asked.
                 let closest = || Answers { native: None, embree: tracer.closest(ray), brute: None };
                 classify_occluded(world, ray, native, embree, None, closest)
             }

@@ -13,7 +13,7 @@
 //! Testing every primitive instead would decide more (both engines may miss the same one), at a cost of the whole scene
 //! for every ray; brute force, as the third voice, does that on small scenes.
 
-use super::oracle::{self, Body, Id, Primitive};
+use super::oracle::{self, Id, Primitive};
 use super::rounding::{Outcome, Precision, outcome};
 use crate::ray::{Hit, Ray};
 use crate::trace::World;
@@ -229,10 +229,9 @@ impl Candidate {
     fn new(ray: &Ray, id: Id, primitive: &Primitive) -> Self {
         let meeting = oracle::meet(ray, primitive);
         let double = outcome(ray, primitive, Precision::Double);
-        let exact = match primitive.body {
-            Body::Triangle(_) => Outcome { may_meet: meeting.is_some(), may_pass: meeting.is_none(), ..double },
-            // Shapes are intersected in f64, not exactly.
-            Body::Shape(_) => double,
+        let exact = match primitive.is_decided_exactly() {
+            true => Outcome { may_meet: meeting.is_some(), may_pass: meeting.is_none(), ..double },
+            false => double,
         };
         let single = outcome(ray, primitive, Precision::Single);
         Self { id, exact, single, is_hit: meeting.is_some_and(|m| m.in_range || m.at_range_end) }
@@ -244,6 +243,7 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
     use crate::scene::{Geometry, Mesh};
+    use crate::shape::{Cylinder, Shape, Sphere};
 
     /// Two unit squares of two triangles each, at z = 0 (0, 1) and z = -1 (2, 3), and at z = -1 a copy (4) of 2.
     fn world() -> World {
@@ -310,6 +310,29 @@ mod tests {
         assert_eq!(closest(ends, hit(0, 1.0), None), Class::Boundary);
         let short = Ray { tmax: 0.999, ..down(0.75, 0.25) };
         assert_eq!(closest(short, None, hit(0, 1.0)), Class::EmbreeWrong);
+    }
+
+    #[test]
+    fn at_a_silhouette_native_may_not_err_either() {
+        let world = |shape| {
+            let geometry = Geometry::Shapes { shapes: vec![shape], material: 0 };
+            World::new(&crate::Scene::from_geometries(vec![geometry], vec![Default::default()])).unwrap()
+        };
+        let judge = |world: &World, [x, y]: [f32; 2], native, embree| {
+            let ray = Ray::new(Vec3::new(x, y, 100.0), Vec3::NEG_Z);
+            classify_closest(world, &ray, &Answers { native, embree, brute: None })
+        };
+        // Past the unit sphere by 1.4e-14 and into it by 1.2e-12: nothing that f64 could tell from 100 away.
+        let (past, into) = ([0.799_706_94, 0.600_390_55], [0.650_676_13, 0.759_355_37]);
+        let ball = world(Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 1.0 }));
+        for (at, right, wrong) in [(past, None, hit(0, 100.0)), (into, hit(0, 100.0), None)] {
+            assert_eq!(judge(&ball, at, right, wrong), Class::Boundary, "{at:?}");
+            assert_eq!(judge(&ball, at, wrong, right), Class::NativeWrong, "{at:?}");
+        }
+        // At a rim two t are compared that are rounded.
+        let (base, apex) = (Vec3::NEG_Z, Vec3::Z);
+        let can = world(Shape::Cylinder(Cylinder { base, apex, radius: 1.0, capped: true }));
+        assert_eq!(judge(&can, past, hit(0, 99.0), None), Class::Boundary);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::exact::{Approx, Dyadic, Rational, Ring, Vector, det, vector, zip};
 use super::exact_shapes::crossings;
 use crate::math::{Affine3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
-use crate::shape::Shape;
+use crate::shape::{Cone, Cylinder, Shape};
 use crate::trace::{Part, Primitives, World};
 
 /// The order of [`Hit::id`]: instance, geometry, primitive.
@@ -29,6 +29,20 @@ pub struct Primitive<'a> {
     pub body: Body<'a>,
     /// From its own coordinates to the world's; None where they are the same.
     pub to_world: Option<Affine3>,
+}
+
+impl Primitive<'_> {
+    /// Whether the native engine's verdict on it is that of exact arithmetic. It is not of shapes that are placed, to which rays are brought in f64,
+    /// nor of capped ones, at whose rims two t are compared; see [`Shape`].
+    pub fn is_decided_exactly(&self) -> bool {
+        match self.body {
+            Body::Triangle(_) => true,
+            Body::Shape(Shape::Cylinder(Cylinder { capped: true, .. }) | Shape::Cone(Cone { capped: true, .. })) => {
+                false
+            }
+            Body::Shape(_) => self.to_world.is_none(),
+        }
+    }
 }
 
 /// What a primitive is.

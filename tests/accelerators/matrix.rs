@@ -5,12 +5,12 @@
 //! cylinders and cones; where it was placed by a transform, triangles are held to the same, and shapes, whose ray is
 //! rounded in their own coordinates, to what that rounding allows.
 
-use twincast::lab::oracle::{self, Body, Id, Primitive};
+use twincast::lab::oracle::{self, Id, Primitive};
 use twincast::lab::rounding::{Precision, outcome};
 use twincast::math::{DAffine3, DMat3, DVec3, Vec3};
 use twincast::scene::{Geometry, Group, Instance, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::{Cone, Cylinder, Hit, Ray, Shape, Tracer, World};
+use twincast::{Hit, Ray, Tracer, World};
 
 use super::subjects::{self, Class, Kind, Subject};
 use crate::parity::assert_parity_of;
@@ -110,12 +110,7 @@ struct Allowed {
 impl Allowed {
     fn new(ray: &Ray, id: Id, primitive: &Primitive<'_>) -> Self {
         let bounds = outcome(ray, primitive, Precision::Double);
-        let rounded = match primitive.body {
-            Body::Triangle(_) => false,
-            Body::Shape(Shape::Cylinder(Cylinder { capped, .. }) | Shape::Cone(Cone { capped, .. })) if *capped => true,
-            Body::Shape(_) => primitive.to_world.is_some(),
-        };
-        let (hit, miss) = if rounded {
+        let (hit, miss) = if !primitive.is_decided_exactly() {
             (bounds.may_hit(ray), bounds.may_miss(ray))
         } else {
             let meeting = oracle::meet(ray, primitive);
