@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::Placeless;
-use super::local_origin::DShape;
+use super::dshape::DShape;
 use super::parts::{Parts, add_group};
 use super::statement::{Statement, statements};
 use super::suggest::suggestion;
@@ -141,7 +141,8 @@ impl Reader {
                 let top = self.stack.pop();
                 self.transform = top.ok_or("popTransform where no pushTransform is left to undo")?;
             }
-            _ => self.turn(keyword, statement)?,
+            "translate" | "rotate" | "scale" => self.multiply_transform(keyword, statement)?,
+            _ => unreachable!("{keyword} is among the usages"),
         }
         statement.end()
     }
@@ -170,7 +171,7 @@ impl Reader {
     }
 
     /// `translate`, `rotate` or `scale`: multiplies the transform from the right, so that it comes first for what follows.
-    fn turn(&mut self, keyword: &str, statement: &mut Statement<'_>) -> Placeless<()> {
+    fn multiply_transform(&mut self, keyword: &str, statement: &mut Statement<'_>) -> Placeless<()> {
         let step = match keyword {
             "translate" => DAffine3::from_translation(statement.vector()?),
             "rotate" => rotation(statement.direction()?, statement.number()?),

@@ -7,8 +7,10 @@
 
 mod compact;
 mod course;
+mod dshape;
+mod finish;
+mod format;
 mod gltf;
-mod local_origin;
 mod nff;
 mod number;
 mod obj;
@@ -27,18 +29,17 @@ mod toml;
 mod weld;
 
 use std::path::Path;
-use std::sync::Arc;
 
-use rayon::prelude::*;
-
+pub(crate) use self::format::Format;
+pub use self::format::SUFFIXES;
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
-use self::weld::weld;
+use self::finish::{bare, doubt_bare, drop_strays, make_finite, meshes};
 use crate::error::{Error, Result, Warning};
-use crate::math::{DAffine3, DMat3, DVec3, Vec2};
+use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Material, Mesh, Scene, fault};
+use crate::scene::{Geometry, Mesh, Scene, fault};
 
 /// How a file is understood.
 #[derive(Clone, Debug, Default)]
@@ -107,19 +108,6 @@ pub enum Normals {
 /// A result whose error is a message that has no file and no place yet.
 type Placeless<T> = std::result::Result<T, String>;
 
-/// The suffixes that [`load`] knows.
-pub const SUFFIXES: [&str; 8] = ["glb", "gltf", "nff", "obj", "ply", "stl", "test", "toml"];
-
-/// Whether a file of this name may say where its picture is to be written ([`Request::output`](crate::scene::Request)).
-pub(crate) fn may_name_a_picture(path: &Path) -> bool {
-    matches!(suffix(path).as_str(), "test" | "toml")
-}
-
-/// What decides the format, in lower case.
-fn suffix(path: &Path) -> String {
-    path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
-}
-
 /// Of a file without a primitive; with what was left out of it, which may be why.
 fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
     let mut message =
@@ -152,34 +140,31 @@ pub fn load_watched(
     options: &LoadOptions,
     on_bytes: Option<&(dyn Fn(u64) + Sync)>,
 ) -> Result<(Scene, Vec<Warning>)> {
-    let suffix = suffix(path);
     // First, so that a directory, a missing or an empty file is called that, whatever its name.
     let file = Mapped::open(path).map_err(|e| Error::input(path, "", system_message(&e)))?.watched(on_bytes);
     if file.is_empty() {
         return Err(Error::input(path, "", "is empty, where a scene is needed"));
     }
-    let is_gltf = matches!(suffix.as_str(), "glb" | "gltf");
-    if !is_gltf && (options.animation != Animation::default() || options.variant.is_some()) {
+    let format = Format::of(path).ok_or_else(|| {
+        let message = format!("unknown suffix {:?}; known are {}", format::suffix(path), SUFFIXES.join(", "));
+        Error::input(path, "", message)
+    })?;
+    if !format.has_animations() && (options.animation != Animation::default() || options.variant.is_some()) {
         let message = "animations (--animation, --time, --frames) and variants of materials (--variant) are asked for, which only glTF and GLB have; leave them out";
         return Err(Error::input(path, "", message));
     }
     let mut warnings = Vec::new();
-    let mut scene = match suffix.as_str() {
-        "glb" | "gltf" => gltf::load(path, &file, options, &mut warnings)?,
-        "nff" => nff::load(path, &file, &mut warnings)?,
-        "obj" => obj::load(path, &file, &mut warnings)?,
-        "ply" => ply::load(path, &file, &mut warnings)?,
-        "stl" => stl::load(path, &file, &mut warnings)?,
-        "test" => course::load(path, &file)?,
-        "toml" => toml::load(path, &file, &mut warnings)?,
-        _ => {
-            let message = format!("unknown suffix {suffix:?}; known are {}", SUFFIXES.join(", "));
-            return Err(Error::input(path, "", message));
-        }
-    };
+    let mut scene = format.load(path, &file, options, &mut warnings)?;
     drop(file);
     scene.files.insert(0, path.to_owned());
     scene.transform(&options.transform());
+    let vague: usize = scene.geometries.iter_mut().map(make_finite).sum();
+    if vague > 0 {
+        let message = format!(
+            "{vague} colours or texture coordinates are not finite; what is not counts as 0, and as 1 where it is alpha"
+        );
+        warnings.push(Warning::new(path, "", message));
+    }
     // At some time of an animation there may be nothing to see.
     let may_be_empty = options.animation.time.is_some();
     fault(&scene).map_err(|message| Error::input(path, "", message))?;
@@ -189,18 +174,11 @@ pub fn load_watched(
     scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
+            drop_strays(mesh);
             options.normals.apply(mesh);
         }
     }
-    let vague: usize = scene.geometries.iter_mut().map(make_finite).sum();
-    if vague > 0 {
-        let message = format!(
-            "{vague} colours or texture coordinates are not finite; what is not counts as 0, and as 1 where it is alpha"
-        );
-        warnings.push(Warning::new(path, "", message));
-    }
-    // glTF's reader knows of sets of coordinates, and that of scenes which meshes are its own: they tell themselves.
-    if !is_gltf && suffix != "toml" {
+    if !format.tells_of_bare_meshes() {
         warnings.extend(doubt_bare(path, bare(&scene.geometries, &scene.materials)));
     }
     let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
@@ -209,20 +187,6 @@ pub fn load_watched(
         warnings.push(Warning::new(path, "", message));
     }
     Ok((scene, warnings))
-}
-
-/// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells of how many colours and coordinates.
-fn make_finite(geometry: &mut Geometry) -> usize {
-    fn each<T: AsMut<[f32; N]> + Send, const N: usize>(values: &mut [T], instead: [f32; N]) -> usize {
-        let mend = |value: &mut T| {
-            let components = value.as_mut().iter_mut().zip(instead).filter(|(component, _)| !component.is_finite());
-            components.map(|(component, instead)| *component = instead).count() > 0
-        };
-        values.par_iter_mut().with_min_len(1 << 14).map(mend).filter(|is_mended| *is_mended).count()
-    }
-    let Geometry::Mesh(mesh) = geometry else { return 0 };
-    let uvs = |uvs: &mut [Vec2]| each(uvs, [0.0; 2]);
-    each(&mut mesh.colors, [0.0, 0.0, 0.0, 1.0]) + uvs(&mut mesh.uvs) + uvs(&mut mesh.second_uvs)
 }
 
 impl LoadOptions {
@@ -246,52 +210,6 @@ impl Unit {
             Self::Inch => 0.0254,
         }
     }
-}
-
-impl Normals {
-    fn apply(self, mesh: &mut Mesh) {
-        match self {
-            Self::File => {}
-            Self::Flat => mesh.normals = Vec::new(),
-            Self::Smooth => smooth(mesh),
-        }
-    }
-}
-
-/// Smooth normals across vertices that differ in other attributes only, as they do at seams of textures.
-fn smooth(mesh: &mut Mesh) {
-    // Adding 0 makes one zero of the two.
-    let key = |i: usize| [(mesh.positions[i] + 0.0).to_array().map(f32::to_bits)];
-    let (welded, keys) = weld(mesh.positions.len(), key, |_| ());
-    let positions = keys.into_iter().map(|bits| bits.map(f32::from_bits).into()).collect();
-    let triangles = mesh.triangles.iter().map(|corners| corners.map(|i| welded[i as usize][0])).collect();
-    let mut joined = Mesh { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Mesh::default() };
-    joined.smooth_normals();
-    mesh.normals = welded.into_iter().map(|[i]| joined.normals[i as usize]).collect();
-}
-
-fn meshes(scene: &Scene) -> impl Iterator<Item = &Mesh> {
-    scene.geometries.iter().filter_map(|geometry| match geometry {
-        Geometry::Mesh(mesh) => Some(mesh),
-        Geometry::Shapes { .. } => None,
-    })
-}
-
-/// How many meshes lack the texture coordinates that their materials want.
-fn bare(geometries: &[Geometry], materials: &[Material]) -> usize {
-    let has_texture = |material: u32| materials.get(material as usize).is_some_and(|m| m.textures().next().is_some());
-    let is_bare = |geometry: &&Geometry| match geometry {
-        Geometry::Mesh(mesh) => mesh.uvs.is_empty() && has_texture(mesh.material),
-        Geometry::Shapes { .. } => false,
-    };
-    geometries.iter().filter(is_bare).count()
-}
-
-/// What is said of them, if there are any.
-fn doubt_bare(path: &Path, bare: usize) -> Option<Warning> {
-    let message =
-        format!("{bare} meshes lack texture coordinates that their materials want: one point of each texture is seen");
-    (bare > 0).then(|| Warning::new(path, "", message))
 }
 
 /// What the system says about a file, as a message.

@@ -3,12 +3,12 @@
 //! Such files mix materials freely. A geometry for each run of equal ones, in the order of the file, would give a file that
 //! alternates between two colours as many geometries as it has lines, and tracers a part for each.
 //!
-//! Shapes that have a [local origin](super::local_origin) are a group of their own.
+//! Shapes that have a [local origin](super::dshape::local_origin) are a group of their own.
 
 use std::sync::Arc;
 
 use super::Placeless;
-use super::local_origin::{self, DShape};
+use super::dshape::{self, DShape};
 use super::weld::weld;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Geometry, Group, Instance, Mesh, Scene};
@@ -72,7 +72,7 @@ impl Parts {
 
     /// Everything, by rising material.
     pub(super) fn sorted(self) -> Sorted {
-        let origin = local_origin::choose(self.0.iter().flat_map(|part| &part.shapes));
+        let origin = dshape::local_origin(self.0.iter().flat_map(|part| &part.shapes));
         let (mut geometries, mut far, mut alone) = (Vec::new(), Vec::new(), Vec::new());
         for (part, material) in self.0.into_iter().zip(0..) {
             if !part.flat.is_empty() {

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::{ply, stl, suffix};
+use super::Format;
 use crate::memory::Mapped;
 
 /// At least so much is in a file.
@@ -21,11 +21,7 @@ pub struct Promised {
 /// file is for [`load`](super::load) to say.
 pub fn promised(path: &Path) -> Option<Promised> {
     let file = Mapped::open(path).ok()?;
-    match suffix(path).as_str() {
-        "ply" => ply::promised(path, &file),
-        "stl" => stl::promised_mesh(&file),
-        _ => None,
-    }
+    Format::of(path)?.promised(path, &file)
 }
 
 #[cfg(test)]

@@ -39,12 +39,16 @@ impl Mesh {
         Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
     }
 
-    /// Stores f64 positions as f32 offsets from an origin, chosen by `choose_origin`.
+    /// Stores f64 positions as f32 offsets from an origin in the middle of those that the mesh's triangles name, where these are far from zero; in the
+    /// middle of all of them where it has no triangles yet.
     pub fn set_positions(&mut self, positions: &[DVec3]) {
-        let tasks = positions.par_chunks(TASK);
-        let bounds =
-            tasks.map(|part| part.iter().filter(|p| p.is_finite()).fold(DAabb::EMPTY, |all, &p| all.include(p)));
-        self.origin = choose_origin(&bounds.reduce(|| DAabb::EMPTY, DAabb::union));
+        let corners = self.triangles.as_flattened();
+        let bounds = if corners.is_empty() {
+            bounds_of(positions, |p| Some(*p))
+        } else {
+            bounds_of(corners, |&i| positions.get(i as usize).copied())
+        };
+        self.origin = choose_origin(&bounds);
         let offset = |p: &DVec3| (p - self.origin).as_vec3();
         self.positions = Arc::new(positions.par_iter().with_min_len(TASK).map(offset).collect());
     }
@@ -138,6 +142,13 @@ impl Mesh {
         }
         self.normals = sums.into_par_iter().with_min_len(TASK).map(|n| n.normalize_or_zero().as_vec3()).collect();
     }
+}
+
+/// Around the finite ones of the points of these items.
+pub(crate) fn bounds_of<T: Sync>(items: &[T], point: impl Fn(&T) -> Option<DVec3> + Sync) -> DAabb {
+    let finite = |item: &T| point(item).filter(|p| p.is_finite());
+    let tasks = items.par_chunks(TASK).map(|part| part.iter().filter_map(finite).fold(DAabb::EMPTY, DAabb::include));
+    tasks.reduce(|| DAabb::EMPTY, DAabb::union)
 }
 
 /// The origin for positions within `bounds`: zero where f32 keeps the shape anyway, else the middle. "Anyway" is

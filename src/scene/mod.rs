@@ -29,7 +29,7 @@ pub use instance::{Group, Instance};
 pub use light::{AreaShape, Attenuation, Light, Unlit};
 pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
-pub(crate) use mesh::choose_origin;
+pub(crate) use mesh::{bounds_of, choose_origin};
 pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossiness, Texels, Workflow};
 pub use pose::{Journey, Pose};
 pub use procedural::{architecture, terrain};

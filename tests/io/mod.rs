@@ -92,6 +92,47 @@ pub fn corners(mesh: &Mesh) -> Vec<[Vec3; 3]> {
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
+/// A vertex that no face uses, far away, neither frames the scene nor takes from the others' precision.
+#[test]
+fn strays_change_nothing() {
+    let far = 1_000_000.1;
+    let corners = [[far, 0.0, far], [far + 2.0, 0.0, far], [far, 2.0, far]];
+    let text = |stray: bool, vertex: &dyn Fn([f64; 3]) -> String| {
+        let all = stray.then_some([0.0; 3]).into_iter().chain(corners).chain(stray.then_some([-3e7, 0.0, 9.0]));
+        all.map(vertex).collect::<String>()
+    };
+    let files = |stray: bool| {
+        let [a, b, c] = if stray { [1, 2, 3] } else { [0, 1, 2] };
+        let obj = text(stray, &|[x, y, z]| format!("v {x} {y} {z}\n"));
+        let rows = text(stray, &|[x, y, z]| format!("{x} {y} {z}\n"));
+        let lists = text(stray, &|[x, y, z]| format!("[{x:?}, {y:?}, {z:?}], "));
+        let count = if stray { 5 } else { 3 };
+        let ply = |kind: &str| {
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex {count}\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
+                 element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}3 {a} {b} {c}\n"
+            )
+        };
+        Files::one("a.obj", format!("{obj}f {} {} {}\n", a + 1, b + 1, c + 1))
+            .and("double.ply", ply("double"))
+            .and("single.ply", ply("float"))
+            .and("a.toml", format!("[[mesh]]\npositions = [{lists}]\ntriangles = [[{a}, {b}, {c}]]\n"))
+    };
+    let (clean, strayed) = (files(false), files(true));
+    for name in ["a.obj", "double.ply", "single.ply", "a.toml"] {
+        let [clean, strayed] = [&clean, &strayed].map(|files| files.scene(name));
+        let [found, expected] = [&strayed, &clean].map(|scene| {
+            let mesh = meshes(scene)[0];
+            (mesh.positions.iter().map(|&p| mesh.point(p)).collect::<Vec<_>>(), scene.bounds().min, scene.bounds().max)
+        });
+        assert_eq!(found, expected, "{name}");
+        let exact = if name == "single.ply" { 0.1 } else { 1e-6 };
+        for (found, corner) in found.0.iter().zip(corners) {
+            assert!((*found - DVec3::from(corner)).length() < exact, "{name}: {found}");
+        }
+    }
+}
+
 #[test]
 fn files_that_are_no_scenes() {
     let files = Files::one("empty.obj", "").and("scene.xyz", "x").and("none", "x");

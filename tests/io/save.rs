@@ -98,6 +98,34 @@ fn triangles_come_back_from_ply() {
 }
 
 #[test]
+fn what_could_not_be_read_again_is_not_written() {
+    let files = Files::one("old.toml", "old");
+    let scene = |mesh: Mesh| Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+    let triangle = |corner: Vec3, last: u32| Mesh::new(vec![corner, Vec3::X, Vec3::Y], vec![[0, 1, last]]);
+    let few = Mesh { normals: vec![Vec3::Z], ..triangle(Vec3::ZERO, 2) };
+    let bent = Mesh { normals: vec![Vec3::NAN; 3], ..triangle(Vec3::ZERO, 2) };
+    let unlike = [
+        (triangle(Vec3::ZERO, 3), "index 3 is past its 3 vertices", 3),
+        (few, "1 normals for 3 positions", 3),
+        (triangle(Vec3::NAN, 2), "not finite", 2),
+        (triangle(Vec3::INFINITY, 2), "not finite", 2),
+        (bent, "not finite", 2),
+    ];
+    for (mesh, words, code) in unlike {
+        let scene = scene(mesh);
+        for name in ["old.toml", "a.nff"] {
+            let error = save(&scene, &files.path(name)).unwrap_err();
+            assert!(error.to_string().contains(words) && error.exit_code() == code, "{name}: {error}");
+        }
+        if code == 3 {
+            assert_eq!(save(&scene, &files.path("a.ply")).unwrap_err().exit_code(), 3);
+        }
+    }
+    assert_eq!(std::fs::read(files.path("old.toml")).unwrap(), b"old");
+    assert!(!files.path("a.nff").exists() && !files.path("a.ply").exists());
+}
+
+#[test]
 fn what_a_format_cannot_say_is_bad_usage() {
     let files = Files::one("old.ply", "old");
     let refused = |scene: &Scene, name: &str, words: &str| {

@@ -271,7 +271,7 @@ fn faults_are_told_with_line_and_remedy() {
             4,
             "did you mean \"red\"?",
         ),
-        ("[sphere]\nradius = 1\n", 1, "a table where \"sphere\" wants a list"),
+        ("[sphere]\nradius = 1\n", 1, "one table [sphere] where there may be several; write [[sphere]]"),
         ("[material.a]\ndiffuse = [1, -1, 0]\n", 2, "from 0 up"),
         ("[material.a]\nior = 0\n", 2, "above 0"),
         (

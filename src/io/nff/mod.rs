@@ -18,7 +18,7 @@ use std::path::Path;
 
 use self::view::View;
 use super::Placeless;
-use super::local_origin::DShape;
+use super::dshape::DShape;
 use super::parts::Parts;
 use super::polygon::triangulate;
 use super::statement::{Statement, statements};
@@ -176,7 +176,7 @@ impl Reader {
                 }
                 self.polygon(corners, line)?;
             }
-            _ => {
+            b"pp" => {
                 let count = corner_count(statement)?;
                 statement.end()?;
                 let (mut corners, mut normals) = (Vec::new(), Vec::new());
@@ -187,6 +187,7 @@ impl Reader {
                 }
                 self.patch(&corners, &normals)?;
             }
+            _ => unreachable!("{} is among the usages", quoted(word)),
         }
         statement.end()
     }

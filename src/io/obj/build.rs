@@ -13,14 +13,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::mtl::Library;
-use super::statement::Polygon;
+use super::statement::{Faces, Polygon};
 use super::{NONE, Obj, Piece, Section};
 use crate::error::{Error, Result, Warning};
 use crate::io::compact::{compact, pick};
 use crate::io::polygon;
 use crate::math::{DAabb, DVec3, Vec2, Vec3, Vec4};
 use crate::memory;
-use crate::scene::{Geometry, Mesh, Scene, choose_origin};
+use crate::scene::{Geometry, Mesh, Scene, bounds_of, choose_origin};
 
 /// Positions that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -49,14 +49,11 @@ type Smooth = HashMap<(u32, u32), DVec3>;
 pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut Vec<Warning>) -> Result<Scene> {
     let sections = std::mem::take(&mut obj.sections);
     let triangles: Vec<Triangles> = sections.iter().map(|section| split(path, &obj, section)).collect::<Result<_>>()?;
+    // One origin for all, so that vertices that meshes share stay equal; what no face uses has no say.
+    let used = |faces: &Faces| bounds_of(&faces.positions, |&i| obj.positions.get(i as usize).copied());
+    let origin = choose_origin(&obj.faces.iter().map(used).fold(DAabb::EMPTY, DAabb::union));
     obj.faces = Vec::new();
     let smooth = smooth_normals(&obj, &triangles);
-    // One origin for all, so that vertices that meshes share stay equal.
-    let bounds = obj.positions.par_chunks(TASK).map(|part| {
-        let finite = part.iter().filter(|p| p.is_finite());
-        finite.fold(DAabb::EMPTY, |all, &p| all.include(p))
-    });
-    let origin = choose_origin(&bounds.reduce(|| DAabb::EMPTY, DAabb::union));
     let is_plain = triangles.iter().all(|triangles| matches!(triangles, Triangles::Plain(_)));
     let mut chains = Chains::new(if is_plain { 0 } else { obj.positions.len() });
     let mut geometries = Vec::new();

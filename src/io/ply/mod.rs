@@ -114,12 +114,12 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
         let message = format!("{} faces with fewer than 3 corners are left out", faces.small);
         warnings.push(Warning::new(path, "", message));
     }
+    mesh.triangles = Arc::new(faces.triangles);
     match vertices.positions {
         Positions::Single(positions) => mesh.positions = Arc::new(positions),
         Positions::Double(positions) => mesh.set_positions(&positions),
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (vertices.normals, vertices.uvs, vertices.colors);
-    mesh.triangles = Arc::new(faces.triangles);
     Ok(mesh)
 }
 

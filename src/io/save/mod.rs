@@ -14,7 +14,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::output::write_atomically;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Mesh, Scene};
 
 /// The suffixes that [`save`] knows.
 pub const SAVE_SUFFIXES: [&str; 3] = ["nff", "ply", "toml"];
@@ -28,8 +28,8 @@ type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
 /// Writes `scene` to `path`. The suffix, in any case, decides the format: one of [`SAVE_SUFFIXES`].
 ///
 /// # Errors
-/// [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, say); [`Error::Output`] where
-/// the file cannot be written, which leaves an old one whole.
+/// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, corners that are
+/// NaN in text); [`Error::Output`] where the file cannot be written, which leaves an old one whole.
 pub fn save(scene: &Scene, path: &Path) -> Result<()> {
     let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
     type Check = fn(&Scene) -> std::result::Result<(), Unsayable>;
@@ -42,6 +42,7 @@ pub fn save(scene: &Scene, path: &Path) -> Result<()> {
             return Err(Error::Usage(format!("{}: scenes are written as {known}", path.display())));
         }
     };
+    scene.check()?;
     check(scene).map_err(|message| Error::Usage(format!("{}: {message}", path.display())))?;
     write_atomically(path, |part| {
         let write_all = || {
@@ -50,6 +51,24 @@ pub fn save(scene: &Scene, path: &Path) -> Result<()> {
             file.into_inner()?.sync_all()
         };
         write_all().map_err(|error: io::Error| Error::output(path, format!("cannot be written: {error}")))
+    })
+}
+
+/// Whether all numbers of the meshes are finite, as those of text formats have to be.
+fn check_finite(scene: &Scene) -> std::result::Result<(), Unsayable> {
+    let is_whole = |mesh: &Mesh| {
+        let vectors = mesh.positions.iter().chain(&mesh.normals).all(|v| v.is_finite());
+        vectors && mesh.origin.is_finite() && mesh.uvs.iter().all(|uv| uv.is_finite())
+    };
+    let broken = scene.geometries.iter().find_map(|geometry| match geometry {
+        Geometry::Mesh(mesh) if !is_whole(mesh) => Some(mesh),
+        Geometry::Mesh(_) | Geometry::Shapes { .. } => None,
+    });
+    broken.map_or(Ok(()), |mesh| {
+        Err(format!(
+            "mesh {:?} has numbers that are not finite, which text cannot hold; write .ply, or leave these out",
+            mesh.name
+        ))
     })
 }
 

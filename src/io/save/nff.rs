@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Unsayable, placed, spaced, spaced_f64};
+use super::{Unsayable, check_finite, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use crate::scene::{
     Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
@@ -12,6 +12,7 @@ use crate::shape::Shape;
 
 /// Whether the format has words for all of it.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
+    check_finite(scene)?;
     let elsewhere = |what: String| Err(format!("NFF has no {what}; write .toml"));
     for (geometry, transform) in placed(scene) {
         let Geometry::Shapes { shapes, .. } = geometry else { continue };

@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::Unsayable;
+use super::{Unsayable, check_finite};
 use crate::image::Curve;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
@@ -14,6 +14,7 @@ use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
+    check_finite(scene)?;
     let is_coloured = |geometry: &Geometry| matches!(geometry, Geometry::Mesh(mesh) if !mesh.colors.is_empty());
     if scene.environment.is_some() {
         return Err("environments are not written; name the picture's file in [environment]".to_owned());

@@ -5,12 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::table::{Read, Table, Value};
 use crate::error::{Error, Result, Warning};
-use crate::io::{LoadOptions, Normals, Unit, UpAxis, load};
+use crate::io::{Format, LoadOptions, Normals, SUFFIXES, Unit, UpAxis, load};
 use crate::math::DAffine3;
 use crate::scene::{Geometry, Scene};
-
-/// Formats that hold meshes. A scene within a scene would bring a second camera and other light.
-const SUFFIXES: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];
 
 /// What is included once, however often it is named.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -42,9 +39,11 @@ impl Include {
         let value = table.need("path")?;
         let name = value.text()?;
         let path = folder.join(name);
-        let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
-        if !SUFFIXES.contains(&suffix.as_str()) {
-            return Err(value.fault(format!("{name:?} is no mesh file; known are {}", SUFFIXES.join(", "))));
+        let holds_meshes = |name: &Path| Format::of(name).is_some_and(Format::holds_meshes);
+        if !holds_meshes(&path) {
+            let is_mesh = |suffix: &&str| holds_meshes(Path::new(&format!("a.{suffix}")));
+            let known: Vec<&str> = SUFFIXES.into_iter().filter(is_mesh).collect();
+            return Err(value.fault(format!("{name:?} is no mesh file; known are {}", known.join(", "))));
         }
         let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];
         let units = [("m", Unit::Metre), ("cm", Unit::Centimetre), ("mm", Unit::Millimetre), ("in", Unit::Inch)];

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::table::{Fault, Read, Table, Value};
-use crate::io::local_origin::DShape;
+use crate::io::dshape::DShape;
 use crate::io::parts::{Parts, Sorted};
 use crate::math::{DMat3, DVec3, Vec2};
 use crate::scene::{Geometry, Mesh};

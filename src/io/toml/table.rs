@@ -69,6 +69,9 @@ impl<'t> Table<'t> {
     /// The tables of `[[key]]`, in order; none where there are none.
     pub(super) fn tables(&mut self, key: &'static str) -> Read<Vec<Table<'t>>> {
         let Some(value) = self.get(key) else { return Ok(Vec::new()) };
+        if let DeValue::Table(_) = value.value {
+            return Err(value.fault(format!("one table [{key}] where there may be several; write [[{key}]]")));
+        }
         value.items()?.map(|item| item.table(format!("[[{key}]]"))).collect()
     }
 

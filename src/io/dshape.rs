@@ -64,7 +64,7 @@ pub(super) enum DShape {
 
 /// The local origin of shapes that stand together: zero where f32 holds them as they are, or a middle would not serve them better. Planes, which are everywhere,
 /// have no say.
-pub(super) fn choose<'a>(shapes: impl Iterator<Item = &'a DShape> + Clone) -> DVec3 {
+pub(super) fn local_origin<'a>(shapes: impl Iterator<Item = &'a DShape> + Clone) -> DVec3 {
     let mut bounded = shapes.filter(|shape| !matches!(shape, DShape::Plane { .. }));
     let bounds = bounded.clone().flat_map(DShape::points).fold(DAabb::EMPTY, |all, &p| all.include(p));
     if bounds.is_empty() || !bounded.any(DShape::is_moved) { DVec3::ZERO } else { choose_origin(&bounds) }
