@@ -287,9 +287,15 @@ mod tests {
         let difference = lean.difference(&full).expect("of one size").max_abs;
         let step = 1.0 / 255.0 / 12.92;
         assert!(difference > 0.0 && difference < 0.5 * step, "{difference:e}");
+        // Where something is a hundred times as bright as white, a hundredth of that share is seen.
+        let mut bright = needing(Reduction::Faint);
+        bright.lights.push(Light::Directional { direction: DVec3::NEG_Y, color: Vec3::splat(100.0) });
+        let full = picture(&bright, &complete(Complete::NOTHING.with(Reduction::Faint))).0;
+        let difference = picture(&bright, &settings()).0.difference(&full).expect("of one size").max_abs;
+        assert!(difference < 0.5 * step, "{difference:e}");
         // Mirrors that matter to the last are followed as far either way.
-        let bright = needing(Reduction::Recursion);
-        assert_eq!(picture(&bright, &settings()).0, picture(&bright, &complete(Complete::ALL)).0);
+        let half = needing(Reduction::Recursion);
+        assert_eq!(picture(&half, &settings()).0, picture(&half, &complete(Complete::ALL)).0);
     }
 
     /// Paths choose among the lights there are, so that the noise is another and the mean is the same.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::brightness;
 use super::reach::reaches;
 use crate::math::{DAabb, DAffine3, Vec3};
 use crate::scene::{Alpha, Geometry, Light, Material, Scene};
@@ -38,6 +39,8 @@ pub struct Census {
     pub ways: f64,
     /// The share of light that a primitive sends on, on average.
     pub albedo: f64,
+    /// No ray that is sent on sees anything brighter than this, linear, at least 1; may be infinite.
+    pub brightest: f32,
 }
 
 /// Meshes.
@@ -125,6 +128,8 @@ impl Census {
             census.ways += share * ways(material);
             census.albedo += share * f64::from(albedo(material));
         }
+        // Asked for only where rays go on: it may look at all of an environment, or of the world's bounds.
+        census.brightest = if census.materials.sending_on > 0 { brightness::bound(scene, world) } else { 1.0 };
         census
     }
 

@@ -15,6 +15,7 @@
 //! ambient term, lights that are black or out of reach. What the plan decides the renderer reads there, and never decides again; of the scene it takes
 //! materials, textures and the lights that are left.
 
+mod brightness;
 mod build;
 mod census;
 mod integrator;
@@ -32,7 +33,7 @@ pub use work::{Rays, Work};
 
 use crate::error::Result;
 use crate::math::Vec3;
-use crate::scene::{Fog, Integrator, Light, Scene, Unlit};
+use crate::scene::{Fog, Integrator, Scene, Unlit};
 use crate::shade::Attributes;
 use crate::shade::light::LightSource;
 use crate::shade::lights::has_emitters;
@@ -63,8 +64,8 @@ pub const USUAL_DEPTH: u32 = 5;
 /// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
 pub const USUAL_PATH_DEPTH: u32 = 64;
 
-/// A share of the picture, in each channel, that is not worth a mirrored or refracted ray: below half the smallest step of 8 bits,
-/// which in sRGB is 1 / 255 / 12.92, so that what is white and less shows no difference.
+/// A share of the picture, in each channel, that is not worth a mirrored or refracted ray to what is white and less: below half the smallest step of 8 bits,
+/// which in sRGB is 1 / 255 / 12.92. Where something may be brighter, the share is as much smaller ([`Census::brightest`]).
 pub const FAINT: f32 = 1e-4;
 
 /// What is wanted of a render. What is none is chosen.
@@ -99,7 +100,7 @@ pub struct Plan {
     pub why: &'static str,
     /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
-    /// Mirrored and refracted rays of no larger share are not followed: [`FAINT`], or 0.
+    /// Mirrored and refracted rays of no larger share are not followed: [`FAINT`] by what is brightest, or 0.
     pub faint: f32,
     /// Whether textures bend normals.
     pub normal_maps: bool,
@@ -135,93 +136,47 @@ impl Plan {
 
     /// The same of a scene that is counted already.
     pub fn of_census(scene: &Scene, world: &World, wishes: &Wishes, census: &Census) -> Self {
-        let Census { materials, meshes, lights, environment, .. } = census;
-        let (environment, complete) = (*environment, wishes.complete);
-        let (sends_on, is_lit) = (materials.sending_on > 0, materials.lit > 0);
-        let bodies = || {
-            let sources: Vec<_> =
-                lights.bright.iter().map(|&i| LightSource::new(&scene.lights[i], world.centre)).collect();
-            has_emitters(scene, world, &sources)
-        };
-        let is_meant_dark = scene.unlit == Unlit::Darkness || !scene.lights.is_empty();
-        let asked = integrator::Needs {
-            sends_on,
-            is_lit,
-            is_dark: is_meant_dark && lights.bright.is_empty() && !environment && !census.ambient,
-            emitters: &bodies,
-        };
-        let (mut integrator, why) = integrator::choose(wishes.integrator, &asked);
-        if complete.has(Reduction::Recursion) && integrator == Integrator::RayCast && wishes.integrator.is_none() {
-            integrator = Integrator::Whitted;
-        }
-        let is_path = integrator == Integrator::Path;
-
-        let reflects = is_lit || is_path && sends_on;
-        // To paths, what is behind everything is light too.
-        let shines = |color: Option<Vec3>| color.is_some_and(|color| color != Vec3::ZERO);
-        let found = is_path && (shines(wishes.background.or(scene.background)) || bodies());
-        let headlight = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && !environment && !found;
-        let lighting = match (reflects, headlight) {
-            (false, _) => Lighting::None,
-            (true, true) => Lighting::Headlight,
-            (true, false) => Lighting::Lights(lights.reaching.clone()),
-        };
-        let lit =
-            is_path || environment || !matches!(&lighting, Lighting::None) && lighting != Lighting::Lights(vec![]);
-        let lighting = match lighting {
-            Lighting::None | Lighting::Lights(_) if complete.has(Reduction::Lights) => {
-                // The bodies of black lights would be mistaken for them by paths.
-                Lighting::Lights(if is_path { lights.bright.clone() } else { (0..scene.lights.len()).collect() })
-            }
-            needed => needed,
-        };
-        let sends = complete.has(Reduction::Recursion);
-        let depth = match integrator {
-            Integrator::RayCast => 0,
-            Integrator::Whitted if sends_on || sends => wishes.max_depth.unwrap_or(USUAL_DEPTH),
-            Integrator::Path if reflects || sends => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
-            Integrator::Whitted | Integrator::Path => 0,
-        };
+        let case = Case { scene, world, wishes, census };
+        let (integrator, why) = case.integrator();
+        let depth = case.depth(integrator);
+        let needed = case.lighting(integrator);
+        let is_lit = integrator == Integrator::Path
+            || census.environment
+            || !matches!(&needed, Lighting::None) && needed != Lighting::Lights(vec![]);
+        let lighting = case.completed(needed, integrator);
         // What ambient light stands for, paths find.
-        let ambient = !is_path && census.ambient && materials.ambient > 0;
-        let alpha = materials.alpha > 0;
-        let surfaces = complete.has(Reduction::Surfaces);
-        let normal_maps = (lit || depth > 0) && materials.normal_mapped > 0 || surfaces;
-        let attributes = Attributes {
-            normals: (lit || depth > 0) && meshes.normals > 0 || surfaces,
-            uvs: (lit || depth > 0 || ambient || alpha || materials.shown_unlit > 0) && materials.textured > 0
-                || normal_maps,
-            colors: (lit || depth > 0 || ambient || alpha || materials.unlit > 0) && meshes.colors > 0 || surfaces,
-        };
+        let ambient = integrator != Integrator::Path && census.ambient && census.materials.ambient > 0;
+        let has = |reduction| wishes.complete.has(reduction);
+        let (attributes, normal_maps) = case.attributes(is_lit || depth > 0, ambient);
         let casting = match &lighting {
             Lighting::Lights(lights) => &lights[..],
             Lighting::None | Lighting::Headlight => &[],
         };
-        let has_surface = |&&i: &&usize| matches!(scene.lights[i], Light::Area { .. });
-        let extended = casting.iter().filter(has_surface).count();
-        let around = usize::from(environment && lighting != Lighting::None);
+        let extended = casting.iter().filter(|&&i| scene.lights[i].is_extended()).count();
+        let around = usize::from(census.environment && lighting != Lighting::None);
+        let glowing = usize::from(integrator == Integrator::Path && census.materials.glowing > 0 && case.has_bodies());
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
-            motion: world.moves() || complete.has(Reduction::Motion),
+            motion: world.moves() || has(Reduction::Motion),
             ambient,
             integrator,
             why,
             depth,
-            faint: if complete.has(Reduction::Faint) { 0.0 } else { FAINT },
-            alpha: alpha || complete.has(Reduction::Alpha),
+            faint: if has(Reduction::Faint) { 0.0 } else { FAINT / census.brightest },
+            alpha: census.materials.alpha > 0 || has(Reduction::Alpha),
             normal_maps,
-            environment,
+            environment: census.environment,
             fog: scene.fog.filter(|_| census.fog),
-            background: wishes.background.or(scene.background),
+            background: case.background(),
             primitives: world.primitive_count(),
-            materials: materials.used as usize,
+            materials: census.materials.used as usize,
             work: Work::new(&work::Means {
                 integrator,
                 depth,
                 ways: census.ways,
                 albedo: census.albedo,
-                lights: [casting.len() - extended, extended + around],
+                lights: [casting.len() - extended, extended + around + glowing],
             }),
             lighting,
         }
@@ -229,7 +184,7 @@ impl Plan {
 
     /// Whether any shadow ray will be traced.
     pub fn shadows(&self) -> bool {
-        matches!(&self.lighting, Lighting::Lights(lights) if !lights.is_empty())
+        self.work.shadow + self.work.area_shadow > 0.0
     }
 
     /// What of the complete model is left out of this plan, which was made with `wishes`.
@@ -248,12 +203,106 @@ impl Plan {
     }
 }
 
+/// What a plan follows from.
+struct Case<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    wishes: &'a Wishes,
+    census: &'a Census,
+}
+
+impl Case<'_> {
+    fn background(&self) -> Option<Vec3> {
+        self.wishes.background.or(self.scene.background)
+    }
+
+    /// Whether anything glows that light comes from.
+    fn has_bodies(&self) -> bool {
+        let Self { scene, world, census, .. } = self;
+        let source = |&i: &usize| LightSource::new(&scene.lights[i], world.centre);
+        has_emitters(scene, world, &census.lights.bright.iter().map(source).collect::<Vec<_>>())
+    }
+
+    /// How far light is followed, and why.
+    fn integrator(&self) -> (Integrator, &'static str) {
+        let Self { scene, wishes, census, .. } = self;
+        let is_meant_dark = scene.unlit == Unlit::Darkness || !scene.lights.is_empty();
+        let asked = integrator::Needs {
+            sends_on: census.materials.sending_on > 0,
+            is_lit: census.materials.lit > 0,
+            is_dark: is_meant_dark && census.lights.bright.is_empty() && !census.environment && !census.ambient,
+            emitters: &|| self.has_bodies(),
+        };
+        let (chosen, why) = integrator::choose(wishes.integrator, &asked);
+        let is_free = chosen == Integrator::RayCast && wishes.integrator.is_none();
+        let sends_on = is_free && wishes.complete.has(Reduction::Recursion);
+        (if sends_on { Integrator::Whitted } else { chosen }, why)
+    }
+
+    /// Whether light that arrives is asked for anywhere.
+    fn reflects(&self, integrator: Integrator) -> bool {
+        let materials = &self.census.materials;
+        materials.lit > 0 || integrator == Integrator::Path && materials.sending_on > 0
+    }
+
+    /// The lights that are needed.
+    fn lighting(&self, integrator: Integrator) -> Lighting {
+        let Self { scene, census, .. } = self;
+        if !self.reflects(integrator) {
+            return Lighting::None;
+        }
+        let is_unlit = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && !census.environment;
+        // To paths, what is behind everything is light too.
+        let shines = || self.background().is_some_and(|color| color != Vec3::ZERO);
+        let finds_light = || integrator == Integrator::Path && (shines() || self.has_bodies());
+        if is_unlit && !finds_light() { Lighting::Headlight } else { Lighting::Lights(census.lights.reaching.clone()) }
+    }
+
+    /// The lights that are asked, needed or not.
+    fn completed(&self, needed: Lighting, integrator: Integrator) -> Lighting {
+        match needed {
+            Lighting::None | Lighting::Lights(_) if self.wishes.complete.has(Reduction::Lights) => {
+                // The bodies of black lights would be mistaken for them by paths.
+                let is_path = integrator == Integrator::Path;
+                let all = || (0..self.scene.lights.len()).collect();
+                Lighting::Lights(if is_path { self.census.lights.bright.clone() } else { all() })
+            }
+            needed => needed,
+        }
+    }
+
+    /// How often rays are sent on.
+    fn depth(&self, integrator: Integrator) -> u32 {
+        let Self { wishes, census, .. } = self;
+        let always = wishes.complete.has(Reduction::Recursion);
+        match integrator {
+            Integrator::Whitted if census.materials.sending_on > 0 || always => wishes.max_depth.unwrap_or(USUAL_DEPTH),
+            Integrator::Path if self.reflects(integrator) || always => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
+            Integrator::RayCast | Integrator::Whitted | Integrator::Path => 0,
+        }
+    }
+
+    /// What is interpolated where a ray hits, and whether normals are mapped. `is_shaded`: whether light is asked for there, or rays go on.
+    fn attributes(&self, is_shaded: bool, ambient: bool) -> (Attributes, bool) {
+        let Census { materials, meshes, .. } = self.census;
+        let all = self.wishes.complete.has(Reduction::Surfaces);
+        let normal_maps = all || is_shaded && materials.normal_mapped > 0;
+        let is_coloured = is_shaded || ambient || materials.alpha > 0;
+        let attributes = Attributes {
+            normals: all || is_shaded && meshes.normals > 0,
+            uvs: normal_maps || (is_coloured || materials.shown_unlit > 0) && materials.textured > 0,
+            colors: all || (is_coloured || materials.unlit > 0) && meshes.colors > 0,
+        };
+        (attributes, normal_maps)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::image::Image;
     use crate::math::{DVec3, Vec2, Vec4};
-    use crate::scene::{Attenuation, Environment, Geometry, Material, Mesh};
+    use crate::scene::{Attenuation, Environment, Geometry, Light, Material, Mesh};
 
     fn scene() -> Scene {
         let mesh = Mesh {
@@ -285,6 +334,17 @@ mod tests {
         let dark = Scene { unlit: Unlit::Darkness, ..scene() };
         assert_eq!(plan(&dark).lighting, Lighting::Lights(Vec::new()));
         assert!(!plan(&dark).shadows() && plan(&dark).to_string().contains("no light"));
+    }
+
+    /// Paths ask surfaces that glow as they ask lights.
+    #[test]
+    fn what_glows_is_asked_by_paths() {
+        let mut scene = scene();
+        scene.materials[0].emission = Vec3::ONE;
+        let by = |integrator| Wishes { integrator: Some(integrator), ..Wishes::default() };
+        assert!(!wished(&scene, &by(Integrator::Whitted)).shadows());
+        let paths = wished(&scene, &by(Integrator::Path));
+        assert!(paths.shadows() && paths.work.rays(100, 1).shadow > 100, "{:?}", paths.work);
     }
 
     #[test]

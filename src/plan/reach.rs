@@ -96,8 +96,8 @@ mod tests {
             let gives = (0..200).any(|_| {
                 let share = (random.vector().as_dvec3() + 1.0) / 2.0;
                 let point = bounds.min + (bounds.max - bounds.min) * share;
-                let even = DVec2::new(random.unit().into(), random.unit().into());
-                source.illuminate(point, even).is_some_and(|arriving| arriving.color != Vec3::ZERO)
+                let xi = DVec2::new(random.unit().into(), random.unit().into());
+                source.illuminate(point, xi).is_some_and(|arriving| arriving.color != Vec3::ZERO)
             });
             let reached = reaches(&light, &bounds);
             assert!(reached || !gives, "{light:?}");

@@ -44,7 +44,7 @@ pub(super) struct Means {
     pub(super) ways: f64,
     /// The share of light that a surface sends on, on average.
     pub(super) albedo: f64,
-    /// Lights that cast shadows, without and with a surface.
+    /// Lights that cast shadows, without and with a surface; surfaces that glow are one of these.
     pub(super) lights: [usize; 2],
 }
 

@@ -1,0 +1,111 @@
+//! How bright the brightest thing may be that a ray sees: what rays may be left out follows from it.
+
+use crate::math::DVec3;
+use crate::scene::{Light, Material, Scene, Specular};
+use crate::trace::World;
+
+/// No ray sees more than this, linear and in any channel; at least 1, and infinite where nothing is known, as beside a light that grows without bound.
+///
+/// What a ray sees is weighted along its way by what mirrors and glass leave of it. Glass has light denser within than outside, by the square of its index
+/// (`Way::scale`): a ray may weigh so much less within than what comes of it, which is counted here.
+pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
+    let arriving: f32 = scene.lights.iter().map(|light| of_light(light, world)).sum();
+    // Where there is none there may be a headlight.
+    let arriving = if scene.lights.is_empty() { 1.0 } else { arriving };
+    let environment = scene.environment.as_ref().map_or(0.0, |environment| {
+        let brightest = environment.image.pixels.iter().map(|pixel| pixel.truncate().max_element()).fold(0.0, f32::max);
+        brightest * environment.intensity
+    });
+    let behind = scene.background.map_or(0.0, |color| color.max_element());
+    let fog = scene.fog.map_or(0.0, |fog| fog.color.max_element());
+    let of_material = |material: &Material| surface(material, scene.ambient.max_element(), arriving + environment);
+    let surfaces = scene.materials.iter().map(of_material).fold(0.0, f32::max);
+    let denser: f32 = scene.materials.iter().map(density).product();
+    [environment, behind, fog, surfaces].into_iter().fold(1.0, f32::max) * denser
+}
+
+/// What a white matte surface shows of it at most.
+fn of_light(light: &Light, world: &World) -> f32 {
+    match light {
+        Light::Directional { color, .. } => color.max_element(),
+        Light::Point { color, attenuation, position, .. } | Light::Spot { color, attenuation, position, .. } => {
+            let color = color.max_element();
+            // The nearer the brighter. Not a product with 0, which of what is infinite would be NaN.
+            if color > 0.0 { color * attenuation.factor(distance(*position, world)) } else { 0.0 }
+        }
+        Light::Area { radiance, .. } => radiance.max_element(),
+    }
+}
+
+/// How far a point is from everything at least; 0 from planes, which are everywhere.
+fn distance(point: DVec3, world: &World) -> f32 {
+    let bounds = world.bounds();
+    if world.is_unbounded() || bounds.is_empty() {
+        return 0.0;
+    }
+    let point = point - world.centre;
+    let nearest = point.clamp(bounds.min.as_dvec3(), bounds.max.as_dvec3());
+    (point - nearest).length() as f32
+}
+
+/// What a surface shows at most of its own, of ambient light, and of what arrives from lights.
+fn surface(material: &Material, ambient: f32, arriving: f32) -> f32 {
+    let n = material.shininess;
+    let peak = match (material.energy_conserving, material.model) {
+        (false, _) => 1.0,
+        (true, Specular::Phong) => (n + 2.0) / 2.0,
+        (true, Specular::BlinnPhong) => (n + 2.0) * (n + 4.0) / (8.0 * ((-n / 2.0).exp2() + n)),
+    };
+    let lit = material.diffuse.max_element() + material.specular.max_element() * peak.max(1.0);
+    let reflected = if lit > 0.0 { lit * arriving } else { 0.0 };
+    material.emission.max_element() + material.ambient.max_element() * ambient + reflected
+}
+
+/// By how much light is denser on one side of a surface than on the other.
+fn density(material: &Material) -> f32 {
+    let refracts = material.transmission.max_element() > 0.0;
+    if refracts { material.ior.max(material.ior.recip()).powi(2) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::scene::{Attenuation, Geometry, Mesh};
+
+    /// A triangle from zero to 1 along x and y, of a material, and a light.
+    fn bound_of(material: Material, light: Light) -> f32 {
+        let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]);
+        scene.lights = vec![light];
+        bound(&scene, &World::new(&scene).expect("sound"))
+    }
+
+    fn matte() -> Material {
+        Material { diffuse: Vec3::splat(0.5), ambient: Vec3::ZERO, specular: Vec3::ZERO, ..Material::default() }
+    }
+
+    fn lamp(position: DVec3, attenuation: Attenuation) -> Light {
+        Light::Point { position, color: Vec3::splat(40.0), attenuation, range: f64::INFINITY, radius: 0.0 }
+    }
+
+    #[test]
+    fn lamps_are_as_bright_as_where_they_are_nearest() {
+        let above = lamp(DVec3::new(0.5, 0.5, 2.0), Attenuation::INVERSE_SQUARE);
+        assert_eq!(bound_of(matte(), above), 0.5 * 40.0 / 4.0);
+        let within = DVec3::new(0.5, 0.5, 0.0);
+        assert_eq!(bound_of(matte(), lamp(within, Attenuation::INVERSE_SQUARE)), f32::INFINITY);
+        assert_eq!(bound_of(matte(), lamp(within, Attenuation::NONE)), 0.5 * 40.0);
+        let black = Material { diffuse: Vec3::ZERO, ..matte() };
+        assert_eq!(bound_of(black, lamp(within, Attenuation::INVERSE_SQUARE)), 1.0);
+    }
+
+    #[test]
+    fn what_glows_is_denser_in_glass() {
+        let sun = Light::Directional { direction: DVec3::NEG_Z, color: Vec3::ZERO };
+        let glowing = Material { emission: Vec3::splat(60.0), ..matte() };
+        assert_eq!(bound_of(glowing.clone(), sun.clone()), 60.0);
+        let glass = Material { transmission: Vec3::ONE, ior: 2.0, ..glowing };
+        assert_eq!(bound_of(glass, sun), 4.0 * 60.0);
+    }
+}
