@@ -33,10 +33,16 @@ pub enum Error {
         /// What is wrong, and what would be right.
         message: String,
     },
-    /// A scene that a backend refuses, or a backend that failed (out of memory, say).
+    /// A scene that no backend could take, with what is wrong and what would be right: an index past the vertices, a singular transform.
+    #[error("scene: {0}")]
+    Scene(String),
+    /// A picture that there is not the memory for.
+    #[error("{0}")]
+    Memory(String),
+    /// A scene that one backend refuses, or a backend that failed (out of memory, say).
     #[error("{backend}: {message}")]
     Backend {
-        /// Which one: `embree` or `native`; `scene` where none could take it, `display server` for a viewer.
+        /// Which one: `embree` or `native`, the denoiser's library, or `display server` for a viewer.
         backend: &'static str,
         /// Its own words, with the error code's name.
         message: String,
@@ -80,7 +86,7 @@ impl Error {
         match self {
             Self::Check(_) => 1,
             Self::Usage(_) => 2,
-            Self::Input { .. } | Self::Backend { .. } => 3,
+            Self::Input { .. } | Self::Scene(_) | Self::Memory(_) | Self::Backend { .. } => 3,
             Self::Output { .. } => 4,
             Self::Unavailable(_) => 5,
             Self::Interrupted => 130,

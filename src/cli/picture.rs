@@ -104,9 +104,8 @@ enum Order {
 impl PictureArgs {
     /// What the flags say, else the scene's file, else what is usual.
     pub(super) fn settings(&self, request: &Request, usual_width: Width) -> Settings {
-        let usual = Settings::default();
-        let size = self.size.map(|size| [size.width, size.height]).or(request.size);
-        let [columns, rows] = size.unwrap_or([usual.width, usual.height]);
+        let asked = Settings::of_request(request);
+        let (columns, rows) = self.size.map_or((asked.width, asked.height), |size| (size.width, size.height));
         let width = match self.packet {
             None => usual_width,
             Some(Packet::One) => Width::One,
@@ -117,13 +116,13 @@ impl PictureArgs {
         Settings {
             width: columns,
             height: rows,
-            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
-            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            spp: self.spp.unwrap_or(asked.spp),
+            seed: self.seed.unwrap_or(asked.seed),
             sampling: self.sampler,
             filter: self.filter,
             light_samples: self.light_samples,
-            integrator: self.integrator.map_or(request.integrator, |Wish(integrator)| integrator),
-            max_depth: self.max_depth.or(request.max_depth),
+            integrator: self.integrator.map_or(asked.integrator, |Wish(integrator)| integrator),
+            max_depth: self.max_depth.or(asked.max_depth),
             batch: Batch { width, coherent: true },
             tile_order: match self.tile_order {
                 Order::Scanline => TileOrder::Scanline,

@@ -1,6 +1,7 @@
 //! `twincast render`: from a scene file to finished pictures.
 
 use std::iter;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -30,13 +31,13 @@ use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result};
 use crate::image::{Metadata, Reference, Response, WriteOptions};
-use crate::io;
+use crate::io::Format;
 use crate::memory::process;
 use crate::plan;
 use crate::render::{Renderer, Settings};
 use crate::scene::{Camera, Geometry, Request, Scene};
 use crate::trace::accel::{Accel, Options as AccelOptions};
-use crate::trace::bvh::Preset;
+use crate::trace::bvh::{Preset, prepare_thread};
 
 /// Render a scene
 #[derive(Clone, Debug, Args)]
@@ -150,15 +151,17 @@ fn render(args: &RenderArgs) -> Result<()> {
     args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;
     let may_be_without = args.print_camera || args.explain.is_wanted();
-    if args.output.is_empty() && !may_be_without && !io::may_name_a_picture(&args.scene.scene) {
+    if args.output.is_empty()
+        && !may_be_without
+        && !Format::of(&args.scene.scene).is_some_and(Format::may_name_a_picture)
+    {
         return Err(no_picture());
     }
     outputs::check_places(&args.output, &args.stats, &args.inputs())?;
     let pool = ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
-    // A thread that starts registers what is to be done at its end, under the lock that the system's loader holds as long as it loads libraries. So all are there
-    // before the trial has it load any.
-    pool.broadcast(|_| ());
+    // Starting a thread takes the dynamic loader's lock, which is held as long as a library is being loaded: so all threads are started, and have what ends with them, before the trial loads any.
+    pool.broadcast(|_| prepare_thread());
     let trial = Trial::start(args.output.clone(), cancel)?;
     trial.join(produce(args, &pool, cancel))
 }
@@ -399,6 +402,9 @@ fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
     limit.ok_or_else(|| "expected a number, at least 0".to_owned())
 }
 
+/// As many as help, and some more; a thousand threads on two cores wait for each other for minutes.
 pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
-    text.parse().ok().filter(|&n| n <= 4096).ok_or_else(|| "expected a number from 0 to 4096".to_owned())
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let most = (4 * cores).max(256);
+    text.parse().ok().filter(|&n| n <= most).ok_or_else(|| format!("expected a number from 0 to {most}"))
 }

@@ -37,7 +37,7 @@ impl Canvas {
     /// Without any sample.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) where it does not fit into memory.
+    /// [`Error::Memory`](crate::Error::Memory) where it does not fit into memory.
     pub(super) fn new(window: Crop, with_firsts: bool, request: Option<&Request>) -> Result<Self> {
         let (pixels, Crop { width, height, .. }) = (window.len(), window);
         let mattes = request.and_then(|request| request.mattes.as_deref());
@@ -47,7 +47,7 @@ impl Canvas {
             sums: zeros(width, height, pixels)?,
             weights: zeros(width, height, pixels)?,
             counts: zeros(width, height, pixels)?,
-            active: vec![true; pixels],
+            active: filled(true, width, height, pixels)?,
             firsts: zeros(width, height, only(with_firsts))?,
             beside: zeros(width, height, pixels.saturating_mul(request.map_or(0, |request| request.stride)))?,
             objects: zeros(width, height, only(mattes.is_some_and(|mattes| mattes.has_objects)))?,
@@ -155,8 +155,12 @@ impl Canvas {
 }
 
 fn zeros<T: Clone + Default>(width: u32, height: u32, count: usize) -> Result<Vec<T>> {
+    filled(T::default(), width, height, count)
+}
+
+fn filled<T: Clone>(value: T, width: u32, height: u32, count: usize) -> Result<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).map_err(|_| too_large(width, height))?;
-    values.resize(count, T::default());
+    values.resize(count, value);
     Ok(values)
 }

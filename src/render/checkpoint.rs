@@ -23,7 +23,7 @@ use crate::math::Vec4;
 pub struct Checkpoint<'a> {
     /// The file, with the suffix `.exr`.
     pub path: &'a Path,
-    /// How often it is written; none for never. It is also written when the render is interrupted.
+    /// How often it is written, and whenever the render is interrupted; none where it is gone on from and no more.
     pub every: Option<Duration>,
     /// Whether to go on from what it holds.
     pub resume: bool,
@@ -83,9 +83,20 @@ impl Renderer<'_> {
         let mut done = 0;
         if resume {
             done = same_render(path, &identity)?;
+            if done > self.most_samples() {
+                let message =
+                    format!("says that {done} samples of a pixel are done, of {} at most", self.most_samples());
+                return Err(Error::input(path, "", message + "; begin anew without --resume"));
+            }
             let channels = image::read_channels(path)?;
             let broken = || Error::input(path, "", "is no whole checkpoint: leave out --resume to begin anew");
             fill(&mut canvas, &channels).ok_or_else(broken)?;
+            // A pixel that goes on has the samples with which the round began, or those with which it ends.
+            let ends = [done, self.next_round(done, true)];
+            let mut going_on = canvas.counts.iter().zip(&canvas.active).filter(|(_, active)| **active);
+            if !going_on.all(|(count, _)| ends.contains(count)) {
+                return Err(broken());
+            }
         }
         let keeper = every.map(|every| Keeper { path, every, last: Instant::now(), identity });
         Ok((canvas, done, keeper))

@@ -16,7 +16,7 @@ impl Film {
     /// A transparent picture.
     ///
     /// # Errors
-    /// [`Error::Usage`] where it does not fit into memory.
+    /// [`Error::Memory`] where it does not fit into memory.
     pub(super) fn new(width: u32, height: u32) -> Result<Self> {
         let count = width as usize * height as usize;
         let mut pixels = Vec::new();
@@ -42,5 +42,7 @@ impl Film {
 
 /// The error for a picture that there is no room for.
 pub(super) fn too_large(width: u32, height: u32) -> Error {
-    Error::Usage(format!("a picture of {width}x{height} pixels does not fit into memory"))
+    Error::Memory(format!(
+        "a picture of {width}x{height} pixels does not fit into memory; make it smaller, or render a part of it"
+    ))
 }

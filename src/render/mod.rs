@@ -181,7 +181,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
-    /// [`Error::Usage`] for a picture that does not fit into memory.
+    /// [`Error::Memory`] for a picture that does not fit into memory.
     pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         if self.settings.adaptive.is_some() {
             return Ok(self.rounds(tracer, control, None)?.0.image());

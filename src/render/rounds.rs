@@ -128,12 +128,12 @@ impl Renderer<'_> {
     }
 
     /// Samples that no pixel exceeds.
-    fn most_samples(&self) -> u32 {
+    pub(super) fn most_samples(&self) -> u32 {
         self.settings.adaptive.map_or(self.settings.spp, |adaptive| adaptive.max_spp)
     }
 
     /// How many samples active pixels have after the round that they enter with `done`.
-    fn next_round(&self, done: u32, keeps: bool) -> u32 {
+    pub(super) fn next_round(&self, done: u32, keeps: bool) -> u32 {
         match self.settings.adaptive {
             Some(adaptive) => adaptive.next(done),
             None if keeps => self.settings.spp.min(done + ROUND),

@@ -5,7 +5,7 @@ use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::plan::{Complete, Plan, Rays, Wishes};
-use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH};
+use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH, Request};
 use crate::trace::Batch;
 
 /// What picture to make of a scene.
@@ -100,6 +100,21 @@ impl Crop {
 }
 
 impl Settings {
+    /// What a scene's file asks for, and what is usual where it says nothing.
+    pub fn of_request(request: &Request) -> Self {
+        let usual = Self::default();
+        let [width, height] = request.size.unwrap_or([usual.width, usual.height]);
+        Self {
+            width,
+            height,
+            spp: request.spp.unwrap_or(usual.spp),
+            seed: request.seed.unwrap_or(usual.seed),
+            integrator: request.integrator,
+            max_depth: request.max_depth,
+            ..usual
+        }
+    }
+
     /// What a plan follows from beside the scene.
     pub fn wishes(&self) -> Wishes {
         let Self { integrator, background, max_depth, complete, .. } = *self;

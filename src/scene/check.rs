@@ -14,12 +14,13 @@ use crate::math::{DVec3, Vec3};
 
 impl Scene {
     /// Whether all indices are in range, attributes match, and materials, shapes, placements and lights can be. What [`io::load`](crate::io::load) gives
-    /// has been checked; what is made by hand should be, for the tracers rely on it. Corners of triangles may be NaN or infinite: those are never hit.
+    /// has been checked; what is made by hand should be, for the tracers rely on it. Corners of triangles may be NaN or infinite: those are never hit. Whether a
+    /// placement can be undone is for [`World::new`](crate::World::new) to say.
     ///
     /// # Errors
-    /// [`Error::Backend`] with the first thing that is wrong.
+    /// [`Error::Scene`] with the first thing that is wrong.
     pub fn check(&self) -> Result<()> {
-        fault(self).map_err(|message| Error::Backend { backend: "scene", message })
+        fault(self).map_err(Error::Scene)
     }
 
     /// Whether its geometries are there.
@@ -114,43 +115,51 @@ fn check_pixels(width: u32, height: u32, found: usize) -> std::result::Result<()
 
 fn check_light(light: &Light) -> std::result::Result<(), String> {
     match light {
-        Light::Directional { color, .. } | Light::Point { color, .. } | Light::Spot { color, .. }
-            if !is_sound(*color) =>
-        {
-            return Err(format!("its color is {color}"));
+        Light::Directional { direction, color } => {
+            check_color("color", *color).and_then(|()| check_direction(*direction))
         }
-        Light::Area { radiance, .. } if !is_sound(*radiance) => return Err(format!("its radiance is {radiance}")),
-        _ => {}
+        Light::Point { position, color, attenuation, range, radius } => {
+            check_color("color", *color)?;
+            check_source(*position, attenuation, *range)?;
+            if !(radius.is_finite() && *radius >= 0.0) {
+                return Err(format!("its radius is {radius}"));
+            }
+            Ok(())
+        }
+        Light::Spot { position, direction, color, attenuation, range, inner_angle: inner, outer_angle: outer } => {
+            check_color("color", *color)?;
+            check_direction(*direction)?;
+            check_source(*position, attenuation, *range)?;
+            if !(0.0 <= *inner && inner < outer && *outer <= FRAC_PI_2) {
+                return Err(format!("its cone has the half-angles {inner}, inside, and {outer}"));
+            }
+            Ok(())
+        }
+        Light::Area { shape, radiance } => check_color("radiance", *radiance).and_then(|()| check_area(shape)),
     }
-    if let Light::Directional { direction, .. } | Light::Spot { direction, .. } = light
-        && !is_unit(*direction)
-    {
-        return Err(format!("its direction is {direction}"));
+}
+
+fn check_color(name: &str, color: Vec3) -> std::result::Result<(), String> {
+    if is_sound(color) { Ok(()) } else { Err(format!("its {name} is {color}")) }
+}
+
+fn check_direction(direction: DVec3) -> std::result::Result<(), String> {
+    if is_unit(direction) { Ok(()) } else { Err(format!("its direction is {direction}")) }
+}
+
+fn check_source(position: DVec3, attenuation: &Attenuation, range: f64) -> std::result::Result<(), String> {
+    let Attenuation { constant, linear, quadratic } = *attenuation;
+    let terms = [constant, linear, quadratic];
+    if !position.is_finite() {
+        return Err(format!("its position is {position}"));
     }
-    if let Light::Point { position, attenuation, range, .. } | Light::Spot { position, attenuation, range, .. } = light
-    {
-        let Attenuation { constant, linear, quadratic } = *attenuation;
-        let terms = [constant, linear, quadratic];
-        if !position.is_finite() {
-            return Err(format!("its position is {position}"));
-        }
-        if !terms.into_iter().all(|term| term.is_finite() && term >= 0.0) || terms == [0.0; 3] {
-            return Err(format!("its attenuation is {constant}, {linear}, {quadratic}"));
-        }
-        if range.is_nan() || *range <= 0.0 {
-            return Err(format!("its range is {range}"));
-        }
+    if !terms.into_iter().all(|term| term.is_finite() && term >= 0.0) || terms == [0.0; 3] {
+        return Err(format!("its attenuation is {constant}, {linear}, {quadratic}"));
     }
-    match *light {
-        Light::Point { radius, .. } if !(radius.is_finite() && radius >= 0.0) => Err(format!("its radius is {radius}")),
-        Light::Spot { inner_angle: inner, outer_angle: outer, .. }
-            if !(0.0 <= inner && inner < outer && outer <= FRAC_PI_2) =>
-        {
-            Err(format!("its cone has the half-angles {inner}, inside, and {outer}"))
-        }
-        Light::Area { ref shape, .. } => check_area(shape),
-        _ => Ok(()),
+    if range.is_nan() || range <= 0.0 {
+        return Err(format!("its range is {range}"));
     }
+    Ok(())
 }
 
 fn check_area(shape: &AreaShape) -> std::result::Result<(), String> {
@@ -192,6 +201,9 @@ fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
     }
     if !mesh.origin.is_finite() {
         return Err("its origin is not finite".into());
+    }
+    if mesh.colors.iter().any(|color| !color.is_finite()) {
+        return Err("colors that are not finite".into());
     }
     let highest = mesh.triangles.as_flattened().par_chunks(1 << 14).filter_map(|part| part.iter().max()).max();
     match highest.filter(|&&i| i as usize >= count) {

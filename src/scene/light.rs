@@ -124,21 +124,32 @@ pub enum AreaShape {
 impl Light {
     /// Moves the light; colours stay, and so does what it gives at a distance that is scaled with it.
     pub(crate) fn transform(&mut self, transform: &DAffine3) {
-        if let Self::Directional { direction, .. } | Self::Spot { direction, .. } = self {
-            *direction = transform.transform_vector3(*direction).normalize();
-        }
-        if let Self::Point { position, .. } | Self::Spot { position, .. } = self {
-            *position = transform.transform_point3(*position);
-        }
         let scale = transform.matrix3.determinant().abs().cbrt();
-        if let Self::Point { range, attenuation, .. } | Self::Spot { range, attenuation, .. } = self {
+        let turn = |direction: &mut DVec3| *direction = transform.transform_vector3(*direction).normalize();
+        let place = |position: &mut DVec3, range: &mut f64, attenuation: &mut Attenuation| {
+            *position = transform.transform_point3(*position);
             *range *= scale;
             attenuation.scale(scale as f32);
-        }
+        };
         match self {
-            Self::Point { radius, .. } => *radius *= scale,
-            Self::Area { shape, .. } => shape.transform(transform, scale),
-            Self::Directional { .. } | Self::Spot { .. } => {}
+            Self::Directional { direction, color: _ } => turn(direction),
+            Self::Point { position, color: _, attenuation, range, radius } => {
+                place(position, range, attenuation);
+                *radius *= scale;
+            }
+            Self::Spot { position, direction, color: _, attenuation, range, inner_angle: _, outer_angle: _ } => {
+                turn(direction);
+                place(position, range, attenuation);
+            }
+            Self::Area { shape, radiance: _ } => shape.transform(transform, scale),
+        }
+    }
+
+    /// Whether what arrives depends on which part of the light is asked.
+    pub const fn is_extended(&self) -> bool {
+        match self {
+            Self::Area { .. } => true,
+            Self::Directional { .. } | Self::Point { .. } | Self::Spot { .. } => false,
         }
     }
 }

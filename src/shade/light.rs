@@ -73,7 +73,7 @@ impl LightSource {
     /// Whether what arrives depends on which part of the light is asked.
     pub const fn is_extended(&self) -> bool {
         match &self.kind {
-            Kind::Light(light) => matches!(light, Light::Area { .. }),
+            Kind::Light(light) => light.is_extended(),
             Kind::Environment(_) | Kind::Patches(_) => true,
         }
     }
@@ -100,12 +100,12 @@ impl LightSource {
     }
 
     /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
-    /// asked that `even`, a point of the unit square, chooses.
-    pub fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
+    /// asked that `xi`, a point of the unit square, chooses.
+    pub fn illuminate(&self, point: DVec3, xi: DVec2) -> Option<Illumination> {
         match &self.kind {
-            Kind::Light(light) => from_light(light, point, even),
-            Kind::Environment(environment) => environment.illuminate(even),
-            Kind::Patches(patches) => patches.illuminate(point, even),
+            Kind::Light(light) => from_light(light, point, xi),
+            Kind::Environment(environment) => environment.illuminate(xi),
+            Kind::Patches(patches) => patches.illuminate(point, xi),
         }
     }
 
@@ -119,7 +119,7 @@ impl LightSource {
 }
 
 /// What arrives from a light of the scene.
-fn from_light(light: &Light, point: DVec3, even: DVec2) -> Option<Illumination> {
+fn from_light(light: &Light, point: DVec3, xi: DVec2) -> Option<Illumination> {
     match light {
         Light::Directional { direction, color } => {
             Some(Illumination { to_light: -*direction, color: *color, end: None, density: None })
@@ -133,7 +133,7 @@ fn from_light(light: &Light, point: DVec3, even: DVec2) -> Option<Illumination> 
             }
             Some(arriving)
         }
-        Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, even),
+        Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, xi),
         Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
             let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
             arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);

@@ -60,13 +60,13 @@ impl Brute {
             Prepared::Triangles { corners, lanes, primitives } => {
                 size_of_val(&corners[..]) + size_of_val(&lanes[..]) + size_of_val(&primitives[..])
             }
-            Prepared::Shapes(shapes) => size_of_val(&shapes[..]),
+            Prepared::Shapes(shapes) => shapes.iter().map(Shape::bytes).sum(),
         };
         let placed = self.placed.iter().flatten().flatten().map(|lanes| size_of_val(&lanes[..]));
         self.parts.iter().map(part).sum::<usize>() + placed.sum::<usize>()
     }
 
-    /// Offers every intersection within the range to `nearest`; stops at the first one if `any`.
+    /// The nearest intersection within the range; if `any`, that of the first part that has one.
     fn trace(&self, ray: &Ray, any: bool) -> Nearest {
         let mut nearest = Nearest::new(ray);
         if !ray.is_valid() {
@@ -105,6 +105,9 @@ impl Brute {
                     Prepared::Shapes(shapes) => {
                         offer_shapes(&mut nearest, ray, Some(&object_ray), shapes, part, placement.instance);
                     }
+                }
+                if any && nearest.hit().is_some() {
+                    return nearest;
                 }
             }
         }

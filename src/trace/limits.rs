@@ -10,7 +10,7 @@ pub(crate) const MOST_PRIMITIVES: u64 = (1 << 29) - 1;
 /// Whether `what`, which has these parts, can be traced.
 ///
 /// # Errors
-/// [`Error::Backend`] for more than [`MOST_PRIMITIVES`], with the number.
+/// [`Error::Scene`] for more than [`MOST_PRIMITIVES`], with the number.
 pub(super) fn check(parts: &[Part], what: &str) -> Result<()> {
     check_count(parts.iter().map(|part| part.primitives.len() as u64).sum(), what)
 }
@@ -20,8 +20,7 @@ fn check_count(count: u64, what: &str) -> Result<()> {
         return Ok(());
     }
     let remedy = "simplify it, or store what repeats once and place it as instances";
-    let message = format!("{what} has {count} primitives, more than {MOST_PRIMITIVES}; {remedy}");
-    Err(Error::Backend { backend: "scene", message })
+    Err(Error::Scene(format!("{what} has {count} primitives, more than {MOST_PRIMITIVES}; {remedy}")))
 }
 
 #[cfg(test)]

@@ -62,10 +62,7 @@ impl Motion {
 /// Says of an instance that [`Motion::new`] gave a time.
 pub(super) fn singular_on_the_way(index: usize, name: &str, time: f64) -> Error {
     let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way";
-    Error::Backend {
-        backend: "scene",
-        message: format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"),
-    }
+    Error::Scene(format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"))
 }
 
 /// The determinant of (1 - s) a + s b, a cubic, in Bernstein's form: it lies between the least and the largest of these.

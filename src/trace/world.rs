@@ -127,7 +127,7 @@ impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
-    /// [`Error::Backend`] for an instance whose transform is singular or not finite, with its name; and for more
+    /// [`Error::Scene`] for an instance whose transform is singular or not finite, with its name; and for more
     /// primitives in one place than tracers can name.
     ///
     /// # Panics
@@ -342,7 +342,7 @@ fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     }
     let remedy = "give it a scale that is neither zero nor beyond what f32 holds";
     let message = format!("instance {index} ({name:?}) has a singular transform; {remedy}");
-    Err(Error::Backend { backend: "scene", message })
+    Err(Error::Scene(message))
 }
 
 #[cfg(test)]

@@ -26,6 +26,18 @@ const VIEWS: [(DVec3, DVec3, f64, [u32; 2]); 4] = [
     (DVec3::new(4.0, -3.0, 2.0), DVec3::new(4.5, 8.0, 2.0), 150.0, [10, 10]),
 ];
 
+#[test]
+fn axes_must_be_unit_vectors_at_right_angles() {
+    let (scene, world) = (Scene::default(), World::default());
+    let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).unwrap();
+    let skew = DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0), DVec3::Z);
+    for by in [DMat3::IDENTITY * 5.0, DMat3::IDENTITY * 0.999, skew, DMat3::ZERO, DMat3::IDENTITY * f64::NAN] {
+        let bent = Camera { frame: camera.frame * by, ..camera.clone() };
+        let error = Renderer::new(&scene, &world, bent, settings(4, 4, 1)).err().expect("a camera that is none");
+        assert!(error.to_string().contains("unit vectors"), "{error}");
+    }
+}
+
 /// R. Ramamoorthi's lectures: w backwards, u to the right, v up; alpha and beta from the tangents.
 #[test]
 fn as_from_the_look_at_frame() {

@@ -118,6 +118,17 @@ fn a_checkpoint_shows_the_picture_so_far_and_is_refused_elsewhere() {
     std::fs::write(&path, &changed).unwrap();
     let error = until(&scene, &settings, &path, true, 3).unwrap_err();
     assert!(error.to_string().contains("by its program: twincast 9"), "{error}");
+    // The samples with which its round began, in digits that say otherwise.
+    let key = b"twincast/round\0string\0";
+    let at = whole.windows(key.len()).position(|bytes| bytes == key).unwrap() + key.len() + 4;
+    for digit in [b'7', b'9'] {
+        let mut changed = whole.clone();
+        assert!(changed[at].is_ascii_digit() && changed[at] != digit);
+        changed[at] = digit;
+        std::fs::write(&path, &changed).unwrap();
+        let error = until(&scene, &settings, &path, true, 3).unwrap_err();
+        assert!(error.exit_code() == 3 && error.to_string().contains("begin anew"), "{error}");
+    }
     twincast::image::write(&path, &shown, &Default::default(), &Default::default()).unwrap();
     let error = until(&scene, &settings, &path, true, 3).unwrap_err();
     assert!(error.exit_code() == 3 && error.to_string().contains("is not a checkpoint"), "{error}");

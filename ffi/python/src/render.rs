@@ -48,24 +48,23 @@ pub struct Wishes {
 
 impl Wishes {
     fn settings(&self, scene: &Scene) -> PyResult<Settings> {
-        let (usual, request) = (Settings::default(), &scene.request);
-        let size = self.size.map(|(width, height)| [width, height]).or(request.size);
-        let [width, height] = size.unwrap_or([usual.width, usual.height]);
+        let asked = Settings::of_request(&scene.request);
+        let (width, height) = self.size.unwrap_or((asked.width, asked.height));
         let integrator = match self.integrator.as_deref() {
-            None => request.integrator,
+            None => asked.integrator,
             Some("auto") => None,
             Some(name) => Some(by_name("integrator", name, Integrator::ALL.map(|it| (it.name(), it)))?),
         };
         Ok(Settings {
             width,
             height,
-            spp: self.spp.or(request.spp).unwrap_or(usual.spp),
-            seed: self.seed.or(request.seed).unwrap_or(usual.seed),
+            spp: self.spp.unwrap_or(asked.spp),
+            seed: self.seed.unwrap_or(asked.seed),
             integrator,
-            max_depth: self.max_depth.or(request.max_depth),
+            max_depth: self.max_depth.or(asked.max_depth),
             background: self.background.map(Vec3::from),
             batch: Batch { coherent: true, ..Batch::default() },
-            ..usual
+            ..asked
         })
     }
 

@@ -96,16 +96,16 @@ impl General {
 
 /// Evenly from the unit square to the unit disk (Shirley and Chiu 1997, *A low distortion map between disk and square*), or
 /// to the regular polygon in it.
-fn on_lens(even: DVec2, blades: u32) -> DVec2 {
+fn on_lens(xi: DVec2, blades: u32) -> DVec2 {
     let at_angle = |angle: f64| DVec2::new(libm::cos(angle), libm::sin(angle));
     if blades >= 3 {
-        let sector = even.x * f64::from(blades);
+        let sector = xi.x * f64::from(blades);
         let corner = |k: f64| at_angle(k * std::f64::consts::TAU / f64::from(blades));
         let (first, second) = (corner(sector.floor()), corner(sector.floor() + 1.0));
         let across = sector.fract();
-        return (first + (second - first) * across) * even.y.sqrt();
+        return (first + (second - first) * across) * xi.y.sqrt();
     }
-    let DVec2 { x, y } = even * 2.0 - 1.0;
+    let DVec2 { x, y } = xi * 2.0 - 1.0;
     if x == 0.0 && y == 0.0 {
         return DVec2::ZERO;
     }
@@ -187,8 +187,8 @@ mod tests {
         for blades in [0, 3, 5, 6] {
             let (side, mut sum, mut second, mut reach) = (200, DVec2::ZERO, 0.0, 0f64);
             for k in 0..side * side {
-                let even = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-                let at = on_lens(even, blades);
+                let xi = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+                let at = on_lens(xi, blades);
                 sum += at;
                 second += at.length_squared();
                 reach = reach.max(at.length());

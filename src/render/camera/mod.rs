@@ -6,7 +6,7 @@ mod general;
 mod pinhole;
 
 use crate::error::{Error, Result};
-use crate::math::{DVec2, DVec3, Vec3};
+use crate::math::{DMat3, DVec2, DVec3, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Camera, Distortion, Projection};
 
@@ -89,10 +89,11 @@ fn check_numbers(camera: &Camera) -> Result<()> {
             return Err(Error::Usage(format!("a camera at {eye}: its place must be finite")));
         }
         // Not so of NaN.
-        let is_frame = frame.is_finite() && frame.determinant().abs() > 1e-6;
+        let is_frame = (frame.transpose() * frame).abs_diff_eq(DMat3::IDENTITY, 1e-6);
         if !is_frame {
-            let message =
-                format!("a camera with the axes {frame}: they must be unit vectors to the right, up and back");
+            let message = format!(
+                "a camera with the axes {frame}: they must be unit vectors to the right, up and back, at right angles"
+            );
             return Err(Error::Usage(message));
         }
     }

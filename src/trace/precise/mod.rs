@@ -152,7 +152,7 @@ impl Precise {
     /// Builds the tree, on rayon's current thread pool.
     ///
     /// # Errors
-    /// [`Error::Backend`] for a triangle that names a vertex that is not there, with its number; and for too many triangles.
+    /// [`Error::Scene`] for a triangle that names a vertex that is not there, with its number; and for too many triangles.
     pub fn new(meshes: Vec<PreciseMesh>) -> Result<Self> {
         for (number, mesh) in meshes.iter().enumerate() {
             check_indices(number, mesh)?;
@@ -196,9 +196,10 @@ impl Precise {
     }
 }
 
-/// What is in the cell, or comes to be: made outside of it, by each thread that finds it empty, of which the first one's stays. Within it, a thread
-/// that waits for its helpers might be given another query, which waits for the cell; and in a process that is forked meanwhile the cell would
-/// wait for ever for a thread that is not there.
+/// What is in the cell, made if it is empty. Several threads may make it at once; what the first of them has made is kept.
+///
+/// Not made within `get_or_init`: there a thread of rayon's that waits for others may take up another query, which waits for this very cell; and
+/// a process that is forked meanwhile would wait for a thread that it does not have.
 fn made_outside<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     cell.get().unwrap_or_else(|| {
         let made = make();
@@ -226,7 +227,7 @@ fn check_indices(number: usize, mesh: &PreciseMesh) -> Result<()> {
                 "triangle {i} of mesh {number} names the vertices {:?}, of which there are {count}",
                 mesh.triangles[i]
             );
-            Err(Error::Backend { backend: "scene", message })
+            Err(Error::Scene(message))
         }
     }
 }
