@@ -19,21 +19,21 @@ use super::Renderer;
 use super::wavefront::Buffers;
 
 impl Renderer<'_> {
-    /// The nearest hits of rays that pass through what does not cover; `even` gives each ray its chance.
+    /// The nearest hits of rays that pass through what does not cover; `xi` gives each ray its chance.
     pub(super) fn closest<T: Tracer + ?Sized>(
         &self,
         tracer: &T,
         rays: &mut [Ray],
         hits: &mut [Option<Hit>],
         batch: Batch,
-        even: impl Fn(usize) -> DVec2,
+        xi: impl Fn(usize) -> DVec2,
     ) {
         tracer.closest_batch(rays, hits, batch);
         if !self.plan.alpha {
             return;
         }
         // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it was.
-        let mut pending: Vec<(usize, f32)> = (0..rays.len()).map(|i| (i, even(i).x as f32)).collect();
+        let mut pending: Vec<(usize, f32)> = (0..rays.len()).map(|i| (i, xi(i).x as f32)).collect();
         loop {
             pending.retain_mut(|(i, chance)| {
                 let (ray, hit) = (&mut rays[*i], &hits[*i]);

@@ -118,19 +118,19 @@ impl FilterSampler {
 
     /// Where from the pixel's corner a sample lies, and its weight: 1, or -1 where the filter is negative.
     #[inline]
-    pub(super) fn place(&self, even: DVec2) -> (DVec2, f32) {
+    pub(super) fn place(&self, xi: DVec2) -> (DVec2, f32) {
         if self.share.is_empty() {
-            return (even, 1.0);
+            return (xi, 1.0);
         }
-        let ((x, a), (y, b)) = (self.along(even.x), self.along(even.y));
+        let ((x, a), (y, b)) = (self.along(xi.x), self.along(xi.y));
         (DVec2::new(x, y) + 0.5, if a == b { 1.0 } else { -1.0 })
     }
 
     /// From the middle along one axis, and whether the filter is negative there.
-    fn along(&self, even: f64) -> (f64, bool) {
-        let step = self.share.partition_point(|&share| share <= even).min(STEPS - 1);
+    fn along(&self, xi: f64) -> (f64, bool) {
+        let step = self.share.partition_point(|&share| share <= xi).min(STEPS - 1);
         let before = if step == 0 { 0.0 } else { self.share[step - 1] };
-        let within = ((even - before) / (self.share[step] - before)).clamp(0.0, 1.0);
+        let within = ((xi - before) / (self.share[step] - before)).clamp(0.0, 1.0);
         (((step as f64 + within) / STEPS as f64 * 2.0 - 1.0) * self.radius, self.negative[step])
     }
 }
@@ -161,13 +161,13 @@ mod tests {
             let n = 4000;
             let (mut mass, mut second, mut expected) = (0.0, 0.0, [0.0; 2]);
             for i in 0..n {
-                let even = (f64::from(i) + 0.5) / f64::from(n);
-                let (at, weight) = sampler.place(DVec2::new(even, 0.5));
+                let xi = (f64::from(i) + 0.5) / f64::from(n);
+                let (at, weight) = sampler.place(DVec2::new(xi, 0.5));
                 let from_middle = at.x - 0.5;
                 assert!(from_middle.abs() <= filter.radius() && (at.y - 0.5).abs() < 2e-3, "{filter}: {at}");
                 mass += f64::from(weight);
                 second += f64::from(weight) * from_middle * from_middle;
-                let x = (even * 2.0 - 1.0) * filter.radius();
+                let x = (xi * 2.0 - 1.0) * filter.radius();
                 expected[0] += filter.value(x);
                 expected[1] += filter.value(x) * x * x;
             }

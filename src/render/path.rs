@@ -205,8 +205,8 @@ impl Renderer<'_> {
             return None;
         }
         let chosen = self.lights.choose(choice)?;
-        let even = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
-        let arriving = chosen.source.illuminate(vertex.point.position, even)?;
+        let xi = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
+        let arriving = chosen.source.illuminate(vertex.point.position, xi)?;
         let value = vertex.lobes.lit(arriving.to_light, chosen.can_be_found);
         let share = match arriving.density {
             // Where the path ends, nothing else finds the light.
@@ -232,8 +232,8 @@ impl Renderer<'_> {
             return tally.after(route, if goes_through { Event::Transmitted } else { Event::Specular });
         }
         // The other number of the pair says whether the path ends.
-        let even = self.choice(vertex, Choice::End).y as f32;
-        tally.choose(route, vertex.lobes.parts(direction.normalize(), true), even)
+        let xi = self.choice(vertex, Choice::End).y as f32;
+        tally.choose(route, vertex.lobes.parts(direction.normalize(), true), xi)
     }
 
     /// The ray that goes on from a surface, if any does.
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn shares_sum_up_to_one() {
         for (a, b) in [(1.0, 1.0), (0.1, 30.0), (5.0, 0.0), (1e-9, 1e9)] {
-            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6 || b == 0.0);
+            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6, "{a}, {b}");
         }
         assert_eq!((power_heuristic(2.0, 0.0), power_heuristic(1.0, f64::INFINITY)), (1.0, 0.0));
     }

@@ -183,9 +183,10 @@ impl Renderer<'_> {
         waves.resize_with(waves.len().max(1), Wave::default);
         let Wave { rays, paths, .. } = &mut waves[0];
         let place = |pixel: &Pattern| self.place(pixel, sample).0;
-        // None of them is cleared: every one is written.
+        // Neither is cleared: every one is written.
         rays.resize(patterns.len(), Ray::new(Vec3::ZERO, Vec3::ZERO));
         hits.resize(patterns.len(), None);
+        // Camera paths differ in their pixel alone, and nobody changes them: those of the last sample stay.
         let known = paths.len();
         paths.resize(patterns.len(), Path::CAMERA);
         paths.iter_mut().zip(0..).skip(known).for_each(|(path, pixel)| path.pixel = pixel);
@@ -207,8 +208,8 @@ impl Renderer<'_> {
                 ray.time = self.time(pixel, sample);
             }
         }
-        let even = |i: usize| self.sampler.pair(&patterns[i], sample, Dimension::alpha(0));
-        self.closest(tracer, rays, hits, self.settings.batch, even);
+        let xi = |i: usize| self.sampler.pair(&patterns[i], sample, Dimension::alpha(0));
+        self.closest(tracer, rays, hits, self.settings.batch, xi);
     }
 
     /// Traces the shadow rays, and adds what is worth those that are free.

@@ -196,18 +196,19 @@ impl Renderer<'_> {
         for Lit { path, route, point, shading, .. } in lit.iter() {
             let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
             for k in 0..count {
-                let even = if light.is_extended() {
+                let xi = if light.is_extended() {
                     let dimension = Dimension::light(index, path.branch);
                     self.light_sampler.pair(&patterns[path.pixel as usize], sample * count + k, dimension)
                 } else {
                     DVec2::ZERO
                 };
-                let Some(arriving) = light.illuminate(point.position, even) else { continue };
+                let Some(arriving) = light.illuminate(point.position, xi) else { continue };
                 if !shading.faces(arriving.to_light) {
                     continue;
                 }
                 let left = self.left_of_light(path, point, light, &arriving);
-                let mut reflected = weight * shading.reflect(&arriving);
+                let [diffuse, highlight] = shading.lobes(arriving.to_light);
+                let mut reflected = weight * ((diffuse + highlight) * arriving.color);
                 if let Some(left) = left {
                     reflected *= left;
                 }
@@ -215,7 +216,7 @@ impl Renderer<'_> {
                     light: index,
                     source: light,
                     arriving: &arriving,
-                    lobes: [shading.lobes(arriving.to_light)[0], shading.lobes(arriving.to_light)[1], Vec3::ZERO],
+                    lobes: [diffuse, highlight, Vec3::ZERO],
                     left: left.unwrap_or(Vec3::ONE),
                     share: 1.0 / count as f32,
                     contribution: reflected,
@@ -227,7 +228,6 @@ impl Renderer<'_> {
                     radiance[path.pixel as usize] += reflected.extend(0.0);
                 }
                 if let Some(tally) = &mut tally {
-                    let [diffuse, highlight] = shading.parts(arriving.to_light);
                     let parts = Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO]);
                     if light.casts_shadows {
                         shadow_parts.push(parts);

@@ -10,29 +10,29 @@ use crate::scene::AreaShape;
 /// Chained f32 roundings in the test of a ray against what stands in a light's place; generous.
 const ROUNDINGS: u32 = 32;
 
-/// What arrives at `point` from the part of the light that `even`, a point of the unit square, chooses, as if all of it
+/// What arrives at `point` from the part of the light that `xi`, a point of the unit square, chooses, as if all of it
 /// shone like that part; none where the light turns its back.
-pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, even: DVec2) -> Option<Illumination> {
+pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DVec2) -> Option<Illumination> {
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
-                return Some(towards(point, seen.at(even), 1.0 / seen.solid_angle, radiance));
+                return Some(towards(point, seen.at(xi), 1.0 / seen.solid_angle, radiance));
             }
-            let at = even * 2.0 - 1.0;
+            let at = xi * 2.0 - 1.0;
             // The cross product of the halves is a quarter of the area.
             flat(point, centre + a * at.x + b * at.y, a.cross(b) * 4.0, radiance)
         }
         AreaShape::Disk { centre, normal, radius } => {
             if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
-                let (offset, density) = seen.at(even);
+                let (offset, density) = seen.at(xi);
                 return Some(towards(point, offset, density, radiance));
             }
             let [x, y] = tangents(normal);
-            let (distance, angle) = (radius * even.x.sqrt(), even.y * std::f64::consts::TAU);
+            let (distance, angle) = (radius * xi.x.sqrt(), xi.y * std::f64::consts::TAU);
             let at = centre + (x * libm::cos(angle) + y * libm::sin(angle)) * distance;
             flat(point, at, normal * (std::f64::consts::PI * radius * radius), radiance)
         }
-        AreaShape::Sphere { centre, radius } => sphere(point, centre, radius, radiance, even),
+        AreaShape::Sphere { centre, radius } => sphere(point, centre, radius, radiance, xi),
     }
 }
 
@@ -68,15 +68,15 @@ fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumina
 }
 
 /// From a direction of the cone that the sphere fills.
-fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, even: DVec2) -> Option<Illumination> {
+fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -> Option<Illumination> {
     let offset = centre - point;
     let distance = offset.length();
     let axis = offset.try_normalize().unwrap_or(DVec3::Y);
     let opening = opening(distance, radius);
-    let height = even.x * opening;
+    let height = xi.x * opening;
     let (cosine, off_axis) = (1.0 - height, (height * (2.0 - height)).max(0.0).sqrt());
     let [x, y] = tangents(axis);
-    let angle = even.y * std::f64::consts::TAU;
+    let angle = xi.y * std::f64::consts::TAU;
     let to_light = axis * cosine + (x * libm::cos(angle) + y * libm::sin(angle)) * off_axis;
     // The solid angle is 2 pi times the opening.
     let color = radiance * (2.0 * opening) as f32;
@@ -140,8 +140,8 @@ mod tests {
     }
 
     fn mean(side: i32, shape: &AreaShape, point: DVec3, normal: DVec3) -> f64 {
-        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-        let each = (0..side * side).filter_map(|k| illuminate(shape, Vec3::ONE, point, even(k)));
+        let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let each = (0..side * side).filter_map(|k| illuminate(shape, Vec3::ONE, point, xi(k)));
         each.map(|light| f64::from(light.color.x) * light.to_light.dot(normal).max(0.0)).sum::<f64>()
             / f64::from(side * side)
     }
@@ -230,8 +230,8 @@ mod tests {
             AreaShape::Disk { centre, normal: DVec3::new(-2.0, -1.0, 0.0).normalize(), radius: 3.0 },
         ] {
             for k in 0..100 {
-                let even = DVec2::new(f64::from(k % 10) + 0.5, f64::from(k / 10) + 0.5) / 10.0;
-                let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, even).unwrap();
+                let xi = DVec2::new(f64::from(k % 10) + 0.5, f64::from(k / 10) + 0.5) / 10.0;
+                let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, xi).unwrap();
                 let end = arriving.end.unwrap();
                 let beyond = match shape {
                     AreaShape::Sphere { .. } => (end - centre).length() - 3.0,

@@ -52,14 +52,14 @@ impl SphericalEllipse {
         Some(Self { axes: [x, z.cross(x), z], half, across, height, farthest: far })
     }
 
-    /// From the point to where a direction meets the disk, which `even`, a point of the unit square, chooses, and how densely such directions
+    /// From the point to where a direction meets the disk, which `xi`, a point of the unit square, chooses, and how densely such directions
     /// are chosen, per steradian.
-    pub(super) fn at(&self, even: DVec2) -> (DVec3, f64) {
-        let angle = even.x * TAU;
+    pub(super) fn at(&self, xi: DVec2) -> (DVec3, f64) {
+        let angle = xi.x * TAU;
         let rim = self.half * DVec2::new(libm::cos(angle), libm::sin(angle));
         let squared = rim.length_squared();
         // 1 - cos of the angle off the axis, evenly up to the rim.
-        let off = even.y * squared / (1.0 + cosine(squared));
+        let off = xi.y * squared / (1.0 + cosine(squared));
         let side = rim * ((off * (2.0 - off)).max(0.0) / squared).sqrt();
         let [x, y, z] = self.axes;
         let direction = x * side.x + y * side.y + z * (1.0 - off);
@@ -138,8 +138,8 @@ mod tests {
             let parts = [([0.0, 0.0], 1.0), ([0.3, 0.4], 0.4), ([-0.5, 0.2], 0.3), ([0.0, -0.6], 0.39)];
             let (side, mut sums) = (600, [0.0; 4]);
             for k in 0..side * side {
-                let even = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-                let (offset, density) = seen.at(even);
+                let xi = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+                let (offset, density) = seen.at(xi);
                 let at = point + offset;
                 assert!((at - CENTRE).length() < RADIUS * (1.0 + 1e-9), "{right} {up} {away}: {at}");
                 assert!((at - CENTRE).dot(normal()).abs() < 1e-9, "{right} {up} {away}: {at}");

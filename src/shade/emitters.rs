@@ -302,21 +302,21 @@ impl Patches {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
-    /// What arrives at `point` from a place on a patch that `even` chooses.
-    pub(super) fn illuminate(&self, point: DVec3, even: DVec2) -> Option<Illumination> {
-        let wanted = even.x * self.total();
+    /// What arrives at `point` from a place on a patch that `xi` chooses.
+    pub(super) fn illuminate(&self, point: DVec3, xi: DVec2) -> Option<Illumination> {
+        let wanted = xi.x * self.total();
         let index = self.cumulative.partition_point(|&sum| sum <= wanted).min(self.patches.len().checked_sub(1)?);
         let before = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
         let within = ((wanted - before) / (self.cumulative[index] - before)).clamp(0.0, 1.0);
         let Patch { corner, sides, normal, is_disk, emission } = self.patches[index];
         let [a, b] = sides.map(|side| side.as_dvec3());
         let (x, y) = if is_disk {
-            let (radius, angle) = (within.sqrt(), even.y * TAU);
+            let (radius, angle) = (within.sqrt(), xi.y * TAU);
             (radius * libm::cos(angle), radius * libm::sin(angle))
         } else {
             // Evenly over a triangle (Turk 1990, *Generating random points in triangles*).
             let root = within.sqrt();
-            (root * (1.0 - even.y), root * even.y)
+            (root * (1.0 - xi.y), root * xi.y)
         };
         let at = corner.as_dvec3() + a * x + b * y;
         let offset = at - point;
@@ -366,8 +366,8 @@ mod tests {
         patches.add_triangle([corner(0.0, 0.0), corner(1.5, 0.0), corner(1.5, 0.8)], bright);
         patches.add_triangle([corner(0.0, 0.0), corner(1.5, 0.8), corner(0.0, 0.8)], bright);
         let side = 300;
-        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-        let each = (0..side * side).filter_map(|k| patches.illuminate(DVec3::ZERO, even(k)));
+        let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let each = (0..side * side).filter_map(|k| patches.illuminate(DVec3::ZERO, xi(k)));
         let mean = each.map(|l| f64::from(l.color.y) * l.to_light.y).sum::<f64>() / f64::from(side * side);
         // Howell's B-3: a parallel rectangle with a corner over the element.
         let (x, y) = (0.75f64, 0.4f64);

@@ -65,11 +65,11 @@ impl EnvironmentLight {
         (row(top as i64) * (1.0 - low) + row(top as i64 + 1) * low) * self.intensity
     }
 
-    /// Light from a direction that `even` chooses.
-    pub(super) fn illuminate(&self, even: DVec2) -> Option<Illumination> {
-        let (y, down) = choose(self.rows.len(), |i| self.rows[i], even.y);
+    /// Light from a direction that `xi` chooses.
+    pub(super) fn illuminate(&self, xi: DVec2) -> Option<Illumination> {
+        let (y, down) = choose(self.rows.len(), |i| self.rows[i], xi.y);
         let row = self.row(y);
-        let (x, right) = choose(row.len(), |i| f64::from(row[i]), even.x);
+        let (x, right) = choose(row.len(), |i| f64::from(row[i]), xi.x);
         let size = DVec2::new(f64::from(self.image.width), f64::from(self.image.height));
         let to_light = self.direction(DVec2::new(x as f64 + right, y as f64 + down) / size);
         let density = self.density(to_light)?;
@@ -173,10 +173,10 @@ mod tests {
     fn directions_have_their_density_and_give_the_whole_light() {
         let light = light(sun, 1.0);
         let side = 400;
-        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
         let (mut irradiance, mut area) = (0.0, 0.0);
         for k in 0..side * side {
-            let arriving = light.illuminate(even(k)).unwrap();
+            let arriving = light.illuminate(xi(k)).unwrap();
             let density = arriving.density.unwrap();
             assert!((light.density(arriving.to_light).unwrap() / density - 1.0).abs() < 1e-12);
             irradiance += f64::from(arriving.color.y) * PI;

@@ -63,7 +63,8 @@ fn along_triangle([a, b, c]: [DVec3; 3], corners: [usize; 3], uvs: &[Vec2], map:
 
 /// The same along a shape at a point of it, in the shape's coordinates: by how its parameters change from one side of the point to the other.
 fn along_shape(shape: &Shape, at: DVec3, map: &Texture) -> Option<[DVec3; 2]> {
-    // How large it is where it is bent, for steps are to be small against that, and whether parameters run around it, and begin again at 0.
+    // Steps are to be small against its radius of curvature, or against the whole of what is flat. And where parameters run around it, they begin again at 0 on the
+    // way.
     let size = || f64::from(shape.bounds().size().max_element());
     let (size, runs_around) = match shape {
         Shape::Plane(_) => (1.0, false),

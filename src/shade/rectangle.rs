@@ -55,16 +55,16 @@ impl SphericalRectangle {
         (solid_angle > 1e-6).then_some(Self { axes: [x, y, z], low, high, depth, lean, start, solid_angle })
     }
 
-    /// From the point to where a direction meets the rectangle that `even`, a point of the unit square, chooses.
-    pub(super) fn at(&self, even: DVec2) -> DVec3 {
+    /// From the point to where a direction meets the rectangle that `xi`, a point of the unit square, chooses.
+    pub(super) fn at(&self, xi: DVec2) -> DVec3 {
         let Self { axes: [x, y, z], low, high, depth, lean: [first, second], start, solid_angle } = *self;
-        let sum = even.x * solid_angle + start;
+        let sum = xi.x * solid_angle + start;
         let slope = (libm::cos(sum) * first - second) / libm::sin(sum);
         let cosine = (slope.hypot(first).recip().copysign(slope)).clamp(-1.0, 1.0);
         let across = (-(cosine * depth) / (1.0 - cosine * cosine).max(1e-300).sqrt()).clamp(low.x, high.x);
         let distance = across.hypot(depth);
         let [begin, end] = [low.y, high.y].map(|end| end / end.hypot(distance));
-        let height = begin + even.y * (end - begin);
+        let height = begin + xi.y * (end - begin);
         let along = (height * distance / (1.0 - height * height).max(1e-300).sqrt()).clamp(low.y, high.y);
         x * across + y * along + z * depth
     }
@@ -118,8 +118,8 @@ mod tests {
         let side = 500;
         let mut counts = [[0u32; 3]; 3];
         for k in 0..side * side {
-            let even = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-            let at = point + seen.at(even) - CENTRE;
+            let xi = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+            let at = point + seen.at(xi) - CENTRE;
             let [s, t] = whole.map(|edge| at.dot(edge) / edge.length_squared());
             assert!(s.abs() <= 1.0 + 1e-9 && t.abs() <= 1.0 + 1e-9 && at.dot(across).abs() < 1e-9, "{at}");
             let third = |x: f64| ((x + 1.0) * 1.5).clamp(0.0, 2.0) as usize;

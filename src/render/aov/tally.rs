@@ -103,13 +103,13 @@ impl Tally {
         }
     }
 
-    /// The route after one of the three events, which `even` (from 0 to below 1) chooses by their shares for each colour.
-    pub(in crate::render) fn choose(&self, route: Route, shares: [Vec3; 3], even: f32) -> Route {
+    /// The route after one of the three events, which `xi` (from 0 to below 1) chooses by their shares for each colour.
+    pub(in crate::render) fn choose(&self, route: Route, shares: [Vec3; 3], xi: f32) -> Route {
         let after = Event::ALL.map(|event| self.after(route, event).0);
         let mut chosen = route.0;
         for (axis, state) in chosen.iter_mut().enumerate() {
             let shares = shares.map(|share| share[axis]);
-            let wanted = even * (shares[0] + shares[1] + shares[2]);
+            let wanted = xi * (shares[0] + shares[1] + shares[2]);
             let event = if wanted < shares[0] {
                 0
             } else if wanted < shares[0] + shares[1] || shares[2] == 0.0 {

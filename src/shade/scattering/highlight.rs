@@ -40,6 +40,17 @@ impl Highlight {
         self.color * self.scale.map_or(height, |scale| scale * height * cosine as f32)
     }
 
+    /// How much of even light it sends on where it is met head-on, in units of its colour; nowhere more.
+    pub(super) fn share(&self) -> f32 {
+        let n = self.shininess;
+        match (self.scale, self.model) {
+            (Some(_), _) => 1.0,
+            // The integrals of cos^n over the hemisphere, over pi: of the angle to the normal, and of half of it.
+            (None, Specular::Phong) => 2.0 / (n + 1.0),
+            (None, Specular::BlinnPhong) => 8.0 / (n + 2.0) * (1.0 - libm::exp2f(-(n + 2.0) / 2.0)),
+        }
+    }
+
     /// About how much of all light it sends on: what samples are divided by.
     pub(super) fn albedo(&self) -> f32 {
         let share = match (self.scale, self.model) {
@@ -51,12 +62,12 @@ impl Highlight {
     }
 
     /// A direction that is likely where the highlight is high; may lie below the surface.
-    pub(super) fn sample(&self, normal: DVec3, to_viewer: DVec3, even: DVec2) -> DVec3 {
+    pub(super) fn sample(&self, normal: DVec3, to_viewer: DVec3, xi: DVec2) -> DVec3 {
         let n = f64::from(self.shininess);
         match self.model {
-            Specular::Phong => warp::power(normal * (2.0 * normal.dot(to_viewer)) - to_viewer, n, even),
+            Specular::Phong => warp::power(normal * (2.0 * normal.dot(to_viewer)) - to_viewer, n, xi),
             Specular::BlinnPhong => {
-                let half = warp::power(normal, n, even);
+                let half = warp::power(normal, n, xi);
                 half * (2.0 * half.dot(to_viewer)) - to_viewer
             }
         }

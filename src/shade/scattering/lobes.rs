@@ -95,14 +95,14 @@ impl<'a> Lobes<'a> {
         if !self.shading.faces(to_light) {
             return [Vec3::ZERO, Vec3::ZERO, whole];
         }
-        let diffuse = self.shading.parts(to_light)[0];
+        let diffuse = self.shading.lobes(to_light)[0];
         // A way through is behind the surface, where nothing else is.
         [diffuse, (whole - diffuse).max(Vec3::ZERO), Vec3::ZERO]
     }
 
-    /// A direction to go on in: `choice` (from 0 to below 1) chooses the lobe, `even` (in the unit square) the
+    /// A direction to go on in: `choice` (from 0 to below 1) chooses the lobe, `xi` (in the unit square) the
     /// direction. None where that leads nowhere.
-    pub fn sample(&self, choice: f64, even: DVec2) -> Option<Scattered> {
+    pub fn sample(&self, choice: f64, xi: DVec2) -> Option<Scattered> {
         let Shading { normal, to_viewer, highlight, .. } = self.shading;
         let mut rest = choice;
         let last = self.chances.iter().rposition(|&chance| chance > 0.0)?;
@@ -112,15 +112,15 @@ impl<'a> Lobes<'a> {
         });
         let lobe = lobe.map_or(last, |lobe| lobe.min(last));
         let (direction, scale) = match lobe {
-            0 => (warp::cosine(*normal, even), 1.0),
-            1 => (highlight.sample(*normal, *to_viewer, even), 1.0),
+            0 => (warp::cosine(*normal, xi), 1.0),
+            1 => (highlight.sample(*normal, *to_viewer, xi), 1.0),
             _ => {
                 let way = if lobe == 2 { self.ways.mirrored? } else { self.ways.refracted? };
                 let Some(gloss) = self.gloss else {
                     let weight = way.share * (way.scale / self.chances[lobe] as f32);
                     return Some(Scattered { direction: way.direction, weight, density: None, scale: way.scale });
                 };
-                (warp::power(way.direction, gloss, even), way.scale)
+                (warp::power(way.direction, gloss, xi), way.scale)
             }
         };
         let Value { share, density } = self.lit(direction, true);
@@ -133,11 +133,11 @@ impl<'a> Lobes<'a> {
 }
 
 impl Way {
-    /// A direction near this one, spread by `gloss` as `even` chooses; none where it would be on the other side of the
+    /// A direction near this one, spread by `gloss` as `xi` chooses; none where it would be on the other side of the
     /// surface. The share stays: all that is lost is what goes there.
-    pub fn spread(&self, gloss: f32, even: DVec2, shading: &Shading) -> Option<DVec3> {
+    pub fn spread(&self, gloss: f32, xi: DVec2, shading: &Shading) -> Option<DVec3> {
         let side = |direction: DVec3| (shading.normal.dot(direction), shading.horizon.dot(direction));
-        let spread = warp::power(self.direction, f64::from(gloss), even);
+        let spread = warp::power(self.direction, f64::from(gloss), xi);
         let crosses = shading.horizon.dot(self.direction) < 0.0;
         let (a, b) = side(spread);
         let stays = if crosses { a < 0.0 && b < 0.0 } else { a > 0.0 && b > 0.0 };

@@ -7,7 +7,7 @@ use super::highlight::Highlight;
 use super::ways;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Interface, Material, Texture};
-use crate::shade::{SurfacePoint, light::Illumination, texture};
+use crate::shade::{SurfacePoint, texture};
 
 /// A surface with its colours looked up, ready for any number of lights.
 #[derive(Clone, Copy, Debug)]
@@ -84,20 +84,9 @@ impl Shading {
         self.normal.dot(to_light) > 0.0 && self.horizon.dot(to_light) > 0.0
     }
 
-    /// What of the arriving light goes to the viewer, linear RGB.
-    pub fn reflect(&self, arriving: &Illumination) -> Vec3 {
-        self.value(arriving.to_light) * arriving.color
-    }
-
     /// Share of even light that is sent on by what is diffuse and by the highlight, linear RGB.
     pub fn albedo(&self) -> Vec3 {
-        self.diffuse + self.highlight.color
-    }
-
-    /// pi f cos for light along `to_light`: what is diffuse, and the highlight.
-    pub fn parts(&self, to_light: DVec3) -> [Vec3; 2] {
-        let diffuse = self.diffuse * self.normal.dot(to_light).max(0.0) as f32;
-        [diffuse, (self.value(to_light) - diffuse).max(Vec3::ZERO)]
+        self.diffuse + self.highlight.color * self.highlight.share()
     }
 
     /// pi f cos for light along `to_light`.
@@ -144,9 +133,14 @@ mod tests {
         }
     }
 
-    fn from(degrees: f64) -> Illumination {
-        let to_light = DVec3::new(-degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
-        Illumination { to_light, color: Vec3::splat(2.0), end: None, density: None }
+    /// Towards a light so far from the normal, on the other side than the viewer.
+    fn from(degrees: f64) -> DVec3 {
+        DVec3::new(-degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0)
+    }
+
+    /// Of a light of 2.
+    fn reflected(shading: &Shading, degrees: f64) -> Vec3 {
+        shading.lobes(from(degrees)).into_iter().sum::<Vec3>() * 2.0
     }
 
     /// Viewer and light 30 and 50 degrees from the normal, on opposite sides: the mirrored light is 20 degrees off the
@@ -158,7 +152,7 @@ mod tests {
             let highlight = 0.5 * angle.to_radians().cos().powi(10);
             let diffuse = 50f64.to_radians().cos();
             let expected = [0.5, 0.25, 0.0].map(|kd| (2.0 * (kd * diffuse + highlight)) as f32);
-            let got = shading(model, viewer).reflect(&from(50.0));
+            let got = reflected(&shading(model, viewer), 50.0);
             assert!((got - Vec3::from_array(expected)).length() < 1e-6, "{model:?}: {got} against {expected:?}");
         }
     }
@@ -167,8 +161,8 @@ mod tests {
     fn a_light_behind_gives_nothing() {
         for model in [Specular::Phong, Specular::BlinnPhong] {
             let shading = shading(model, DVec3::Y);
-            assert_eq!(shading.reflect(&from(100.0)), Vec3::ZERO);
-            assert!(!shading.faces(from(100.0).to_light));
+            assert_eq!(reflected(&shading, 100.0), Vec3::ZERO);
+            assert!(!shading.faces(from(100.0)));
         }
     }
 }

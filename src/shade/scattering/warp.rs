@@ -6,8 +6,8 @@ use crate::math::{DVec2, DVec3, tangents};
 
 /// A direction with the density cos / pi about `normal` (Malley's method: Pharr, Jakob, Humphreys 2016, *Physically Based Rendering*
 /// 13.6.3).
-pub(super) fn cosine(normal: DVec3, even: DVec2) -> DVec3 {
-    around(normal, (1.0 - even.x).sqrt(), even.y)
+pub(super) fn cosine(normal: DVec3, xi: DVec2) -> DVec3 {
+    around(normal, (1.0 - xi.x).sqrt(), xi.y)
 }
 
 /// The density of [`cosine`], for a direction on the side of the normal.
@@ -17,8 +17,8 @@ pub(super) fn cosine_density(cosine: f64) -> f64 {
 
 /// A direction with the density (n + 1) / (2 pi) cos^n about `axis` (Lafortune and Willems 1994, *Using the modified Phong
 /// reflectance model for physically based rendering*).
-pub(super) fn power(axis: DVec3, n: f64, even: DVec2) -> DVec3 {
-    around(axis, libm::pow(1.0 - even.x, 1.0 / (n + 1.0)), even.y)
+pub(super) fn power(axis: DVec3, n: f64, xi: DVec2) -> DVec3 {
+    around(axis, libm::pow(1.0 - xi.x, 1.0 / (n + 1.0)), xi.y)
 }
 
 /// The density of [`power`] where the cosine to the axis is `cosine`.
@@ -41,9 +41,9 @@ mod tests {
     fn samples_have_their_density() {
         let axis = DVec3::new(1.0, -2.0, 0.5).normalize();
         let side = 200;
-        let even = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
+        let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
         let mean = |sample: &dyn Fn(DVec2) -> DVec3| {
-            let squares = (0..side * side).map(|k| sample(even(k)).dot(axis).powi(2));
+            let squares = (0..side * side).map(|k| sample(xi(k)).dot(axis).powi(2));
             squares.sum::<f64>() / f64::from(side * side)
         };
         // The integral of 2 c^3 over c from 0 to 1, and of (n + 1) c^(n + 2).
