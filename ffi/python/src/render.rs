@@ -68,30 +68,29 @@ impl Wishes {
         })
     }
 
-    fn camera(&self, scene: &Scene, settings: &Settings) -> PyResult<Camera> {
+    /// The camera that is wished for, or the scene's; none where that has none.
+    fn camera(&self, scene: &Scene) -> PyResult<Option<Camera>> {
         if let Some((eye, target, up, fov)) = self.view {
             let [eye, target, up] = [eye, target, up].map(DVec3::from);
             let camera = Camera::look_at(eye, target, up, fov.to_radians());
-            return camera.ok_or_else(|| {
-                PyValueError::new_err(
-                    "eye, look_at and up: they must be finite, eye and look_at two points, and up not zero",
-                )
-            });
+            let message = "eye, look_at and up: they must be finite, eye and look_at two points, and up not zero";
+            return camera.map(Some).ok_or_else(|| PyValueError::new_err(message));
         }
         if let Some(name) = &self.camera {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);
             let names: Vec<&str> = scene.cameras.iter().map(|camera| &camera.name[..]).collect();
             let unknown = || PyValueError::new_err(format!("camera {name:?} is not one of {names:?}"));
-            return found.cloned().ok_or_else(unknown);
+            return found.cloned().map(Some).ok_or_else(unknown);
         }
-        let aspect = f64::from(settings.width) / f64::from(settings.height.max(1));
-        Ok(scene.cameras.first().cloned().unwrap_or_else(|| Camera::framing(&scene.bounds(), aspect)))
+        Ok(scene.cameras.first().cloned())
     }
 
     fn render<'py>(&self, py: Python<'py>, scene: &Scene) -> PyResult<Picture<'py>> {
         let settings = self.settings(scene)?;
-        let camera = self.camera(scene, &settings)?;
+        let camera = self.camera(scene)?;
+        let aspect = f64::from(settings.width) / f64::from(settings.height.max(1));
         let image = pool::interruptible(py, self.threads, |cancel| {
+            let camera = camera.unwrap_or_else(|| Camera::framing(&scene.bounds(), aspect));
             let world = World::new(scene)?;
             let renderer = Renderer::new(scene, &world, camera, settings)?;
             renderer.render(&Bvh::build(&world), Control { cancel: Some(cancel), ..Control::default() })
@@ -161,10 +160,12 @@ pub fn render_meshes<'py>(
             return Err(PyValueError::new_err(message));
         }
         let mut mesh = Mesh { material: number as u32, ..Mesh::new(Vec::new(), triangles) };
-        mesh.set_positions(&positions);
-        if is_smooth {
-            mesh.smooth_normals();
-        }
+        pool::run(py, wishes.threads, || {
+            mesh.set_positions(&positions);
+            if is_smooth {
+                mesh.smooth_normals();
+            }
+        })?;
         geometries.push(Geometry::Mesh(mesh));
         materials.push(Material { diffuse: Vec3::from(*color), ..Material::default() });
     }

@@ -153,16 +153,31 @@ def test_pools_that_are_in_use_are_not_ended(rng):
             assert np.array_equal(answer, expected)
 
 
+def grid(side):
+    """Corners and faces of so many rows of so many vertices."""
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(side), np.arange(side)))
+    corners = np.stack([x, y, np.sin(x) + np.cos(y)], axis=1).astype(np.float32)
+    first = (y * side + x)[(x < side - 1) & (y < side - 1)]
+    halves = [first, first + 1, first + side + 1], [first, first + side + 1, first + side]
+    return corners, np.concatenate([np.stack(half, axis=1) for half in halves])
+
+
+def answer(child, queue):
+    """What a child puts into the queue within a minute; it is small enough for the child to end before anyone takes it out."""
+    child.join(60)
+    hung = child.is_alive()
+    child.kill()
+    assert not hung, "the child waits for a thread that it has not"
+    assert child.exitcode == 0
+    return queue.get()
+
+
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
 def test_a_fork_while_another_thread_asks_for_its_first_distance():
     """Whatever that thread has begun, it does not end it in the child."""
     import threading
 
-    side = np.arange(700)
-    x, y = (part.ravel() for part in np.meshgrid(side, side))
-    corners = np.stack([x, y, np.sin(x) + np.cos(y)], axis=1).astype(np.float32)
-    first = (y * 700 + x)[(x < 699) & (y < 699)]
-    faces = np.concatenate([np.stack([first, first + 1, first + 701], 1), np.stack([first, first + 701, first + 700], 1)])
+    corners, faces = grid(700)
     large = twincast.RaycastingScene()
     large.add_triangles(corners, faces)
     # The tree alone.
@@ -180,11 +195,29 @@ def test_a_fork_while_another_thread_asks_for_its_first_distance():
     asked.join()
     expected = large.compute_distance(point).tolist()
     for child in children:
-        child.join(60)
-        hung = child.is_alive()
-        child.kill()
-        assert not hung, "the child waits for a thread that it has not"
-        assert queue.get() == expected
+        assert answer(child, queue) == expected
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+@pytest.mark.parametrize("what", ["flat", "smooth", "file"])
+def test_a_fork_renders_as_its_parent_did(what, tmp_path):
+    """Meshes of so many vertices that threads share them; and a file without a camera, of which all is to be seen."""
+    shown, normals = grid(200), what
+    if what == "file":
+        corners, faces = shown
+        shown, normals = tmp_path / "grid.obj", None
+        lines = ["v {} {} {}".format(*row) for row in corners] + ["f {} {} {}".format(*row) for row in faces + 1]
+        shown.write_text("\n".join(lines))
+
+    def render():
+        return twincast.render(shown, size=(8, 8), normals=normals).tolist()
+
+    expected = render()
+    context = multiprocessing.get_context("fork")
+    queue = context.SimpleQueue()
+    child = context.Process(target=lambda: queue.put(render()), daemon=True)
+    child.start()
+    assert answer(child, queue) == expected
 
 
 def test_a_mesh_that_comes_while_the_tree_is_built_counts_from_then_on(monkeypatch):
