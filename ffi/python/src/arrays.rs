@@ -3,9 +3,13 @@
 use std::ops::Range;
 
 use numpy::ndarray::{ArrayView1, ArrayView2};
-use numpy::{Element, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::slice::{ChunksMut, ParallelSliceMut};
 use twincast::Ray;
 use twincast::math::{DVec3, Vec3};
 use twincast::trace::precise::PreciseRay;
@@ -18,13 +22,37 @@ pub const CHUNK: usize = 1024;
 const SHORTEST: f32 = 1e-18;
 const FARTHEST: f32 = 1e19;
 
-/// So many zeros, which nobody has to write: pages that the system gives when they are touched, by the thread that answers.
-///
-/// # Errors
-/// `MemoryError` where there is no room. For that NumPy makes them: a vector would end the process.
-pub fn zeros<'py, T: Element>(py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyArray1<T>>> {
-    let zeros = py.import("numpy")?.call_method1("zeros", (count, T::get_dtype(py)))?;
-    Ok(zeros.cast_into()?)
+/// What threads answer, of each ray or point so many numbers: an array that they write to a chunk at a time, and that is Python's afterwards.
+pub struct Answers<'py, T: Element> {
+    numbers: PyReadwriteArray1<'py, T>,
+    width: usize,
+}
+
+impl<'py, T: Element + Send> Answers<'py, T> {
+    /// `count` times `width` zeros, which nobody has to write: pages that the system gives when they are touched, by the thread that answers.
+    ///
+    /// # Errors
+    /// `MemoryError` where there is no room. For that NumPy makes them: a vector would end the process.
+    pub fn new(py: Python<'py>, count: usize, width: usize) -> PyResult<Self> {
+        let zeros = py.import("numpy")?.call_method1("zeros", (count * width, T::get_dtype(py)))?;
+        Ok(Self { numbers: zeros.cast_into::<PyArray1<T>>()?.readwrite(), width })
+    }
+
+    /// Those of each [`CHUNK`] of rays or points.
+    pub fn chunks(&mut self) -> PyResult<ChunksMut<'_, T>> {
+        Ok(self.numbers.as_slice_mut()?.par_chunks_mut(self.width * CHUNK))
+    }
+
+    /// All of them.
+    pub fn flat(self) -> Bound<'py, PyArray1<T>> {
+        Bound::clone(&self.numbers)
+    }
+
+    /// The same, a row for each ray or point.
+    pub fn rows(self) -> PyResult<Bound<'py, PyArray2<T>>> {
+        let (width, flat) = (self.width, self.flat());
+        flat.reshape([flat.len() / width, width])
+    }
 }
 
 /// The nearest f32, but no infinite one, which would be a miss.

@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::trace::precise::{Precise, PreciseRay};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, weights_f32, zeros};
+use crate::arrays::{Answers, CHUNK, Ends, Points, Rays, finite_f32, weights_f32};
 use crate::pool;
 use crate::scene::{Scene, table};
 
@@ -40,15 +40,13 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let counted = self.counted(py, threads)?;
-        let answers = zeros(py, rays.len())?;
-        let mut counts = answers.readwrite();
-        let counts = counts.as_slice_mut()?;
-        pool::each(py, threads, counts.par_chunks_mut(CHUNK).enumerate(), |(chunk, counts)| {
+        let mut answers = Answers::new(py, rays.len(), 1)?;
+        pool::each(py, threads, answers.chunks()?.enumerate(), |(chunk, counts)| {
             let mut found = [0; CHUNK];
             counted.count_batch(&rays.some(rays.chunk(chunk)), &mut found[..counts.len()]);
             counts.iter_mut().zip(found).for_each(|(count, found)| *count = found as i32);
         })?;
-        Ok(answers)
+        Ok(answers.flat())
     }
 
     /// All hits; of each ray the first `most`. Locations only where they are asked for, else without rows.

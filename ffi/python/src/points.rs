@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::math::DVec3;
 use twincast::trace::precise::NearestPoint;
 
-use crate::arrays::{CHUNK, Points, Rows, weights_f32, zeros};
+use crate::arrays::{Answers, CHUNK, Points, Rows, weights_f32};
 use crate::inside::are_inside;
 use crate::order::{self, Order};
 use crate::pool;
@@ -63,14 +63,12 @@ impl Scene {
     fn nearest<'py>(&self, py: Python<'py>, points: Points<'py>, threads: usize) -> PyResult<Nearest<'py>> {
         let rows = points.rows("points")?;
         let count = rows.len();
-        let (all_points, all_uv, all_normals) = (zeros(py, 3 * count)?, zeros(py, 2 * count)?, zeros(py, 3 * count)?);
-        let (primitives, geometries, distances) = (zeros(py, count)?, zeros(py, count)?, zeros(py, count)?);
-        let (mut point, mut uv, mut normal) = (all_points.readwrite(), all_uv.readwrite(), all_normals.readwrite());
+        let (mut point, mut uv, mut normal) =
+            (Answers::new(py, count, 3)?, Answers::new(py, count, 2)?, Answers::new(py, count, 3)?);
         let (mut primitive, mut geometry, mut distance) =
-            (primitives.readwrite(), geometries.readwrite(), distances.readwrite());
-        let (point, uv, normal) = (point.as_slice_mut()?, uv.as_slice_mut()?, normal.as_slice_mut()?);
-        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
-        let distance = distance.as_slice_mut()?;
+            (Answers::new(py, count, 1)?, Answers::new(py, count, 1)?, Answers::new(py, count, 1)?);
+        let tasks = (point.chunks()?, uv.chunks()?, normal.chunks()?);
+        let others = (primitive.chunks()?, geometry.chunks()?, distance.chunks()?);
         let is_f32 = rows.is_f32();
         pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
@@ -78,10 +76,6 @@ impl Scene {
             let found = along_order(&rows, order.as_ref(), cancel, None, |points, found| {
                 self.precise.nearest_point_batch(points, found)
             });
-            let tasks =
-                (point.par_chunks_mut(3 * CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
-            let others =
-                (primitive.par_chunks_mut(CHUNK), geometry.par_chunks_mut(CHUNK), distance.par_chunks_mut(CHUNK));
             let tasks = tasks.into_par_iter().zip(others.into_par_iter()).enumerate();
             tasks.for_each(|(chunk, ((point, uv, normal), (primitive, geometry, distance)))| {
                 if cancel.load(Ordering::Relaxed) {
@@ -106,8 +100,7 @@ impl Scene {
                 self.normals_of(primitive, geometry, true, normal, |x| x);
             });
         })?;
-        let (point, uv) = (all_points.reshape([count, 3])?, all_uv.reshape([count, 2])?);
-        Ok((point, primitives, geometries, uv, all_normals.reshape([count, 3])?, distances))
+        Ok((point.rows()?, primitive.flat(), geometry.flat(), uv.rows()?, normal.rows()?, distance.flat()))
     }
 
     /// How far each point is from the nearest triangle; NaN where there is none. With `samples` above 0, negative where

@@ -8,7 +8,7 @@ use twincast::math::DVec3;
 use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
 use twincast::{Batch, Hit, Tracer};
 
-use crate::arrays::{CHUNK, Ends, Points, Rays, finite_f32, weights_f32, zeros};
+use crate::arrays::{Answers, CHUNK, Ends, Points, Rays, finite_f32, weights_f32};
 use crate::{pool, value_error};
 
 /// No triangle, or no mesh, in arrays of unsigned numbers.
@@ -80,10 +80,8 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
-        let answers = zeros(py, rays.len())?;
-        let mut first = answers.readwrite();
-        let first = first.as_slice_mut()?;
-        pool::each(py, threads, first.par_chunks_mut(CHUNK).enumerate(), |(chunk, first)| {
+        let mut answers = Answers::new(py, rays.len(), 1)?;
+        pool::each(py, threads, answers.chunks()?.enumerate(), |(chunk, first)| {
             let mut hits = [None; CHUNK];
             if let Some(hits) = self.exact_hits(&rays, chunk, &mut hits) {
                 first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
@@ -93,7 +91,7 @@ impl Scene {
                 first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
             }
         })?;
-        Ok(answers)
+        Ok(answers.flat())
     }
 
     /// Whether each ray hits anything.
@@ -109,17 +107,15 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let exact = self.precise.exact().filter(|_| rays.are_f32());
-        let answers = zeros(py, rays.len())?;
-        let mut occluded = answers.readwrite();
-        let occluded = occluded.as_slice_mut()?;
-        pool::each(py, threads, occluded.par_chunks_mut(CHUNK).enumerate(), |(chunk, occluded)| {
+        let mut answers = Answers::new(py, rays.len(), 1)?;
+        pool::each(py, threads, answers.chunks()?.enumerate(), |(chunk, occluded)| {
             let which = rays.chunk(chunk);
             match exact.and_then(|bvh| Some((bvh, rays.rounded(which.clone())?))) {
                 Some((bvh, rays)) => bvh.occluded_batch(&rays, occluded, Batch::of(&rays)),
                 None => self.precise.occluded_batch(&rays.some(which), occluded),
             }
         })?;
-        Ok(answers)
+        Ok(answers.flat())
     }
 
     /// The nearest hits in f32; a miss has t infinite, ids `INVALID` and zeros. Normals are those of triangles, of unit length if
@@ -138,16 +134,12 @@ impl Scene {
     ) -> PyResult<Cast<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
-        let (all_t, all_uv, all_normals) = (zeros(py, count)?, zeros(py, 2 * count)?, zeros(py, 3 * count)?);
-        let (primitives, geometries) = (zeros(py, count)?, zeros(py, count)?);
-        let (mut t, mut uv, mut normal) = (all_t.readwrite(), all_uv.readwrite(), all_normals.readwrite());
-        let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
-        let (t, uv, normal) = (t.as_slice_mut()?, uv.as_slice_mut()?, normal.as_slice_mut()?);
-        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
-        let tasks = (t.par_chunks_mut(CHUNK), uv.par_chunks_mut(2 * CHUNK), normal.par_chunks_mut(3 * CHUNK));
-        let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
-        let tasks = tasks.into_par_iter().zip(ids).enumerate();
-        pool::each(py, threads, tasks, |(chunk, ((t, uv, normal), (primitive, geometry)))| {
+        let (mut t, mut uv) = (Answers::new(py, count, 1)?, Answers::new(py, count, 2)?);
+        let (mut primitive, mut geometry) = (Answers::new(py, count, 1)?, Answers::new(py, count, 1)?);
+        let mut normal = Answers::new(py, count, 3)?;
+        let tasks = (t.chunks()?, uv.chunks()?, primitive.chunks()?, geometry.chunks()?, normal.chunks()?);
+        let tasks = tasks.into_par_iter().enumerate();
+        pool::each(py, threads, tasks, |(chunk, (t, uv, primitive, geometry, normal))| {
             let mut hits = [None; CHUNK];
             for (i, hit) in self.hits(&rays, chunk, &mut hits).iter().enumerate() {
                 (t[i], primitive[i], geometry[i]) = (f32::INFINITY, INVALID, INVALID);
@@ -160,7 +152,7 @@ impl Scene {
             }
             self.normals_of(primitive, geometry, normalize, normal, |x| x as f32);
         })?;
-        Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries, all_normals.reshape([count, 3])?))
+        Ok((t.flat(), uv.rows()?, primitive.flat(), geometry.flat(), normal.rows()?))
     }
 
     /// The nearest hits in f64; a miss has t infinite, ids -1 and zeros.
@@ -176,15 +168,10 @@ impl Scene {
     ) -> PyResult<Closest<'py>> {
         let rays = Rays::new(&origins, &directions, tmin, &tmax)?;
         let count = rays.len();
-        let (all_t, all_uv) = (zeros(py, count)?, zeros(py, 2 * count)?);
-        let (primitives, geometries) = (zeros(py, count)?, zeros(py, count)?);
-        let (mut t, mut uv) = (all_t.readwrite(), all_uv.readwrite());
-        let (mut primitive, mut geometry) = (primitives.readwrite(), geometries.readwrite());
-        let (t, uv) = (t.as_slice_mut()?, uv.as_slice_mut()?);
-        let (primitive, geometry) = (primitive.as_slice_mut()?, geometry.as_slice_mut()?);
-        let ids = primitive.par_chunks_mut(CHUNK).zip(geometry.par_chunks_mut(CHUNK));
-        let tasks = t.par_chunks_mut(CHUNK).zip(uv.par_chunks_mut(2 * CHUNK)).zip(ids).enumerate();
-        pool::each(py, threads, tasks, |(chunk, ((t, uv), (primitive, geometry)))| {
+        let (mut t, mut uv) = (Answers::new(py, count, 1)?, Answers::new(py, count, 2)?);
+        let (mut primitive, mut geometry) = (Answers::new(py, count, 1)?, Answers::new(py, count, 1)?);
+        let tasks = (t.chunks()?, uv.chunks()?, primitive.chunks()?, geometry.chunks()?);
+        pool::each(py, threads, tasks.into_par_iter().enumerate(), |(chunk, (t, uv, primitive, geometry))| {
             let mut hits = [None; CHUNK];
             for (i, hit) in self.precise_hits(&rays, chunk, &mut hits).iter().enumerate() {
                 (t[i], primitive[i], geometry[i]) = (f64::INFINITY, -1, -1);
@@ -195,7 +182,7 @@ impl Scene {
                 }
             }
         })?;
-        Ok((all_t, all_uv.reshape([count, 2])?, primitives, geometries))
+        Ok((t.flat(), uv.rows()?, primitive.flat(), geometry.flat()))
     }
 
     /// The normals of triangles, of unit length; zero for `INVALID`, for what is not there, and for triangles without an area.
@@ -219,10 +206,8 @@ impl Scene {
         let exists = |geometry: u32, primitive: u32| {
             meshes.get(geometry as usize).is_some_and(|mesh| (primitive as usize) < mesh.triangles.len())
         };
-        let answers = zeros(py, 3 * count)?;
-        let mut normals = answers.readwrite();
-        let normals = normals.as_slice_mut()?;
-        pool::each(py, threads, normals.par_chunks_mut(3 * CHUNK).enumerate(), |(chunk, normals)| {
+        let mut answers = Answers::new(py, count, 3)?;
+        pool::each(py, threads, answers.chunks()?.enumerate(), |(chunk, normals)| {
             let (mut geometries, mut primitives) = ([INVALID; CHUNK], [INVALID; CHUNK]);
             let count = normals.len() / 3;
             for i in 0..count {
@@ -233,7 +218,7 @@ impl Scene {
             }
             self.normals_of(&primitives[..count], &geometries[..count], true, normals, |x| x);
         })?;
-        answers.reshape([count, 3])
+        answers.rows()
     }
 }
 
