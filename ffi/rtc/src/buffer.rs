@@ -95,6 +95,8 @@ impl Items {
 pub struct View {
     buffer: Arc<Buffer>,
     items: Items,
+    /// Of an item, by its format.
+    item_bytes: usize,
 }
 
 impl View {
@@ -106,7 +108,7 @@ impl View {
         if buffer.data.is_null() && items.count > 0 {
             return Err(Failure::argument("invalid argument"));
         }
-        Ok(Self { buffer, items })
+        Ok(Self { buffer, items, item_bytes: format::bytes(items.format) })
     }
 
     /// Where the first item is; null in a buffer without bytes.
@@ -127,15 +129,18 @@ impl View {
         self.items.count
     }
 
-    /// Words of item `index`, which may not be there.
+    /// Where item `index` is; none where there is no such item, or where items are of fewer bytes than these.
+    #[inline]
+    fn item(&self, index: usize, bytes: usize) -> Option<*const u8> {
+        let is_there = index < self.count() && bytes <= self.item_bytes;
+        is_there.then(|| self.data().wrapping_add(index * self.stride()).cast_const())
+    }
+
+    /// The first words of item `index`, which may not be there.
     #[inline]
     pub fn words<const N: usize>(&self, index: usize) -> Option<[u32; N]> {
-        if index >= self.count() || self.buffer.data.is_null() {
-            return None;
-        }
-        let item = self.data().wrapping_add(index * self.stride());
-        // SAFETY: the format that was checked when the view was set has at least N words an item; the item lies in the buffer, which
-        // the caller promised to be so large, and alive.
+        let item = self.item(index, 4 * N)?;
+        // SAFETY: the item has that many bytes, and lies in the buffer, which the caller promised to be so large, and alive.
         Some(unsafe { item.cast::<[u32; N]>().read_unaligned() })
     }
 
@@ -145,12 +150,10 @@ impl View {
         self.words(index).map(|words| words.map(f32::from_bits))
     }
 
-    /// The byte with this index, of items of one byte.
+    /// The first byte of item `index`.
     pub fn byte(&self, index: usize) -> Option<u8> {
-        if index >= self.count() || self.buffer.data.is_null() {
-            return None;
-        }
+        let item = self.item(index, 1)?;
         // SAFETY: as in `words`.
-        Some(unsafe { self.data().wrapping_add(index * self.stride()).read() })
+        Some(unsafe { item.read() })
     }
 }
