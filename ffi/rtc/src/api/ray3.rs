@@ -60,7 +60,7 @@ macro_rules! packets {
                 // SAFETY: the interface's rules.
                 let lanes = unsafe { Packed::new(rays, $count) };
                 // SAFETY: an array of so many, by the interface's rules.
-                $trace(committed, query, &lanes, $count, |lane| unsafe { is_valid(valid, lane) });
+                $trace(committed, query, &lanes, |lane| unsafe { is_valid(valid, lane) });
             };
             if valid.is_null() {
                 // Which is reported there.
@@ -176,7 +176,7 @@ macro_rules! streams {
                 for i in 0..count as usize {
                     // SAFETY: so many packets, so far apart, by the interface's rules.
                     let lanes = unsafe { Packed::new(rays.wrapping_byte_add(i * stride), width as usize) };
-                    $trace(scene, query, &lanes, width as usize, |_| true);
+                    $trace(scene, query, &lanes, |_| true);
                 }
             };
             // SAFETY: the interface's rules.
@@ -194,8 +194,8 @@ macro_rules! streams {
             let work = |scene: &Committed, query: &Query| {
                 let spare = Spare::new();
                 // SAFETY: so many arrays, by the interface's rules.
-                let lanes = unsafe { Pointers::new(rays.cast(), &spare) };
-                $trace(scene, query, &lanes, count as usize, |_| true);
+                let lanes = unsafe { Pointers::new(rays.cast(), count as usize, &spare) };
+                $trace(scene, query, &lanes, |_| true);
             };
             // SAFETY: the interface's rules.
             unsafe { ask(scene, context, rays.cast_mut(), work) }

@@ -79,7 +79,7 @@ macro_rules! packets {
                 // SAFETY: the interface's rules.
                 let lanes = unsafe { Packed::new(rays, $count) };
                 // SAFETY: an array of so many, by the interface's rules.
-                $trace(committed, query, &lanes, $count, |lane| unsafe { *valid.add(lane) != 0 });
+                $trace(committed, query, &lanes, |lane| unsafe { *valid.add(lane) != 0 });
             };
             if valid.is_null() {
                 // Which is reported there.

@@ -1,65 +1,105 @@
 //! Rays as the caller lays them out: word by word, so many rays side by side.
 
+use std::marker::PhantomData;
 use std::mem::{size_of, transmute};
 
 use twincast::trace::bvh::Packet;
 
-use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay};
+use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay, RTCRayHit};
+
+/// What a lane holds.
+pub trait Words {
+    /// In so many words.
+    const COUNT: usize;
+}
+
+impl Words for RTCRay {
+    const COUNT: usize = RAY_WORDS;
+}
+
+impl Words for RTCRayHit {
+    const COUNT: usize = RAY_WORDS + HIT_WORDS;
+}
 
 /// Rays of the caller's, by number; those words of all rays that are the same lie side by side.
-pub trait Lanes {
+///
+/// # Safety
+/// As long as the lanes are there, [`word`](Lanes::word) is where this thread can read each of [`Record`](Lanes::Record)'s words of each of
+/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`TFAR`] and the words of hits.
+pub unsafe trait Lanes {
+    /// A ray, or a ray and its hit.
+    type Record: Words;
+
+    /// How many rays.
+    fn count(&self) -> usize;
+
     /// Where word `word` of ray `lane` is: those of the ray, then those of its hit.
-    fn word(&self, word: usize, lane: usize) -> *mut u32;
+    ///
+    /// # Safety
+    /// There is such a word, and such a lane.
+    unsafe fn word(&self, word: usize, lane: usize) -> *mut u32;
+
+    /// All rays where they are; none unless they are eight that lie as the native tracer reads them.
+    ///
+    /// # Safety
+    /// Nobody writes to them as long as the result is used.
+    #[inline(always)]
+    unsafe fn packet(&self) -> Option<&Packet> {
+        None
+    }
+
+    /// Whether the words up to `word` are there of `N` rays in a row, from `first` on.
+    #[inline(always)]
+    fn has<const N: usize>(&self, word: usize, first: usize) -> bool {
+        const { assert!(N <= 8, "rays are side by side in eights") };
+        word < Self::Record::COUNT && self.count().checked_sub(N).is_some_and(|last| first <= last)
+    }
+
+    /// One word of rays in a row, eight at most.
+    #[inline(always)]
+    fn row<const N: usize>(&self, word: usize, first: usize) -> [u32; N] {
+        assert!(self.has::<N>(word, first));
+        // SAFETY: they are there, and who implements this promises that they can be read, and lie side by side.
+        unsafe { self.word(word, first).cast::<[u32; N]>().read() }
+    }
+
+    /// Writes one word that answers, of rays in a row, eight at most.
+    #[inline(always)]
+    fn set_row<const N: usize>(&self, word: usize, first: usize, values: [u32; N]) {
+        assert!(self.has::<N>(word, first) && (word == TFAR || word >= RAY_WORDS));
+        // SAFETY: they are there and answer, and who implements this promises that they can be written to, and lie side by side.
+        unsafe { self.word(word, first).cast::<[u32; N]>().write(values) };
+    }
 
     /// A ray.
     #[inline(always)]
     fn ray(&self, lane: usize) -> RTCRay {
+        assert!(self.has::<1>(RAY_WORDS - 1, lane));
         let mut words = [0u32; RAY_WORDS];
         for (k, word) in words.iter_mut().enumerate() {
-            // SAFETY: who made the lanes promised that all words of all rays can be read.
+            // SAFETY: it is there, and who implements this promises that it can be read.
             *word = unsafe { self.word(k, lane).read() };
         }
         // SAFETY: both are that many words, of which each may be anything.
         unsafe { transmute::<[u32; RAY_WORDS], RTCRay>(words) }
     }
 
-    /// Eight rays where they are; none where they do not lie as the native tracer reads them.
-    ///
-    /// # Safety
-    /// Nobody writes to them as long as the result is used.
-    #[inline(always)]
-    unsafe fn packet(&self, _first: usize) -> Option<&Packet> {
-        None
-    }
-
-    /// One word of eight rays.
-    #[inline(always)]
-    fn eight(&self, word: usize, first: usize) -> [u32; 8] {
-        // SAFETY: who made the lanes promised that all words of all rays can be read; they lie side by side.
-        unsafe { self.word(word, first).cast::<[u32; 8]>().read() }
-    }
-
-    /// Writes one word of eight rays.
-    #[inline(always)]
-    fn set_eight(&self, word: usize, first: usize, values: [u32; 8]) {
-        // SAFETY: who made the lanes promised that hits, and where rays end, can be written; they lie side by side.
-        unsafe { self.word(word, first).cast::<[u32; 8]>().write(values) };
-    }
-
     /// Writes where a ray ends.
     #[inline(always)]
     fn set_tfar(&self, lane: usize, tfar: f32) {
-        // SAFETY: who made the lanes promised that it can be written.
-        unsafe { self.word(TFAR, lane).write(tfar.to_bits()) };
+        self.set_row(TFAR, lane, [tfar.to_bits()]);
     }
 
-    /// Writes a hit.
+    /// Writes a hit, and that the ray ends there.
     #[inline(always)]
-    fn set_hit(&self, lane: usize, hit: &RTCHit) {
+    fn set_hit(&self, lane: usize, tfar: f32, hit: &RTCHit) {
+        assert!(self.has::<1>(RAY_WORDS + HIT_WORDS - 1, lane));
         // SAFETY: a hit begins with that many words.
         let words = unsafe { (&raw const *hit).cast::<[u32; HIT_WORDS]>().read() };
+        // SAFETY: all words are there, and who implements this promises that these can be written to.
+        unsafe { self.word(TFAR, lane).write(tfar.to_bits()) };
         for (k, word) in words.into_iter().enumerate() {
-            // SAFETY: who made the lanes promised that all words of all hits can be written.
+            // SAFETY: as above.
             unsafe { self.word(RAY_WORDS + k, lane).write(word) };
         }
     }
@@ -67,10 +107,11 @@ pub trait Lanes {
     /// A hit as it is.
     #[inline(always)]
     fn hit(&self, lane: usize) -> RTCHit {
+        assert!(self.has::<1>(RAY_WORDS + HIT_WORDS - 1, lane));
         let mut hit = RTCHit::NONE;
         let words = (&raw mut hit).cast::<u32>();
         for k in 0..HIT_WORDS {
-            // SAFETY: a hit begins with that many words; who made the lanes promised that they can be read.
+            // SAFETY: a hit begins with that many words; it is there, and who implements this promises that it can be read.
             unsafe { words.add(k).write(self.word(RAY_WORDS + k, lane).read()) };
         }
         hit
@@ -95,33 +136,42 @@ const _: () = {
     assert!(offset_of!(Packet, direction) == 8 * offset_of!(RTCRay, dir));
     assert!(offset_of!(Packet, time) == 8 * offset_of!(RTCRay, time));
     assert!(offset_of!(Packet, tmax) == 8 * offset_of!(RTCRay, tfar));
+    assert!(size_of::<Packet>() <= 8 * size_of::<RTCRay>() && Packet::RAYS == 8);
     assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);
     assert!(offset_of!(RTCRay, tfar) == 4 * TFAR && offset_of!(RTCRay, mask) == 4 * MASK);
 };
 
 /// A packet: all first words, all second words and so on.
-#[derive(Clone, Copy)]
-pub struct Packed {
+pub struct Packed<T> {
     base: *mut u32,
     width: usize,
+    record: PhantomData<T>,
 }
 
-impl Packed {
+impl<T: Words> Packed<T> {
     /// # Safety
-    /// From `base` on there are `width` rays, with their hits where these are asked for; they are this thread's as long as the lanes are used.
+    /// From `base` on there are `width` rays, with their hits where `T` has one; they are this thread's as long as the lanes are there.
     pub unsafe fn new(base: *mut u32, width: usize) -> Self {
-        Self { base, width }
+        Self { base, width, record: PhantomData }
     }
 }
 
-impl Lanes for Packed {
+// SAFETY: who made the lanes promised that there are so many rays of so many words, and that they are this thread's.
+unsafe impl<T: Words> Lanes for Packed<T> {
+    type Record = T;
+
     #[inline(always)]
-    fn word(&self, word: usize, lane: usize) -> *mut u32 {
+    fn count(&self) -> usize {
+        self.width
+    }
+
+    #[inline(always)]
+    unsafe fn word(&self, word: usize, lane: usize) -> *mut u32 {
         self.base.wrapping_add(word * self.width + lane)
     }
 
     #[inline(always)]
-    unsafe fn packet(&self, _first: usize) -> Option<&Packet> {
+    unsafe fn packet(&self) -> Option<&Packet> {
         let packet = self.base.cast::<Packet>().cast_const();
         // SAFETY: who made the lanes promised that there are eight rays, which begin with one of these, and the caller that nobody writes to them.
         (self.width == Packet::RAYS && packet.is_aligned()).then(|| unsafe { &*packet })
@@ -130,10 +180,11 @@ impl Lanes for Packed {
 
 /// An array for each word; null for one that the caller has no use for.
 #[cfg(feature = "v3")]
-#[derive(Clone, Copy)]
-pub struct Pointers<'a> {
+pub struct Pointers<'a, T> {
     words: *const *mut u32,
+    count: usize,
     spare: &'a Spare,
+    record: PhantomData<T>,
 }
 
 /// What stands for arrays that are not there, of eight rays.
@@ -153,20 +204,29 @@ impl Spare {
 }
 
 #[cfg(feature = "v3")]
-impl<'a> Pointers<'a> {
+impl<'a, T: Words> Pointers<'a, T> {
     /// # Safety
-    /// `words` are pointers to arrays of the words of rays, then of hits where these are asked for, each null or as long as there are rays; they are this
-    /// thread's as long as the lanes are used.
-    pub unsafe fn new(words: *const *mut u32, spare: &'a Spare) -> Self {
-        Self { words, spare }
+    /// `words` are pointers to arrays of the words of `count` rays, then of their hits where `T` has one, each null or that long; they are this thread's as
+    /// long as the lanes are there.
+    pub unsafe fn new(words: *const *mut u32, count: usize, spare: &'a Spare) -> Self {
+        Self { words, count, spare, record: PhantomData }
     }
 }
 
 #[cfg(feature = "v3")]
-impl Lanes for Pointers<'_> {
+// SAFETY: who made the lanes promised that there are such arrays, which are this thread's; what stands for others is long enough for eight rays, wherever
+// they are, and what of it may be written to can be.
+unsafe impl<T: Words> Lanes for Pointers<'_, T> {
+    type Record = T;
+
     #[inline(always)]
-    fn word(&self, word: usize, lane: usize) -> *mut u32 {
-        // SAFETY: who made the lanes promised that there are so many pointers.
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    unsafe fn word(&self, word: usize, lane: usize) -> *mut u32 {
+        // SAFETY: there is such a word, so who made the lanes promised that there are so many pointers.
         let array = unsafe { self.words.add(word).read() };
         if array.is_null() {
             return match word {

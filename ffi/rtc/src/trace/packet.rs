@@ -10,7 +10,7 @@ use super::Query;
 use super::cast::{Sight, after, cast_one, name_solid, sight};
 use super::lanes::{Lanes, MASK, TFAR};
 use super::offer::{Target, hit_of};
-use crate::abi::{RAY_WORDS, RTCRayHit};
+use crate::abi::{RAY_WORDS, RTCRay, RTCRayHit};
 use crate::scene::Committed;
 
 /// Rays of a packet.
@@ -19,7 +19,6 @@ const RAYS: usize = Packet::RAYS;
 /// The lanes of a query, and which of them are asked for.
 struct Called<'a, L, V> {
     lanes: &'a L,
-    count: usize,
     /// Whether triangles do not count where rays begin.
     excludes_start: bool,
     is_valid: V,
@@ -39,19 +38,19 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         one: impl Fn(&Bvh, &Asked<'_, 1>, usize),
     ) {
         let Some((solid, mask)) = plain(committed, query, any) else {
-            return (0..self.count).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
+            return (0..self.lanes.count()).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
         };
-        let mut first = 0;
-        while first + 2 * RAYS <= self.count {
+        let (count, mut first) = (self.lanes.count(), 0);
+        while first + 2 * RAYS <= count {
             let [low, high] = [self.packet(first), self.packet(first + RAYS)];
             let lanes = [self.seeing(first, mask), self.seeing(first + RAYS, mask)];
             two(solid, &Asked { packets: [&low, &high], lanes }, first);
             first += 2 * RAYS;
         }
-        while first < self.count {
+        while first < count {
             let lanes = [self.seeing(first, mask)];
             // SAFETY: nobody writes to them before it is answered.
-            let in_place = unsafe { self.lanes.packet(first) };
+            let in_place = unsafe { self.lanes.packet() };
             match in_place.filter(|_| !self.excludes_start) {
                 Some(packet) => one(solid, &Asked { packets: [packet], lanes }, first),
                 None => one(solid, &Asked { packets: [&self.packet(first)], lanes }, first),
@@ -73,33 +72,35 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     #[inline(always)]
     fn as_it_is(&self, first: usize) -> Packet {
         let mut packet = Packet::NONE;
-        if first + RAYS > self.count {
-            for lane in first..self.count {
+        let count = self.lanes.count();
+        if first + RAYS > count {
+            for lane in first..count {
                 packet.set(lane - first, &super::cast::native(&self.lanes.ray(lane)));
             }
             return packet;
         }
         for axis in 0..3 {
-            packet.origin[axis] = self.lanes.eight(axis, first).map(f32::from_bits);
-            packet.direction[axis] = self.lanes.eight(DIRECTION + axis, first).map(f32::from_bits);
+            packet.origin[axis] = self.lanes.row(axis, first).map(f32::from_bits);
+            packet.direction[axis] = self.lanes.row(DIRECTION + axis, first).map(f32::from_bits);
         }
-        packet.tmin = self.lanes.eight(TNEAR, first).map(f32::from_bits);
-        packet.tmax = self.lanes.eight(TFAR, first).map(f32::from_bits);
+        packet.tmin = self.lanes.row(TNEAR, first).map(f32::from_bits);
+        packet.tmax = self.lanes.row(TFAR, first).map(f32::from_bits);
         packet
     }
 
     /// A bit for each of these rays that is valid and has a bit in common with `mask`.
     #[inline(always)]
     fn seeing(&self, first: usize, mask: u32) -> u32 {
-        let Self { lanes, count, is_valid, .. } = self;
-        let mut seeing = 0;
-        if first + RAYS > *count {
-            for lane in first..*count {
-                seeing |= u32::from(is_valid(lane) && lanes.ray(lane).mask & mask != 0) << (lane - first);
+        let Self { lanes, is_valid, .. } = self;
+        let (count, mut seeing) = (lanes.count(), 0);
+        if first + RAYS > count {
+            for lane in first..count {
+                let [own] = lanes.row(MASK, lane);
+                seeing |= u32::from(is_valid(lane) && own & mask != 0) << (lane - first);
             }
             return seeing;
         }
-        for (lane, own) in lanes.eight(MASK, first).into_iter().enumerate() {
+        for (lane, own) in lanes.row::<RAYS>(MASK, first).into_iter().enumerate() {
             seeing |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
         }
         seeing
@@ -119,13 +120,12 @@ fn plain<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a 
     (sight(committed, query, mask, any) == Sight::Everything).then_some((solid, mask))
 }
 
-/// Nearest hits of `count` rays, of those that are valid.
+/// Nearest hits of rays, of those that are valid.
 #[inline(always)]
 pub fn intersect_lanes(
     committed: &Committed,
     query: &Query,
-    lanes: &impl Lanes,
-    count: usize,
+    lanes: &impl Lanes<Record = RTCRayHit>,
     is_valid: impl Fn(usize) -> bool,
 ) {
     let alone = |lane: usize| intersect_lane(committed, query, lanes, lane);
@@ -139,7 +139,7 @@ pub fn intersect_lanes(
         solid.closest_packets(asked, |[hits]| tell(committed, query, lanes, first, hits));
     };
     // Hits where rays begin are seen afterwards: there are none, nearly always.
-    Called { lanes, count, excludes_start: false, is_valid }.each(committed, query, false, alone, two, one);
+    Called { lanes, excludes_start: false, is_valid }.each(committed, query, false, alone, two, one);
 }
 
 /// The nearest hit of one ray.
@@ -151,9 +151,8 @@ fn intersect_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane
     // SAFETY: it is ours, and used through this pointer alone.
     let target = unsafe { Target::closest(own) };
     cast_one::<false>(committed, query, &target);
-    lanes.set_tfar(lane, target.tfar());
     // SAFETY: as above.
-    lanes.set_hit(lane, unsafe { &(*own).hit });
+    lanes.set_hit(lane, target.tfar(), unsafe { &(*own).hit });
 }
 
 /// Writes the hits of the rays from lane `first` on.
@@ -173,17 +172,17 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     }
     let PacketHits { t, u, v, normal, primitive, geometry, .. } = hits;
     let [nx, ny, nz] = normal;
-    lanes.set_eight(TFAR, first, t.map(f32::to_bits));
+    lanes.set_row(TFAR, first, t.map(f32::to_bits));
     for (word, row) in [nx, ny, nz, u, v].into_iter().enumerate() {
-        lanes.set_eight(RAY_WORDS + word, first, row.map(f32::to_bits));
+        lanes.set_row(RAY_WORDS + word, first, row.map(f32::to_bits));
     }
-    lanes.set_eight(RAY_WORDS + 5, first, *primitive);
-    lanes.set_eight(RAY_WORDS + 6, first, *geometry);
+    lanes.set_row(RAY_WORDS + 5, first, *primitive);
+    lanes.set_row(RAY_WORDS + 6, first, *geometry);
     // SAFETY: the context is the caller's, which lives as long as the query, or our own.
     let context = unsafe { query.context.read() };
-    lanes.set_eight(RAY_WORDS + 7, first, [context.instance; RAYS]);
+    lanes.set_row(RAY_WORDS + 7, first, [context.instance; RAYS]);
     #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    lanes.set_eight(RAY_WORDS + 8, first, [context.instance_primitive; RAYS]);
+    lanes.set_row(RAY_WORDS + 8, first, [context.instance_primitive; RAYS]);
 }
 
 /// A bit for each ray that was hit where it begins.
@@ -191,7 +190,7 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
 fn at_start(lanes: &impl Lanes, first: usize, hits: &PacketHits) -> u32 {
     let mut at_start = 0;
     if hits.lanes == 0xff {
-        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.eight(TNEAR, first)).enumerate() {
+        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.row::<RAYS>(TNEAR, first)).enumerate() {
             at_start |= u32::from(*t == f32::from_bits(tnear)) << lane;
         }
         return at_start;
@@ -230,19 +229,17 @@ fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: us
         open &= open - 1;
         let ng = Vec3::new(nx[i], ny[i], nz[i]);
         if let Some(named) = name_solid(committed, geometry[i], primitive[i], [u[i], v[i]], ng) {
-            lanes.set_tfar(first + i, t[i]);
-            lanes.set_hit(first + i, &hit_of(query, geometry[i], &named));
+            lanes.set_hit(first + i, t[i], &hit_of(query, geometry[i], &named));
         }
     }
 }
 
-/// Whether each of `count` rays hits anything, of those that are valid.
+/// Whether each ray hits anything, of those that are valid.
 #[inline(always)]
 pub fn occluded_lanes(
     committed: &Committed,
     query: &Query,
-    lanes: &impl Lanes,
-    count: usize,
+    lanes: &impl Lanes<Record = RTCRay>,
     is_valid: impl Fn(usize) -> bool,
 ) {
     let alone = |lane: usize| {
@@ -266,6 +263,5 @@ pub fn occluded_lanes(
         let [occluded] = solid.occluded_packets(asked);
         end(first, occluded);
     };
-    Called { lanes, count, excludes_start: committed.excludes_start, is_valid }
-        .each(committed, query, true, alone, two, one);
+    Called { lanes, excludes_start: committed.excludes_start, is_valid }.each(committed, query, true, alone, two, one);
 }
