@@ -2,8 +2,7 @@
 
 use twincast::math::{Aabb, Vec3, is_traceable};
 
-use super::State;
-use super::surface::segment;
+use super::{State, TimeSteps};
 use crate::buffer::View;
 
 /// What is put at vertices with a radius.
@@ -37,11 +36,10 @@ pub struct Segment {
 #[derive(Clone, Debug)]
 pub struct Linear {
     pub shape: Shape,
-    steps: Vec<Vec<Ball>>,
-    normals: Vec<Vec<Vec3>>,
+    pub steps: TimeSteps<Vec<Ball>>,
+    normals: TimeSteps<Vec<Vec3>>,
     /// Of curves: the first vertex, and which neighbours there are.
     segments: Vec<(u32, u8)>,
-    range: (f32, f32),
 }
 
 const LEFT: u8 = 1;
@@ -62,30 +60,15 @@ impl Linear {
         let segments = if shape == Shape::RoundCurve { read_segments(state) } else { Vec::new() };
         Self {
             shape,
-            steps: state.vertices.iter().map(balls).collect(),
-            normals: state.normals.iter().map(normals).collect(),
+            steps: TimeSteps::new(state.vertices.iter().map(balls).collect(), state.time_range),
+            normals: TimeSteps::new(state.normals.iter().map(normals).collect(), state.time_range),
             segments,
-            range: state.time_range,
         }
     }
 
     /// How many primitives.
     pub fn count(&self) -> usize {
         if self.shape == Shape::RoundCurve { self.segments.len() } else { self.steps[0].len() }
-    }
-
-    pub fn step_count(&self) -> usize {
-        self.steps.len()
-    }
-
-    /// From when to when it moves.
-    pub fn range(&self) -> (f32, f32) {
-        self.range
-    }
-
-    /// Whether it is there at a time at all.
-    pub fn is_at(&self, time: f32) -> bool {
-        self.steps.len() == 1 || (self.range.0..=self.range.1).contains(&time)
     }
 
     /// The balls of a primitive at a step.
@@ -120,11 +103,10 @@ impl Linear {
     }
 
     fn ball_at(&self, vertex: usize, time: f32) -> Option<Ball> {
-        if self.steps.len() == 1 {
-            return self.steps[0].get(vertex).copied();
-        }
-        let (step, fraction) = segment(self.steps.len(), self.range, time);
-        let (a, b) = (self.steps[step].get(vertex)?, self.steps[step + 1].get(vertex)?);
+        let (before, after) = self.steps.around(time);
+        let a = before.get(vertex)?;
+        let Some((after, fraction)) = after else { return Some(*a) };
+        let b = after.get(vertex)?;
         let radius = a.radius * (1.0 - fraction) + b.radius * fraction;
         Some(Ball { centre: a.centre * (1.0 - fraction) + b.centre * fraction, radius })
     }
@@ -136,12 +118,10 @@ impl Linear {
 
     /// The normal of an oriented disc at a time.
     pub fn normal_at(&self, primitive: usize, time: f32) -> Option<Vec3> {
-        if self.normals.len() == 1 {
-            return self.normals[0].get(primitive).copied();
-        }
-        let (step, fraction) = segment(self.normals.len(), self.range, time);
-        let (a, b) = (self.normals[step].get(primitive)?, self.normals[step + 1].get(primitive)?);
-        Some(*a * (1.0 - fraction) + *b * fraction)
+        let (before, after) = self.normals.around(time);
+        let a = *before.get(primitive)?;
+        let Some((after, fraction)) = after else { return Some(a) };
+        Some(a * (1.0 - fraction) + *after.get(primitive)? * fraction)
     }
 
     /// A segment of a curve at a time.

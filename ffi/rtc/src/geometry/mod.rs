@@ -6,6 +6,7 @@
 mod buffers;
 mod interpolate;
 mod linear;
+mod steps;
 mod surface;
 mod transform;
 
@@ -21,7 +22,8 @@ use crate::scene::Scene;
 
 pub use interpolate::{Place, interpolate};
 pub use linear::{Ball, Linear, Segment, Shape};
-pub use surface::{Named, Surface, segment};
+pub use steps::{TimeSteps, around};
+pub use surface::{Named, Surface};
 pub use transform::{Motion, Transform, read as read_transform, words as transform_words, write as write_transform};
 
 /// What a geometry is made of.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use twincast::math::{Aabb, Vec3, is_traceable};
 
-use super::{Kind, State};
+use super::{Kind, State, TimeSteps};
 use crate::abi::RTCGrid;
 use crate::buffer::View;
 use crate::failure::{Failure, Result};
@@ -34,11 +34,10 @@ enum Pairs {
 /// A mesh as it was when its scene was committed.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Vertices at each time step; the last one is not a number.
-    pub steps: Vec<Arc<Vec<Vec3>>>,
+    /// Vertices, of which the last one is not a number.
+    pub steps: TimeSteps<Arc<Vec<Vec3>>>,
     pub triangles: Arc<Vec<[u32; 3]>>,
     pairs: Pairs,
-    range: (f32, f32),
 }
 
 /// A hit in terms of the geometry.
@@ -48,15 +47,6 @@ pub struct Named {
     pub u: f32,
     pub v: f32,
     pub ng: Vec3,
-}
-
-/// The step before a time, and how far it is to the next.
-pub fn segment(steps: usize, (begin, end): (f32, f32), time: f32) -> (usize, f32) {
-    let segments = (steps - 1) as f32;
-    let at = ((time - begin) / (end - begin) * segments).clamp(0.0, segments);
-    // NaN becomes 0.
-    let step = (at.floor() as usize).min(steps - 2);
-    (step, if at.is_nan() { 0.0 } else { at - step as f32 })
 }
 
 impl Surface {
@@ -92,12 +82,8 @@ impl Surface {
             step.push(Vec3::NAN);
             Arc::new(step)
         });
-        Ok(Self { steps: steps.collect(), triangles: Arc::new(triangles), pairs, range: state.time_range })
-    }
-
-    /// Whether it stands still.
-    pub fn is_still(&self) -> bool {
-        self.steps.len() == 1
+        let steps = TimeSteps::new(steps.collect(), state.time_range);
+        Ok(Self { steps, triangles: Arc::new(triangles), pairs })
     }
 
     /// Whether each triangle is a primitive.
@@ -105,28 +91,17 @@ impl Surface {
         matches!(self.pairs, Pairs::None)
     }
 
-    /// From when to when it moves.
-    pub fn range(&self) -> (f32, f32) {
-        self.range
-    }
-
-    /// Whether it is there at a time at all.
-    pub fn is_at(&self, time: f32) -> bool {
-        self.is_still() || (self.range.0..=self.range.1).contains(&time)
-    }
-
-    /// The corners of a triangle at a step.
-    fn corners(&self, triangle: usize, step: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|i| self.steps[step][i as usize])
+    /// The corners of a triangle among the vertices of a step.
+    fn corners(&self, triangle: usize, vertices: &[Vec3]) -> [Vec3; 3] {
+        self.triangles[triangle].map(|i| vertices[i as usize])
     }
 
     /// The same at a time.
     pub fn corners_at(&self, triangle: usize, time: f32) -> [Vec3; 3] {
-        if self.is_still() {
-            return self.corners(triangle, 0);
-        }
-        let (step, fraction) = segment(self.steps.len(), self.range, time);
-        let (a, b) = (self.corners(triangle, step), self.corners(triangle, step + 1));
+        let (before, after) = self.steps.around(time);
+        let a = self.corners(triangle, before);
+        let Some((after, fraction)) = after else { return a };
+        let b = self.corners(triangle, after);
         let mix = |k: usize| a[k] * (1.0 - fraction) + b[k] * fraction;
         [mix(0), mix(1), mix(2)]
     }
@@ -134,8 +109,8 @@ impl Surface {
     /// The box of a triangle at a step; empty for one that cannot be hit.
     pub fn bounds_at(&self, triangle: usize, step: usize) -> Aabb {
         let is_good = |corners: [Vec3; 3]| corners.iter().all(|&corner| is_traceable(corner));
-        if (0..self.steps.len()).all(|step| is_good(self.corners(triangle, step))) {
-            Aabb::around(self.corners(triangle, step))
+        if self.steps.iter().all(|vertices| is_good(self.corners(triangle, vertices))) {
+            Aabb::around(self.corners(triangle, &self.steps[step]))
         } else {
             Aabb::EMPTY
         }

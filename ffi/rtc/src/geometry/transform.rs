@@ -2,7 +2,7 @@
 
 use twincast::math::{Affine3, DMat3, DQuat, Mat3, Vec3};
 
-use super::{Kind, State};
+use super::{Kind, State, TimeSteps};
 use crate::abi::{RTCQuaternionDecomposition, format};
 use crate::buffer::View;
 use crate::failure::{Failure, Result};
@@ -92,11 +92,7 @@ fn between(a: &RTCQuaternionDecomposition, b: &RTCQuaternionDecomposition, at: f
 }
 
 /// Where an instance is at each time.
-#[derive(Clone, Debug)]
-pub struct Motion {
-    steps: Vec<Transform>,
-    range: (f32, f32),
-}
+pub type Motion = TimeSteps<Transform>;
 
 /// How many places between two steps are looked at, where a path is not straight.
 const PLACES: usize = 32;
@@ -106,43 +102,30 @@ impl Motion {
     pub fn of(kind: Kind, state: &State, transforms: &[Transform], primitive: usize) -> Result<Self> {
         let range = state.time_range;
         if kind == Kind::Instance {
-            return Ok(Self { steps: transforms.to_vec(), range });
+            return Ok(Self::new(transforms.to_vec(), range));
         }
         let steps = state.transform_buffers.iter().map(|view| transform_of(view.as_ref(), primitive));
-        Ok(Self { steps: steps.collect::<Result<_>>()?, range })
-    }
-
-    /// Whether it stands still.
-    pub fn is_still(&self) -> bool {
-        self.steps.len() == 1
-    }
-
-    /// Whether it is there at a time at all.
-    pub fn is_at(&self, time: f32) -> bool {
-        self.is_still() || (self.range.0..=self.range.1).contains(&time)
+        Ok(Self::new(steps.collect::<Result<_>>()?, range))
     }
 
     /// Where it is.
     pub fn at(&self, time: f32) -> Affine3 {
-        if self.steps.len() == 1 {
-            return self.steps[0].matrix();
-        }
-        let (step, fraction) = super::surface::segment(self.steps.len(), self.range, time);
-        mix(&self.steps[step], &self.steps[step + 1], fraction)
+        let (before, after) = self.around(time);
+        after.map_or_else(|| before.matrix(), |(after, fraction)| mix(before, after, fraction))
     }
 
     /// Times from 0 to 1 and where it is then, between which everything moves in straight lines, or nearly: by how much points within
     /// `reach` of the origin may stray from these lines. None where it is not there in that time. Of what moves.
     pub fn places(&self, reach: f32) -> (Vec<(f32, Affine3)>, f32) {
-        let (begin, end) = self.range;
+        let (begin, end) = self.range();
         let (first, last) = (begin.max(0.0), end.min(1.0));
         if first > last {
             return (Vec::new(), 0.0);
         }
         let mut places = vec![(first, self.at(first))];
         let mut stray: f32 = 0.0;
-        let segments = (self.steps.len() - 1) as f32;
-        for (step, pair) in self.steps.windows(2).enumerate() {
+        let segments = (self.len() - 1) as f32;
+        for (step, pair) in self.windows(2).enumerate() {
             let mut count = 1;
             if let [Transform::Quaternion(a), Transform::Quaternion(b)] = pair {
                 count = PLACES;

@@ -49,24 +49,22 @@ pub fn other_boxes(records: &[Option<Record>], parts: &[Part]) -> Boxes {
         let Some(record) = record else { continue };
         let item = |primitive: usize| Item { geometry: id as u32, primitive: primitive as u32 };
         match &record.body {
-            Body::Surface(surface) if surface.is_still() => {}
+            Body::Surface(surface) if surface.steps.is_still() => {}
             Body::Surface(surface) => {
                 for i in 0..surface.triangles.len() {
-                    boxes.add(
-                        item(i),
-                        (0..surface.steps.len()).map(|step| surface.bounds_at(i, step)),
-                        surface.range(),
-                    );
+                    let steps = (0..surface.steps.len()).map(|step| surface.bounds_at(i, step));
+                    boxes.add(item(i), steps, surface.steps.range());
                 }
             }
             Body::Linear(linear) => {
                 for i in 0..linear.count() {
-                    boxes.add(item(i), (0..linear.step_count()).map(|step| linear.bounds_at(i, step)), linear.range());
+                    let steps = (0..linear.steps.len()).map(|step| linear.bounds_at(i, step));
+                    boxes.add(item(i), steps, linear.steps.range());
                 }
             }
             Body::User(user) => {
-                for i in 0..user.boxes[0].len() {
-                    boxes.add(item(i), user.boxes.iter().map(|step| step[i]), user.range);
+                for i in 0..user[0].len() {
+                    boxes.add(item(i), user.iter().map(|step| step[i]), user.range());
                 }
             }
             Body::Instances(instances) => {

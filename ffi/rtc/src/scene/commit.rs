@@ -8,13 +8,13 @@ use twincast::trace::bvh::{BoxTree, Bvh, Options, Preset};
 use twincast::trace::{Part, Primitives};
 
 use super::boxes::other_boxes;
-use super::committed::{Body, Committed, Heeded, Instance, Record, UserGeometry};
+use super::committed::{Body, Committed, Heeded, Instance, Record};
 use super::progress::Progress;
 use super::{Scene, State};
 use crate::abi::{RTCBounds, RTCBoundsFunctionArguments, RTCProgressMonitorFunction, quality, scene_flag};
 use crate::device::Callback;
 use crate::failure::{Failure, Result};
-use crate::geometry::{self, Geometry, Kind, Linear, Motion, Surface};
+use crate::geometry::{self, Geometry, Kind, Linear, Motion, Surface, TimeSteps};
 
 /// What is to be made.
 pub struct Plan {
@@ -116,7 +116,7 @@ fn record(geometry: &Arc<Geometry>) -> Result<Option<Record>> {
 }
 
 /// Asks the caller for the boxes.
-fn user_geometry(geometry: &Geometry, state: &geometry::State) -> UserGeometry {
+fn user_geometry(geometry: &Geometry, state: &geometry::State) -> TimeSteps<Vec<Aabb>> {
     let function = state.functions.bounds;
     let bounds_of = |primitive: u32, time_step: u32| {
         let mut bounds = RTCBounds { lower: [f32::INFINITY; 3], upper: [f32::NEG_INFINITY; 3], ..RTCBounds::default() };
@@ -129,7 +129,7 @@ fn user_geometry(geometry: &Geometry, state: &geometry::State) -> UserGeometry {
         Aabb { min: Vec3::from(bounds.lower), max: Vec3::from(bounds.upper) }
     };
     let boxes = (0..state.steps() as u32).map(|step| (0..state.primitive_count).map(|i| bounds_of(i, step)).collect());
-    UserGeometry { boxes: boxes.collect(), range: state.time_range }
+    TimeSteps::new(boxes.collect(), state.time_range)
 }
 
 fn instances(kind: Kind, state: &geometry::State) -> Result<Vec<Instance>> {
@@ -169,7 +169,7 @@ fn solid_parts(records: &[Option<Record>]) -> (Vec<Part>, bool) {
     let mut parts = Vec::new();
     for (id, record) in records.iter().enumerate() {
         if let Some(Record { body: Body::Surface(surface), .. }) = record
-            && surface.is_still()
+            && surface.steps.is_still()
         {
             is_plain &= surface.is_plain();
             let (positions, triangles) = (Arc::clone(&surface.steps[0]), Arc::clone(&surface.triangles));

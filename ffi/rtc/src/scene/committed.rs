@@ -7,7 +7,7 @@ use twincast::trace::bvh::{BoxTree, Bvh};
 
 use crate::abi::RTCBounds;
 use crate::device::Device;
-use crate::geometry::{Functions, Geometry, Linear, Motion, Surface};
+use crate::geometry::{Functions, Geometry, Linear, Motion, Surface, TimeSteps};
 
 use super::Scene;
 use super::near::Near;
@@ -24,7 +24,8 @@ pub struct Record {
 pub enum Body {
     Surface(Surface),
     Linear(Linear),
-    User(UserGeometry),
+    /// User geometry: boxes of each primitive.
+    User(TimeSteps<Vec<Aabb>>),
     Instances(Vec<Instance>),
 }
 
@@ -45,19 +46,6 @@ impl Instance {
     /// From the world to the scene at a time; not finite where the transform is singular.
     pub fn to_scene(&self, time: f32) -> DAffine3 {
         self.to_scene.unwrap_or_else(|| self.motion.at(time).as_daffine3().inverse())
-    }
-}
-
-/// User geometry: boxes of each primitive at each step.
-pub struct UserGeometry {
-    pub boxes: Vec<Vec<Aabb>>,
-    pub range: (f32, f32),
-}
-
-impl UserGeometry {
-    /// Whether it is there at a time at all.
-    pub fn is_at(&self, time: f32) -> bool {
-        self.boxes.len() == 1 || (self.range.0..=self.range.1).contains(&time)
     }
 }
 

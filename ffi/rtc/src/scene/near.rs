@@ -9,39 +9,26 @@ use twincast::trace::bvh::{BoxTree, Options, Search};
 
 use super::committed::{Body, Committed, Item};
 use super::path;
-use crate::geometry::Surface;
+use crate::geometry::{Surface, TimeSteps};
 
 /// Boxes of primitives.
 pub struct Near {
     tree: BoxTree,
     items: Vec<Item>,
-    /// As many.
-    paths: Vec<Option<Path>>,
+    /// As many: where those are that move.
+    paths: Vec<Option<TimeSteps<Aabb>>>,
 }
 
-/// Where a primitive is that moves.
-struct Path {
-    /// At equally distant times of the range, at least two.
-    steps: Vec<Aabb>,
-    range: (f32, f32),
-}
-
-impl Path {
-    fn new(steps: Vec<Aabb>, range: (f32, f32)) -> Option<Self> {
-        (steps.len() > 1).then_some(Self { steps, range })
+/// Whether what moves is as near as that at a time; maybe where rounding decides.
+fn is_near(path: &TimeSteps<Aabb>, point: Vec3, radius: f32, time: f32) -> bool {
+    if !path.is_at(time) {
+        return false;
     }
-
-    /// Whether it is as near as that at a time; maybe where rounding decides.
-    fn is_near(&self, point: Vec3, radius: f32, time: f32) -> bool {
-        if !(self.range.0..=self.range.1).contains(&time) {
-            return false;
-        }
-        let Aabb { min, max } = path::at(&self.steps, self.range, time);
-        let slack = 8.0 * f32::EPSILON * (min.abs().max(max.abs()).max(point.abs()).max_element() + radius);
-        // Not by "farther than": what is not a number is shown.
-        let is_farther = (min - point).max(point - max).max(Vec3::ZERO).length() > radius + slack;
-        !is_farther
-    }
+    let Aabb { min, max } = path::at(path, path.range(), time);
+    let slack = 8.0 * f32::EPSILON * (min.abs().max(max.abs()).max(point.abs()).max_element() + radius);
+    // Not by "farther than": what is not a number is shown.
+    let is_farther = (min - point).max(point - max).max(Vec3::ZERO).length() > radius + slack;
+    !is_farther
 }
 
 impl Near {
@@ -52,15 +39,16 @@ impl Near {
             let mut add = |primitive: usize, steps: Vec<Aabb>, range: (f32, f32)| {
                 items.push(Item { geometry: id as u32, primitive: primitive as u32 });
                 boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
-                paths.push(Path::new(steps, range));
+                let path = TimeSteps::new(steps, range);
+                paths.push((!path.is_still()).then_some(path));
             };
             match &record.body {
                 Body::Surface(surface) => primitives(surface, &mut add),
                 // Points and curves are not shown: the interface's rule.
                 Body::Linear(_) => {}
                 Body::User(user) => {
-                    for i in 0..user.boxes[0].len() {
-                        add(i, user.boxes.iter().map(|step| step[i]).collect(), user.range);
+                    for i in 0..user[0].len() {
+                        add(i, user.iter().map(|step| step[i]).collect(), user.range());
                     }
                 }
                 Body::Instances(instances) => {
@@ -78,7 +66,7 @@ impl Near {
     pub fn visit(&self, point: Vec3, mut radius: f32, time: Option<f32>, visitor: &mut dyn FnMut(Item) -> Search) {
         self.tree.visit_near(point, radius, &mut |i| {
             if let (Some(path), Some(time)) = (&self.paths[i as usize], time)
-                && !path.is_near(point, radius, time)
+                && !is_near(path, point, radius, time)
             {
                 return Search::Continue(radius);
             }
@@ -106,13 +94,13 @@ fn primitives(surface: &Surface, add: &mut impl FnMut(usize, Vec<Aabb>, (f32, f3
             }
             before => {
                 if let Some((last, all)) = before {
-                    add(last as usize, all, surface.range());
+                    add(last as usize, all, surface.steps.range());
                 }
                 Some((primitive, bounds))
             }
         };
     }
     if let Some((last, all)) = open {
-        add(last as usize, all, surface.range());
+        add(last as usize, all, surface.steps.range());
     }
 }

@@ -2,7 +2,7 @@
 
 use twincast::math::{Aabb, Vec3};
 
-use crate::geometry::segment;
+use crate::geometry::around;
 
 /// The box between two.
 pub fn between(a: Aabb, b: Aabb, at: f32) -> Aabb {
@@ -11,14 +11,8 @@ pub fn between(a: Aabb, b: Aabb, at: f32) -> Aabb {
 
 /// Where a box is that has these places, at equal distances of a range of time; outside it, where it is at that end.
 pub fn at(steps: &[Aabb], range: (f32, f32), time: f32) -> Aabb {
-    match steps {
-        [] => Aabb::EMPTY,
-        [only] => *only,
-        _ => {
-            let (step, fraction) = segment(steps.len(), range, time);
-            between(steps[step], steps[step + 1], fraction)
-        }
-    }
+    let (before, after) = around(steps, range, time);
+    after.map_or(*before, |(after, fraction)| between(*before, *after, fraction))
 }
 
 /// Boxes at time 0 and at time 1 between which it then always is; empty for what is not there in that time.

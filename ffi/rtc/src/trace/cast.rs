@@ -179,7 +179,7 @@ fn cast_item<const ANY: bool>(
     let Item { geometry, primitive } = item;
     match &record.body {
         Body::Surface(surface) => {
-            if surface.is_at(ray.time) {
+            if surface.steps.is_at(ray.time) {
                 let corners = surface.corners_at(primitive as usize, ray.time);
                 let native = Ray { tmax: target.tfar(), ..for_triangles(committed, ray) };
                 if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
@@ -189,7 +189,7 @@ fn cast_item<const ANY: bool>(
             }
         }
         Body::Linear(linear) => {
-            if linear.is_at(ray.time) {
+            if linear.steps.is_at(ray.time) {
                 round::offer(linear, primitive, &native(ray), &mut |t, named| {
                     if (ray.tnear..=target.tfar()).contains(&t) {
                         target.offer(query, record, geometry, t, named);

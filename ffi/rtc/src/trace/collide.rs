@@ -34,7 +34,7 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
     let near = second.near();
     for (geometry0, record) in first.records.iter().enumerate() {
         let Some(Body::User(own)) = record.as_ref().map(|record| &record.body) else { continue };
-        for (primitive0, bounds) in own.boxes[0].iter().enumerate() {
+        for (primitive0, bounds) in own[0].iter().enumerate() {
             if !bounds.min.cmple(bounds.max).all() {
                 continue;
             }
@@ -47,7 +47,7 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
                 if let Some(Body::User(other)) = other
                     && !is_itself
                 {
-                    let box1 = &other.boxes[0][item.primitive as usize];
+                    let box1 = &other[0][item.primitive as usize];
                     let overlaps = |a: Vec3, b: Vec3| a.cmple(b).all();
                     if overlaps(bounds.min, box1.max) && overlaps(box1.min, bounds.max) {
                         waiting.push(RTCCollision {
