@@ -114,7 +114,12 @@ impl World {
 impl World {
     /// A ray over [0, infinity] as tracers of this world take it: they know the scene recentred by [`World::centre`]. `origin` is in the scene's coordinates.
     pub fn ray(&self, origin: DVec3, direction: Vec3) -> Ray {
-        Ray::new((origin - self.centre).as_vec3(), direction)
+        Ray::new(self.to_world(origin), direction)
+    }
+
+    /// A point of the scene as tracers of this world take it.
+    pub fn to_world(&self, point: DVec3) -> Vec3 {
+        (point - self.centre).as_vec3()
     }
 
     /// Where a point of a ray, or [of what it meets](crate::shade::SurfacePoint), is in the scene's coordinates.
