@@ -292,3 +292,210 @@ fn broken_inputs_are_errors() {
     fs::write(&text, "not an image").unwrap();
     assert!(image::read(&text).unwrap_err().to_string().starts_with(&text.display().to_string()));
 }
+
+/// The parts of an error that say which file it is about, that it is an input, and these words.
+#[track_caller]
+fn refused(path: &Path, words: &[&str]) {
+    let error = image::read(path).expect_err("a picture that is not read");
+    let text = error.to_string();
+    assert_eq!(error.exit_code(), 3, "{text}");
+    assert!(text.starts_with(&path.display().to_string()) && !text.contains('\n'), "{text}");
+    assert!(words.iter().all(|words| text.contains(words)), "{words:?} in {text}");
+}
+
+/// Readers that write past their memory where a file is damaged get to see none, whatever it is called.
+#[cfg(feature = "oiio")]
+#[test]
+fn formats_whose_readers_are_not_trusted_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // How such files begin.
+    let starts: [(&str, &[u8]); 4] = [
+        ("iff", b"FOR4\0\0\0\x80CIMGTBHD\0\0\0\x20"),
+        ("ico", b"\0\0\x01\0\x01\0\x08\x08\0\0\x01\0\x20\0"),
+        ("z", b"\x2f\x08\x67\xab\0\x04\0\x04"),
+        ("sgi", b"\x01\xda\x01\x01\0\x03\0\x04\0\x04\0\x03"),
+    ];
+    for (suffix, start) in starts {
+        let bytes = [start, &[0; 200]].concat();
+        let path = folder.path().join("a").with_extension(suffix);
+        fs::write(&path, &bytes).unwrap();
+        refused(
+            &path,
+            &[&format!("pictures of the format .{suffix} are not read; convert it to EXR, HDR, PNG, JPEG or TIFF")],
+        );
+        let misnamed = folder.path().join("a.exr");
+        fs::write(&misnamed, &bytes).unwrap();
+        refused(&misnamed, &["no .exr picture, nor another of a format that is read; convert it"]);
+    }
+    // What is written still is.
+    let path = folder.path().join("b.sgi");
+    write(&path, &Image::new(8, 8), Depth::Half);
+    refused(&path, &["pictures of the format .sgi are not read"]);
+}
+
+/// The suffix may lie.
+#[test]
+fn formats_are_told_by_the_content() {
+    let folder = tempfile::tempdir().unwrap();
+    let [png, lie] = ["a.png", "a.exr"].map(|name| folder.path().join(name));
+    write(&png, &exact_in_half(), Depth::Half);
+    fs::rename(&png, &lie).unwrap();
+    assert_eq!(image::read(&lie).unwrap().width, exact_in_half().width);
+}
+
+/// An OpenEXR file of two pixels with these channels, in each of which they are `value` and half of that.
+fn exr_of(path: &Path, channels: &[(&str, f32)]) {
+    use exr::prelude::*;
+    let list = channels.iter().map(|&(name, value)| {
+        let samples = match name.strip_prefix("uint ") {
+            Some(_) => FlatSamples::U32(vec![value as u32; 2]),
+            None => FlatSamples::F32(vec![value, value / 2.0]),
+        };
+        AnyChannel::new(name.trim_start_matches("uint "), samples)
+    });
+    let channels = AnyChannels::sort(list.collect());
+    let layer = Layer::new((2, 1), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
+    exr::prelude::Image::from_layer(layer).write().to_file(path).unwrap();
+}
+
+/// Colours are the channels that are called so, wherever they stand and whatever stands before them.
+#[test]
+fn colours_of_openexr_are_told_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    for (channels, pixel) in [
+        (&[("Adepth.Z", 9.0), ("B", 3.0), ("G", 2.0), ("R", 1.0)][..], [1.0, 2.0, 3.0, 1.0]),
+        (&[("A", 0.5), ("Adepth.Z", 9.0), ("B", 3.0), ("G", 2.0), ("R", 1.0), ("Z", 7.0)], [1.0, 2.0, 3.0, 0.5]),
+        (&[("B", 3.0), ("C", 9.0), ("G", 2.0), ("R", 1.0), ("Y", 8.0)], [1.0, 2.0, 3.0, 1.0]),
+        (&[("Adepth.Z", 9.0), ("B", 3.0), ("R", 1.0), ("Y", 4.0)], [4.0, 4.0, 4.0, 1.0]),
+        (&[("A", 0.5), ("Y", 4.0)], [4.0, 4.0, 4.0, 0.5]),
+        (&[("depth", 4.0)], [4.0, 4.0, 4.0, 1.0]),
+    ] {
+        exr_of(&path, channels);
+        let image = image::read(&path).unwrap();
+        assert_eq!(image.pixels[0].to_array(), pixel, "{channels:?}");
+        assert_eq!(image.pixels[1].x, pixel[0] / 2.0, "{channels:?}");
+    }
+    for channels in [
+        &[("B", 3.0), ("R", 1.0)][..],
+        &[("X", 1.0), ("Z", 3.0)],
+        &[("Adepth.Z", 1.0), ("beauty.B", 3.0), ("beauty.G", 2.0), ("beauty.R", 1.0)],
+    ] {
+        exr_of(&path, channels);
+        let names: Vec<_> = channels.iter().map(|(name, _)| *name).collect();
+        refused(&path, &["no channels R, G and B, or Y; it has "]);
+        let text = image::read(&path).unwrap_err().to_string();
+        assert!(names.iter().all(|name| text.contains(name)), "{text}");
+    }
+    exr_of(&path, &[("uint B", 3.0), ("uint G", 2.0), ("uint R", 1.0)]);
+    refused(&path, &["whole numbers"]);
+    // Beside colours they are what they are.
+    exr_of(&path, &[("B", 3.0), ("G", 2.0), ("R", 1.0), ("uint object", 7.0)]);
+    assert_eq!(image::read(&path).unwrap().pixels[0].to_array(), [1.0, 2.0, 3.0, 1.0]);
+}
+
+/// Radiance, *Radiance file formats*: the first axis of the line of sizes is the slower one, +Y upwards, +X to the right.
+#[cfg(feature = "oiio")]
+#[test]
+fn the_line_of_sizes_of_radiance_says_how_a_picture_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    let read = |sizes: &str, reds: [u8; 6]| {
+        let mut file = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{sizes}\n").into_bytes();
+        reds.iter().for_each(|&red| file.extend([red, 1, 1, 129]));
+        fs::write(&path, file).unwrap();
+        image::read(&path)
+    };
+    let upright = read("-Y 2 +X 3", [10, 20, 30, 40, 50, 60]).unwrap();
+    assert_eq!((upright.width, upright.height), (3, 2));
+    assert!(upright.pixels[0].x < upright.pixels[5].x);
+    assert_eq!(read("+Y 2 +X 3", [40, 50, 60, 10, 20, 30]).unwrap(), upright);
+    assert_eq!(read("-Y 2 -X 3", [30, 20, 10, 60, 50, 40]).unwrap(), upright);
+    assert_eq!(read("+Y 2 -X 3", [60, 50, 40, 30, 20, 10]).unwrap(), upright);
+    for sizes in ["+X 3 -Y 2", "-X 3 -Y 2", "+X 3 +Y 2", "-X 3 +Y 2"] {
+        assert!(read(sizes, [1; 6]).is_err());
+        refused(&path, &["-Y or +Y"]);
+    }
+}
+
+/// What a camera says of how it was held.
+#[test]
+fn jpeg_files_are_turned_as_exif_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.jpg");
+    let mut image = Image::new(32, 16);
+    for (i, pixel) in image.pixels.iter_mut().enumerate() {
+        *pixel = Vec4::new(if i % 32 < 16 { 0.9 } else { 0.1 }, if i < 256 { 0.9 } else { 0.1 }, 0.2, 1.0);
+    }
+    write(&path, &image, Depth::Half);
+    let plain = fs::read(&path).unwrap();
+    let is_near = |a: f32, b: f32| (a - b).abs() < 0.1;
+    // Seen from the upper left corner: whether red, then green, is bright there; and whether width and height change places.
+    for (orientation, red, green, turned) in [
+        (1u8, true, true, false),
+        (2, false, true, false),
+        (3, false, false, false),
+        (4, true, false, false),
+        (5, true, true, true),
+        (6, true, false, true),
+        (7, false, false, true),
+        (8, false, true, true),
+    ] {
+        let directory = [0, 1, 0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation, 0, 0, 0, 0, 0, 0];
+        let exif = [&b"Exif\0\0MM\0*\0\0\0\x08"[..], &directory].concat();
+        let segment = [&[0xff, 0xe1, 0, exif.len() as u8 + 2][..], &exif].concat();
+        fs::write(&path, [&plain[..2], &segment, &plain[2..]].concat()).unwrap();
+        let found = image::read(&path).unwrap();
+        assert_eq!([found.width, found.height], if turned { [16, 32] } else { [32, 16] }, "{orientation}");
+        let corner = found.pixels[0];
+        let value = |bright| if bright { 0.9 } else { 0.1 };
+        assert!(is_near(corner.x, value(red)) && is_near(corner.y, value(green)), "{orientation}: {corner}");
+    }
+}
+
+/// An OpenEXR file of three columns and two rows, whose pixels are 1 to 6, with its origin and the x, y, width and height of the display window.
+fn exr_within(path: &Path, at: (i32, i32), (x, y, width, height): (i32, i32, usize, usize)) {
+    use exr::prelude::*;
+    let pixels = |at: Vec2<usize>| {
+        let value = (at.y() * 3 + at.x()) as f32 + 1.0;
+        (value, value, value)
+    };
+    let attributes = LayerAttributes { layer_position: Vec2(at.0, at.1), ..LayerAttributes::default() };
+    let layer = Layer::new((3, 2), attributes, Encoding::UNCOMPRESSED, SpecificChannels::rgb(pixels));
+    let mut file = exr::prelude::Image::from_layer(layer);
+    file.attributes.display_window = exr::meta::attribute::IntegerBounds::new(Vec2(x, y), (width, height));
+    file.write().to_file(path).unwrap();
+}
+
+/// A part of a picture is stretched over nothing: it stays where it belongs.
+#[test]
+fn a_part_is_read_in_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let mut part = Image::new(3, 2);
+    part.pixels.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = Vec4::splat(i as f32 + 1.0));
+    let metadata = Metadata { window: Some(image::Window { x: 1, y: 2, full: [6, 5] }), ..Default::default() };
+    image::write(&path, &part, &metadata, &WriteOptions::default()).unwrap();
+    assert_eq!(image::read(&path).unwrap(), part);
+    let whole = image::read_whole(&path).unwrap();
+    let reds: Vec<f32> = whole.pixels.iter().map(|pixel| pixel.w).collect();
+    assert_eq!((whole.width, whole.height), (6, 5));
+    let mut expected = vec![0.0; 12];
+    expected.extend([0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 4.0, 5.0, 6.0, 0.0, 0.0]);
+    expected.extend([0.0; 6]);
+    assert_eq!(reds, expected);
+
+    // Windows of others begin anywhere, and pictures reach beyond them.
+    for (at, display, expected) in [
+        ((-1, 0), (0, 0, 2, 2), vec![2.0, 3.0, 5.0, 6.0]),
+        ((11, -20), (10, -20, 4, 1), vec![0.0, 1.0, 2.0, 3.0]),
+        ((50, 50), (0, 0, 2, 1), vec![0.0, 0.0]),
+        ((0, 0), (0, 0, 3, 2), vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        ((7, 7), (7, 7, 3, 2), vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+    ] {
+        exr_within(&path, at, display);
+        let whole = image::read_whole(&path).unwrap();
+        assert_eq!((whole.width as usize, whole.height as usize), (display.2, display.3));
+        assert_eq!(whole.pixels.iter().map(|pixel| pixel.x).collect::<Vec<_>>(), expected, "{at:?} {display:?}");
+    }
+}

@@ -64,7 +64,8 @@ void write(const std::string& name, const Layout& layout, const Attributes& attr
 
 class Input {
 public:
-    explicit Input(const std::string& path);
+    Input(const std::string& path, const std::string& format);
+    void size(uint32_t* width_and_height) const;
     Layout layout() const;
     Attributes attributes();
     void read(uint8_t* samples, size_t length) const;
@@ -72,6 +73,9 @@ public:
     void read_all(uint8_t* samples, size_t length) const;
 
 private:
+    // Where in the file the colours and alpha are, in this order.
+    std::vector<int> picked() const;
+
     std::unique_ptr<OIIO::ImageInput> file;
     // What was given back and is not the file's; a deque's elements stay where they are as it grows.
     std::deque<std::string> strings;

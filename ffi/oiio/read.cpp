@@ -1,17 +1,26 @@
+#include <algorithm>
+#include <iterator>
+
+#include <OpenImageIO/strutil.h>
+
 #include "parts.h"
 
 namespace twincast::oiio {
 
 namespace {
 
-std::unique_ptr<OIIO::ImageInput> reader(const std::string& path)
+std::unique_ptr<OIIO::ImageInput> reader(const std::string& path, const std::string& format)
 {
+    // Without the path: given that, OpenImageIO would try its other readers as well.
+    auto file = OIIO::ImageInput::create(format);
+    if (!file)
+        fail(OIIO::geterror(), "not an image that OpenImageIO reads");
     // Straight alpha as it is: OpenImageIO would multiply encoded colours by it.
     OIIO::ImageSpec wishes;
     wishes.attribute("oiio:UnassociatedAlpha", 1);
-    auto file = OIIO::ImageInput::open(path, &wishes);
-    if (!file)
-        fail(OIIO::geterror(), "not an image that OpenImageIO reads");
+    OIIO::ImageSpec found;
+    if (!file->open(path, found, wishes))
+        fail(file, "not an image that OpenImageIO reads");
     return file;
 }
 
@@ -24,33 +33,84 @@ template<typename T> Slice<T> values(const OIIO::ImageSpec& spec, const char* na
 
 }  // namespace
 
-Input::Input(const std::string& path)
-    : file(reader(path))
+Input::Input(const std::string& path, const std::string& format)
+    : file(reader(path, format))
 {
 }
 
-Layout Input::layout() const
+std::vector<int> Input::picked() const
+{
+    const OIIO::ImageSpec& spec = file->spec();
+    std::vector<int> picked;
+    const std::string format = file->format_name();
+    // OpenImageIO's reader writes past its memory where there are tiles of these (its issue 5315).
+    if (format == "tiff" && spec.get_int_attribute("tiff:PhotometricInterpretation") == 5
+        && spec.get_int_attribute("oiio:BitsPerSample", 8) < 8)
+        throw std::runtime_error("CMYK of less than 8 bits, which is not read");
+    if (format != "openexr") {
+        // Colours come first, and alpha after them.
+        const int colours = spec.nchannels < 3 ? 1 : 3;
+        const bool alpha  = spec.nchannels > colours && spec.alpha_channel == colours;
+        for (int i = 0; i < colours + alpha; ++i)
+            picked.push_back(i);
+        return picked;
+    }
+    // Channels have names, and any order.
+    auto find = [&](const char* name) {
+        auto& names = spec.channelnames;
+        auto found  = std::find(names.begin(), names.end(), name);
+        return found == names.end() ? -1 : int(found - names.begin());
+    };
+    const int r = find("R"), g = find("G"), b = find("B"), y = find("Y"), a = find("A");
+    if (r >= 0 && g >= 0 && b >= 0)
+        picked = { r, g, b };
+    else if (y >= 0)
+        picked = { y };
+    else if (spec.nchannels == 1)
+        picked = { 0 };
+    else
+        throw std::runtime_error("no channels R, G and B, or Y; it has " + OIIO::Strutil::join(spec.channelnames, ", "));
+    for (int channel : picked)
+        if (!spec.channelformat(channel).is_floating_point())
+            throw std::runtime_error("colours of whole numbers; only floating values are read");
+    if (a >= 0)
+        picked.push_back(a);
+    return picked;
+}
+
+void Input::size(uint32_t* width_and_height) const
 {
     const OIIO::ImageSpec& spec = file->spec();
     if (spec.deep || spec.depth > 1)
         throw std::runtime_error("a deep or volume image; only flat ones are read");
     if (spec.width < 0 || spec.height < 0 || spec.nchannels < 1)
         throw std::runtime_error("an image without pixels");
+    width_and_height[0] = uint32_t(spec.width);
+    width_and_height[1] = uint32_t(spec.height);
+}
+
+Layout Input::layout() const
+{
+    uint32_t width_and_height[2];
+    size(width_and_height);
+    const OIIO::ImageSpec& spec = file->spec();
 
     Layout layout {};
-    layout.width  = uint32_t(spec.width);
-    layout.height = uint32_t(spec.height);
-    // Colours come first, whatever else there is (depth, normals) comes after them.
-    const bool gray  = spec.nchannels < 3;
-    const int colour = gray ? 1 : 3;
-    layout.alpha     = spec.nchannels > colour && spec.alpha_channel == colour;
-    layout.channels  = uint32_t(colour + layout.alpha);
-    layout.straight  = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
+    layout.width  = width_and_height[0];
+    layout.height = width_and_height[1];
+    const std::vector<int> channels = picked();
+
+    layout.channels = uint32_t(channels.size());
+    layout.alpha    = channels.size() % 2 == 0;
+    layout.straight = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
     // Of the colours: channels may be of several types.
-    const OIIO::TypeDesc format = spec.channelformat(0);
+    const OIIO::TypeDesc format = spec.channelformat(channels.front());
     layout.kind                 = format == OIIO::TypeDesc::UINT8  ? Kind::U8
                                   : format.is_floating_point()     ? Kind::Float
                                                                    : Kind::U16;
+    layout.orientation = uint32_t(spec.get_int_attribute("Orientation", 1));
+    const int32_t window[] { spec.x, spec.y, spec.full_x, spec.full_y, spec.full_width, spec.full_height };
+    std::copy(std::begin(window), std::end(window), layout.window);
     return layout;
 }
 
@@ -84,8 +144,17 @@ void Input::read(uint8_t* samples, size_t length) const
 {
     const Layout expected = layout();
     check_length(expected, length);
-    if (!file->read_image(0, 0, 0, int(expected.channels), type_of(expected.kind), samples))
-        fail(file, "cannot be read");
+    const std::vector<int> channels = picked();
+    const OIIO::TypeDesc type       = type_of(expected.kind);
+    const size_t pixel              = channels.size() * type.size();
+    // What lies side by side in the file as it does here is read in one go.
+    for (size_t first = 0, end = 0; first < channels.size(); first = end) {
+        for (end = first + 1; end < channels.size() && channels[end] == channels[end - 1] + 1;)
+            ++end;
+        const int begin = channels[first];
+        if (!file->read_image(0, 0, begin, begin + int(end - first), type, samples + first * type.size(), pixel))
+            fail(file, "cannot be read");
+    }
 }
 
 Slice<Named> Input::channels()

@@ -45,8 +45,11 @@ extern "C" const twincast::oiio::Functions* twincast_oiio()
         [](Bytes path, const Layout* layout, const Attributes* attributes, Bytes samples) {
             return guarded([=] { write(text(path), *layout, *attributes, samples); });
         },
-        [](Bytes path, Input** input) { return guarded([=] { *input = new Input(text(path)); }); },
+        [](Bytes path, Bytes format, Input** input) {
+            return guarded([=] { *input = new Input(text(path), text(format)); });
+        },
         [](Input* input) { guarded([=] { delete input; }); },
+        [](const Input* input, uint32_t* size) { return guarded([=] { input->size(size); }); },
         [](const Input* input, Layout* layout) { return guarded([=] { *layout = input->layout(); }); },
         [](Input* input, Attributes* attributes) { return guarded([=] { *attributes = input->attributes(); }); },
         [](Input* input, uint8_t* samples, size_t length) { return guarded([=] { input->read(samples, length); }); },

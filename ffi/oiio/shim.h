@@ -55,6 +55,10 @@ struct Layout {
     bool linear;
     // What follows the colours in each pixel, of four bytes each.
     Slice<Named> beside;
+    // Of what is read: how it has to be turned to be seen, 1 to 8 as EXIF counts; 1 for not at all.
+    uint32_t orientation;
+    // Of what is read: its x and y, and x, y, width and height of the picture that it is a part of.
+    int32_t window[6];
 };
 
 // Attributes, as far as they are there: of 0 or 1 value, matrices of 0 or 16.
@@ -78,8 +82,12 @@ struct Functions {
     Failure (*suffixes)(Bytes*);
     // Path, layout, attributes, samples.
     Failure (*write)(Bytes, const Layout*, const Attributes*, Bytes);
-    Failure (*open)(Bytes, Input**);
+    // Path, and the format's name or a suffix of it: no other format's reader gets to see the file.
+    Failure (*open)(Bytes, Bytes, Input**);
     void (*close)(Input*);
+    // Width and height.
+    Failure (*size)(const Input*, uint32_t*);
+    // Of the colours; fails where there are none.
     Failure (*layout)(const Input*, Layout*);
     // They last until the next call for the same file.
     Failure (*attributes)(Input*, Attributes*);

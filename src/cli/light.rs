@@ -32,7 +32,7 @@ impl LightArgs {
             scene.lights = vec![Light::Directional { direction: -sun, color: Vec3::ONE }];
         }
         if let Some(path) = &self.environment {
-            scene.environment = Some(Environment::new(image::read(path)?));
+            scene.environment = Some(Environment::new(image::read_whole(path)?));
         }
         Ok(())
     }

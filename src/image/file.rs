@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use super::metadata::Placed;
 #[cfg(feature = "oiio")]
 use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
@@ -162,14 +163,43 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }
 
-/// Reads an image. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
-/// spread over R, G and B, and missing alpha is 1. Of files with several images or layers, the first is read.
+/// Reads an image as it is to be seen. Integer samples are taken for sRGB and linearised, floating samples are taken as they are; gray is
+/// spread over R, G and B, and missing alpha is 1. Of files with several images or layers, the first is read; of OpenEXR the channels
+/// R, G and B, or Y, and A.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that is missing, broken or in a format that this build does not read, and for one that
 /// claims more than 2^28 pixels, or more than its size makes plausible.
 pub fn read(path: &Path) -> Result<Image> {
     read_samples(path).map(samples::decode)
+}
+
+/// As [`read`], but the whole picture where an OpenEXR file holds a part of it: transparent black around that, and nothing of what lies beyond.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_whole(path: &Path) -> Result<Image> {
+    let part = read(path)?;
+    let Some(Placed { x, y, full }) = backend::placed(path).map_err(|message| unreadable(path, &message))? else {
+        return Ok(part);
+    };
+    let [width, height] = full.map(|side| u64::try_from(side).unwrap_or(0));
+    check_size(width, height, file_size(path)?).map_err(|message| unreadable(path, &message))?;
+    let mut whole = Image::new(width as u32, height as u32);
+    // What both have of a side: where it begins in the whole and in the part, and how long it is.
+    let shared = |at: i64, part: u32, whole: u64| {
+        let (first, end) = (at.max(0), (at + i64::from(part)).min(whole as i64));
+        (first as usize, (first - at) as usize, (end - first).max(0) as usize)
+    };
+    let ((left, from_left, columns), (top, from_top, rows)) =
+        (shared(x, part.width, width), shared(y, part.height, height));
+    if columns > 0 {
+        for row in 0..rows {
+            let source = &part.pixels[(from_top + row) * part.width as usize + from_left..][..columns];
+            whole.pixels[(top + row) * width as usize + left..][..columns].copy_from_slice(source);
+        }
+    }
+    Ok(whole)
 }
 
 /// What [`read`] decodes.

@@ -37,6 +37,22 @@ pub struct Window {
     pub full: [u32; 2],
 }
 
+/// Where the pixels of a file lie in the picture that it holds a part of, which they may also reach beyond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Placed {
+    pub x: i64,
+    pub y: i64,
+    /// Width and height of the whole picture.
+    pub full: [i64; 2],
+}
+
+impl Placed {
+    /// None where a file of this width and height is the whole picture.
+    pub(super) fn unless_whole(self, width: u32, height: u32) -> Option<Self> {
+        (self != Self { x: 0, y: 0, full: [width.into(), height.into()] }).then_some(self)
+    }
+}
+
 impl Default for Metadata {
     /// This program, and nothing else.
     fn default() -> Self {

@@ -3,21 +3,24 @@
 //! What an [`Image`] becomes in a file is decided by the suffix: linear samples where the format holds floating values
 //! (OpenEXR, Radiance), 8-bit codes everywhere else, TIFF included, by what a camera makes of light (`response`). `samples.rs` turns pixels into a file's samples, and a
 //! backend moves them: `oiio` (OpenImageIO, feature `oiio`) or `pure.rs` (the crates exr and image). Both write the
-//! same pixels. What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
+//! same pixels, and read PNG by the same decoder (`picture.rs`). What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
 
 mod channels;
 mod compare;
 pub mod denoise;
 mod file;
 pub mod flip;
+mod guarded;
 mod jpeg;
 #[cfg(any(feature = "oiio", feature = "oidn"))]
 mod loading;
 mod metadata;
 #[cfg(feature = "oiio")]
 mod oiio;
+mod orientation;
 #[cfg(all(test, feature = "oiio"))]
 mod parity;
+mod picture;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure;
 #[cfg(any(test, not(feature = "oiio")))]
@@ -30,9 +33,11 @@ pub mod srgb;
 pub use channels::{Channel, Channels, Plane};
 pub use compare::Difference;
 pub use file::{
-    Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, write, write_channels,
+    Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, read_whole, write,
+    write_channels,
 };
 pub(crate) use file::{has_common_suffix, prepare};
+pub(crate) use guarded::guarded;
 pub(crate) use jpeg::is_cut_short;
 pub use metadata::{Metadata, Window};
 pub use reference::Reference;

@@ -1,19 +1,18 @@
 //! Image files without OpenImageIO: OpenEXR by the crate exr, PNG and JPEG by the crate image.
 
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use exr::prelude::{self as openexr, ReadChannels, ReadLayers, WritableImage, f16};
 use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
-use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
+use image::{ExtendedColorType, ImageEncoder};
 use openexr::{AttributeValue, FlatSamples, Text};
 
 use super::file::{COMMON, Encoding};
-use super::metadata::{Metadata, Window, is_text, narrow, widen};
+use super::metadata::{Metadata, Placed, Window, is_text, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
-use super::{Channel, pure_channels};
-use crate::memory::Mapped;
+use super::{Channel, guarded, picture, pure_channels};
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -141,7 +140,7 @@ pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
 
 /// Reads a file, unless `check` refuses its width and height. The format is told by the content.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    if openexr_magic(path)? { read_exr(path, check) } else { read_other(path, check) }
+    if openexr_magic(path)? { guarded(|| read_exr(path, check)) } else { picture::read(path, check) }
 }
 
 fn openexr_magic(path: &Path) -> Result<bool> {
@@ -149,25 +148,18 @@ fn openexr_magic(path: &Path) -> Result<bool> {
     Ok(exr::meta::magic_number::is_exr(&mut file).unwrap_or(false))
 }
 
-fn read_other(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    // Mapped, as textures are, so that decoders are compiled once.
-    let bytes = Mapped::open(path).map_err(|e| e.to_string())?;
-    let mut reader = ImageReader::new(Cursor::new(&bytes[..])).with_guessed_format().map_err(|e| e.to_string())?;
-    reader.no_limits(); // ours follow, before anything is allocated
-    let decoder = reader.into_decoder().map_err(|e| e.to_string())?;
-    let (width, height) = decoder.dimensions();
-    check(width.into(), height.into())?;
-    let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
-    let color = decoded.color();
-    let is_deep = color.bytes_per_pixel() > color.channel_count();
-    let values = match (is_deep, color.has_alpha()) {
-        (false, false) => Values::U8(decoded.into_rgb8().into_raw()),
-        (false, true) => Values::U8(decoded.into_rgba8().into_raw()),
-        (true, false) => Values::U16(decoded.into_rgb16().into_raw()),
-        (true, true) => Values::U16(decoded.into_rgba16().into_raw()),
-    };
-    let channels = Channels { colour: true, alpha: color.has_alpha().then_some(Alpha::Straight) };
-    Ok(Samples { width, height, channels, values })
+/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that is not OpenEXR.
+pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
+    if !openexr_magic(path)? {
+        return Ok(None);
+    }
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let header = meta.headers.first().ok_or("no layers")?;
+    let (at, display) = (header.own_attributes.layer_position, header.shared_attributes.display_window);
+    let [x, y] =
+        [(at.0, display.position.0), (at.1, display.position.1)].map(|(at, full)| i64::from(at) - i64::from(full));
+    let full = [display.size.0, display.size.1].map(|side| i64::try_from(side).unwrap_or(0));
+    Ok(Placed { x, y, full }.unless_whole(header.layer_size.0 as u32, header.layer_size.1 as u32))
 }
 
 /// The channels of a flat OpenEXR file, in the order of their names.
@@ -216,6 +208,9 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
             return Err(format!("no channels R, G and B, or Y; it has {}", names.join(", ")));
         }
     };
+    if colours.iter().any(|colour| matches!(colour, FlatSamples::U32(_))) {
+        return Err("colours of whole numbers; only floating values are read".to_owned());
+    }
     let alpha = plane("A");
     let channels = Channels { colour: colours.len() == 3, alpha: alpha.map(|_| Alpha::Premultiplied) };
     let planes: Vec<&FlatSamples> = colours.into_iter().chain(alpha).collect();

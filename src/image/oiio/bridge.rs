@@ -104,6 +104,10 @@ pub(super) struct Layout<'a> {
     pub(super) linear: bool,
     /// What follows the colours in each pixel, of four bytes each.
     pub(super) beside: Slice<'a, Named<'a>>,
+    /// Of what is read: how it has to be turned to be seen, 1 to 8 as EXIF counts.
+    pub(super) orientation: u32,
+    /// Of what is read: its x and y, and x, y, width and height of the picture that it is a part of.
+    pub(super) window: [i32; 6],
 }
 
 /// Attributes, as far as they are there: of 0 or 1 value, matrices of 0 or 16.
@@ -136,8 +140,9 @@ struct File {
 pub(super) struct Functions {
     suffixes: unsafe extern "C" fn(*mut Bytes<'_>) -> Failure,
     write: unsafe extern "C" fn(Bytes<'_>, *const Layout<'_>, *const Attributes<'_>, Bytes<'_>) -> Failure,
-    open: unsafe extern "C" fn(Bytes<'_>, *mut *mut File) -> Failure,
+    open: unsafe extern "C" fn(Bytes<'_>, Bytes<'_>, *mut *mut File) -> Failure,
     close: unsafe extern "C" fn(*mut File),
+    size: unsafe extern "C" fn(*const File, *mut [u32; 2]) -> Failure,
     layout: unsafe extern "C" fn(*const File, *mut Layout<'_>) -> Failure,
     attributes: unsafe extern "C" fn(*mut File, *mut Attributes<'_>) -> Failure,
     read: unsafe extern "C" fn(*mut File, *mut u8, usize) -> Failure,
@@ -159,10 +164,11 @@ impl Functions {
         result(unsafe { (self.write)(bytes(path), layout, attributes, samples.into()) })
     }
 
-    pub(super) fn open(&self, path: &Path) -> Result<Input<'_>> {
+    /// Opens a file by the reader of a format, which is told by its name or by a suffix of its files.
+    pub(super) fn open(&self, path: &Path, format: &str) -> Result<Input<'_>> {
         let mut file = ptr::null_mut();
-        // SAFETY: the shim fills in a file of its own.
-        result(unsafe { (self.open)(bytes(path), &raw mut file) })?;
+        // SAFETY: the shim reads the names during the call, and fills in a file of its own.
+        result(unsafe { (self.open)(bytes(path), format.into(), &raw mut file) })?;
         Ok(Input { functions: self, file })
     }
 }
@@ -175,6 +181,15 @@ pub(super) struct Input<'f> {
 }
 
 impl Input<'_> {
+    /// Width and height.
+    pub(super) fn size(&self) -> Result<[u32; 2]> {
+        let mut size = [0; 2];
+        // SAFETY: the file is open, and the shim fills in two numbers.
+        result(unsafe { (self.functions.size)(self.file, &raw mut size) })?;
+        Ok(size)
+    }
+
+    /// Of the colours; an error where there are none.
     pub(super) fn layout(&self) -> Result<Layout<'static>> {
         let mut layout = Layout::default();
         // SAFETY: the file is open, and of slices the shim fills in none.

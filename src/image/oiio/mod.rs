@@ -4,15 +4,17 @@
 //! | --- | --- |
 //! | `shim` | opens the shim, and OpenImageIO with it, when the first image file is read or written |
 //! | `bridge` | its functions and types |
+//! | `formats` | which formats are read |
 //! | `unheard` | formats whose writers do not tell what goes wrong |
 //!
 //! The crate `oiio` was rejected: it needs OpenImageIO 3.1, and Debian 12 and 13 have 2.4 and 2.5.
 
 mod bridge;
+mod formats;
 mod shim;
 mod unheard;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use exr::prelude::f16;
@@ -20,10 +22,13 @@ use exr::prelude::f16;
 use self::bridge::{Attributes, Input, Kind, Layout, Named, Result, Slice, Text};
 use self::shim::functions;
 use super::file::Encoding;
-use super::metadata::{Metadata, Window, is_text, narrow, widen};
+use super::jpeg::{self, Plain};
+use super::metadata::{Metadata, Placed, Window, is_text, narrow, widen};
+use super::orientation::upright;
 use super::samples::{Alpha, Channels, Samples, Values};
-use super::{Channel, Channels as AllChannels, Plane};
+use super::{Channel, Channels as AllChannels, Plane, picture};
 use crate::error::Error;
+use crate::memory::Mapped;
 
 /// Loads OpenImageIO unless it is there.
 ///
@@ -75,6 +80,7 @@ pub(super) fn write(
         straight: samples.channels.alpha == Some(Alpha::Straight),
         linear: encoding.linear,
         beside: beside[..].into(),
+        ..Layout::default()
     };
     let [camera, screen] = [&metadata.world_to_camera, &metadata.world_to_screen].map(|m| m.as_ref().map(narrow));
     let [fovcot, seconds] = [metadata.fovcot, metadata.render_time_seconds].map(|x| x.map(|x| x as f32));
@@ -126,13 +132,13 @@ fn interleaved(samples: &Samples, colours: &[u8], channels: &[Channel]) -> Vec<u
 
 /// Every channel of a file, unless `check` refuses its width and height.
 pub(super) fn read_channels(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<AllChannels> {
-    let mut input = functions()?.open(path)?;
-    let layout = input.layout()?;
-    check(layout.width.into(), layout.height.into())?;
+    let mut input = open_exr(path)?;
+    let [width, height] = input.size()?;
+    check(width.into(), height.into())?;
     let named: Vec<_> = input.channels()?.iter().map(|channel| (channel.name.text(), channel.kind)).collect();
     let size = |kind| if kind == Kind::Half { 2 } else { 4 };
     let pixel: usize = named.iter().map(|&(_, kind)| size(kind)).sum();
-    let pixels = layout.width as usize * layout.height as usize;
+    let pixels = width as usize * height as usize;
     let mut samples = vec![0u8; pixels * pixel];
     input.read_all(&mut samples)?;
     let mut at = 0;
@@ -151,14 +157,54 @@ pub(super) fn read_channels(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>)
         };
         Channel { name, plane }
     });
-    Ok(AllChannels { width: layout.width, height: layout.height, channels: channels.collect() })
+    Ok(AllChannels { width, height, channels: channels.collect() })
 }
 
-/// Reads a file, unless `check` refuses its width and height.
+/// Reads a file as it is to be seen, unless `check` refuses its width and height.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    let mut input = functions()?.open(path)?;
+    match formats::of(path)? {
+        // To the same bits, and libpng writes to where errors belong by itself.
+        formats::PNG => picture::read(path, check),
+        formats::JPEG => read_jpeg(path, check),
+        format => read_as(path, format, check),
+    }
+}
+
+/// Of a JPEG file the picture alone: what OpenImageIO makes of the words that cameras and programs leave beside it reads past their end where they are damaged.
+fn read_jpeg(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    let file = Mapped::open(path).map_err(|error| error.to_string())?;
+    let Plain { bytes, orientation } = jpeg::plain(&file).ok_or("a broken JPEG file: there is no picture in it")?;
+    let Some((_memory, place)) = in_memory(&bytes) else { return read_as(path, formats::JPEG, check) };
+    let samples = read_as(&place, formats::JPEG, check);
+    let samples = samples.map_err(|message| message.replace(&*place.to_string_lossy(), &path.to_string_lossy()))?;
+    Ok(upright(samples, orientation))
+}
+
+/// A file in memory of these bytes, as long as it is open, and its name; none where there are no such files.
+#[cfg(target_os = "linux")]
+fn in_memory(bytes: &[u8]) -> Option<(std::fs::File, PathBuf)> {
+    use std::io::Write;
+
+    let (mut file, place) = crate::memory::in_memory(c"twincast-picture").ok()?;
+    file.write_all(bytes).ok()?;
+    std::fs::metadata(&place).ok()?;
+    Some((file, place))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn in_memory(_: &[u8]) -> Option<(std::fs::File, PathBuf)> {
+    None
+}
+
+/// Reads a file by the reader of a format, which is told by its name or by a suffix of its files.
+pub(super) fn read_as(path: &Path, format: &str, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    let mut input = functions()?.open(path, format)?;
     let layout = input.layout()?;
     check(layout.width.into(), layout.height.into())?;
+    if format == formats::RADIANCE && layout.orientation > 4 {
+        // Of such lines OpenImageIO takes two for each other.
+        return Err("its lines are columns of the picture (the line of its sizes begins with X); only those with rows are read, of which the line begins with -Y or +Y".to_owned());
+    }
     let alpha = layout.alpha.then_some(if layout.straight { Alpha::Straight } else { Alpha::Premultiplied });
     let channels = Channels { colour: layout.channels >= 3, alpha };
     let count = layout.width as usize * layout.height as usize * channels.count();
@@ -167,7 +213,26 @@ pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Resul
         Kind::U16 => Values::U16(fill(&mut input, count)?),
         _ => Values::Float(fill(&mut input, count)?),
     };
-    Ok(Samples { width: layout.width, height: layout.height, channels, values })
+    Ok(upright(Samples { width: layout.width, height: layout.height, channels, values }, layout.orientation))
+}
+
+/// An OpenEXR file, opened.
+fn open_exr(path: &Path) -> Result<Input<'static>> {
+    match formats::of(path) {
+        Ok(formats::OPENEXR) => functions()?.open(path, formats::OPENEXR),
+        _ => Err("not an OpenEXR file".to_owned()),
+    }
+}
+
+/// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that is not OpenEXR.
+pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
+    if formats::of(path)? != formats::OPENEXR {
+        return Ok(None);
+    }
+    let layout = open_exr(path)?.layout()?;
+    let [x, y, full_x, full_y, full_width, full_height] = layout.window.map(i64::from);
+    Ok(Placed { x: x - full_x, y: y - full_y, full: [full_width, full_height] }
+        .unless_whole(layout.width, layout.height))
 }
 
 fn fill<T: bytemuck::Pod>(input: &mut Input, count: usize) -> Result<Vec<T>> {
@@ -178,7 +243,7 @@ fn fill<T: bytemuck::Pod>(input: &mut Input, count: usize) -> Result<Vec<T>> {
 
 /// Reads the attributes that [`write`] writes.
 pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
-    let mut input = functions()?.open(path)?;
+    let mut input = open_exr(path)?;
     let found = input.attributes()?;
     let matrix = |m: Slice<f32>| m.get().try_into().ok().map(|m: &[f32; 16]| widen(m));
     let number = |x: Slice<f32>| x.get().first().copied().map(f64::from);

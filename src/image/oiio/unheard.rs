@@ -17,8 +17,11 @@ const UNHEARD: [&str; 22] = [
 
 /// Whether a file of this name is written so.
 pub(super) fn are_written_to(path: &Path) -> bool {
-    let suffix = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    UNHEARD.contains(&suffix.as_str())
+    UNHEARD.contains(&suffix(path).as_str())
+}
+
+fn suffix(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Has `write` make a file of a picture of this size, and holds it against that.
@@ -73,5 +76,6 @@ fn check(path: &Path, size: [u32; 2]) -> Result<()> {
         let is_right = [found_width, found_height] == size.map(u64::from);
         is_right.then_some(()).ok_or_else(|| format!("the file says {found_width} x {found_height}"))
     };
-    super::read(path, &is_right).map(drop).map_err(|message| useless(message.trim()))
+    // What it has written itself is not damaged by others, in whichever format.
+    super::read_as(path, &suffix(path), &is_right).map(drop).map_err(|message| useless(message.trim()))
 }

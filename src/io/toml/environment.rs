@@ -15,7 +15,7 @@ pub(super) fn environment(value: Value<'_>, folder: &Path, files: &mut Vec<PathB
     if !path.is_file() {
         return Err(name.fault(format!("there is no file {}", path.display())).into());
     }
-    let image = image::read(&path).map_err(|error| Stop::Elsewhere { at: name.at, error })?;
+    let image = image::read_whole(&path).map_err(|error| Stop::Elsewhere { at: name.at, error })?;
     files.push(path);
     let intensity = table.optional("intensity", |value| value.share())?.unwrap_or(1.0);
     let rotation = table.optional("rotation", |value| value.number())?.unwrap_or(0.0).to_radians();
