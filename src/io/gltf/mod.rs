@@ -27,6 +27,7 @@ mod morph;
 mod node;
 mod pose;
 mod punctual;
+mod quotes;
 mod schema;
 mod skin;
 mod textures;
@@ -37,6 +38,7 @@ mod variants;
 use std::path::Path;
 
 use self::document::Document;
+use self::quotes::shortened;
 use super::LoadOptions;
 use crate::error::{Error, Result, Warning};
 use crate::memory::Mapped;
@@ -68,6 +70,19 @@ pub(super) fn load(
     options: &LoadOptions,
     warnings: &mut Vec<Warning>,
 ) -> Result<Scene> {
+    let before = warnings.len();
+    let scene = read(path, file, options, warnings);
+    for warning in &mut warnings[before..] {
+        warning.message = shortened(&warning.message);
+    }
+    scene.map_err(|error| match error {
+        Error::Input { path, place, message } => Error::input(path, place, shortened(&message)),
+        other => other,
+    })
+}
+
+/// The same, with messages of any length.
+fn read(path: &Path, file: &Mapped<'_>, options: &LoadOptions, warnings: &mut Vec<Warning>) -> Result<Scene> {
     let parts = container::split(file).map_err(|(place, message)| Error::input(path, place, message))?;
     let root: schema::Root = serde_json::from_slice(parts.json).map_err(|e| {
         let place = format!("line {}, column {}", e.line(), e.column());
