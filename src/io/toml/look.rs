@@ -275,9 +275,21 @@ fn end(table: &mut Table<'_>, start: [DVec3; 3]) -> Read<Option<Pose>> {
 
 fn projection(table: &mut Table<'_>) -> Read<Projection> {
     let kinds = ["perspective", "orthographic", "equirectangular"].map(|name| (name, name));
-    match table.optional("projection", |value| value.choice(&kinds))? {
-        Some("orthographic") => Ok(Projection::Orthographic(length(table.need("height")?)?)),
-        Some("equirectangular") => Ok(Projection::Equirectangular),
+    let kind = table.optional("projection", |value| value.choice(&kinds))?.unwrap_or(kinds[0].0);
+    if kind != "orthographic" {
+        table.refuse(
+            "height",
+            "is for orthographic cameras alone; write projection = \"orthographic\", or leave it out",
+        )?;
+    }
+    if kind != "perspective" {
+        for key in ["fov", "fov_x"] {
+            table.refuse(key, "is for perspective cameras alone; leave it out")?;
+        }
+    }
+    match kind {
+        "orthographic" => Ok(Projection::Orthographic(length(table.need("height")?)?)),
+        "equirectangular" => Ok(Projection::Equirectangular),
         _ => {
             let vertical = table.optional("fov", angle)?;
             let horizontal = table.optional("fov_x", angle)?;

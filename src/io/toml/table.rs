@@ -47,7 +47,9 @@ impl<'t> Table<'t> {
 
     /// The value of a key, if it is there.
     pub(super) fn get(&mut self, key: &'static str) -> Option<Value<'t>> {
-        self.asked.push(key);
+        if !self.asked.contains(&key) {
+            self.asked.push(key);
+        }
         let (_, value) = self.entries.get_key_value(key)?;
         Some(Value { value: value.get_ref(), key, at: value.span().start })
     }
@@ -64,6 +66,14 @@ impl<'t> Table<'t> {
         read: impl FnOnce(Value<'t>) -> Read<T>,
     ) -> Read<Option<T>> {
         self.get(key).map(read).transpose()
+    }
+
+    /// Refuses a key that belongs to something else, if it is there; it is not among those that the table knows.
+    pub(super) fn refuse(&self, key: &'static str, why: &str) -> Read<()> {
+        match self.entries.get_key_value(key) {
+            Some((_, value)) => Err(Fault { at: value.span().start, message: format!("{key:?} {why}") }),
+            None => Ok(()),
+        }
     }
 
     /// The tables of `[[key]]`, in order; none where there are none.
