@@ -5,12 +5,12 @@ use std::path::Path;
 
 use bytemuck::{Pod, try_cast_vec};
 use image::error::ImageError;
-use image::{ImageReader, Limits};
+use image::{ImageDecoder, ImageReader, Limits};
 
 use crate::error::{Error, Result, one_line};
-use crate::image::is_cut_short;
+use crate::image::{guarded, is_cut_short};
 use crate::io::Placeless;
-use crate::memory::Mapped;
+use crate::memory::{Mapped, process};
 use crate::scene::{Pixels, Texture};
 
 /// Longest side, in pixels.
@@ -19,6 +19,9 @@ const LONGEST_SIDE: u32 = 16_384;
 const MOST_PIXELS: u64 = 1 << 26;
 /// Most memory the decoder may use besides the pixels.
 const MOST_MEMORY: u64 = 1 << 29;
+
+/// Of the memory that could be had, the share that pictures may take: what is rendered wants some, too.
+const SHARE: f64 = 0.75;
 
 /// Reads a picture file. None where there is no such file.
 ///
@@ -47,7 +50,8 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     // The size first, and without limits of the library's, whose message would not say it.
     let mut sizing = reader()?;
     sizing.no_limits();
-    let (width, height) = sizing.into_dimensions().map_err(|e| broken(&e))?;
+    let sizing = sizing.into_decoder().map_err(|e| broken(&e))?;
+    let ((width, height), color) = (sizing.dimensions(), sizing.color_type());
     let pixels = u64::from(width) * u64::from(height);
     if width.max(height) > LONGEST_SIDE || pixels > MOST_PIXELS {
         return Err(format!(
@@ -57,14 +61,29 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     if is_cut_short(bytes) {
         return Err("is a broken picture: it is cut short".to_owned());
     }
-    let image = reader()?.decode().map_err(|e| broken(&e))?;
-    let is_deep = image.color().bytes_per_pixel() > image.color().channel_count();
+    let is_deep = color.bytes_per_pixel() > color.channel_count();
+    // As it is decoded, and as it stays. Each texture may be small enough, and all of them too many.
+    let bytes = pixels * (u64::from(color.bytes_per_pixel()) + if is_deep { 8 } else { 4 });
+    check_memory(bytes, process::available()).map_err(|m| format!("claims {width} x {height} pixels, {m}"))?;
+    let image = guarded(|| reader()?.decode().map_err(|e| broken(&e)))?;
     let pixels = if is_deep {
         Pixels::from(in_fours(image.into_rgba16().into_raw()))
     } else {
         Pixels::from(in_fours(image.into_rgba8().into_raw()))
     };
     Ok(Texture { name: name.to_string(), width, height, pixels, ..Texture::default() })
+}
+
+/// Whether so many bytes may be taken of the memory that could be had, as far as that is known.
+fn check_memory(bytes: u64, available: Option<u64>) -> Placeless<()> {
+    let most = available.map_or(u64::MAX, |available| (available as f64 * SHARE) as u64);
+    if bytes <= most {
+        return Ok(());
+    }
+    let [bytes, most] = [bytes, most].map(|bytes| bytes.div_ceil(1_000_000));
+    Err(format!(
+        "which take {bytes} MB, and of the memory that is left textures may take {most} MB; use fewer or smaller ones"
+    ))
 }
 
 /// Without a copy, unless there is room for more values than whole pixels take.
@@ -84,5 +103,18 @@ fn broken(error: &ImageError) -> String {
     match error {
         ImageError::Unsupported(_) => format!("is not a PNG, JPEG or WebP picture that can be read: {error}"),
         _ => format!("is a broken picture: {}", one_line(&error.to_string())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_leave_memory_for_the_rest() {
+        assert_eq!(check_memory(75, Some(100)), Ok(()));
+        assert_eq!(check_memory(u64::MAX, None), Ok(()));
+        let message = check_memory(76_000_001, Some(100_000_000)).unwrap_err();
+        assert!(message.contains("take 77 MB") && message.contains("may take 75 MB"), "{message}");
     }
 }

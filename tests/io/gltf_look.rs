@@ -220,3 +220,50 @@ fn variants_of_materials() {
     let error = with(&Maker::triangle().files(), Some("day")).unwrap_err();
     assert!(error.to_string().contains("the file has none"), "{error}");
 }
+
+/// Images that are the same bytes, in one view or in several, or the same file, are decoded once.
+#[test]
+fn a_picture_is_decoded_once_however_many_images_it_is() {
+    let mut maker = square(json!({}));
+    let views = [maker.view(&obj::picture()), maker.view(&obj::picture())];
+    let file = json!({"uri": "p.png"});
+    maker.json["images"] =
+        json!([{"bufferView": views[0]}, {"bufferView": views[0]}, {"bufferView": views[1]}, file, file]);
+    maker.json["images"].as_array_mut().unwrap().iter_mut().for_each(|image| image["mimeType"] = json!("image/png"));
+    maker.json["textures"] = (0..5).map(|source| json!({"source": source})).collect();
+    let material = |i| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}});
+    maker.json["materials"] = (0..5).map(material).collect();
+    let primitive = maker.json["meshes"][0]["primitives"][0].clone();
+    let primitives = (0..5).map(|i| {
+        let mut primitive = primitive.clone();
+        primitive["material"] = json!(i);
+        primitive
+    });
+    maker.json["meshes"][0]["primitives"] = primitives.collect();
+    let scene = maker.files().and("p.png", obj::picture()).scene("a.gltf");
+    let mut places: Vec<_> = scene.textures.iter().map(|texture| texture.pixels.bytes().as_ptr()).collect();
+    assert_eq!(places.len(), 5);
+    places.sort();
+    places.dedup();
+    assert_eq!(places.len(), 2, "one of bytes, one of the file");
+}
+
+/// A file may hold words of any length, messages may not.
+#[test]
+fn what_a_message_quotes_is_cut() {
+    let long = "x".repeat(100_000);
+    for json in [
+        json!({"asset": {"version": "2.0"}, "nodes": long}),
+        json!({"asset": {"version": long}}),
+        json!({"asset": {"version": "2.0"}, "images": [{"name": long, "uri": "data:,x"}], "textures": [{"source": 0}]}),
+        json!({"asset": {"version": "2.0"}, "extensionsRequired": [long]}),
+        json!({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4, "uri": long}]}),
+    ] {
+        let files = Files::one("a.gltf", json.to_string());
+        let words = match load(&files.path("a.gltf"), &LoadOptions::default()) {
+            Ok((_, warnings)) => warnings.iter().map(ToString::to_string).collect(),
+            Err(error) => error.to_string(),
+        };
+        assert!(words.len() < 1000, "{words}");
+    }
+}

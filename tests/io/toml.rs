@@ -149,7 +149,7 @@ fn lights_and_materials() {
     assert_eq!((glass.model, glass.emission), (Specular::BlinnPhong, Vec3::new(0.0, 0.0, 0.01)));
     let wood = &scene.materials[4];
     let slots = [wood.diffuse_texture, wood.emission_texture, wood.normal_texture];
-    assert_eq!((slots, scene.textures.len()), ([Some(0), Some(1), Some(2)], 3));
+    assert_eq!((slots, scene.textures.len()), ([Some(0); 3], 1), "a picture is read once");
     assert_eq!((wood.alpha, wood.opacity, wood.normal_scale), (Alpha::Mask { cutoff: 0.5 }, 1.0, 1.0));
     let [bottle, pane, sign] = [0, 2, 3].map(|i| &scene.materials[i]);
     assert_eq!((bottle.interface, bottle.reflection, bottle.diffuse), (Interface::Fresnel, Vec3::ONE, Vec3::ZERO));
@@ -306,6 +306,21 @@ fn faults_are_told_with_line_and_remedy() {
             "a length above 0",
         ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nheight = 3\n",
+            4,
+            "\"height\" is for orthographic cameras alone",
+        ),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\nfov_x = 3\n",
+            5,
+            "\"fov_x\" is for perspective cameras alone",
+        ),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nqqqq = 3\n",
+            4,
+            "; it knows eye, look_at, up, eye_end, look_at_end, up_end, projection, fov, fov_x, lens, distortion, name, shutter, shift",
+        ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"orthographic\"\n", 1, "\"height\""),
         (
             "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nprojection = \"equirectangular\"\ndistortion = [1, 0, 0, 0, 0]\n",
@@ -358,4 +373,18 @@ fn faults_are_told_with_line_and_remedy() {
     let files = Files::one("a.toml", "[[file]]\npath = \"b.obj\"\n").and("b.obj", "f 1 2 3\n");
     let error = twincast::io::load(&files.path("a.toml"), &Default::default()).unwrap_err().to_string();
     assert!(error.contains("b.obj: line 1") && error.ends_with("a.toml, line 2)"), "{error}");
+}
+
+/// Materials that name one picture share it; and each file is told of once.
+#[test]
+fn a_picture_is_read_once_however_many_materials_name_it() {
+    let mut text = SPHERE.to_owned();
+    for i in 0..20 {
+        text += &format!("[material.m{i}]\ntexture = \"p.png\"\nemission_texture = \"q.png\"\n");
+    }
+    let scene = Files::one("a.toml", text).and("p.png", obj::picture()).and("q.png", obj::picture()).scene("a.toml");
+    let pictures = scene.files.iter().filter(|file| file.extension().is_some_and(|suffix| suffix == "png"));
+    assert_eq!((scene.textures.len(), pictures.count()), (2, 2));
+    let slots = scene.materials[..20].iter().map(|m| (m.diffuse_texture, m.emission_texture));
+    assert!(slots.eq([(Some(0), Some(1)); 20]));
 }

@@ -1,7 +1,7 @@
 //! Textures, and the pictures they show.
 //!
-//! A picture is decoded once, when a material first needs it, and shared by all textures that show it: one for each sampler, place
-//! (`KHR_texture_transform`) and set of coordinates.
+//! A picture is decoded once, when a material first needs it, and shared by all images that are it, and by all textures that show it: one for each sampler,
+//! place (`KHR_texture_transform`) and set of coordinates.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -23,11 +23,34 @@ pub(super) struct Textures<'a> {
     list: Vec<Texture>,
     /// By glTF's texture, where it lies, and whether by the second set of coordinates.
     known: HashMap<(usize, [u32; 6], bool), u32>,
-    /// By glTF's image; None where the file is missing.
-    pictures: HashMap<usize, Option<Texture>>,
+    /// By what glTF's images are made of; None where the file is missing.
+    pictures: HashMap<Source<'a>, Option<Texture>>,
     /// By the address of a picture's pixels, and whether as numbers.
     means: HashMap<(usize, bool), Vec4>,
     pub(super) warnings: Vec<Warning>,
+}
+
+/// What an image is made of: several may be made of the same.
+#[derive(PartialEq, Eq, Hash)]
+enum Source<'a> {
+    Uri(&'a str),
+    /// Of a buffer view.
+    Bytes(&'a [u8]),
+}
+
+impl<'a> Source<'a> {
+    fn of(document: &'a Document<'a>, index: usize) -> Result<Self> {
+        let image = &document.root.images[index];
+        let pointer = format!("/images/{index}");
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => Ok(Self::Uri(uri)),
+            (None, Some(view)) => match document.view(view) {
+                Ok((bytes, _)) => Ok(Self::Bytes(bytes)),
+                Err(message) => Err(document.error(format!("{pointer}/bufferView"), message)),
+            },
+            (None, None) => Err(document.error(pointer, "the image has neither a URI nor a buffer view")),
+        }
+    }
 }
 
 /// The sets of texture coordinates of a material, in the order in which its textures name them.
@@ -171,15 +194,23 @@ impl<'a> Textures<'a> {
             return Ok(None);
         };
         document.check_index(&format!("/textures/{index}/{told_by}"), image, root.images.len(), "image")?;
-        Ok(match self.pictures.entry(image) {
+        Ok(match self.pictures.entry(Source::of(document, image)?) {
             Entry::Occupied(known) => known.get().clone(),
-            Entry::Vacant(free) => free.insert(decoded(document, image, &mut self.warnings)?).clone(),
+            Entry::Vacant(free) => {
+                let picture = decoded(document, image, free.key(), &mut self.warnings)?;
+                free.insert(picture).clone()
+            }
         })
     }
 }
 
 /// Decodes an image. None, and a warning, where its file is missing.
-fn decoded(document: &Document<'_>, index: usize, warnings: &mut Vec<Warning>) -> Result<Option<Texture>> {
+fn decoded(
+    document: &Document<'_>,
+    index: usize,
+    source: &Source<'_>,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<Texture>> {
     let image = &document.root.images[index];
     let pointer = format!("/images/{index}");
     let decode = |bytes: &[u8]| {
@@ -187,8 +218,8 @@ fn decoded(document: &Document<'_>, index: usize, warnings: &mut Vec<Warning>) -
         let told = |m| document.error(&pointer, format!("image {:?} {m}", image.name));
         texture::decode(bytes, name).map(Some).map_err(told)
     };
-    match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => match uri::resolve(document.path, uri).map_err(|m| document.error(&pointer, m))? {
+    match *source {
+        Source::Uri(uri) => match uri::resolve(document.path, uri).map_err(|m| document.error(&pointer, m))? {
             Target::Data(bytes) => decode(&bytes),
             Target::File(file) => {
                 let texture = texture::open(&file).map_err(|e| about(document, &pointer, e))?;
@@ -200,11 +231,7 @@ fn decoded(document: &Document<'_>, index: usize, warnings: &mut Vec<Warning>) -
                 Ok(texture)
             }
         },
-        (None, Some(view)) => {
-            let (bytes, _) = document.view(view).map_err(|m| document.error(format!("{pointer}/bufferView"), m))?;
-            decode(bytes)
-        }
-        (None, None) => Err(document.error(pointer, "the image has neither a URI nor a buffer view")),
+        Source::Bytes(bytes) => decode(bytes),
     }
 }
 

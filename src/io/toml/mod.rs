@@ -16,9 +16,9 @@ mod pieces;
 mod primitives;
 mod table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ::toml::Spanned;
 use ::toml::de::DeTable;
@@ -73,6 +73,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         scene: Scene::default(),
         warnings,
         materials: BTreeMap::new(),
+        pictures: HashMap::new(),
         plain: None,
         includes: Includes::default(),
         bare: 0,
@@ -147,6 +148,8 @@ struct Reader<'a> {
     warnings: &'a mut Vec<Warning>,
     /// Indices by name.
     materials: BTreeMap<String, u32>,
+    /// Indices of textures by the files of their pictures.
+    pictures: HashMap<PathBuf, u32>,
     /// The index of the material of primitives that name none, once there is one.
     plain: Option<u32>,
     includes: Includes,
@@ -209,15 +212,20 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The index of a picture that a value names.
+    /// The index of a picture that a value names, which is read the first time.
     fn texture(&mut self, value: Option<Value<'_>>) -> std::result::Result<Option<u32>, Stop> {
         let Some(value) = value else { return Ok(None) };
         let path = self.folder.join(value.text()?);
+        if let Some(known) = self.pictures.get(&path) {
+            return Ok(Some(*known));
+        }
         let picture: Option<Texture> = texture::open(&path).map_err(|error| Stop::Elsewhere { at: value.at, error })?;
         let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
         self.scene.textures.push(picture);
-        self.scene.files.push(path);
-        Ok(Some(self.scene.textures.len() as u32 - 1))
+        self.scene.files.push(path.clone());
+        let index = self.scene.textures.len() as u32 - 1;
+        self.pictures.insert(path, index);
+        Ok(Some(index))
     }
 
     /// What stands in a group, or at the top of the file.
