@@ -33,7 +33,7 @@ fn axes_must_be_unit_vectors_at_right_angles() {
     let skew = DMat3::from_cols(DVec3::X, DVec3::new(0.1, 1.0, 0.0), DVec3::Z);
     for by in [DMat3::IDENTITY * 5.0, DMat3::IDENTITY * 0.999, skew, DMat3::ZERO, DMat3::IDENTITY * f64::NAN] {
         let bent = Camera { frame: camera.frame * by, ..camera.clone() };
-        let error = Renderer::new(&scene, &world, bent, settings(4, 4, 1)).err().expect("a camera that is none");
+        let error = Renderer::new(&scene, &world, bent, settings(4, 4, 1)).expect_err("a camera that is none");
         assert!(error.to_string().contains("unit vectors"), "{error}");
     }
 }
