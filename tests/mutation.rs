@@ -177,6 +177,7 @@ fn mutate_json(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
 enum Outcome {
     Scene,
     Refused,
+    Slow,
     Failed(String),
 }
 
@@ -200,7 +201,7 @@ fn run(path: &Path, normals: Normals) -> Outcome {
     let (time, bytes) = (begin.elapsed(), allocation::most());
     match result {
         Err(_) => Outcome::Failed("a panic".into()),
-        _ if time > LONGEST => Outcome::Failed(format!("it took {time:?}")),
+        _ if time > LONGEST => Outcome::Slow,
         _ if bytes > MOST_BYTES => Outcome::Failed(format!("it took {bytes} bytes")),
         Ok(outcome) => outcome,
     }
@@ -239,7 +240,11 @@ fn broken_files_do_no_harm() {
             let path = place.join("broken").with_extension(&seed.suffix);
             fs::write(&path, &bytes).unwrap();
             let normals = [Normals::File, Normals::Flat, Normals::Smooth][random.below(3)];
-            let outcome = run(&path, normals);
+            // What stalls once may have had to wait for the tests beside this one; what is slow is slow each time.
+            let outcome = match (0..3).map(|_| run(&path, normals)).find(|outcome| !matches!(outcome, Outcome::Slow)) {
+                Some(outcome) => outcome,
+                None => Outcome::Failed(format!("it took more than {LONGEST:?}, three times")),
+            };
             let failed = matches!(outcome, Outcome::Failed(_));
             if failed {
                 let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("broken-{count}.{}", seed.suffix));
@@ -262,6 +267,7 @@ fn broken_files_do_no_harm() {
                 refused += 1;
             }
             Ok((_, _, _, Outcome::Scene)) => scenes += 1,
+            Ok((_, _, _, Outcome::Slow)) => unreachable!("it was run again"),
             Err(problem) => panic!("broken file {expected}: {problem}"),
         }
     }
