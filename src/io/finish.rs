@@ -61,7 +61,7 @@ pub(super) fn make_finite(geometry: &mut Geometry) -> usize {
             let components = value.as_mut().iter_mut().zip(instead).filter(|(component, _)| !component.is_finite());
             components.map(|(component, instead)| *component = instead).count() > 0
         };
-        values.par_iter_mut().with_min_len(1 << 14).map(mend).filter(|is_mended| *is_mended).count()
+        values.par_iter_mut().with_min_len(TASK).map(mend).filter(|is_mended| *is_mended).count()
     }
     let Geometry::Mesh(mesh) = geometry else { return 0 };
     let uvs = |uvs: &mut [Vec2]| each(uvs, [0.0; 2]);

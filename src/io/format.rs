@@ -49,6 +49,11 @@ pub const SUFFIXES: [&str; TABLE.len()] = {
     suffixes
 };
 
+/// The suffixes of formats that hold meshes and not a scene, which would bring a second camera and other light where it is included.
+pub(super) fn mesh_suffixes() -> impl Iterator<Item = &'static str> {
+    TABLE.iter().filter(|(_, format)| format.holds_meshes()).map(|(suffix, _)| *suffix)
+}
+
 /// What decides the format, in lower case.
 pub(super) fn suffix(path: &Path) -> String {
     path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
@@ -108,8 +113,8 @@ impl Format {
         }
     }
 
-    /// Whether it holds meshes that a scene may include, and not a scene, which would bring a second camera and other light.
-    pub(super) const fn holds_meshes(self) -> bool {
+    /// Whether it holds meshes alone, which scenes may include.
+    const fn holds_meshes(self) -> bool {
         match self {
             Self::Gltf | Self::Obj | Self::Ply | Self::Stl => true,
             Self::Nff | Self::Course | Self::Toml => false,

@@ -1,7 +1,9 @@
 //! How bright the brightest thing may be that a ray sees: what rays may be left out follows from it.
 
-use crate::math::DVec3;
-use crate::scene::{Light, Material, Scene, Specular};
+use std::cell::LazyCell;
+
+use crate::math::{Aabb, DVec3};
+use crate::scene::{Light, Material, Scene};
 use crate::trace::World;
 
 /// No ray sees more than this, linear and in any channel; at least 1, and infinite where nothing is known, as beside a light that grows without bound.
@@ -9,7 +11,10 @@ use crate::trace::World;
 /// What a ray sees is weighted along its way by what mirrors and glass leave of it. Glass has light denser within than outside, by the square of its index
 /// (`Way::scale`): a ray may weigh so much less within than what comes of it, which is counted here.
 pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
-    let arriving: f32 = scene.lights.iter().map(|light| of_light(light, world)).sum();
+    // They take a look at every triangle, and only lamps ask for them.
+    let bounds = LazyCell::new(|| world.bounds());
+    let nearest = |lamp: DVec3| if world.is_unbounded() { 0.0 } else { distance(lamp - world.centre, *bounds) };
+    let arriving: f32 = scene.lights.iter().map(|light| of_light(light, &nearest)).sum();
     // Where there is none there may be a headlight.
     let arriving = if scene.lights.is_empty() { 1.0 } else { arriving };
     let environment = scene.environment.as_ref().map_or(0.0, |environment| {
@@ -24,39 +29,32 @@ pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     [environment, behind, fog, surfaces].into_iter().fold(1.0, f32::max) * denser
 }
 
-/// What a white matte surface shows of it at most.
-fn of_light(light: &Light, world: &World) -> f32 {
+/// What a white matte surface shows of it at most; `nearest` tells how far a lamp is from everything at least.
+fn of_light(light: &Light, nearest: &impl Fn(DVec3) -> f32) -> f32 {
     match light {
         Light::Directional { color, .. } => color.max_element(),
         Light::Point { color, attenuation, position, .. } | Light::Spot { color, attenuation, position, .. } => {
             let color = color.max_element();
             // The nearer the brighter. Not a product with 0, which of what is infinite would be NaN.
-            if color > 0.0 { color * attenuation.factor(distance(*position, world)) } else { 0.0 }
+            if color > 0.0 { color * attenuation.factor(nearest(*position)) } else { 0.0 }
         }
         Light::Area { radiance, .. } => radiance.max_element(),
     }
 }
 
-/// How far a point is from everything at least; 0 from planes, which are everywhere.
-fn distance(point: DVec3, world: &World) -> f32 {
-    let bounds = world.bounds();
-    if world.is_unbounded() || bounds.is_empty() {
+/// How far a point is from a box; 0 from an empty one.
+fn distance(point: DVec3, bounds: Aabb) -> f32 {
+    if bounds.is_empty() {
         return 0.0;
     }
-    let point = point - world.centre;
     let nearest = point.clamp(bounds.min.as_dvec3(), bounds.max.as_dvec3());
     (point - nearest).length() as f32
 }
 
 /// What a surface shows at most of its own, of ambient light, and of what arrives from lights.
 fn surface(material: &Material, ambient: f32, arriving: f32) -> f32 {
-    let n = material.shininess;
-    let peak = match (material.energy_conserving, material.model) {
-        (false, _) => 1.0,
-        (true, Specular::Phong) => (n + 2.0) / 2.0,
-        (true, Specular::BlinnPhong) => (n + 2.0) * (n + 4.0) / (8.0 * ((-n / 2.0).exp2() + n)),
-    };
-    let lit = material.diffuse.max_element() + material.specular.max_element() * peak.max(1.0);
+    let peak = material.highlight_scale().unwrap_or(1.0).max(1.0);
+    let lit = material.diffuse.max_element() + material.specular.max_element() * peak;
     let reflected = if lit > 0.0 { lit * arriving } else { 0.0 };
     material.emission.max_element() + material.ambient.max_element() * ambient + reflected
 }

@@ -178,6 +178,16 @@ impl Material {
         !self.unlit && (self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO)
     }
 
+    /// What an energy-conserving highlight is scaled by: pi times the factor of its f, so that met head-on it sends on just `specular`. None for the classic one, which has
+    /// no such factor.
+    pub(crate) fn highlight_scale(&self) -> Option<f32> {
+        let n = self.shininess;
+        self.energy_conserving.then(|| match self.model {
+            Specular::Phong => (n + 2.0) / 2.0,
+            Specular::BlinnPhong => (n + 2.0) / 8.0 * ((n + 4.0) / (libm::exp2f(-n / 2.0) + n)),
+        })
+    }
+
     /// What all shares of an energy-conserving material are multiplied by, so that they sum up to no more than 1.
     pub fn conserving_scale(&self) -> f32 {
         let mirrored = match self.interface {

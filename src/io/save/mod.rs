@@ -12,6 +12,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::io::format::suffix;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::output::write_atomically;
 use crate::scene::{Geometry, Mesh, Scene};
@@ -31,7 +32,7 @@ type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
 /// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, corners that are
 /// NaN in text); [`Error::Output`] where the file cannot be written, which leaves an old one whole.
 pub fn save(scene: &Scene, path: &Path) -> Result<()> {
-    let suffix = path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let suffix = suffix(path);
     type Check = fn(&Scene) -> std::result::Result<(), Unsayable>;
     let (check, write): (Check, Writer) = match suffix.as_str() {
         "nff" => (nff::check, nff::write),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::table::{Read, Table, Value};
 use crate::error::{Error, Result, Warning};
-use crate::io::{Format, LoadOptions, Normals, SUFFIXES, Unit, UpAxis, load};
+use crate::io::{LoadOptions, Normals, Unit, UpAxis, format, load};
 use crate::math::DAffine3;
 use crate::scene::{Geometry, Scene};
 
@@ -39,10 +39,9 @@ impl Include {
         let value = table.need("path")?;
         let name = value.text()?;
         let path = folder.join(name);
-        let holds_meshes = |name: &Path| Format::of(name).is_some_and(Format::holds_meshes);
-        if !holds_meshes(&path) {
-            let is_mesh = |suffix: &&str| holds_meshes(Path::new(&format!("a.{suffix}")));
-            let known: Vec<&str> = SUFFIXES.into_iter().filter(is_mesh).collect();
+        let suffix = format::suffix(&path);
+        if !format::mesh_suffixes().any(|known| known == suffix) {
+            let known: Vec<&str> = format::mesh_suffixes().collect();
             return Err(value.fault(format!("{name:?} is no mesh file; known are {}", known.join(", "))));
         }
         let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];

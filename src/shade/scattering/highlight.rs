@@ -22,12 +22,8 @@ pub(super) struct Highlight {
 
 impl Highlight {
     pub(super) fn new(material: &Material) -> Self {
-        let n = material.shininess;
-        let scale = material.energy_conserving.then(|| match material.model {
-            Specular::Phong => (n + 2.0) / 2.0,
-            Specular::BlinnPhong => (n + 2.0) / 8.0 * ((n + 4.0) / (libm::exp2f(-n / 2.0) + n)),
-        });
-        Self { color: material.specular, shininess: n, model: material.model, scale }
+        let Material { specular: color, shininess, model, .. } = *material;
+        Self { color, shininess, model, scale: material.highlight_scale() }
     }
 
     /// pi f cos, for light at `cosine` to the normal.
