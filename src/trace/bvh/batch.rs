@@ -11,7 +11,7 @@ use super::placements::walk_over;
 use super::query::{Closest, Query};
 use super::simd::Simd;
 use super::walk::Visit;
-use super::{Bvh, bundle, isa, tile};
+use super::{Bvh, bundle, isa};
 use crate::ray::Ray;
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
@@ -21,7 +21,7 @@ use crate::trace::spread::Spread;
 /// rays.
 struct Workspace {
     singles: Singles,
-    tile: tile::Scratch,
+    bundles: bundle::Scratch,
 }
 
 /// For rays that make no bundle: those in flight, or what one that walks alone has hit of which there was doubt.
@@ -52,7 +52,7 @@ pub(crate) fn prepare_thread() {
 impl Workspace {
     fn new() -> Box<Self> {
         let singles = Singles { flight: Flight::new(), doubted: None };
-        Box::new(Self { singles, tile: tile::Scratch::new() })
+        Box::new(Self { singles, bundles: bundle::Scratch::new() })
     }
 }
 
@@ -134,7 +134,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
         coherent: bool,
     ) {
-        let Workspace { singles, tile } = workspace;
+        let Workspace { singles, bundles } = workspace;
         let is_all = self.has_only_triangles();
         let mut in_bundles = coherent && self.has_triangles();
         let mut objects = None;
@@ -145,7 +145,7 @@ impl Bvh {
             start = chunk.end;
             let (first, count) = (chunk.start, chunk.len());
             let traced = if in_bundles {
-                tile::trace::<S, Q>(tile, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
+                bundle::trace::<S, Q>(bundles, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
             } else {
                 0
             };
@@ -155,12 +155,12 @@ impl Bvh {
                 let from = open.trailing_zeros() as usize;
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
-                let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut tile.t);
+                let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut bundles.t);
                 Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
-            let visitors = &mut tile.visitors;
+            let visitors = &mut bundles.visitors;
             if Q::ANY && !visitors.is_empty() && (is_last || visitors.len() >= VISITORS) {
                 let objects = match &objects {
                     Some(objects) => objects,
@@ -171,9 +171,9 @@ impl Bvh {
             }
             if !is_all {
                 let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);
-                S::apart(Others::<Q> { bvh: self, rays, answers, t: &tile.t });
+                S::apart(Others::<Q> { bvh: self, rays, answers, t: &bundles.t });
             }
-            in_bundles &= !Q::ANY || tile.entered <= MOST_PLACES;
+            in_bundles &= !Q::ANY || bundles.entered <= MOST_PLACES;
         }
     }
 

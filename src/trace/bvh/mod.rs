@@ -12,7 +12,7 @@
 //! | `ready` | rays made ready eight at a time |
 //! | `batch`, `arrivals`, `query` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle; the two questions |
 //! | `flight`, `set`, `addresses` | single rays, several of them in turn; which of them take a step; where what they need next lies in memory |
-//! | `tile`, `bundle`, `rows`, `range`, `edges`, `footprint` | 64 rays that start, or end, in one point, at once |
+//! | `bundle` | 64 rays that start, or end, in one point, at once |
 //! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
 //! | `level` | triangles and shapes of one coordinate system |
 //! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
@@ -56,11 +56,9 @@ mod closest_point;
 mod clusters;
 mod coplanar;
 mod discs;
-mod edges;
 mod farthest;
 mod filter;
 mod flight;
-mod footprint;
 mod found;
 mod isa;
 mod leaves;
@@ -80,11 +78,9 @@ mod quad;
 mod query;
 #[cfg(test)]
 mod random;
-mod range;
 mod ready;
 mod refit;
 mod room;
-mod rows;
 mod set;
 mod shapes;
 mod simd;
@@ -92,7 +88,6 @@ mod slab;
 mod stack;
 mod steps;
 mod support;
-mod tile;
 mod triangles;
 mod walk;
 mod woop;

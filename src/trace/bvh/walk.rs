@@ -1,5 +1,5 @@
 //! One ray from the root to the leaves, by itself: among shapes, for all hits, and among triangles where it is alone ([`super::alone`]).
-//! Other rays among triangles travel in bundles ([`super::tile`]), flights ([`super::flight`]) or packets ([`super::packet`]), whose beam takes the same walk.
+//! Other rays among triangles travel in bundles ([`super::bundle`]), flights ([`super::flight`]) or packets ([`super::packet`]), whose beam takes the same walk.
 //!
 //! A walk knows no primitive. It hands each leaf to a closure, which says how far the ray still needs to look.
 

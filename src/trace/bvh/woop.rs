@@ -1,5 +1,5 @@
 //! Rays against triangles in f32, a lane a pair, with bounds on the rounding: one ray and eight triangles ([`super::filter`]), or eight
-//! rays and one triangle ([`super::packet`]); or a ray of a bundle and eight triangles ([`super::tile`]).
+//! rays and one triangle ([`super::packet`]); or a ray of a bundle and eight triangles ([`super::bundle`]).
 //!
 //! The test is Woop's (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*): corners relative to the
 //! origin are sheared so that the ray runs along its largest axis, and the edge functions are 2 x 2 determinants. Here it

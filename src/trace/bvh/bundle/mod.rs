@@ -1,320 +1,220 @@
-//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common.
+//! A bundle of up to 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a point
+//! light.
 //!
-//! **Projection.** All rays run the same way along one axis, the bundle's; a ray is its slopes (p, q) against it, and t
-//! is measured along it: t' = t |d|, d being the direction's component. Box and triangle tests then take two products
-//! where three were, boxes are entered along the axis at the same t' by all rays, and the rectangle of all slopes bounds
-//! the bundle more tightly than a box of directions would.
-//!
-//! **Turning.** Shadow rays towards a point light do not share their origin but their end. They are turned round: the
-//! bundle starts at the light, and t runs from there. The turned rays serve the tests that reject; what decides a hit is
-//! asked of the rays as they were given.
-//!
-//! **Placed.** In the coordinates of an object the same rays are a bundle again ([`Bundle::place`]), with an origin that is not quite
-//! the one that is meant, and directions that are rounded: each component by u, so that slopes are off by twice as much as in the
-//! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
+//! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
+//!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
+//!   remains is tested against all rays; where they are three or fewer, each of them against all boxes ([`way`]).
+//! - **Triangles**: with a common origin, the edge function of a ray is the scalar product of its direction with a normal
+//!   that belongs to the edge. Eight triangles are rejected at once by the rectangle of slopes, and by rows of rays; of the others each group
+//!   of rays takes four scalar products ([`meeting`]). Leaves that few rays enter are tested ray by ray instead, against eight triangles
+//!   at once ([`single`]).
+//! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
+//!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
+//!   and v of what was noted are computed four rays at a time
+//!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
+//! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
+//!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`alone`]).
+//!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
+//!   ([`super::flight`]).
 
+mod alone;
+mod edges;
+mod footprint;
+mod found;
+mod meeting;
+mod octants;
+mod placed;
+mod range;
+mod rays;
+mod rows;
+mod single;
 mod slab;
+mod walk;
+mod way;
 
 use std::marker::PhantomData;
 
-use super::filter::largest_axis;
-use super::isa::Kernel;
-use super::place::Place;
-use super::query::Query;
-use super::range::Range;
-use super::ready::columns;
-use super::rows::Rows;
-use super::simd::{Array, Group, Mask, Simd, Vector};
-use super::slab::HUGE;
-use crate::math::{UNIT_ROUNDOFF, Vec3};
+use super::Bvh;
+use super::build::MAX_DEPTH;
+use super::flight::Visitors;
+use super::node::WIDTH;
+use super::placements::FIXED;
+use super::query::{Query, SOMETHING};
+use super::simd::Simd;
 use crate::ray::Ray;
-pub(super) use slab::{Boxes, BundleSlab};
+use found::{BundleFound, Finish};
+use octants::{Octants, Part};
+use placed::Tour;
+use range::Range;
+use rays::{Bundle, Fill, Fit};
+use walk::{Walk, few};
+use way::{Entry, Way};
 
-/// Rays in a bundle.
-pub(super) const RAYS: usize = 64;
+pub(super) use rays::{PerRay, RAYS, axes};
 
-/// How many rays ahead of those of a bundle others are fetched.
-const AHEAD: usize = 3 * RAYS;
-
-/// One number for each ray.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-pub(super) struct PerRay(pub [f32; RAYS]);
-
-impl PerRay {
-    pub const ZERO: Self = Self([0.0; RAYS]);
+/// Working memory, made once a batch.
+pub(super) struct Scratch {
+    one: One,
+    /// t of the closest hits of the last bundle, where there are any.
+    pub t: [f64; RAYS],
+    /// How many placed objects the last bundles entered.
+    pub entered: u32,
+    /// Rays that look for any hit, and are still to go through placed objects each by itself.
+    pub visitors: Vec<Visitors>,
+    /// Rays of one octant.
+    part: Part,
 }
 
-/// The rays of a bundle, component by component.
-pub(super) struct Bundle {
-    /// Where they start.
-    pub origin: [f32; 3],
-    /// How far a ray's own origin may be from there, in each component.
-    pub blur: f32,
-    /// The axis that all rays run along; the other two are the next ones, cyclically.
-    pub axis: usize,
-    /// 1 or -1: which way they run along it.
-    pub forward: f32,
-    /// Directions, as given.
-    pub direction: [PerRay; 3],
-    /// The axis' component of each direction, without its sign: t' of t = 1.
-    pub depth: PerRay,
-    /// The least of them.
-    least_depth: f32,
-    /// Directions on the other two axes over `depth`, the smallest and largest of them, and the largest magnitude (or 1).
-    pub slope: [PerRay; 2],
-    pub low: [f32; 2],
-    pub high: [f32; 2],
-    pub largest: f32,
-    /// The least and the largest slopes of each row of eight rays.
-    pub rows: Rows,
-    /// 1 / slope.
-    pub reciprocal: [PerRay; 2],
-    /// Least and most that t' may be; rounded inwards, so that what lies between is within the range for sure.
-    pub begin: PerRay,
-    pub end: PerRay,
-    /// The most that t' may be, rounded outwards; and the least for any ray, likewise.
-    pub limit: PerRay,
-    pub first: f32,
-    /// Whether t runs from the common end back to the rays' own origins.
-    pub is_turned: bool,
+/// As many of a placed object's triangles fit between shadow rays that go through it each by itself. With 1 to 20 shadow rays of 2,500 placements take as long. Closest hits gain nothing by going alone, however many there are.
+const GRAINS: f32 = 20.0;
+
+/// Places on a stack.
+const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
+
+/// One bundle and its way.
+struct One {
+    /// In the tree of placements, and in one of triangles.
+    upper: [Entry; STACK],
+    stack: [Entry; STACK],
+    /// In the world, and in the coordinates of a placed object.
+    bundle: Bundle,
+    local: Bundle,
+    range: Range,
+    found: BundleFound,
 }
 
-/// How rays make a bundle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fit {
-    /// All of them make one.
-    Whole,
-    /// They have a point in common, but some are not valid or run into another octant.
-    Parts,
-    /// They have nothing in common.
-    None,
-}
-
-/// Relative slack for t' that is rounded outwards or inwards: a product and the conversion, four times over.
-pub(super) const SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
-/// Absolute slack, against underflow.
-pub(super) const TINY: f32 = 1e-37;
-/// Error of a direction's component, over the component, that counts for nothing beside its rounding.
-const NOISE: f32 = UNIT_ROUNDOFF / 8.0;
-/// Slopes beyond this spoil the bounds for all rays.
-const STEEPEST: f32 = 16.0;
-
-/// Takes the rays, of which the bundle is valid only if they fit as a whole. Those that end in one point fit only if
-/// any hit is asked for.
-pub(super) struct Fill<'a, Q> {
-    pub bundle: &'a mut Bundle,
-    pub rays: &'a [Ray; RAYS],
-    pub range: &'a mut Range,
-    pub query: PhantomData<Q>,
-}
-
-impl<Q: Query> Kernel for Fill<'_, Q> {
-    type Output = Fit;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Fit {
-        let Self { bundle, rays, range, .. } = self;
-        let fit = bundle.gather::<S, Q>(rays, range);
-        if fit != Fit::Whole {
-            return fit;
-        }
-        range.open::<S>(bundle.is_turned);
-        bundle.project::<S>(range)
-    }
-}
-
-impl Bundle {
+impl Scratch {
     pub fn new() -> Self {
-        Self {
-            origin: [0.0; 3],
-            blur: 0.0,
-            axis: 0,
-            forward: 1.0,
-            direction: [PerRay::ZERO; 3],
-            depth: PerRay::ZERO,
-            least_depth: 0.0,
-            slope: [PerRay::ZERO; 2],
-            low: [0.0; 2],
-            high: [0.0; 2],
-            largest: 1.0,
-            rows: Rows::NONE,
-            reciprocal: [PerRay::ZERO; 2],
-            begin: PerRay::ZERO,
-            end: PerRay::ZERO,
-            limit: PerRay::ZERO,
-            first: 0.0,
-            is_turned: false,
-        }
+        let found = BundleFound::new();
+        let stack = [Entry::root(!0); STACK];
+        let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
+        let one = One { upper: stack, stack, bundle, local, range, found };
+        Self { one, t: [0.0; RAYS], entered: 0, visitors: Vec::new(), part: Part::new() }
     }
+}
 
-    /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need not run
-    /// into one octant. True if they fit as a whole.
-    #[inline(always)]
-    pub fn place<S: Simd>(&mut self, world: &Self, place: &Place, range: &Range) -> bool {
-        let (origin, blur) = place.point::<S>(Vec3::from_array(world.origin), world.blur);
-        (self.origin, self.blur, self.is_turned) = (origin.to_array(), blur, world.is_turned);
-        let noise = place.directions::<S>(&world.direction, &mut self.direction);
-        if self.is_turned {
-            // A ray's own origin is told from the common end and its direction, whose components are rounded.
-            let mut longest = S::Wide::splat(0.0);
-            for group in 0..RAYS / S::Wide::LANES {
-                for direction in &self.direction {
-                    longest = S::Wide::at(direction, group).abs().max(longest);
-                }
+/// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through all triangles, into `answers` of
+/// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
+/// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.visitors`, among whom ray 0 is called `first`.
+#[inline(always)]
+pub(super) fn trace<S: Simd, Q: Query>(
+    scratch: &mut Scratch,
+    bvh: &Bvh,
+    first: usize,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) -> u64 {
+    let Scratch { one, t, entered, visitors, part } = scratch;
+    *entered = 0;
+    // Of a part; filled only where there is one.
+    let mut parted = None;
+    // All of them, if they fill a bundle. If they do not, or make none, those of one octant after the other. In one loop, so
+    // that what is called here, of which most of the kernel consists, is compiled once.
+    let mut octants = if rays.len() == RAYS { None } else { Some(Octants::new(rays)) };
+    let mut done = 0;
+    loop {
+        let members = match &mut octants {
+            None => u64::MAX,
+            Some(octants) => match octants.next() {
+                Some(members) => members,
+                None => return done,
+            },
+        };
+        let whole = (<&[Ray; RAYS]>::try_from(rays), <&mut [Q::Answer; RAYS]>::try_from(&mut *answers));
+        let (group, count, group_answers, group_t) = match (whole, &octants) {
+            ((Ok(rays), Ok(answers)), None) => (rays, RAYS, answers, &mut *t),
+            _ => {
+                part.gather(rays, members);
+                let (answers, t) = parted.insert(([Q::MISS; RAYS], [0.0; RAYS]));
+                (&part.rays, part.count, answers, t)
             }
-            self.blur += UNIT_ROUNDOFF * 1.01 * longest.largest() + noise;
+        };
+        let fit =
+            S::apart(Fill::<Q> { bundle: &mut one.bundle, rays: group, range: &mut one.range, query: PhantomData });
+        let before = visitors.len();
+        let is_traced =
+            fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered, visitors);
+        // Until here their bits are of the part, if there is one.
+        for some in &mut visitors[before..] {
+            some.first = first;
+            if octants.is_some() {
+                some.rays = part.members(some.rays);
+            }
         }
-        let (is_finite, fit) = (self.blur < HUGE && origin.is_finite(), self.project::<S>(range));
-        let ([a, b], [c, d]) = (self.low, self.high);
-        let least_slope = a.abs().min(b.abs()).min(c.abs()).min(d.abs()).min(1.0);
-        is_finite && fit == Fit::Whole && noise <= NOISE * least_slope * self.least_depth
+        if is_traced {
+            done |= members;
+        }
+        if let Some((part_answers, part_t)) = &parted {
+            if is_traced {
+                part.scatter(part_answers, answers);
+                part.scatter(part_t, t);
+            }
+        } else if fit == Fit::Parts {
+            octants = Some(Octants::new(rays));
+        } else {
+            return done;
+        }
     }
+}
 
-    /// Directions and ranges as they are; where all rays start, or end.
+impl One {
+    /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
+    /// too steep for a tree.
+    #[expect(clippy::too_many_arguments, reason = "rays, and all that is told of them")]
     #[inline(always)]
-    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
-        let zero = S::V8::splat(0.0);
-        let start = splat::<S>(rays[0].origin);
-        let last = rays[0].origin + rays[0].direction;
-        let end = splat::<S>(last);
-        // Zero while every ray is finite, and while all start in one point.
-        let (mut finite, mut spread) = (zero, zero);
-        let (mut apart, mut size) = (zero, zero);
-        let (mut in_range, mut latest) = (u32::MAX, zero);
-        // 36 cache lines a bundle, of which four are asked for at a time: the last four here, the others below.
-        let ahead = rays.as_ptr().wrapping_add(AHEAD).cast::<u8>();
-        S::prefetch(ahead.wrapping_add(256 * 8));
-        for (i, rays) in rays.as_chunks::<8>().0.iter().enumerate() {
-            let [x, y, z, dx, dy, dz, tmin, tmax] = columns::<S>(rays);
-            // Some at a time, for they come from memory mostly, and more than a bundle ahead: all at once, before this one is traced, held up what
-            // the tree needs. A hint, whatever follows these rays.
-            S::prefetch(ahead.wrapping_add(256 * i));
-            let (origin, direction) = ([x, y, z], [dx, dy, dz]);
-            for axis in 0..3 {
-                store::<S>(&mut self.direction[axis], i, direction[axis]);
-                finite = direction[axis].mul_add(zero, finite);
-                spread = spread.add(origin[axis].sub(start[axis]).abs());
+    fn trace<S: Simd, Q: Query>(
+        &mut self,
+        bvh: &Bvh,
+        rays: &[Ray; RAYS],
+        count: usize,
+        answers: &mut [Q::Answer; RAYS],
+        t: &mut [f64; RAYS],
+        entered: &mut u32,
+        visitors: &mut Vec<Visitors>,
+    ) -> bool {
+        let Self { upper, stack, bundle, local, range, found } = self;
+        let Some(mut tour) = Tour::new(bvh, bundle, count, upper) else { return false };
+        found.start();
+        while let Some((place, seeing, near)) = tour.next::<S>(range) {
+            let (tree, _) = bvh.triangles_at(place);
+            if tree.tree().is_empty() {
+                continue;
+            }
+            let seeing = if Q::ANY { seeing & !range.done::<S>() } else { seeing };
+            if Q::ANY && seeing == 0 {
+                continue;
+            }
+            if Q::ANY && place != FIXED && bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count) {
+                visitors.push(Visitors { place, first: 0, rays: seeing });
+                continue;
+            }
+            *entered += u32::from(place != FIXED);
+            let is_bundle = place == FIXED || local.place::<S>(bundle, bvh.placements.at(place), range);
+            let bundle = if place == FIXED { &*bundle } else { &*local };
+            let reach = tree.tree().reach();
+            let Some(slab) = bundle.slab(reach).filter(|_| is_bundle) else {
                 if Q::ANY {
-                    apart = origin[axis].add(direction[axis]).sub(end[axis]).abs().max(apart);
-                    size = origin[axis].abs().add(direction[axis].abs()).max(size);
-                    finite = origin[axis].mul_add(zero, finite);
+                    visitors.push(Visitors { place, first: 0, rays: seeing });
+                } else {
+                    alone::trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
                 }
+                continue;
+            };
+            let way = Way::new(bundle, slab, count);
+            let few = few(bundle, reach);
+            let walk = Walk { bvh, place, tree, rays, bundle, found, few, query: PhantomData::<Q> };
+            walk.run::<S>(stack, way, seeing);
+            if Q::ANY || tour.has_placements() {
+                range.shorten::<S>(bundle, &found.sure, &found.limit);
             }
-            in_range &= zero.at_most(tmin).and(tmin.at_most(tmax)).bits();
-            latest = latest.max(tmax);
-            store::<S>(&mut range.begin, i, tmin);
-            store::<S>(&mut range.limit, i, tmax);
         }
-        let is_shared = spread.at_most(zero).bits() == 0xff;
-        (self.origin, self.blur, self.is_turned) = (rays[0].origin.to_array(), 0.0, !is_shared);
-        let is_valid = finite.at_most(zero).bits() == 0xff && in_range & 0xff == 0xff;
-        if is_shared {
-            return if is_valid { Fit::Whole } else { Fit::Parts };
-        }
-        if !Q::ANY {
-            return Fit::None;
-        }
-        if !is_valid {
-            // One ray that is not valid may be what is off.
-            return Fit::Parts;
-        }
-        let (apart, rounding) = (apart.largest(), 4.0 * UNIT_ROUNDOFF * size.largest());
-        // A light of some size is no point: its rays are better traced one by one. And farther than the common end, t
-        // does not run backwards from it.
-        if !(apart <= 4.0 * rounding && latest.largest() <= 1.0 && last.is_finite()) {
-            return Fit::None;
-        }
-        (self.origin, self.blur) = (last.to_array(), apart + rounding);
-        Fit::Whole
-    }
-
-    /// The most t' that is wanted of each ray.
-    #[inline(always)]
-    pub fn limit_of<S: Simd>(&self, range: &Range, limit: &mut PerRay) {
-        for group in 0..RAYS / S::Wide::LANES {
-            let (most, depth) = (S::Wide::at(&range.limit, group), S::Wide::at(&self.depth, group));
-            most.mul(depth).mul_add(S::Wide::splat(1.0 + SLACK), S::Wide::splat(TINY)).put(limit, group);
-        }
-    }
-
-    /// Everything that is derived from the directions.
-    #[inline(always)]
-    fn project<S: Simd>(&mut self, range: &Range) -> Fit {
-        let [x, y, z] = &self.direction;
-        self.axis = largest_axis(Vec3::new(x.0[0], y.0[0], z.0[0]).abs());
-        let [p, q, along] = axes(self.axis);
-        let splat = S::Wide::splat;
-        let sign = splat(if self.is_turned { -1.0 } else { 1.0 });
-        let infinite = splat(f32::INFINITY);
-        let (mut low, mut high) = ([infinite; 3], [splat(f32::NEG_INFINITY); 3]);
-        let mut first = infinite;
-        for group in 0..RAYS / S::Wide::LANES {
-            let d = S::Wide::at(&self.direction[along], group).mul(sign);
-            (low[2], high[2]) = (d.min(low[2]), d.max(high[2]));
-            let depth = d.abs();
-            depth.put(&mut self.depth, group);
-            let shrink = splat(1.0).div(depth).mul(sign);
-            for (i, axis) in [p, q].into_iter().enumerate() {
-                let slope = S::Wide::at(&self.direction[axis], group).mul(shrink);
-                slope.put(&mut self.slope[i], group);
-                splat(1.0).div(slope).put(&mut self.reciprocal[i], group);
-                (low[i], high[i]) = (slope.min(low[i]), slope.max(high[i]));
+        if Q::ANY {
+            for (answer, limit) in answers.iter_mut().zip(&range.limit.0) {
+                *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
             }
-            let (begin, start) = (S::Wide::at(&range.begin, group), S::Wide::at(&range.start, group));
-            let (end, limit) = (S::Wide::at(&range.sure, group), S::Wide::at(&range.limit, group));
-            begin.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.begin, group);
-            end.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).put(&mut self.end, group);
-            limit.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.limit, group);
-            first = start.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(first);
+        } else {
+            S::apart(Finish::<Q> { bvh, found, bundle, rays, count, answers, t });
         }
-        self.first = first.smallest().max(0.0);
-        let low = [low[0].smallest(), low[1].smallest(), low[2].smallest()];
-        let high = [high[0].largest(), high[1].largest(), high[2].largest()];
-        let one_sided = |i: usize| low[i] > f32::MIN_POSITIVE || high[i] < -f32::MIN_POSITIVE;
-        if !(one_sided(0) && one_sided(1) && one_sided(2)) {
-            return Fit::Parts;
-        }
-        (self.forward, self.least_depth) = if low[2] > 0.0 { (1.0, low[2]) } else { (-1.0, -high[2]) };
-        (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
-        self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
-        self.rows = Rows::new::<S>(&self.slope);
-        // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's coordinates
-        // a depth may be infinite, which leaves no slope.
-        let is_small = high[2].max(-low[2]) < HUGE;
-        if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
+        true
     }
-
-    /// The area across the bundle's axis that belongs to each of `count` rays, at t'.
-    #[inline(always)]
-    pub fn grain(&self, t: f32, count: usize) -> f32 {
-        let [p, q] = [self.high[0] - self.low[0], self.high[1] - self.low[1]];
-        p * q * t * t / count as f32
-    }
-
-    /// Whether products of three lengths, as of corners and edges, may leave f32 in a tree that reaches that far.
-    #[inline(always)]
-    pub fn may_overflow(&self, reach: Vec3) -> bool {
-        // Components of a normal are two products of edges, which are at most twice as long as corners are far; its scalar product
-        // with a corner or a direction is three: 24, and rounding.
-        let far = (Vec3::from_array(self.origin).abs() + reach).max_element();
-        let most = far.max(self.largest);
-        32.0 * most * far * far >= HUGE
-    }
-}
-
-/// The two axes beside `axis`, and itself.
-#[inline(always)]
-pub(super) const fn axes(axis: usize) -> [usize; 3] {
-    [(axis + 1) % 3, (axis + 2) % 3, axis]
-}
-
-#[inline(always)]
-fn splat<S: Simd>(p: Vec3) -> [S::V8; 3] {
-    [S::V8::splat(p.x), S::V8::splat(p.y), S::V8::splat(p.z)]
-}
-
-#[inline(always)]
-fn store<S: Simd>(values: &mut PerRay, i: usize, lanes: S::V8) {
-    values.0.as_chunks_mut().0[i] = lanes.to_array();
 }

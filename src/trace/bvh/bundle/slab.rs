@@ -1,13 +1,13 @@
 //! Boxes against all rays of a bundle at once, by the rectangle of their slopes.
 
-use super::{Bundle, axes};
+use super::rays::{Bundle, axes};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL, WIDTH};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 use crate::trace::bvh::slab::HUGE;
 
 /// A bundle made ready for slab tests in one tree, on its own axes.
-pub(in crate::trace::bvh) struct BundleSlab {
+pub(super) struct BundleSlab {
     /// Which of a node's six bounds is met first, and last.
     near: [usize; 3],
     far: [usize; 3],
@@ -20,7 +20,7 @@ pub(in crate::trace::bvh) struct BundleSlab {
 }
 
 /// The boxes of a node, seen from the origin of a bundle.
-pub(in crate::trace::bvh) struct Boxes {
+pub(super) struct Boxes {
     /// On the first two axes: what reciprocals of slopes are multiplied with. On the third: t'.
     pub near: [[f32; WIDTH]; 3],
     pub far: [[f32; WIDTH]; 3],

@@ -1,7 +1,7 @@
 //! Eight or sixteen rays of a caller's that go the same way: they walk as one, and meet triangles eight at a time.
 //!
 //! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a bundle of 64
-//! ([`super::tile`]), whose making takes longer than eight rays do. So as little as possible is made ready:
+//! ([`super::bundle`]), whose making takes longer than eight rays do. So as little as possible is made ready:
 //!
 //! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal directions, at
 //!   little more than what a single ray costs. Rays are asked only if any hit will do, and at leaves ([`Party`](party::Party)).

@@ -6,16 +6,16 @@
 //! of which a bundle sees both sides. A hit without doubt is noted in place; what is left in doubt is kept in a row, and decided when all pairs are
 //! through.
 
+use super::edges::Edges;
+use super::footprint::Footprints;
 use super::found::DONE;
+use super::rays::{Bundle, TINY, axes};
+use super::rows;
 use super::walk::Walk;
 use crate::trace::bvh::block::LANES;
-use crate::trace::bvh::bundle::{Bundle, TINY, axes};
-use crate::trace::bvh::edges::Edges;
-use crate::trace::bvh::footprint::Footprints;
 use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::rows;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
 
 /// Block `index` of a leaf that rays of these rows enter, before `most`.

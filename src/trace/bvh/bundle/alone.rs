@@ -1,13 +1,13 @@
 //! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are no bundle in its coordinates.
 
 use super::found::BundleFound;
+use super::range::Range;
+use super::rays::RAYS;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
-use crate::trace::bvh::bundle::RAYS;
 use crate::trace::bvh::found::{Found, NONE};
 use crate::trace::bvh::query::Closest;
-use crate::trace::bvh::range::Range;
 use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::slab::most_t;

@@ -5,22 +5,22 @@ use std::marker::PhantomData;
 
 use super::found::{BundleFound, DONE};
 use super::meeting::Meeting;
+use super::rays::{Bundle, PerRay, RAYS, SLACK, TINY};
+use super::rows;
 use super::way::{Entry, Goal, Way};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS, SLACK, TINY};
 use crate::trace::bvh::coplanar::Spot;
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::rows;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::triangles::TriangleTree;
 
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;
 
-/// [`FEW`] in a tree that reaches that far. [`Edges`](crate::trace::bvh::edges::Edges) must not overflow; where they might, every ray is by itself.
+/// [`FEW`] in a tree that reaches that far. [`Edges`](super::edges::Edges) must not overflow; where they might, every ray is by itself.
 #[inline(always)]
 pub(super) fn few(bundle: &Bundle, reach: Vec3) -> u32 {
     if bundle.may_overflow(reach) { RAYS as u32 } else { FEW }

@@ -1,9 +1,9 @@
 //! What the rays of a bundle have hit so far: for the most part only noted, and computed at the end, four at a time.
 
+use super::rays::{Bundle, PerRay, RAYS};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::bundle::{Bundle, PerRay, RAYS};
 use crate::trace::bvh::found::NONE;
 use crate::trace::bvh::isa::Kernel;
 use crate::trace::bvh::noted::{FourHits, Rays, Shared, splat, widen};

@@ -5,7 +5,8 @@
 
 use std::hint::select_unpredictable;
 
-use crate::trace::bvh::bundle::{Boxes, Bundle, BundleSlab, PerRay, RAYS};
+use super::rays::{Bundle, PerRay, RAYS};
+use super::slab::{Boxes, BundleSlab};
 use crate::trace::bvh::node::{Child, Tree, WIDTH};
 use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
 

@@ -15,11 +15,11 @@
 //! with its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that, and b N.
 
 use super::found::DONE;
+use super::rays::{Bundle, RAYS, SLACK, TINY, axes};
 use super::walk::Walk;
 use super::way::Entry;
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::bundle::{Bundle, RAYS, SLACK, TINY, axes};
 use crate::trace::bvh::place::Blur;
 use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::planes::{Heights, Planes};

@@ -1,12 +1,12 @@
 //! A bundle among placed objects: it goes through the tree of placements as through any other, and from each of them on
 //! in the object's coordinates.
 
+use super::range::Range;
+use super::rays::{Bundle, PerRay};
 use super::way::{Entry, Goal, Way};
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::bundle::{Bundle, PerRay};
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::placements::{FIXED, PlacementTree};
-use crate::trace::bvh::range::Range;
 use crate::trace::bvh::simd::Simd;
 
 /// The placements, as what a bundle looks for.
