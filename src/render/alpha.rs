@@ -8,7 +8,7 @@
 //! refers to it. What rounds to the same t, a decal in the plane of its wall, is passed with it; a gap keeps them apart. Scenes
 //! without such surfaces pay for none of this.
 
-use crate::math::{DVec2, Vec3};
+use crate::math::DVec2;
 use crate::ray::{Hit, Ray};
 use crate::scene::Alpha;
 use crate::shade::SurfacePoint;
@@ -16,7 +16,6 @@ use crate::shade::coverage::coverage;
 use crate::trace::{Batch, Tracer};
 
 use super::Renderer;
-use super::wavefront::Buffers;
 
 impl Renderer<'_> {
     /// The nearest hits of rays that pass through what does not cover; `xi` gives each ray its chance.
@@ -55,9 +54,8 @@ impl Renderer<'_> {
         }
     }
 
-    /// Adds what is worth each shadow ray, less what is covered on its way.
-    pub(super) fn add_through<T: Tracer + ?Sized>(&self, tracer: &T, buffers: &mut Buffers) {
-        let Buffers { radiance, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } = buffers;
+    /// Of each shadow ray what is left by all that covers its way; their ranges are used up.
+    pub(super) fn left_through<T: Tracer + ?Sized>(&self, tracer: &T, shadow_rays: &mut [Ray]) -> Vec<f32> {
         let mut left = vec![1.0f32; shadow_rays.len()];
         let mut pending: Vec<usize> = (0..shadow_rays.len()).collect();
         while !pending.is_empty() {
@@ -73,15 +71,7 @@ impl Renderer<'_> {
                 left[i] > 0.0
             });
         }
-        trail.free(|i| left[i]);
-        for ((pixel, worth), left) in shadow_light.iter().zip(&left) {
-            let worth: Vec3 = *worth * *left;
-            radiance[*pixel as usize] += worth.extend(0.0);
-        }
-        let Some(tally) = tally else { return };
-        for (((pixel, _), parts), left) in shadow_light.iter().zip(shadow_parts).zip(left) {
-            tally.add_parts(*pixel, parts, left);
-        }
+        left
     }
 
     /// How much of the surface is there that was hit; none where it is opaque.

@@ -21,6 +21,7 @@ mod path;
 mod rounds;
 pub(crate) mod sampler;
 mod settings;
+mod shadows;
 mod tiles;
 mod wavefront;
 mod whitted;

@@ -15,7 +15,7 @@ use crate::math::{DVec2, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
-use crate::shade::light::{Illumination, LightSource};
+use crate::shade::light::Illumination;
 use crate::shade::lights::{Chosen, Found};
 use crate::shade::scattering::{Lobes, Shading, Value, Ways};
 use crate::trace::Tracer;
@@ -24,6 +24,7 @@ use super::Renderer;
 use super::aov::{Event, Parts, Route, Tally};
 use super::explain::Answer;
 use super::sampler::{Bounces, Choice, Dimension, Pattern};
+use super::shadows::Sent;
 use super::wavefront::{Buffers, Path, Wave};
 
 /// How often a path is scattered before it may end by chance.
@@ -84,12 +85,8 @@ impl Renderer<'_> {
     fn scatter(&self, depth: u32, sample: u32, current: usize, next: usize, buffers: &mut Buffers) {
         let (wave, mut onwards) = (mem::take(&mut buffers.waves[current]), mem::take(&mut buffers.waves[next]));
         onwards.clear();
-        buffers.shadow_rays.clear();
-        buffers.shadow_light.clear();
-        buffers.shadow_parts.clear();
-        let Buffers {
-            patterns, bounces, radiance, hits, shadow_rays, shadow_light, shadow_parts, tally, trail, ..
-        } = &mut *buffers;
+        let Buffers { patterns, bounces, radiance, hits, shadows, tally, trail, .. } = &mut *buffers;
+        shadows.clear();
         let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         let coverage = if depth == 0 { 1.0 } else { 0.0 };
         for (i, ((ray, path), hit)) in wave.rays.iter().zip(&wave.paths).zip(hits.iter()).enumerate() {
@@ -137,20 +134,10 @@ impl Renderer<'_> {
                         contribution: worth,
                     }
                 });
-                if chosen.source.casts_shadows {
-                    shadow_rays.push(LightSource::shadow_ray(vertex.point, &arriving));
-                    shadow_light.push((path.pixel, worth));
-                } else {
-                    *pixel += worth.extend(0.0);
-                }
-                if let Some(tally) = &mut tally {
-                    let parts = Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found));
-                    if chosen.source.casts_shadows {
-                        shadow_parts.push(parts);
-                    } else {
-                        tally.add_parts(path.pixel, &parts, 1.0);
-                    }
-                }
+                let sent =
+                    Sent { source: chosen.source, arriving: &arriving, point: vertex.point, pixel: path.pixel, worth };
+                let parts = || Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found));
+                shadows.add(&sent, radiance, tally.as_deref_mut().map(|tally| (tally, parts())));
             }
             if let (true, Some((ray, path))) = (depth < self.plan.depth, self.go_on(&vertex, lobe)) {
                 if let Some(tally) = &tally {

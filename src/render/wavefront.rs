@@ -17,11 +17,12 @@ use crate::shade::lights::Lights;
 use crate::shade::{SurfacePoint, appearance, normal_map};
 use crate::trace::{Batch, Tracer};
 
-use super::aov::{Parts, Request, Route, Tally};
+use super::aov::{Request, Route, Tally};
 use super::camera::View;
 use super::explain::Trail;
 use super::media::Media;
 use super::sampler::{Bounces, Dimension, Pattern};
+use super::shadows::Shadows;
 use super::whitted::Lit;
 use super::{Renderer, tiles::Tile};
 
@@ -45,11 +46,7 @@ pub(super) struct Buffers {
     pub(super) waves: Vec<Wave>,
     pub(super) hits: Vec<Option<Hit>>,
     pub(super) lit: Vec<Lit>,
-    pub(super) shadow_rays: Vec<Ray>,
-    /// What each shadow ray is worth, and to which pixel.
-    pub(super) shadow_light: Vec<(u32, Vec3)>,
-    /// The same by kinds of paths; empty where light is not told apart.
-    pub(super) shadow_parts: Vec<Parts>,
+    pub(super) shadows: Shadows,
     pub(super) occluded: Vec<bool>,
     /// Laid where a pixel is to be explained.
     pub(super) trail: Trail,
@@ -210,31 +207,6 @@ impl Renderer<'_> {
         }
         let xi = |i: usize| self.sampler.pair(&patterns[i], sample, Dimension::alpha(0));
         self.closest(tracer, rays, hits, self.settings.batch, xi);
-    }
-
-    /// Traces the shadow rays, and adds what is worth those that are free.
-    pub(super) fn add_unshadowed<T: Tracer + ?Sized>(&self, tracer: &T, batch: Batch, buffers: &mut Buffers) {
-        if buffers.shadow_rays.is_empty() {
-            return;
-        }
-        if self.plan.alpha {
-            self.add_through(tracer, buffers);
-            return;
-        }
-        let Buffers { radiance, shadow_rays, shadow_light, shadow_parts, tally, occluded, trail, .. } = buffers;
-        occluded.clear();
-        occluded.resize(shadow_rays.len(), false);
-        tracer.occluded_batch(shadow_rays, occluded, batch);
-        trail.free(|i| f32::from(u8::from(!occluded[i])));
-        for ((pixel, reflected), _) in shadow_light.iter().zip(&*occluded).filter(|(_, occluded)| !**occluded) {
-            radiance[*pixel as usize] += reflected.extend(0.0);
-        }
-        let Some(tally) = tally else { return };
-        for (((pixel, _), parts), _) in
-            shadow_light.iter().zip(shadow_parts).zip(occluded).filter(|(_, hidden)| !**hidden)
-        {
-            tally.add_parts(*pixel, parts, 1.0);
-        }
     }
 
     /// What a ray sees that hits nothing, and how much it covers; the background hides an environment from camera rays.

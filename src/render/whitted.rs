@@ -13,7 +13,6 @@ use std::ops::Range;
 use crate::math::{DVec2, Vec3};
 use crate::scene::Integrator;
 use crate::shade::SurfacePoint;
-use crate::shade::light::LightSource;
 use crate::shade::scattering::{Shading, Ways};
 use crate::trace::{Batch, Tracer};
 
@@ -21,6 +20,7 @@ use super::Renderer;
 use super::aov::{Event, Parts, Route};
 use super::explain::Answer;
 use super::sampler::Dimension;
+use super::shadows::Sent;
 use super::wavefront::{Buffers, Path, Wave};
 
 /// Most rays that are followed at once below the camera's.
@@ -185,13 +185,10 @@ impl Renderer<'_> {
         batch: Batch,
         buffers: &mut Buffers,
     ) {
-        let Buffers { patterns, radiance, lit, shadow_rays, shadow_light, shadow_parts, tally, trail, .. } =
-            &mut *buffers;
+        let Buffers { patterns, radiance, lit, shadows, tally, trail, .. } = &mut *buffers;
         let (index, light) = (light as u32, &self.lights.sources()[light]);
         let count = if light.is_extended() { self.settings.light_samples } else { 1 };
-        shadow_rays.clear();
-        shadow_light.clear();
-        shadow_parts.clear();
+        shadows.clear();
         let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         for Lit { path, route, point, shading, .. } in lit.iter() {
             let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
@@ -221,20 +218,9 @@ impl Renderer<'_> {
                     share: 1.0 / count as f32,
                     contribution: reflected,
                 });
-                if light.casts_shadows {
-                    shadow_rays.push(LightSource::shadow_ray(point, &arriving));
-                    shadow_light.push((path.pixel, reflected));
-                } else {
-                    radiance[path.pixel as usize] += reflected.extend(0.0);
-                }
-                if let Some(tally) = &mut tally {
-                    let parts = Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO]);
-                    if light.casts_shadows {
-                        shadow_parts.push(parts);
-                    } else {
-                        tally.add_parts(path.pixel, &parts, 1.0);
-                    }
-                }
+                let sent = Sent { source: light, arriving: &arriving, point, pixel: path.pixel, worth: reflected };
+                let parts = || Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO]);
+                shadows.add(&sent, radiance, tally.as_deref_mut().map(|tally| (tally, parts())));
             }
         }
         self.add_unshadowed(tracer, batch, buffers);
