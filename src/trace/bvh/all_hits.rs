@@ -141,7 +141,7 @@ impl TriangleTree {
     ) {
         for index in leaf.blocks() {
             let mut scratch = None;
-            let block = self.block(index, &mut scratch);
+            let block = self.block::<S>(index, &mut scratch);
             let mut open = filter.candidates::<S, true>(block, limit(ray)).lanes;
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;

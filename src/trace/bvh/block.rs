@@ -40,8 +40,7 @@ impl Block {
         }
         let [a, b, c] = corners;
         let size = (b - a).abs().max((c - b).abs()).max((a - c).abs()).max_element();
-        // Rounded up.
-        self.size = self.size.max(size * (1.0 + f32::EPSILON));
+        self.size = self.size.max(rounded_up(size));
         self.primitive[lane] = primitive;
         self.part[lane] = part;
         self.lanes |= 1 << lane;
@@ -69,6 +68,12 @@ impl Block {
             Vec3::new(cx[lane], cy[lane], cz[lane]),
         ]
     }
+}
+
+/// At least a size that was rounded.
+#[inline(always)]
+pub(super) fn rounded_up(size: f32) -> f32 {
+    size * (1.0 + f32::EPSILON)
 }
 
 /// One triangle of a block.

@@ -74,7 +74,7 @@ pub(super) fn walk<S: Simd>(
         |leaf| {
             for index in leaf.blocks() {
                 let mut scratch = None;
-                let block = triangles.block(index, &mut scratch);
+                let block = triangles.block::<S>(index, &mut scratch);
                 let mut open = test(&filter, block, limit).lanes;
                 while open != 0 {
                     let lane = open.trailing_zeros() as usize % LANES;

@@ -14,6 +14,7 @@ use std::collections::BinaryHeap;
 use super::Bvh;
 use super::level::Through;
 use super::node::{Child, Tree};
+use super::simd::Portable;
 use super::triangles::TriangleTree;
 use crate::math::{Aabb, DVec3, Vec3, gamma64};
 use crate::shape::closest::{TrianglePoint, closest_point};
@@ -218,7 +219,7 @@ impl<'a> Search<'a> {
         let Some(triangles) = self.triangles(level) else { return };
         for index in leaf.blocks() {
             let mut scratch = None;
-            let block = triangles.block(index, &mut scratch);
+            let block = triangles.block::<Portable>(index, &mut scratch);
             for lane in block.used() {
                 let corners = block.triangle(lane);
                 let part = triangles.part(block.part[lane]);

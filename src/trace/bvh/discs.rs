@@ -12,7 +12,7 @@
 //! component, besides what does not grow with that; so by 1.8 u (|q| + height + radius) at most, of which the last two are in the disc.
 
 use super::node::{Child, Node, WIDTH};
-use super::simd::{Array, Simd, Vector};
+use super::simd::{Array, Portable, Simd, Vector};
 use super::triangles::TriangleTree;
 use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec3};
 
@@ -127,7 +127,7 @@ impl Maker<'_> {
         let mut bounds = Aabb::EMPTY;
         let mut facing = DVec3::ZERO;
         for index in leaf.blocks() {
-            let block = self.triangles.block(index, &mut scratch);
+            let block = self.triangles.block::<Portable>(index, &mut scratch);
             for lane in block.used() {
                 let triangle = block.triangle(lane);
                 bounds = triangle.iter().fold(bounds, |bounds, &corner| bounds.include(corner));
@@ -249,7 +249,7 @@ mod tests {
         }
         for index in child.blocks() {
             let mut scratch = None;
-            let block = triangles.block(index, &mut scratch);
+            let block = triangles.block::<Portable>(index, &mut scratch);
             all.extend(block.used().map(|lane| block.triangle(lane).map(|corner| corner.as_dvec3())));
         }
     }

@@ -2,13 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::block::{Block, LANES, Lane};
+use super::block::{Block, LANES, Lane, rounded_up};
 use super::build::Record;
+use super::isa::Kernel;
 use super::meshes::Meshes;
 use super::node::{Child, Node, Tree, WIDTH};
 use super::room;
-use super::simd::Simd;
-use crate::math::{Aabb, is_traceable};
+use super::simd::{Array as _, Portable, Simd, Vector};
+use crate::math::{Aabb, Vec3, is_traceable};
 use crate::memory::Array;
 use crate::trace::Part;
 
@@ -31,7 +32,7 @@ pub(super) trait Blocks {
     /// Whether corners are fetched from the mesh when a block is asked for.
     const IS_PUT_TOGETHER: bool;
     /// Block `index`; `scratch` is where it may be put together.
-    fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
     fn address<S: Simd>(&self, index: u32) -> *const u8;
 }
@@ -39,7 +40,7 @@ pub(super) trait Blocks {
 impl Blocks for [Block] {
     const IS_PUT_TOGETHER: bool = false;
     #[inline(always)]
-    fn block<'a>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
+    fn block<'a, S: Simd>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
         &self[index as usize]
     }
     #[inline(always)]
@@ -51,8 +52,8 @@ impl Blocks for [Block] {
 impl Blocks for Numbers {
     const IS_PUT_TOGETHER: bool = true;
     #[inline(always)]
-    fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        scratch.insert(self.read(index))
+    fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.put_together::<S>(index, scratch)
     }
     #[inline(always)]
     fn address<S: Simd>(&self, index: u32) -> *const u8 {
@@ -97,10 +98,10 @@ impl Leaves {
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
     #[inline(always)]
-    pub fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+    pub fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         match self {
             Self::Blocks(blocks) => &blocks[index as usize],
-            Self::Numbers(numbers) => scratch.insert(numbers.read(index)),
+            Self::Numbers(numbers) => numbers.put_together::<S>(index, scratch),
         }
     }
 
@@ -172,7 +173,7 @@ impl Leaves {
             Self::Numbers(numbers) => {
                 numbers.meshes = meshes.clone();
                 let count = numbers.blocks.len() as u32;
-                (0..count).into_par_iter().all(|index| is_sound(&numbers.read(index)))
+                (0..count).into_par_iter().all(|index| is_sound(numbers.put_together::<Portable>(index, &mut None)))
             }
         }
     }
@@ -230,11 +231,56 @@ fn blocks<T: Send>(tree: &mut Tree, items: &[Record], block: impl Fn(&[Record]) 
     })
 }
 
+/// A block is put together from the numbers of its triangles.
+struct PutTogether<'a> {
+    numbers: &'a Numbers,
+    index: u32,
+    /// Empty.
+    block: &'a mut Block,
+}
+
+impl Kernel for PutTogether<'_> {
+    type Output = ();
+
+    /// In vectors: corners that are stored one by one keep whoever loads eight of them waiting.
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        const NOWHERE: &Vec3 = &Vec3::ZERO;
+        let Self { numbers: Numbers { blocks, meshes }, index, block } = self;
+        let numbers = &blocks[index as usize];
+        let (mut last, _) = meshes.find(numbers[0]);
+        let mut triangles = [[NOWHERE; 3]; LANES];
+        // The used lanes come first.
+        for (lane, &number) in numbers.iter().enumerate().take_while(|(_, number)| **number != NONE) {
+            let (mesh, primitive) = meshes.find_near(number, &mut last);
+            let [a, b, c] = mesh.triangles[primitive as usize];
+            let positions = &mesh.positions[..];
+            triangles[lane] = [&positions[a as usize], &positions[b as usize], &positions[c as usize]];
+            block.primitive[lane] = primitive;
+            block.part[lane] = mesh.part;
+            block.lanes |= 1 << lane;
+        }
+        let corners = S::by_component(&triangles);
+        let mut largest = S::V8::splat(0.0);
+        for axis in 0..3 {
+            let [a, b, c] = corners[axis];
+            for edge in [b.sub(a), c.sub(b), a.sub(c)] {
+                largest = largest.max(edge.abs());
+            }
+            for k in 0..3 {
+                block.corners[axis][k] = corners[axis][k].to_array();
+            }
+        }
+        block.size = rounded_up(largest.largest());
+    }
+}
+
 impl Numbers {
-    #[inline]
-    fn read(&self, index: u32) -> Block {
-        let mut block = Block::EMPTY;
-        self.of_block(index).for_each(|number| self.meshes.push(&mut block, number));
+    /// Not inlined, for it is long, and kernels ask for blocks in many places.
+    #[inline(always)]
+    fn put_together<'a, S: Simd>(&self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        let block = scratch.insert(Block::EMPTY);
+        S::apart_narrow(PutTogether { numbers: self, index, block });
         block
     }
 
@@ -258,5 +304,62 @@ impl Numbers {
         let block = scratch.insert(Block::EMPTY);
         self.meshes.push(block, self.blocks[index][lane]);
         Lane { block, lane: 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::math::Vec3;
+    use crate::trace::Primitives;
+    use crate::trace::bvh::isa::{Present, dispatch};
+    use crate::trace::bvh::random::Random;
+
+    struct Read<'a>(&'a Numbers, u32);
+
+    impl Kernel for Read<'_> {
+        type Output = Block;
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Block {
+            *self.0.put_together::<S>(self.1, &mut None)
+        }
+    }
+
+    fn below(count: u32, random: &mut Random) -> u32 {
+        ((random.unit() + 1.0) / 2.0 * count as f32) as u32
+    }
+
+    fn part(geometry: u32, random: &mut Random, vertices: usize, triangles: usize) -> Part {
+        let positions: Vec<Vec3> = (0..vertices).map(|_| random.vec3()).collect();
+        let triangles = (0..triangles).map(|_| std::array::from_fn(|_| below(vertices as u32, random))).collect();
+        let positions = Arc::new(positions);
+        Part { primitives: Primitives::Triangles { positions, triangles: Arc::new(triangles) }, geometry, instance: 0 }
+    }
+
+    #[test]
+    fn blocks_are_put_together_as_they_would_be_made() {
+        let mut random = Random::new(7);
+        let parts = [part(0, &mut random, 3, 1), part(1, &mut random, 40, 60), part(2, &mut random, 9, 30)];
+        let alone = Meshes::new(&parts[1..2]);
+        // The last vertex is at the end of its array, and the mixed blocks are of three meshes.
+        for (meshes, most) in [(alone, 60), (Meshes::new(&parts), 91)] {
+            let mut blocks: Vec<[u32; LANES]> = vec![std::array::from_fn(|lane| most - 1 - lane as u32)];
+            blocks.extend((0..300).map(|k| {
+                let first = below(most - 8, &mut random);
+                let number = |lane| if k % 3 == 0 { below(most, &mut random) } else { first + lane };
+                numbered((0..1 + k % 8).map(number))
+            }));
+            let leaves = Numbers { blocks: blocks.clone().into(), meshes: meshes.clone() };
+            for (index, numbers) in blocks.iter().enumerate() {
+                let mut expected = Block::EMPTY;
+                numbers.iter().filter(|&&n| n != NONE).for_each(|&number| meshes.push(&mut expected, number));
+                for isa in Present::all() {
+                    let block = dispatch(isa, Read(&leaves, index as u32));
+                    assert_eq!(bytemuck::bytes_of(&block), bytemuck::bytes_of(&expected), "{isa:?}: {numbers:?}");
+                }
+            }
+        }
     }
 }

@@ -103,6 +103,15 @@ impl Meshes {
         (mesh, number - mesh.first)
     }
 
+    /// As [`Self::find`], where the mesh is likely to be `last`, of which the last one was.
+    #[inline(always)]
+    pub fn find_near<'a>(&'a self, number: u32, last: &mut &'a Mesh) -> (&'a Mesh, u32) {
+        if number.wrapping_sub(last.first) as usize >= last.triangles.len() {
+            *last = self.find(number).0;
+        }
+        (last, number - last.first)
+    }
+
     /// Adds a triangle to a block.
     #[inline(always)]
     pub fn push(&self, block: &mut Block, number: u32) {

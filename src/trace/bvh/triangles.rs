@@ -114,7 +114,7 @@ impl TriangleTree {
             |leaf| {
                 let mut farthest = f32::NEG_INFINITY;
                 for index in leaf.blocks() {
-                    farthest = farthest.max(self.leaves.block(index, &mut None).farthest::<S>(way));
+                    farthest = farthest.max(self.leaves.block::<S>(index, &mut None).farthest::<S>(way));
                 }
                 farthest
             },
@@ -133,8 +133,8 @@ impl TriangleTree {
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
     #[inline(always)]
-    pub fn block<'a>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.leaves.block(index, scratch)
+    pub fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.leaves.block::<S>(index, scratch)
     }
 
     /// The ids of a part, as blocks number them.
@@ -171,7 +171,7 @@ impl TriangleTree {
     ) {
         for index in leaf.blocks() {
             let mut scratch = None;
-            let block = self.block(index, &mut scratch);
+            let block = self.block::<S>(index, &mut scratch);
             let mut open = filter.candidates::<S, true>(block, nearest.limit()).lanes;
             while open != 0 {
                 let lane = open.trailing_zeros() as usize % LANES;

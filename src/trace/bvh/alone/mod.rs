@@ -151,7 +151,7 @@ impl Bvh {
             |leaf| {
                 for index in leaf.blocks() {
                     let mut scratch = None;
-                    let block = triangles.block(index, &mut scratch);
+                    let block = triangles.block::<S>(index, &mut scratch);
                     // The black box keeps the filter in memory, as it does the slabs of a single ray where nodes are entered (`walk::Enter`): without it the
                     // compiler spreads each number over a vector before the walk, and spills them.
                     let candidates = std::hint::black_box(&filter).candidates::<S, BLURRED>(block, noted.limit);

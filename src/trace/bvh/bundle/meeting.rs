@@ -34,7 +34,7 @@ impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
     fn run<S: Simd>(self) -> bool {
         let Self { walk, index, rows, most } = self;
         let (tree, bundle, mut scratch) = (walk.tree, walk.bundle, None);
-        let block = tree.block(index, &mut scratch);
+        let block = tree.block::<S>(index, &mut scratch);
         let Some((lanes, edges)) = Edges::new::<S>(block, bundle, most) else { return false };
         // A byte for each triangle, in it a bit for each row.
         let seen = Footprints::new::<S>(&block.corners, bundle).rows::<S>(&bundle.rows);

@@ -91,7 +91,7 @@ impl<Q: Query> Walk<'_, Q> {
         let is_turned = Q::ANY && bundle.is_turned;
         for index in leaf.child.blocks() {
             let mut scratch = None;
-            let block = self.tree.block(index, &mut scratch);
+            let block = self.tree.block::<S>(index, &mut scratch);
             let mut seen = Seen::new(block, axes, self.start(leaf.rays.trailing_zeros() as usize % RAYS, is_turned));
             // Made when a ray first asks; they serve every origin.
             let mut planes = None;

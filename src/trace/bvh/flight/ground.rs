@@ -32,7 +32,7 @@ pub(super) trait Ground {
     }
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
-    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory a node is, or a leaf's first block, or a placement.
     fn address(&self, space: Space, next: Child) -> *const u8;
 }
@@ -69,8 +69,8 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
         self.tree.node(child)
     }
     #[inline(always)]
-    fn block<'a>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.leaves.block(index, scratch)
+    fn block<'a, S: Simd>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.leaves.block::<S>(index, scratch)
     }
     #[inline(always)]
     fn address(&self, _: Space, next: Child) -> *const u8 {
@@ -116,8 +116,8 @@ impl Ground for Rounded<'_> {
         self.triangles.tree().node(child)
     }
     #[inline(always)]
-    fn block<'a>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.triangles.block(index, scratch)
+    fn block<'a, S: Simd>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.triangles.block::<S>(index, scratch)
     }
     #[inline(always)]
     fn address(&self, _: Space, next: Child) -> *const u8 {
@@ -172,8 +172,8 @@ impl Ground for Placed<'_> {
         &self.0[space.0 as usize].nodes[child.node() as usize]
     }
     #[inline(always)]
-    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.0[space.0 as usize].triangles.block(index, scratch)
+    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0[space.0 as usize].triangles.block::<S>(index, scratch)
     }
     #[inline(always)]
     fn address(&self, space: Space, next: Child) -> *const u8 {
@@ -207,8 +207,8 @@ impl Ground for Objects<'_> {
         self.0.node(space, child)
     }
     #[inline(always)]
-    fn block<'a>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.0.block(space, index, scratch)
+    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0.block::<S>(space, index, scratch)
     }
     #[inline(always)]
     fn address(&self, space: Space, next: Child) -> *const u8 {

@@ -335,7 +335,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                 let mut count = 0;
                 for k in at_leaves {
                     let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
-                    let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                    let block = ground.block::<S>(traveller.space, leaf.first(), &mut scratch);
                     let (sides, passed) = traveller.look::<S, G>(block);
                     sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
                     count += usize::from(passed != 0);
@@ -344,7 +344,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                 }
                 for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
                     let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
-                    let block = ground.block(traveller.space, leaf.first(), &mut scratch);
+                    let block = ground.block::<S>(traveller.space, leaf.first(), &mut scratch);
                     if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
                         flight.send::<S, G>(*k % RAYS, next, ground);
                     }

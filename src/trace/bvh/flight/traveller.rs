@@ -173,7 +173,7 @@ impl Traveller {
     #[inline(always)]
     pub fn visit<S: Simd, Q: Query, G: Ground>(&mut self, leaf: Child, bvh: &Bvh, ground: &G, rays: &[Ray]) -> Child {
         let mut scratch = None;
-        let block = ground.block(self.space, leaf.first(), &mut scratch);
+        let block = ground.block::<S>(self.space, leaf.first(), &mut scratch);
         let (sides, passed) = self.look::<S, G>(block);
         let next = self.pass(leaf);
         let hit = if passed == 0 { None } else { self.hit::<S, Q, G>(leaf, block, &sides, passed, bvh, ground, rays) };

@@ -117,7 +117,7 @@ impl<Y: Surveyor> Near<'_, Y> {
     fn measure<S: Simd>(&mut self, sight: &Sight<S::V8>) -> Option<Child> {
         let Sight { seeker: k, leaf, lower, open } = sight;
         let (seeker, mut open, mut scratch) = (&mut self.seekers[*k], *open, None);
-        let block = self.triangles.block(leaf.first(), &mut scratch);
+        let block = self.triangles.block::<S>(leaf.first(), &mut scratch);
         let (before, scale) = (seeker.limit, self.surveyor.scale());
         while open != 0 {
             let lane = lower.nearest(open);
@@ -177,7 +177,7 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
             let mut count = 0;
             for k in flying.of(leaf & !none) {
                 let (seeker, leaf, mut scratch) = (&mut self.seekers[k], next[k], None);
-                let block = triangles.block(leaf.first(), &mut scratch);
+                let block = triangles.block::<S>(leaf.first(), &mut scratch);
                 let lower = lower_bounds::<S>(block, seeker.local, seeker.error, rounding);
                 let open = lower.within(seeker.limit) & block.lanes;
                 sights[count % TRAVELLERS] = Sight { seeker: k, leaf, lower, open };

@@ -34,7 +34,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
         |leaf| {
             for index in leaf.blocks() {
                 let mut scratch = None;
-                let block = triangles.block(index, &mut scratch);
+                let block = triangles.block::<S>(index, &mut scratch);
                 let mut open = beam.triangles::<S>(block, most);
                 let mut changed = false;
                 while open != 0 {

@@ -8,6 +8,7 @@ use std::mem::offset_of;
 
 use super::x86::{D4, M8, V4, V8};
 use super::{Mask, Simd};
+use crate::math::Vec3;
 use crate::memory;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::isa::{self, Kernel};
@@ -185,6 +186,22 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[V8; 3]; 3] {
+        let mut corners = [[V8(unsafe { _mm256_setzero_ps() }); 3]; 3];
+        // Loops: what is a function's argument is not inlined here, and then not of this instruction set.
+        for k in 0..3 {
+            let mut rows = [unsafe { _mm_setzero_ps() }; 8];
+            for (row, triangle) in rows.iter_mut().zip(triangles) {
+                *row = row_of_three(triangle[k]);
+            }
+            for (axis, component) in columns_of_three(rows).into_iter().enumerate() {
+                corners[axis][k] = component;
+            }
+        }
+        corners
+    }
+
+    #[inline(always)]
     fn transpose(rows: [V8; 8]) -> [V8; 8] {
         let [V8(a), V8(b), V8(c), V8(d), V8(e), V8(f), V8(g), V8(h)] = rows;
         unsafe {
@@ -207,6 +224,24 @@ impl Simd for Avx2 {
                 V8(_mm256_permute2f128_ps::<0x31>(p3, q3)),
             ]
         }
+    }
+}
+
+/// Three numbers, and a zero: what lies behind them is not read.
+#[inline(always)]
+fn row_of_three(numbers: &Vec3) -> __m128 {
+    unsafe { _mm_maskload_ps(std::ptr::from_ref(numbers).cast(), _mm_setr_epi32(-1, -1, -1, 0)) }
+}
+
+/// Eight rows of three become three columns of eight.
+#[inline(always)]
+fn columns_of_three([a, b, c, d, e, f, g, h]: [__m128; 8]) -> [V8; 3] {
+    unsafe {
+        let (ae, bf) = (_mm256_set_m128(e, a), _mm256_set_m128(f, b));
+        let (cg, dh) = (_mm256_set_m128(g, c), _mm256_set_m128(h, d));
+        let (low, high) = (_mm256_unpacklo_ps(ae, bf), _mm256_unpacklo_ps(cg, dh));
+        let z = _mm256_shuffle_ps::<0x44>(_mm256_unpackhi_ps(ae, bf), _mm256_unpackhi_ps(cg, dh));
+        [V8(_mm256_shuffle_ps::<0x44>(low, high)), V8(_mm256_shuffle_ps::<0xee>(low, high)), V8(z)]
     }
 }
 

@@ -8,6 +8,7 @@ use std::arch::x86_64::*;
 use super::avx2::Avx2;
 use super::x86::{D4, V4, V8, lanewise, opaque};
 use super::{Group, Mask, Simd, Vector};
+use crate::math::Vec3;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
@@ -94,6 +95,11 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn corners(block: &Block, offset: u32) -> [V8; 3] {
         Avx2::corners(block, offset)
+    }
+
+    #[inline(always)]
+    fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[V8; 3]; 3] {
+        Avx2::by_component(triangles)
     }
 
     #[inline(always)]

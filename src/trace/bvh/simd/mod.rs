@@ -88,6 +88,8 @@ pub(super) trait Simd {
     fn row(node: &Node, offset: u32) -> Self::V8;
     /// A component of a block's corners, `offset` bytes after that of the first axis. What is no such start means some of its numbers.
     fn corners(block: &Block, offset: u32) -> [Self::V8; 3];
+    /// The corners of eight triangles component by component, as a block has them.
+    fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[Self::V8; 3]; 3];
     /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
     fn prefetch(address: *const u8);
     /// Has all of these loaded.

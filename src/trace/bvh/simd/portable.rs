@@ -1,6 +1,7 @@
 //! Plain arrays, for any processor.
 
 use super::{Array, Doubles, Group, Mask, Simd, TURNED, Three, Turned, Vector};
+use crate::math::Vec3;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::isa::{self, Kernel};
@@ -108,6 +109,19 @@ impl Simd for Portable {
     #[inline(always)]
     fn corners(block: &Block, offset: u32) -> [[f32; 8]; 3] {
         block.corners[(offset / Block::AXIS) as usize % 3]
+    }
+
+    #[inline(always)]
+    fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[[f32; 8]; 3]; 3] {
+        let mut corners = [[[0.0; 8]; 3]; 3];
+        for (lane, triangle) in triangles.iter().enumerate() {
+            for (k, corner) in triangle.iter().enumerate() {
+                for axis in 0..3 {
+                    corners[axis][k][lane] = corner[axis];
+                }
+            }
+        }
+        corners
     }
 
     #[inline(always)]
