@@ -11,7 +11,7 @@
 
 use std::mem;
 
-use crate::math::{DVec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
@@ -193,7 +193,10 @@ impl Renderer<'_> {
         }
         let chosen = self.lights.choose(choice)?;
         let xi = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
-        let arriving = chosen.source.illuminate(vertex.point.position, xi)?;
+        // From where rays start that find it, or the two estimates would be weighed by different distances.
+        let is_found_from_above = chosen.can_be_found && !vertex.lobes.go_through();
+        let lift = if is_found_from_above { vertex.point.lift } else { DVec3::ZERO };
+        let arriving = chosen.source.illuminate(vertex.point.position + lift, xi)?;
         let value = vertex.lobes.lit(arriving.to_light, chosen.can_be_found);
         let share = match arriving.density {
             // Where the path ends, nothing else finds the light.

@@ -10,13 +10,16 @@ use crate::scene::AreaShape;
 /// Chained f32 roundings in the test of a ray against what stands in a light's place; generous.
 const ROUNDINGS: u32 = 32;
 
+/// Where a light is met at less than this, what stands in its place is taken to be in the way rather than that what stands before it is not.
+const LEAST_COSINE: f64 = 1e-3;
+
 /// What arrives at `point` from the part of the light that `xi`, a point of the unit square, chooses, as if all of it
 /// shone like that part; none where the light turns its back.
 pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DVec2) -> Option<Illumination> {
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
-                return Some(towards(point, seen.at(xi), 1.0 / seen.solid_angle, radiance));
+                return Some(towards(point, seen.at(xi), 1.0 / seen.solid_angle, radiance, a.cross(b)));
             }
             let at = xi * 2.0 - 1.0;
             // The cross product of the halves is a quarter of the area.
@@ -25,7 +28,7 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DV
         AreaShape::Disk { centre, normal, radius } => {
             if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
                 let (offset, density) = seen.at(xi);
-                return Some(towards(point, offset, density, radiance));
+                return Some(towards(point, offset, density, radiance, normal));
             }
             let [x, y] = tangents(normal);
             let (distance, angle) = (radius * xi.x.sqrt(), xi.y * std::f64::consts::TAU);
@@ -44,11 +47,12 @@ fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Spherical
     if is_rectangle { SphericalRectangle::seen_from(point, centre, half_edges) } else { None }
 }
 
-/// From the light at `offset` from the point, in whose direction as many are chosen, per steradian.
-fn towards(point: DVec3, offset: DVec3, density: f64, radiance: Vec3) -> Illumination {
+/// From the light at `offset` from the point, in whose direction as many are chosen, per steradian; `across` is a vector across it.
+fn towards(point: DVec3, offset: DVec3, density: f64, radiance: Vec3, across: DVec3) -> Illumination {
     let to_light = offset.normalize();
+    let cosine = to_light.dot(across.normalize_or_zero());
     let color = radiance * (1.0 / (std::f64::consts::PI * density)) as f32;
-    let end = Some(short_of(point + offset, to_light, point));
+    let end = Some(short_of(point + offset, to_light, point, cosine));
     Illumination { to_light, color, end, density: Some(density) }
 }
 
@@ -63,7 +67,8 @@ fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumina
         return None;
     }
     let color = radiance * (facing / (std::f64::consts::PI * squared)) as f32;
-    let (end, density) = (Some(short_of(at, to_light, point)), Some(squared / facing));
+    let end = Some(short_of(at, to_light, point, facing / area.length()));
+    let density = Some(squared / facing);
     color.is_finite().then_some(Illumination { to_light, color, end, density })
 }
 
@@ -84,7 +89,8 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -
     let way = distance * cosine + if is_outside(distance, radius) { -half_chord } else { half_chord };
     let at = point + to_light * way.max(0.0);
     let density = Some(1.0 / (std::f64::consts::TAU * opening));
-    Some(Illumination { to_light, color, end: Some(short_of(at, to_light, point)), density })
+    let end = Some(short_of(at, to_light, point, half_chord / radius));
+    Some(Illumination { to_light, color, end, density })
 }
 
 /// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point inside.
@@ -123,11 +129,12 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
     (facing > 0.0).then(|| offset.length_squared() / facing)
 }
 
-/// A point before `at` on the way from `point`, by what f32 may move the surface there: what stands in the light's place must
-/// not be in its way.
-pub(super) fn short_of(at: DVec3, to_light: DVec3, point: DVec3) -> DVec3 {
+/// A point before `at` on the way from `point`, by what f32 may move the surface there, across it: what stands in the light's place must
+/// not be in its way. `cosine` is of the way to the surface's normal.
+pub(super) fn short_of(at: DVec3, to_light: DVec3, point: DVec3, cosine: f64) -> DVec3 {
     let slack = f64::from(gamma(ROUNDINGS)) * (at.abs().max_element() + (at - point).length());
-    at - to_light * slack.min((at - point).dot(to_light).max(0.0))
+    let along = slack / cosine.abs().max(LEAST_COSINE);
+    at - to_light * along.min((at - point).dot(to_light).max(0.0))
 }
 
 #[cfg(test)]
@@ -220,6 +227,19 @@ mod tests {
     fn within_a_ball_of_light_everything_is_as_bright() {
         let ball = AreaShape::Sphere { centre: DVec3::new(0.1, 0.2, 0.3), radius: 2.0 };
         assert!((reflected(&ball, DVec3::ZERO, DVec3::Y) - 1.0).abs() < 1e-3);
+    }
+
+    /// However flat a ray comes in: f32 moves a surface across itself, and not along the ray.
+    #[test]
+    fn shadow_rays_that_graze_end_before_the_light() {
+        let (centre, normal) = (DVec3::new(100.0, 50.0, 0.0), DVec3::NEG_Y);
+        let disk = AreaShape::Disk { centre, normal, radius: 3.0 };
+        for cosine in [0.1, 0.01, 0.002] {
+            let point = centre + DVec3::new(-1000.0, -1000.0 * cosine, 0.0);
+            let end = illuminate(&disk, Vec3::ONE, point, DVec2::new(0.3, 0.6)).unwrap().end.unwrap();
+            let before = (end - centre).dot(normal);
+            assert!(before > 1e-3 && before < 1e-2, "{cosine}: {before}");
+        }
     }
 
     #[test]

@@ -324,7 +324,7 @@ impl Patches {
         let cosine = normal.dot(to_light).abs();
         let density = brightness(emission) / self.total() * offset.length_squared() / cosine;
         let color = emission * (1.0 / (PI * density)) as f32;
-        let end = Some(short_of(at, to_light, point));
+        let end = Some(short_of(at, to_light, point, cosine));
         (density.is_finite() && color.is_finite()).then_some(Illumination {
             to_light,
             color,

@@ -129,7 +129,7 @@ fn from_light(light: &Light, point: DVec3, xi: DVec2) -> Option<Illumination> {
             if *radius > 0.0 {
                 // Within the lamp nothing is in between.
                 let way = ((*position - point).length() - radius).max(0.0);
-                arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point));
+                arriving.end = Some(short_of(point + arriving.to_light * way, arriving.to_light, point, 1.0));
             }
             Some(arriving)
         }

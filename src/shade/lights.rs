@@ -116,8 +116,10 @@ impl Lights {
         match (seat, self.patches) {
             (Seat::Patch(brightness), Some((index, total))) => {
                 let offset = point.position - from;
+                let squared = offset.length_squared();
                 let cosine = offset.normalize_or_zero().dot(point.normal).abs();
-                let density = brightness / total * offset.length_squared() / cosine;
+                // What is rounded may start on the very patch that it finds: nobody asks for that direction.
+                let density = if squared > 0.0 { brightness / total * squared / cosine } else { 0.0 };
                 Found::Shared { radiance: emission, density: density * self.chance(index) }
             }
             (Seat::Alone, _) | (Seat::Patch(_), None) => Found::Alone,
@@ -182,6 +184,29 @@ fn chances(sources: &[LightSource], bounds: &Aabb) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Geometry, Material};
+    use crate::shade::Attributes;
+    use crate::trace::bvh::Bvh;
+    use crate::{Cuboid, Tracer};
+
+    /// A ray may start, rounded, on the surface that it finds: its share is a number.
+    #[test]
+    fn what_is_found_where_a_ray_starts_counts_in_full() {
+        let glowing = Material { emission: Vec3::ONE, ..Material::default() };
+        let lamp = Cuboid::new(Vec3::ZERO, Vec3::ONE).expect("a box");
+        let shapes = Geometry::Shapes { shapes: vec![lamp.into()], material: 0 };
+        let scene = Scene::from_geometries(vec![shapes], vec![glowing]);
+        let world = World::new(&scene).expect("a scene");
+        let lights = Lights::chosen(&scene, &world, Vec::new(), None);
+        let ray = world.ray(DVec3::new(0.3, 0.4, 3.0), Vec3::NEG_Z);
+        let hit = Bvh::build(&world).closest(&ray).expect("a hit");
+        let point = SurfacePoint::new(&scene, &world, &ray, &hit, Attributes::ALL);
+        let found = |from| lights.found(&hit, &point, from, Vec3::ONE);
+        assert_eq!(found(point.position), Found::Shared { radiance: Vec3::ONE, density: 0.0 });
+        // Two squared over a cosine of 1, and six square metres.
+        let Found::Shared { density, .. } = found(point.position + DVec3::Z * 2.0) else { panic!("a patch") };
+        assert!((density - 4.0 / 6.0).abs() < 1e-6, "{density}");
+    }
 
     #[test]
     fn lights_are_chosen_by_what_they_give_and_none_is_forgotten() {

@@ -1,11 +1,13 @@
 //! How light goes round: furnaces, form factors, a caustic, and integrators against each other.
 
+use std::f32::consts::{PI, TAU};
+
 use twincast::math::{DVec3, Mat3, Vec3, Vec4};
 use twincast::render::Control;
 use twincast::scene::{
     AreaShape, Camera, Environment, Geometry, Integrator, Interface, Light, Material, Mesh, Specular,
 };
-use twincast::{Disk, Image, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
+use twincast::{Cuboid, Disk, Image, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
 
 use super::{Engine, engines, floor, matte, render, settings};
 
@@ -53,6 +55,38 @@ fn means(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<(&'static s
 fn over_corner(a: f64, b: f64) -> f64 {
     let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
     (a / p * (b / p).atan() + b / q * (a / q).atan()) / std::f64::consts::TAU
+}
+
+/// A ball of flat facets with the normals of a round one, one share of which is met from nowhere: `rings` and twice as many and a third of meridians.
+fn faceted_ball(rings: u32) -> Mesh {
+    let meridians = rings * 4 / 3;
+    let place = |ring: u32, meridian: u32| {
+        let (down, around) = (PI * ring as f32 / rings as f32, TAU * meridian as f32 / meridians as f32);
+        Vec3::new(down.sin() * around.cos(), down.cos(), down.sin() * around.sin())
+    };
+    let positions: Vec<Vec3> = (0..=rings).flat_map(|r| (0..meridians).map(move |m| place(r, m))).collect();
+    let index = |ring: u32, meridian: u32| ring * meridians + meridian % meridians;
+    let quads = (0..rings).flat_map(|r| (0..meridians).map(move |m| (r, m)));
+    let triangles = quads.flat_map(|(r, m)| {
+        let [a, b, c, d] = [index(r, m), index(r, m + 1), index(r + 1, m + 1), index(r + 1, m)];
+        [[a, b, c], [a, c, d]]
+    });
+    Mesh { normals: positions.clone(), ..Mesh::new(positions, triangles.collect()) }
+}
+
+/// A room whose walls are all as bright: whatever is convex and matte in it shows its albedo, however its facets are smoothed. Walls that are asked, and found
+/// by chance, are both near, so that a point that is another for one of the two would be seen.
+#[test]
+fn the_two_ways_to_a_near_light_add_up_to_one_on_smooth_facets() {
+    let walls = Geometry::Shapes {
+        shapes: vec![Cuboid::new(Vec3::splat(-1.2), Vec3::splat(1.2)).unwrap().into()],
+        material: 1,
+    };
+    let scene = Scene::from_geometries(vec![Geometry::Mesh(faceted_ball(6)), walls], vec![matte(0.8), glowing(1.0)]);
+    let camera = Camera::look_at(DVec3::Z * 1.15, DVec3::ZERO, DVec3::Y, 70f64.to_radians()).unwrap();
+    for (engine, mean) in means(&scene, &camera, &paths(16, 256)) {
+        assert!((mean - Vec3::splat(0.8)).abs().max_element() < 2e-3, "{engine}: {mean}");
+    }
 }
 
 /// Panels and a ball of light over a floor, each with what makes it visible.

@@ -17,13 +17,17 @@ pub(super) fn point(sample: u32, spp: u32, key: [u32; 4], jitter: [u32; 4]) -> D
     DVec2::new((column + (row + jx) / f64::from(n)) / f64::from(m), (f64::from(s) + jy) / f64::from(spp))
 }
 
-/// The middle of the `sample`th of at least `spp` cells, row by row or in the order that a key chooses: where on the pixel a sample is
-/// must not say when it is taken.
+/// The middle of the `sample`th of `spp` cells, row by row or in the order that a key chooses: where on the pixel a sample is
+/// must not say when it is taken. Cells are alike in area: of as many as fill no grid some rows have one less, and are the lower for it.
 pub(super) fn grid(sample: u32, spp: u32, order: Option<u32>) -> DVec2 {
-    let m = spp.isqrt();
-    let n = spp.div_ceil(m);
+    let rows = spp.div_ceil(spp.isqrt());
+    let (few, more) = (spp / rows, spp % rows);
     let sample = order.map_or(sample, |key| permute(sample, spp, key));
-    DVec2::new((f64::from(sample % m) + 0.5) / f64::from(m), (f64::from(sample / m) + 0.5) / f64::from(n))
+    let in_low_rows = (rows - more) * few;
+    let (before, count) = if sample < in_low_rows { (0, few) } else { (in_low_rows, few + 1) };
+    let (row, column) = ((sample - before) / count, (sample - before) % count);
+    let middle = f64::from(before + row * count) + f64::from(count) / 2.0;
+    DVec2::new((f64::from(column) + 0.5) / f64::from(count), middle / f64::from(spp))
 }
 
 /// The `i`th element of a permutation of `0..length` that `key` chooses: Kensler's, a hash of the next power of two
@@ -66,6 +70,28 @@ mod tests {
                 let mut images: Vec<_> = (0..length).map(|i| permute(i, length, key)).collect();
                 images.sort_unstable();
                 assert_eq!(images, (0..length).collect::<Vec<_>>(), "{length} by {key}");
+            }
+        }
+    }
+
+    /// What a pixel shows of an edge is its share of the pixel, as near as so many samples can tell; and nothing is missed at one end.
+    #[test]
+    fn a_grid_covers_the_pixel_evenly() {
+        for spp in 1..200 {
+            let places: Vec<_> = (0..spp).map(|sample| grid(sample, spp, None)).collect();
+            let shuffled: Vec<_> = (0..spp).map(|sample| grid(sample, spp, Some(7))).collect();
+            assert!(places.iter().all(|place| shuffled.contains(place)), "{spp}");
+            let mean = places.iter().sum::<DVec2>() / f64::from(spp);
+            assert!((mean - DVec2::splat(0.5)).abs().max_element() < 1e-12, "{spp}: {mean}");
+            // On either axis no strip has a share of the samples that differs from its width by more than two cells of a side.
+            let side = 1.0 / f64::from(spp.isqrt());
+            for edge in [0.3, 0.5, 0.7] {
+                let share = |is_below: &dyn Fn(&DVec2) -> bool| {
+                    places.iter().filter(|place| is_below(place)).count() as f64 / f64::from(spp)
+                };
+                for share in [share(&|place| place.x < edge), share(&|place| place.y < edge)] {
+                    assert!((share - edge).abs() <= side, "{spp}, {edge}: {share}");
+                }
             }
         }
     }

@@ -56,6 +56,11 @@ impl<'a> Lobes<'a> {
         self.chances[0] + self.chances[1] > 0.0 || self.gloss.is_some()
     }
 
+    /// Whether light from below has a value.
+    pub fn go_through(&self) -> bool {
+        self.gloss.is_some() && self.ways.refracted.is_some()
+    }
+
     /// Whether there are several, of which [`Lobes::sample`] follows one.
     pub fn is_choice(&self) -> bool {
         self.chances.iter().filter(|&&chance| chance > 0.0).count() > 1
