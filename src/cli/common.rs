@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-use super::progress;
+use super::{interrupt, progress};
 use crate::error::{Error, Result, Warning};
 use crate::io::{self, Animation, LoadOptions};
 use crate::math::DVec3;
@@ -35,9 +35,10 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "SECONDS", value_parser = parse_time)]
     pub(crate) time: Option<f64>,
 
-    /// Which animation of the file, by its name or its number from 0 on (default: its only one)
+    /// Which animation of the file, by its name or its number from 0 on, or all; may be repeated for several at once
+    /// (default: its only one)
     #[arg(long, value_name = "NAME")]
-    animation: Option<String>,
+    animation: Vec<String>,
 
     /// Frames a second: with --time, what moves goes on for one of them while the time of --shutter goes from 0 to 1
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_fps)]
@@ -102,7 +103,8 @@ impl SceneArgs {
         // Whatever is wrong with the file is for the loader to say.
         let length = std::fs::metadata(&self.scene).map_or(0, |file| file.len());
         let bar = progress::bar(length, "loading", quiet);
-        let scene = io::load_watched(&self.scene, &self.options(has_shutter), Some(&|bytes| bar.inc(bytes)));
+        let load = || io::load_watched(&self.scene, &self.options(has_shutter), Some(&|bytes| bar.inc(bytes)));
+        let scene = interrupt::while_reading(load);
         bar.finish_and_clear();
         scene
     }
@@ -110,10 +112,10 @@ impl SceneArgs {
     /// How the file is understood.
     fn options(&self, has_shutter: bool) -> LoadOptions {
         // A pose that is stored does not move.
-        let is_animated = self.time.is_some() || self.animation.is_some();
+        let is_animated = self.time.is_some() || !self.animation.is_empty();
         LoadOptions {
             animation: Animation {
-                name: self.animation.clone(),
+                names: self.animation.clone(),
                 time: self.time,
                 exposure: if has_shutter && is_animated { 1.0 / self.fps } else { 0.0 },
             },

@@ -1,12 +1,17 @@
-//! Ctrl-C: stop cleanly at the first, at once at the second.
+//! Ctrl-C: stop cleanly at the first, at once at the second, and at the first where nothing has begun that could be left half done.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::complain;
 use super::leave::leave;
 use crate::error::{Error, Result};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static INSTALLED: AtomicBool = AtomicBool::new(false);
+/// Whether only files are being read.
+static READING: AtomicBool = AtomicBool::new(false);
+/// Whether it is being tried to write pictures.
+static TRYING: AtomicBool = AtomicBool::new(false);
 
 /// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130. May be asked for again.
 pub(super) fn install() -> Result<&'static AtomicBool> {
@@ -14,12 +19,33 @@ pub(super) fn install() -> Result<&'static AtomicBool> {
         return Ok(&INTERRUPTED);
     }
     ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+        let is_reading = READING.load(Ordering::Relaxed) && !TRYING.load(Ordering::Relaxed);
+        if INTERRUPTED.swap(true, Ordering::Relaxed) || is_reading {
+            if is_reading {
+                complain("error", &Error::Interrupted);
+            }
             leave(130);
         }
     })
     .map_err(|error| Error::Unavailable(format!("Ctrl-C cannot be handled: {error}")))?;
     Ok(&INTERRUPTED)
+}
+
+/// Reads something, in the midst of which Ctrl-C ends the process: no loader need ask for it.
+pub(super) fn while_reading<T>(read: impl FnOnce() -> T) -> T {
+    during(&READING, read)
+}
+
+/// Tries something out that Ctrl-C must let come to its end, for it tidies up.
+pub(super) fn while_trying<T>(try_out: impl FnOnce() -> T) -> T {
+    during(&TRYING, try_out)
+}
+
+fn during<T>(flag: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    flag.store(true, Ordering::Relaxed);
+    let done = work();
+    flag.store(false, Ordering::Relaxed);
+    done
 }
 
 /// Between two phases of work: an error once Ctrl-C was pressed.

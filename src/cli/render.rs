@@ -25,12 +25,12 @@ use super::light::LightArgs;
 use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
-use super::response::ResponseArgs;
+use super::response::{ResponseArgs, too_bright};
 use super::summary::Rendered;
 use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
-use crate::error::{Error, Result};
-use crate::image::{Metadata, Reference, Response, WriteOptions};
+use crate::error::{Error, Result, Warning};
+use crate::image::{self, Metadata, Reference, Response, WriteOptions};
 use crate::io::Format;
 use crate::memory::process;
 use crate::plan;
@@ -328,6 +328,10 @@ impl RenderArgs {
         let response = self.response.choose(&asked.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };
         outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
+        if let Some(path) = asked.pictures.iter().find(|path| !image::keeps_radiance(path)) {
+            let told = too_bright(&picture.image, &options.response).map(|message| Warning::new(path, "", message));
+            warn(told.as_slice());
+        }
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         Ok(start.elapsed().as_secs_f64())
     }

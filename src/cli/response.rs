@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::common::by_name;
-use crate::image::{Curve, MOST_STOPS, Response, TEMPERATURES};
+use crate::image::{Curve, Image, MOST_STOPS, Response, TEMPERATURES};
 use crate::scene::Request;
 
 /// For pictures of 8 bits; OpenEXR and Radiance files keep radiance.
@@ -35,6 +35,26 @@ impl ResponseArgs {
     }
 }
 
+/// Where most of what is seen is cut off as white: how much, and the exposure that would show it.
+pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
+    // Filmic curves have no white that light would be cut off at.
+    if !matches!(response.curve, Curve::Linear | Curve::Srgb) {
+        return None;
+    }
+    let gain = response.exposure.exp2();
+    let covered = image.pixels.iter().filter(|pixel| pixel.w > 0.0);
+    let mut bright: Vec<f32> = covered.map(|pixel| pixel.truncate().min_element() * gain).collect();
+    let (count, white) = (bright.len(), bright.iter().filter(|&&light| light >= 1.0).count());
+    if 2 * white <= count {
+        return None;
+    }
+    let median = *bright.select_nth_unstable_by(count / 2, f32::total_cmp).1;
+    let share = (100.0 * white as f64 / count as f64).round();
+    let exposure = (response.exposure - (median.log2() + 1.0).ceil()).max(-MOST_STOPS);
+    let message = "is brighter than white and cut off (OpenEXR and Radiance keep it)";
+    Some(format!("{share} % of what is seen {message}; --exposure {exposure} would show it"))
+}
+
 fn parse_stops(text: &str) -> Result<f32, String> {
     let stops = text.parse().ok().filter(|stops: &f32| stops.abs() <= MOST_STOPS);
     stops.ok_or_else(|| format!("expected stops from -{MOST_STOPS} to {MOST_STOPS}"))
@@ -53,6 +73,24 @@ fn parse_kelvin(text: &str) -> Result<f32, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vec4;
+
+    #[test]
+    fn a_picture_that_is_mostly_white_is_told() {
+        let image = |values: [f32; 4]| Image {
+            width: 2,
+            height: 2,
+            pixels: values.map(|v| Vec4::new(v, v, v, f32::from(u8::from(v > 0.0)))).to_vec(),
+        };
+        let told = |values, exposure| too_bright(&image(values), &Response { exposure, ..Response::default() });
+        // Not what is not covered.
+        let message = told([0.0, 100.0, 200.0, 0.5], 0.0).unwrap();
+        assert!(message.starts_with("67 % of what is seen") && message.contains("--exposure -8 would"), "{message}");
+        assert_eq!(told([0.0, 100.0, 200.0, 0.5], -8.0), None, "the advice holds");
+        assert_eq!(told([2.0, 0.2, 0.3, 2.0], 0.0), None, "half of it is light that is meant to be bright");
+        let filmic = Response { curve: Curve::Filmic, ..Response::default() };
+        assert_eq!(too_bright(&image([100.0; 4]), &filmic), None);
+    }
 
     #[test]
     fn flags_win_over_the_scene() {

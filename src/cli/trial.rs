@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, JoinHandle};
 
-use super::outputs;
+use super::{interrupt, outputs};
 use crate::error::{Error, Result};
 
 /// A trial that is going on.
@@ -24,7 +24,7 @@ impl Trial {
     /// Tries these out. Where one cannot be written, `cancel` is set, so that the work for it ends.
     pub(super) fn start(pictures: Vec<PathBuf>, cancel: &'static AtomicBool) -> Result<Self> {
         let work = move || {
-            let tried = outputs::try_out(&pictures);
+            let tried = interrupt::while_trying(|| outputs::try_out(&pictures));
             if tried.is_err() {
                 cancel.store(true, Ordering::Relaxed);
             }

@@ -258,6 +258,12 @@ fn write_part(
     })
 }
 
+/// Whether the format that the suffix says holds light of any strength.
+pub(crate) fn keeps_radiance(path: &Path) -> bool {
+    let suffix = suffix(path);
+    EXR.contains(&suffix.as_str()) || RADIANCE.contains(&suffix.as_str())
+}
+
 fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
     if EXR.contains(&suffix) {
         // What is more would come back as infinite.

@@ -59,8 +59,9 @@ pub struct LoadOptions {
 /// In which pose things are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Animation {
-    /// Of the file's animations, the one with this name, or this number, counted from 0. None where the file has only one.
-    pub name: Option<String>,
+    /// Of the file's animations, those with these names, or these numbers, counted from 0, played at once: of two that move the same, the later one counts. `all` is all
+    /// of them, where none has that name. None where the file has only one.
+    pub names: Vec<String>,
     /// When, in seconds from the animation's start; before its first key and after its last one all stands still. None, and no
     /// name, is the pose that the file stores.
     pub time: Option<f64>,

@@ -1,11 +1,11 @@
 //! Pictures for textures: PNG, JPEG and WebP, from files or from bytes within another file.
 
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bytemuck::{Pod, try_cast_vec};
 use image::error::ImageError;
-use image::{ImageDecoder, ImageReader, Limits};
+use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use crate::error::{Error, Result, one_line};
 use crate::image::{guarded, is_cut_short};
@@ -23,18 +23,32 @@ const MOST_MEMORY: u64 = 1 << 29;
 /// Of the memory that could be had, the share that pictures may take: what is rendered wants some, too.
 const SHARE: f64 = 0.75;
 
-/// Reads a picture file. None where there is no such file.
+/// A picture; or why a material that names it may do without: it is missing, or in another format.
+pub(super) type Opened = std::result::Result<Texture, String>;
+
+/// Reads a picture file.
 ///
 /// # Errors
 /// [`Error::Input`] that names the picture where it cannot be read, is broken or is too large.
-pub(super) fn open(path: &Path) -> Result<Option<Texture>> {
+pub(super) fn open(path: &Path) -> Result<Opened> {
     let bytes = match Mapped::open(path) {
         Ok(bytes) => bytes,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            return Ok(Err(format!("texture {:?} is missing", path.display())));
+        }
         Err(e) => return Err(Error::input(path, "", super::system_message(&e))),
     };
+    if !matches!(image::guess_format(&bytes), Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) {
+        let message = "is no PNG, JPEG or WebP picture; convert it to one of these";
+        return Ok(Err(format!("texture {:?} {message}", path.display())));
+    }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    decode(&bytes, &name).map(Some).map_err(|message| Error::input(path, "", message))
+    decode(&bytes, &name).map(Ok).map_err(|message| Error::input(path, "", message))
+}
+
+/// The file of a name that stands in `file`. Names from Windows have backslashes.
+pub(super) fn beside(file: &Path, name: &str) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
 }
 
 /// Decodes a picture. The format is told by the first bytes, since suffixes and MIME types lie.

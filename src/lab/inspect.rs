@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::suspicious::{Suspicious, suspicious};
@@ -73,7 +74,8 @@ pub struct MeshInfo {
 impl Inspection {
     /// Looks through the whole scene, in parallel on rayon's current thread pool.
     pub fn new(scene: &Scene) -> Self {
-        let meshes = scene.geometries.iter().enumerate().filter_map(|(i, geometry)| match geometry {
+        // Side by side, for of many small meshes each is too little to be shared out.
+        let meshes = scene.geometries.par_iter().enumerate().filter_map(|(i, geometry)| match geometry {
             Geometry::Mesh(mesh) => Some(MeshInfo::new(i as u32, mesh)),
             Geometry::Shapes { .. } => None,
         });
@@ -171,20 +173,25 @@ impl fmt::Display for Inspection {
         row("lights", &list(&self.lights))?;
         row("cameras", &list(&self.cameras))?;
         row("memory", &format!("{:.1} MiB", self.bytes as f64 / f64::from(1 << 20)))?;
-        let mut clean = true;
-        for mesh in &self.meshes {
-            let found: Vec<_> = mesh.suspicious.rows().into_iter().filter(|(_, count)| *count > 0).collect();
-            if !found.is_empty() {
-                clean = false;
-                writeln!(f, "geometry {} {:?}, {} triangles:", mesh.geometry, mesh.name, mesh.triangles)?;
-                for (what, count) in found {
-                    writeln!(f, "  {count:>10} {what}")?;
-                }
-            }
+        let rows = |f: &mut fmt::Formatter<'_>, suspicious: &Suspicious| {
+            let found = suspicious.rows().into_iter().filter(|(_, count)| *count > 0);
+            found.into_iter().try_for_each(|(what, count)| writeln!(f, "  {count:>10} {what}"))
+        };
+        let faulty: Vec<_> = self.meshes.iter().filter(|mesh| mesh.suspicious != Suspicious::default()).collect();
+        for mesh in faulty.iter().take(MESHES_SHOWN) {
+            writeln!(f, "geometry {} {:?}, {} triangles:", mesh.geometry, mesh.name, mesh.triangles)?;
+            rows(f, &mesh.suspicious)?;
         }
-        write!(f, "{}", if clean { "nothing suspicious\n" } else { "" })
+        if let Some(others) = faulty.get(MESHES_SHOWN..).filter(|others| !others.is_empty()) {
+            writeln!(f, "{} other geometries (--json has each):", others.len())?;
+            rows(f, &others.iter().map(|mesh| mesh.suspicious).fold(Suspicious::default(), Suspicious::plus))?;
+        }
+        write!(f, "{}", if faulty.is_empty() { "nothing suspicious\n" } else { "" })
     }
 }
+
+/// Meshes of which each is told what looks like a mistake.
+const MESHES_SHOWN: usize = 20;
 
 /// How many, and the first few by name.
 fn list<S: AsRef<str>>(names: &[S]) -> String {

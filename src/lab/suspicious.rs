@@ -30,6 +30,18 @@ pub struct Suspicious {
 }
 
 impl Suspicious {
+    /// The counts of both.
+    pub(super) fn plus(self, other: Self) -> Self {
+        Self {
+            degenerate: self.degenerate + other.degenerate,
+            not_finite: self.not_finite + other.not_finite,
+            duplicate: self.duplicate + other.duplicate,
+            open_edges: self.open_edges + other.open_edges,
+            non_manifold_edges: self.non_manifold_edges + other.non_manifold_edges,
+            flipped_edges: self.flipped_edges + other.flipped_edges,
+        }
+    }
+
     /// Counts with what they count, in the order of the reports.
     pub fn rows(&self) -> [(&'static str, u64); 6] {
         [

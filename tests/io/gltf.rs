@@ -448,7 +448,8 @@ fn faults_are_told_with_their_pointer() {
     ] {
         fault("/materials/0/extensions", json!({ name: value }), "/materials/0/extensions", words);
     }
-    fault("/materials/0/pbrMetallicRoughness/metallicFactor", json!(2), "/materials/0", "from 0 to 1");
+    let metallic = "/materials/0/pbrMetallicRoughness/metallicFactor";
+    fault(metallic, json!(2), metallic, "from 0 to 1, and is 2");
     fault(
         "/materials/0/pbrMetallicRoughness/metallicRoughnessTexture",
         json!({"index": 7}),

@@ -100,10 +100,20 @@ fn which_animation_is_meant() {
     second["samplers"][0]["output"] = json!(moved);
     maker.json["animations"] = json!([first, second]);
     let files = maker.files();
-    let named = |name: &str| Animation { name: Some(name.into()), ..Animation::default() };
+    let named = |name: &str| Animation { names: vec![name.into()], ..Animation::default() };
     assert_eq!(origin(&posed(&files, named("Walk"))).x, 2.0);
     assert_eq!(origin(&posed(&files, named("0"))).x, 1.0);
     fault(&files, at(0.0), "/animations", "the file has 0, \"Walk\"");
+    // All at once, as Blender writes one for each object; of two that move the same the later one counts.
+    let several =
+        |names: &[&str]| Animation { names: names.iter().map(|&n| n.into()).collect(), ..Animation::default() };
+    assert_eq!(["all", "0"].map(|name| origin(&posed(&files, several(&[name]))).x), [2.0, 1.0]);
+    assert_eq!(origin(&posed(&files, several(&["Walk", "0"]))).x, 1.0);
+    let size = maker.floats("VEC3", &[2.; 3]);
+    maker.json["animations"][1]["channels"][0]["target"]["path"] = json!("scale");
+    maker.json["animations"][1]["samplers"][0]["output"] = json!(size);
+    let scene = posed(&maker.files(), several(&["all"]));
+    assert_eq!((origin(&scene).x, scene.instances[0].transform.matrix3.x_axis.x), (1.0, 2.0));
     fault(&files, named("Run"), "/animations", "no animation \"Run\"");
     fault(&Maker::triangle().files(), at(0.0), "/animations", "the file has none");
 }
@@ -162,7 +172,7 @@ fn things_move_while_the_shutter_is_open() {
     ]);
     maker.json["scenes"] = json!([{"nodes": [0, 2, 3]}]);
     maker.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]);
-    let open = Animation { time: Some(0.25), exposure: 0.25, name: None };
+    let open = Animation { time: Some(0.25), exposure: 0.25, names: Vec::new() };
     let scene = posed(&maker.files(), open);
     let ends: Vec<_> = scene.instances.iter().map(|i| (i.transform, i.transform_end)).collect();
     assert_eq!(ends[0].0.translation, DVec3::new(0.5, 0.0, 0.0));

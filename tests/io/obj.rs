@@ -97,7 +97,7 @@ fn smoothing_groups() {
 #[test]
 fn slips_cost_no_more_than_what_they_are() {
     let obj = format!("# C:\\models\\\n{VERTICES}mtllib a.mtl\nvt 0.5 # c\nusemtl red\nf 1/1 2/1 3/1\n");
-    let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl red\nKd 0.25 # grey\nmap_Kd\nKs 0.5\n");
+    let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl red\nKd 0.25 # grey\nmap_Kd\nKs 0.5\nNs 9\n");
     let (scene, warnings) = files.load("a.obj");
     let (mesh, material) = (meshes(&scene)[0], &scene.materials[0]);
     assert_eq!((mesh.triangles.len(), mesh.uvs[0]), (1, Vec2::new(0.5, 0.0)));
@@ -140,6 +140,23 @@ fn materials_and_textures() {
     assert_eq!(shapes, [("left", 0, 2), ("right", 1, 1)]);
 }
 
+/// What exporters write beside a `Ks` that none of them shows: MeshLab 0, trimesh 1, Blender's physical materials nothing but a roughness.
+#[test]
+fn highlights_without_an_edge_are_none() {
+    let of = |lines: &str| {
+        let obj = format!("mtllib a.mtl\n{VERTICES}usemtl a\nf 1 2 3\n");
+        let files = Files::one("a.obj", obj).and("a.mtl", format!("newmtl a\nKs 1 1 1\nillum 2\n{lines}"));
+        let material = files.scene("a.obj").materials.swap_remove(0);
+        (material.specular != Vec3::ZERO).then_some(material.shininess)
+    };
+    assert_eq!(
+        ["", "Ns 0\n", "Ns 1\n", "Ns 1.5\n", "Pr 0.5\nNs 20\n"].map(of),
+        [None, None, None, Some(1.5), Some(20.0)]
+    );
+    // 2 / Pr^4 - 2.
+    assert_eq!(["Pr 0.5\n", "Pr 1\n", "Pr 0\n"].map(of), [Some(30.0), None, Some(1000.0)]);
+}
+
 #[test]
 fn what_is_missing_is_a_warning() {
     let obj = format!("mtllib none.mtl\n{VERTICES}usemtl a\nf 1 2 3\np 1\nl 1 2\nf 1 2\ncurv 0 1 2\n");
@@ -171,7 +188,7 @@ fn what_is_missing_is_a_warning() {
 #[test]
 fn colours_in_xyz_and_options_without_effect() {
     // D65's white, a red beyond the display's, and grey from one number.
-    let mtl = "newmtl a\nKa xyz 0.5\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\n";
+    let mtl = "newmtl a\nKa xyz 0.5\nKd xyz 0.9505 1 1.089\nKs xyz 0.5 0.2 0\nKe spectral a.rfl 1\nmap_Kd -mm 0.2 0.5 a.png\nNs 9\n";
     let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
     let (scene, warnings) = Files::one("a.obj", &obj).and("a.mtl", mtl).and("a.png", picture()).load("a.obj");
     let material = &scene.materials[0];
@@ -291,10 +308,25 @@ fn faults_in_what_it_refers_to_name_that() {
     check("newmtl a\nKd 1 -1 1\n", b"x", "a.mtl", "line 2", "from 0 up");
     check("Kd 1 1 1\n", b"x", "a.mtl", "line 1", "newmtl");
     check("newmtl a\nmap_Kd -s 2\n", b"x", "a.mtl", "line 2", "file name");
-    check("newmtl a\nmap_Kd a.png\n", b"x", "a.png", "", "not a PNG");
     let whole = picture();
     check("newmtl a\nmap_Kd a.png\n", &whole[..whole.len() - 20], "a.png", "", "broken");
     check("newmtl a\nmap_Kd a.png\n", &huge_picture(), "a.png", "", "100000 x 100000");
+}
+
+/// A sound picture in a format that is not read keeps nobody from the mesh, as one that is missing does not.
+#[test]
+fn textures_in_other_formats_are_left_out() {
+    let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+    for bytes in
+        [&b"BM\x46\0\0\0\0\0\0\0"[..], b"II*\0\x08\0\0\0", b"\0\0\x02\0\0\0\0\0\0\0\0\0\x01\0\x01\0\x18\0abc", b"x"]
+    {
+        let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl a\nmap_Kd a.tga\n").and("a.tga", bytes);
+        let (scene, warnings) = files.load("a.obj");
+        assert_eq!((scene.primitive_count(), scene.textures.len()), (1, 0));
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert_eq!((&warning.path, warning.place.as_str()), (&files.path("a.mtl"), "line 2"));
+        assert!(warning.message.contains("a.tga\" is no PNG, JPEG or WebP picture; convert it"), "{warning}");
+    }
 }
 
 /// A PNG of some 60 bytes that claims 100,000 x 100,000 pixels.

@@ -56,6 +56,57 @@ fn attributes_and_what_is_skipped() {
     assert_eq!(scene.materials[0].diffuse, Vec3::ONE);
 }
 
+/// NumPy's whole numbers, as meshio and trimesh write them: skipped where they mean nothing here, and as indices.
+#[test]
+fn whole_numbers_of_64_bits() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property int64 label\nelement face 2\nproperty list uint8 uint64 vertex_indices\nproperty int64 part\nend_header\n";
+    let mut bytes = header.as_bytes().to_vec();
+    for (corner, label) in SQUARE.iter().zip(-2i64..) {
+        bytes.extend(corner.iter().flat_map(|x| x.to_le_bytes()).chain(label.to_le_bytes()));
+    }
+    for face in [[0u64, 1, 2], [0, 2, 3]] {
+        bytes.push(3);
+        bytes.extend(face.iter().flat_map(|i| i.to_le_bytes()).chain(7i64.to_le_bytes()));
+    }
+    let text = header.replace("binary_little_endian", "ascii")
+        + "0 0 0 -2\n1 0 0 -1\n1 1 0 0\n0 1 0 9000000000\n3 0 1 2 7\n3 0 2 3 7\n";
+    let [a, b, c, d] = SQUARE.map(Vec3::from);
+    for bytes in [bytes, text.into_bytes()] {
+        let scene = Files::one("a.ply", bytes).scene("a.ply");
+        assert_eq!(corners(meshes(&scene)[0]), [[a, b, c], [a, c, d]]);
+    }
+}
+
+/// MeshLab names its texture in a comment.
+#[test]
+fn a_texture_that_a_comment_names() {
+    let text = |comments: &str, of_face: &str, values: &str| {
+        format!(
+            "ply\nformat ascii 1.0\n{comments}element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             property float texture_u\nproperty float texture_v\nelement face 1\n\
+             property list uchar int vertex_indices\n{of_face}end_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2{values}\n"
+        )
+    };
+    let named = "comment TextureFile my picture.png\n";
+    let scene = Files::one("a.ply", text(named, "", "")).and("my picture.png", super::obj::picture()).scene("a.ply");
+    assert_eq!((scene.materials[0].diffuse_texture, scene.textures.len()), (Some(0), 1));
+    assert_eq!((scene.materials[0].diffuse, meshes(&scene)[0].uvs[1]), (Vec3::ONE, Vec2::X));
+    let coordinates = "property list uchar float texcoord\n";
+    for (text, place, words) in [
+        (text(named, "", ""), "line 3", "my picture.png\" is missing"),
+        (text(named, coordinates, " 6 0 0 1 0 0 1"), "line 3", "faces have them"),
+        (text(named, "", "").replace("texture_u", "other"), "line 3", "vertices do not have them"),
+        (text(&named.repeat(2), "", ""), "line 3", "several textures"),
+        (text("", "property uchar red\n", " 255"), "line 9", "colours of faces"),
+    ] {
+        let (scene, warnings) = Files::one("a.ply", text).load("a.ply");
+        assert_eq!((scene.primitive_count(), scene.textures.len()), (1, 0));
+        let [warning] = &warnings[..] else { panic!("{words}: {warnings:?}") };
+        assert!(warning.place == place && warning.message.contains(words), "{warning}");
+    }
+}
+
 #[test]
 fn binary_attributes_are_those_of_the_text() {
     let header = |format: &str, list: &str| {

@@ -283,7 +283,7 @@ fn faults_are_told_with_line_and_remedy() {
         ("[material.a]\nnormal_scale = 2\n", 2, "\"normal_texture\", which is missing"),
         ("[material.a]\nattenuation_color = 1\nattenuation_distance = 1\n", 1, "give it a \"transmission\""),
         ("[material.a]\nmodel = \"phnog\"\n", 2, "did you mean \"phong\"?"),
-        ("[material.a]\ntexture = \"none.png\"\n", 2, "there is no file"),
+        ("[material.a]\ntexture = \"none.png\"\n", 2, "none.png\" is missing"),
         ("[render]\nsize = [0, 1]\n", 2, "whole numbers from 1 to"),
         ("[render]\nmax_depth = 1001\n", 2, "wants a whole number from 0 to 1000"),
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),

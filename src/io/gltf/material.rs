@@ -106,10 +106,18 @@ impl<'a> Materials<'a> {
     ) -> Result<Material> {
         let document = self.document;
         let pbr = &source.pbr_metallic_roughness;
-        let mut numbers = pbr.base_color_factor.iter().chain(&source.emissive_factor);
-        let shares = [pbr.metallic_factor, pbr.roughness_factor];
-        if !numbers.all(|x| x.is_finite() && *x >= 0.0) || !shares.iter().all(|x| (0.0..=1.0).contains(x)) {
-            return Err(document.error(pointer, "factors have to be finite and from 0 up, shares from 0 to 1"));
+        let factors = [
+            ("pbrMetallicRoughness/baseColorFactor", &pbr.base_color_factor[..], f32::MAX),
+            ("emissiveFactor", &source.emissive_factor, f32::MAX),
+            ("pbrMetallicRoughness/metallicFactor", &[pbr.metallic_factor], 1.0),
+            ("pbrMetallicRoughness/roughnessFactor", &[pbr.roughness_factor], 1.0),
+        ];
+        for (name, numbers, most) in factors {
+            if let Some(wrong) = numbers.iter().find(|x| !(0.0..=most).contains(*x)) {
+                let range = if most == 1.0 { "from 0 to 1" } else { "finite and from 0 up" };
+                let message = format!("it has to be {range}, and is {wrong}");
+                return Err(document.error(format!("{pointer}/{name}"), message));
+            }
         }
         let alpha = self.alpha(source, pointer)?;
         let extensions = extension::read(&source.extensions)

@@ -45,6 +45,9 @@ use crate::memory::Mapped;
 use crate::scene::Scene;
 
 /// The extensions that are honoured; a file that requires another is refused.
+/// Extensions of which a picture shows nothing: how polygons were split, and who made the file.
+const UNSEEN_EXTENSIONS: [&str; 3] = ["FB_ngon_encoding", "KHR_xmp", "KHR_xmp_json_ld"];
+
 pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -123,7 +126,8 @@ fn check_version(path: &Path, root: &schema::Root, warnings: &mut Vec<Warning>) 
         );
         return Err(Error::input(path, format!("/extensionsRequired/{index}"), message));
     }
-    let unknown: Vec<&str> = root.extensions_used.iter().filter(is_unknown).map(String::as_str).collect();
+    let is_seen = |name: &&String| is_unknown(name) && !UNSEEN_EXTENSIONS.contains(&name.as_str());
+    let unknown: Vec<&str> = root.extensions_used.iter().filter(is_seen).map(String::as_str).collect();
     if !unknown.is_empty() {
         let message = format!("uses extensions that are not supported and left out: {}", unknown.join(", "));
         warnings.push(Warning::new(path, "/extensionsUsed", message));

@@ -223,12 +223,11 @@ fn decoded(
             Target::Data(bytes) => decode(&bytes),
             Target::File(file) => {
                 let texture = texture::open(&file).map_err(|e| about(document, &pointer, e))?;
-                if texture.is_none() {
-                    let message =
-                        format!("texture {:?} is missing; the material is rendered without it", file.display());
+                let without = |why| {
+                    let message = format!("{why}; the material is rendered without it");
                     warnings.push(document.warning(format!("{pointer}/uri"), message));
-                }
-                Ok(texture)
+                };
+                Ok(texture.map_err(without).ok())
             }
         },
         Source::Bytes(bytes) => decode(bytes),

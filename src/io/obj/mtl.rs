@@ -29,6 +29,11 @@ pub(super) struct Library {
     files: Vec<PathBuf>,
 }
 
+/// The largest exponent that is usual.
+const SHARPEST: f32 = 1000.0;
+/// Up to this exponent a highlight would cover all that the light does: `Ns 0` of MeshLab and `Ns 1` of trimesh stand beside a `Ks` that nobody is meant to see.
+const BLUNTEST: f32 = 1.0;
+
 #[derive(Default)]
 struct Entry {
     file: PathBuf,
@@ -37,6 +42,7 @@ struct Entry {
     specular: Vec3,
     emission: Vec3,
     shininess: Option<f32>,
+    roughness: Option<f32>,
     illumination: Option<i32>,
     /// The line that makes it transparent.
     transparent: Option<usize>,
@@ -62,12 +68,12 @@ impl Library {
         if names.trim().is_empty() {
             return Ok(());
         }
-        let whole = beside(obj, names);
+        let whole = texture::beside(obj, names);
         // A name may contain spaces; the format also lets several names stand in a line.
         let files: Vec<PathBuf> = if whole.is_file() {
             vec![whole]
         } else {
-            let each: Vec<_> = names.split_whitespace().map(|name| beside(obj, name)).collect();
+            let each: Vec<_> = names.split_whitespace().map(|name| texture::beside(obj, name)).collect();
             if each.iter().any(|file| file.exists()) { each } else { vec![whole] }
         };
         for file in files {
@@ -184,6 +190,7 @@ impl Entry {
             b"Ks" => self.specular = color(keyword, words)?,
             b"Ke" => self.emission = color(keyword, words)?,
             b"Ns" => self.shininess = Some(scalar(keyword, words)?.max(0.0)),
+            b"Pr" => self.roughness = Some(scalar(keyword, words)?.clamp(0.0, 1.0)),
             b"d" | b"Tr" => {
                 // `d -halo 0.5` is transparency too.
                 let value = words
@@ -207,23 +214,31 @@ impl Entry {
                 return Ok(left_out);
             }
             // Physical values that Phong's model has no use for.
-            b"Ni" | b"Tf" | b"sharpness" | b"Pr" | b"Pm" | b"Ps" | b"Pc" | b"Pcr" | b"aniso" | b"anisor" => {}
+            b"Ni" | b"Tf" | b"sharpness" | b"Pm" | b"Ps" | b"Pc" | b"Pcr" | b"aniso" | b"anisor" => {}
             _ => return Ok(Some(quoted(keyword))),
         }
         Ok(None)
+    }
+
+    /// The exponent of the highlight; none where there is no highlight.
+    fn shininess(&self) -> Option<f32> {
+        // The same width as a lobe of GGX of that roughness (Walter et al. 2007, *Microfacet models for refraction through rough surfaces*).
+        let of_roughness = |roughness: f32| (2.0 / roughness.powi(4) - 2.0).min(SHARPEST);
+        let exponent = self.shininess.or(self.roughness.map(of_roughness))?;
+        (exponent > BLUNTEST).then_some(exponent)
     }
 
     fn material(&self, name: String, diffuse_texture: Option<u32>) -> Material {
         // A texture alone means the texture as it is.
         let plain = if diffuse_texture.is_some() { Vec3::ONE } else { Material::default().diffuse };
         let diffuse = self.diffuse.unwrap_or(plain);
-        let has_highlight = !matches!(self.illumination, Some(0 | 1));
+        let shininess = self.shininess().filter(|_| !matches!(self.illumination, Some(0 | 1)));
         Material {
             name,
             ambient: self.ambient.unwrap_or(diffuse),
             diffuse,
-            specular: if has_highlight { self.specular } else { Vec3::ZERO },
-            shininess: self.shininess.unwrap_or(Material::default().shininess),
+            specular: if shininess.is_some() { self.specular } else { Vec3::ZERO },
+            shininess: shininess.unwrap_or(Material::default().shininess),
             emission: self.emission,
             diffuse_texture,
             ..Material::default()
@@ -293,7 +308,7 @@ struct Textures {
 
 impl Textures {
     fn get(&mut self, library: &Path, map: &Map, warnings: &mut Vec<Warning>) -> Result<Option<u32>> {
-        let file = beside(library, &map.file);
+        let file = texture::beside(library, &map.file);
         let settings = [map.scale.x, map.scale.y, map.offset.x, map.offset.y].map(f32::to_bits);
         let key = (file, settings, map.clamp);
         if let Some(known) = self.known.get(&key) {
@@ -301,10 +316,9 @@ impl Textures {
         }
         let place = format!("line {}", map.line);
         let texture = texture::open(&key.0).map_err(|error| error.named_in(library, &place))?;
-        if texture.is_none() {
-            let message = format!("texture {:?} is missing; the material is rendered without it", key.0.display());
-            warnings.push(Warning::new(library, place, message));
-        }
+        let without =
+            |why| warnings.push(Warning::new(library, place, format!("{why}; the material is rendered without it")));
+        let texture = texture.map_err(without).ok();
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let transform = Affine2::from_scale_angle_translation(map.scale, 0.0, map.offset);
         let index = texture.map(|texture| {
@@ -326,12 +340,7 @@ fn is_map(keyword: &[u8]) -> bool {
 fn named_file(file: &Path, statement: &[u8]) -> Option<PathBuf> {
     let statement = statement.trim_ascii();
     let begins = (1..statement.len()).filter(|&i| statement[i - 1].is_ascii_whitespace());
-    begins.map(|i| beside(file, &name(&statement[i..]))).find(|path| path.is_file())
-}
-
-/// The file of a name that stands in `file`. Names from Windows have backslashes.
-fn beside(file: &Path, name: &str) -> PathBuf {
-    file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
+    begins.map(|i| texture::beside(file, &name(&statement[i..]))).find(|path| path.is_file())
 }
 
 fn scalar(keyword: &[u8], words: &mut Words<'_>) -> Placeless<f32> {

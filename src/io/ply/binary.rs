@@ -60,6 +60,8 @@ fn decode<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> f64 {
         Scalar::U16 => u16::from_le_bytes(word::<BIG, 2>(bytes)).into(),
         Scalar::I32 => i32::from_le_bytes(word::<BIG, 4>(bytes)).into(),
         Scalar::U32 => u32::from_le_bytes(word::<BIG, 4>(bytes)).into(),
+        Scalar::I64 => i64::from_le_bytes(word::<BIG, 8>(bytes)) as f64,
+        Scalar::U64 => u64::from_le_bytes(word::<BIG, 8>(bytes)) as f64,
         Scalar::F32 => f32::from_le_bytes(word::<BIG, 4>(bytes)).into(),
         Scalar::F64 => f64::from_le_bytes(word::<BIG, 8>(bytes)),
     }

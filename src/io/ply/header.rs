@@ -16,6 +16,8 @@ pub(super) struct Header {
     pub(super) length: usize,
     /// Lines in it.
     pub(super) lines: usize,
+    /// The pictures that comments name as textures, as MeshLab does, and their lines.
+    pub(super) textures: Vec<(usize, String)>,
 }
 
 /// How the body is written.
@@ -55,6 +57,9 @@ pub(super) enum Scalar {
     U16,
     I32,
     U32,
+    /// Not of the format's own, but what NumPy's whole numbers are written as.
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -68,6 +73,8 @@ impl Scalar {
             b"ushort" | b"uint16" => Self::U16,
             b"int" | b"int32" => Self::I32,
             b"uint" | b"uint32" => Self::U32,
+            b"int64" => Self::I64,
+            b"uint64" => Self::U64,
             b"float" | b"float32" => Self::F32,
             b"double" | b"float64" => Self::F64,
             _ => return None,
@@ -80,7 +87,7 @@ impl Scalar {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
 
@@ -91,14 +98,19 @@ impl Scalar {
             Self::U8 => f64::from(u8::MAX),
             Self::I16 => f64::from(i16::MAX),
             Self::U16 => f64::from(u16::MAX),
-            // Whoever writes 32 bits means bytes: nobody measures colours in billions.
-            Self::I32 | Self::U32 => f64::from(u8::MAX),
+            // Whoever writes 32 bits or more means bytes: nobody measures colours in billions.
+            Self::I32 | Self::U32 | Self::I64 | Self::U64 => f64::from(u8::MAX),
             Self::F32 | Self::F64 => 1.0,
         }
     }
 }
 
 impl Element {
+    /// Whether it has a property of this name, be it a value or a list.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.properties.iter().any(|p| p.name == name)
+    }
+
     /// The first property that is a value and has one of the names.
     pub(super) fn index(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|p| p.list.is_none() && names.contains(&p.name.as_str()))
@@ -114,6 +126,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
     }
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
+    let mut textures = Vec::new();
     let mut last = 1;
     // Lines without joining: a comment may end in a backslash. All end as the first one does: behind a `\r` alone, with which the format's author
     // has them end, a binary body may begin with `\n`.
@@ -125,7 +138,12 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
         let (line, text) = (last, Lines::new(raw).next().map(|(_, text)| text.into_owned()).unwrap_or_default());
         let mut words = Words::new(&text, line);
         match words.next() {
-            None | Some(b"ply" | b"comment" | b"obj_info") => {}
+            None | Some(b"ply" | b"obj_info") => {}
+            Some(b"comment") => {
+                if words.next() == Some(b"TextureFile") && !words.rest().is_empty() {
+                    textures.push((line, name(words.rest())));
+                }
+            }
             Some(b"format") => encoding = Some(format(&mut words).map_err(|message| fail(line, message))?),
             Some(b"element") => elements.push(element(&mut words, line).map_err(|message| fail(line, message))?),
             Some(b"property") => {
@@ -150,7 +168,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
                         return Err(fail(element.line, message));
                     }
                 }
-                return Ok(Header { encoding, elements, length, lines: line });
+                return Ok(Header { encoding, elements, length, lines: line, textures });
             }
             Some(word) => return Err(fail(line, format!("{} is no statement of a PLY header", quoted(word)))),
         }
@@ -187,7 +205,10 @@ fn property(words: &mut Words<'_>) -> Placeless<Property> {
         let word = words.next().unwrap_or_default();
         let known = Scalar::named(word);
         known.ok_or_else(|| {
-            format!("{} is no type; use char, uchar, short, ushort, int, uint, float or double", quoted(word))
+            format!(
+                "{} is no type; use char, uchar, short, ushort, int, uint, int64, uint64, float or double",
+                quoted(word)
+            )
         })
     };
     let is_list = Words::new(words.rest(), words.line).next() == Some(b"list");

@@ -21,10 +21,10 @@ use self::faces::Faces;
 use self::header::{Element, Encoding, Header, Scalar};
 use self::vertices::{Layout, Positions, Vertices};
 use crate::error::{Error, Result, Warning};
-use crate::io::{Placeless, Promised};
+use crate::io::{Placeless, Promised, texture};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Material, Mesh, Scene};
+use crate::scene::{Geometry, Material, Mesh, Scene, Texture, Wrap};
 
 /// Items that are read one by one until the file is told.
 const TELL: usize = 1 << 16;
@@ -64,8 +64,39 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         Encoding::Big => read(path, &header, binary::Binary::<true>::new(file, begin), warnings)?,
     };
     let base = if mesh.colors.is_empty() { Material::default().diffuse } else { Vec3::ONE };
-    let material = Material { ambient: base, diffuse: base, ..Material::default() };
-    Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]))
+    let (texture, left_out) = texture_of(path, &header, &mesh)?;
+    warnings.extend(left_out);
+    let base = if texture.is_some() { Vec3::ONE } else { base };
+    let diffuse_texture = texture.is_some().then_some(0);
+    let material = Material { ambient: base, diffuse: base, diffuse_texture, ..Material::default() };
+    let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]);
+    if let Some(texture) = texture {
+        scene.files.push(texture::beside(path, &header.textures[0].1));
+        scene.textures.push(Texture { wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, ..texture });
+    }
+    Ok(scene)
+}
+
+/// The picture that a comment names, for texture coordinates of vertices; or what is said where it is left out.
+fn texture_of(path: &Path, header: &Header, mesh: &Mesh) -> Result<(Option<Texture>, Option<Warning>)> {
+    let [(line, name), ..] = &header.textures[..] else { return Ok((None, None)) };
+    let place = format!("line {line}");
+    let left_out = |why: String| {
+        let message = format!("{why}; the mesh is rendered without it");
+        Ok((None, Some(Warning::new(path, &place, message))))
+    };
+    let of_faces = header.elements.iter().any(|element| element.name == "face" && element.has("texcoord"));
+    if header.textures.len() > 1 {
+        return left_out("several textures (TextureFile) are named, of which none is read".to_owned());
+    }
+    if of_faces || mesh.uvs.is_empty() {
+        let has = if of_faces { "faces have" } else { "vertices do not have" };
+        return left_out(format!("texture {name:?} would need texture coordinates of vertices, and here {has} them"));
+    }
+    match texture::open(&texture::beside(path, name)).map_err(|error| error.named_in(path, &place))? {
+        Ok(texture) => Ok((Some(texture), None)),
+        Err(why) => left_out(why),
+    }
 }
 
 /// What the header says of vertices and faces, if the file may hold as many; a face is a triangle at least.
@@ -109,6 +140,10 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
     if items.rest() > 0 {
         let message = format!("{} bytes after the last element that the header declares are ignored", items.rest());
         warnings.push(Warning::new(path, items.place(), message));
+    }
+    if let Some(element) = header.elements.iter().find(|e| e.name == "face" && ["red", "r"].iter().any(|r| e.has(r))) {
+        let message = "colours of faces are not read, those of vertices are; the mesh is rendered without them";
+        warnings.push(Warning::new(path, format!("line {}", element.line), message));
     }
     if faces.small > 0 {
         let message = format!("{} faces with fewer than 3 corners are left out", faces.small);

@@ -35,7 +35,7 @@ use super::texture;
 use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Geometry, Light, Material, Scene, Texture, Unlit};
+use crate::scene::{Attenuation, Geometry, Light, Material, Scene, Unlit};
 use crate::shape::Shape;
 
 /// What stops the reading of a file: something in it, or in a file it names.
@@ -219,8 +219,8 @@ impl Reader<'_> {
         if let Some(known) = self.pictures.get(&path) {
             return Ok(Some(*known));
         }
-        let picture: Option<Texture> = texture::open(&path).map_err(|error| Stop::Elsewhere { at: value.at, error })?;
-        let picture = picture.ok_or_else(|| value.fault(format!("there is no file {}", path.display())))?;
+        let picture = texture::open(&path).map_err(|error| Stop::Elsewhere { at: value.at, error })?;
+        let picture = picture.map_err(|why| value.fault(why))?;
         self.scene.textures.push(picture);
         self.scene.files.push(path.clone());
         let index = self.scene.textures.len() as u32 - 1;

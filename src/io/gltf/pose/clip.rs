@@ -18,13 +18,13 @@ pub(super) struct Clip<'a> {
 }
 
 impl<'a> Clip<'a> {
-    /// The animation that is asked for, by its name, or its number where none has that name; none where no animation is.
+    /// The animations that are asked for, by their names, or their numbers where none has that name.
     ///
     /// # Errors
     /// Where there is no such animation, or there are several and it is not said which, with those that there are.
-    pub(super) fn choose(document: &'a Document<'a>, wish: &Animation) -> Result<Option<Self>> {
-        if wish.name.is_none() && wish.time.is_none() {
-            return Ok(None);
+    pub(super) fn choose(document: &'a Document<'a>, wish: &Animation) -> Result<Vec<Self>> {
+        if wish.names.is_empty() && wish.time.is_none() {
+            return Ok(Vec::new());
         }
         let all = &document.root.animations;
         let told = |message: String| {
@@ -36,23 +36,36 @@ impl<'a> Clip<'a> {
             let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             document.error("/animations", format!("{message}; the file has {known}"))
         };
-        let index = match &wish.name {
-            Some(name) => {
-                let named = all.iter().position(|one| one.name == *name);
-                let found = named.or_else(|| name.parse().ok().filter(|&number| number < all.len()));
-                found.ok_or_else(|| told(format!("no animation {name:?}")))?
+        let mut chosen = Vec::new();
+        for name in &wish.names {
+            let named = all.iter().position(|one| one.name == *name);
+            match named.or_else(|| name.parse().ok().filter(|&number| number < all.len())) {
+                Some(index) => chosen.push(index),
+                None if name == "all" && !all.is_empty() => chosen.extend(0..all.len()),
+                None => return Err(told(format!("no animation {name:?}"))),
             }
-            None if all.len() == 1 => 0,
-            None if all.is_empty() => return Err(told("a time of an animation is asked for".into())),
-            None => return Err(told("it has to be said which animation is meant (--animation)".into())),
-        };
-        Ok(Some(Self { document, index, source: &all[index] }))
+        }
+        if wish.names.is_empty() {
+            match all.len() {
+                0 => return Err(told("a time of an animation is asked for".into())),
+                1 => chosen.push(0),
+                _ => {
+                    return Err(told("it has to be said which animations are meant (--animation NAME, or all)".into()));
+                }
+            }
+        }
+        Ok(chosen.into_iter().map(|index| Self { document, index, source: &all[index] }).collect())
     }
 
-    /// What it says of nodes, by their index, at a time in seconds. Before its first key and after its last one it stands still.
-    pub(super) fn at(&self, time: f64, warnings: &mut Vec<Warning>) -> Result<HashMap<usize, Animated>> {
+    /// Adds what it says of nodes, by their index, at a time in seconds, in place of what was said before. Before its first key and after its last one it stands
+    /// still.
+    pub(super) fn add(
+        &self,
+        time: f64,
+        nodes: &mut HashMap<usize, Animated>,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<()> {
         let Self { document, index, source } = self;
-        let mut nodes: HashMap<usize, Animated> = HashMap::new();
         let mut known_times = HashSet::new();
         let mut unknown = 0;
         for (c, channel) in source.channels.iter().enumerate() {
@@ -86,6 +99,6 @@ impl<'a> Clip<'a> {
             let message = format!("{unknown} channels animate something other than nodes, and are left out");
             warnings.push(document.warning(format!("/animations/{index}/channels"), message));
         }
-        Ok(nodes)
+        Ok(())
     }
 }

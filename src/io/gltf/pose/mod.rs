@@ -47,14 +47,17 @@ pub(super) fn poses(
     animation: &Animation,
     warnings: &mut Vec<Warning>,
 ) -> Result<Poses> {
-    let Some(clip) = Clip::choose(document, animation)? else {
-        return Ok(Poses { start: Pose::new(document, hierarchy, HashMap::new())?, end: None });
+    let clips = Clip::choose(document, animation)?;
+    let at = |time: f64, warnings: &mut Vec<Warning>| {
+        let mut animated = HashMap::new();
+        clips.iter().try_for_each(|clip| clip.add(time, &mut animated, warnings))?;
+        Pose::new(document, hierarchy, animated)
     };
     let time = animation.time.unwrap_or(0.0);
-    let start = Pose::new(document, hierarchy, clip.at(time, warnings)?)?;
-    let moves = animation.exposure > 0.0;
+    let start = at(time, warnings)?;
+    let moves = !clips.is_empty() && animation.exposure > 0.0;
     // What was warned of once is enough.
-    let end = moves.then(|| Pose::new(document, hierarchy, clip.at(time + animation.exposure, &mut Vec::new())?));
+    let end = moves.then(|| at(time + animation.exposure, &mut Vec::new()));
     Ok(Poses { start, end: end.transpose()? })
 }
 
