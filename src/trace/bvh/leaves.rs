@@ -243,6 +243,7 @@ impl Kernel for PutTogether<'_> {
     type Output = ();
 
     /// In vectors: corners that are stored one by one keep whoever loads eight of them waiting.
+    #[expect(clippy::needless_range_loop, reason = "iterators of vectors are not always taken apart")]
     #[inline(always)]
     fn run<S: Simd>(self) {
         const NOWHERE: &Vec3 = &Vec3::ZERO;
