@@ -19,13 +19,10 @@ pub(super) fn install() -> Result<&'static AtomicBool> {
         return Ok(&INTERRUPTED);
     }
     ctrlc::set_handler(|| {
-        let is_reading = READING.load(Ordering::Relaxed) && !TRYING.load(Ordering::Relaxed);
-        if INTERRUPTED.swap(true, Ordering::Relaxed) || is_reading {
-            if is_reading {
-                complain("error", &Error::Interrupted);
-            }
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
             leave(130);
         }
+        leave_if_reading();
     })
     .map_err(|error| Error::Unavailable(format!("Ctrl-C cannot be handled: {error}")))?;
     Ok(&INTERRUPTED)
@@ -38,7 +35,19 @@ pub(super) fn while_reading<T>(read: impl FnOnce() -> T) -> T {
 
 /// Tries something out that Ctrl-C must let come to its end, for it tidies up.
 pub(super) fn while_trying<T>(try_out: impl FnOnce() -> T) -> T {
-    during(&TRYING, try_out)
+    let done = during(&TRYING, try_out);
+    if INTERRUPTED.load(Ordering::Relaxed) {
+        leave_if_reading();
+    }
+    done
+}
+
+/// Ends the process where nothing but reading goes on.
+fn leave_if_reading() {
+    if READING.load(Ordering::Relaxed) && !TRYING.load(Ordering::Relaxed) {
+        complain("error", &Error::Interrupted);
+        leave(130);
+    }
 }
 
 fn during<T>(flag: &AtomicBool, work: impl FnOnce() -> T) -> T {
