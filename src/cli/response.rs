@@ -42,13 +42,14 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
         return None;
     }
     let gain = response.exposure.exp2();
-    let covered = image.pixels.iter().filter(|pixel| pixel.w > 0.0);
-    let mut bright: Vec<f32> = covered.map(|pixel| pixel.truncate().min_element() * gain).collect();
-    let (count, white) = (bright.len(), bright.iter().filter(|&&light| light >= 1.0).count());
+    let covered = || image.pixels.iter().filter(|pixel| pixel.w > 0.0);
+    let light = || covered().map(|pixel| pixel.truncate().min_element() * gain);
+    let (count, white) = (covered().count(), light().filter(|&light| light >= 1.0).count());
     if 2 * white <= count {
         return None;
     }
-    let median = *bright.select_nth_unstable_by(count / 2, f32::total_cmp).1;
+    // Large pictures are not copied for nothing.
+    let median = *light().collect::<Vec<f32>>().select_nth_unstable_by(count / 2, f32::total_cmp).1;
     let share = (100.0 * white as f64 / count as f64).round();
     let exposure = (response.exposure - (median.log2() + 1.0).ceil()).max(-MOST_STOPS);
     let message = "is brighter than white and cut off (OpenEXR and Radiance keep it)";

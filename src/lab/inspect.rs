@@ -174,8 +174,8 @@ impl fmt::Display for Inspection {
         row("cameras", &list(&self.cameras))?;
         row("memory", &format!("{:.1} MiB", self.bytes as f64 / f64::from(1 << 20)))?;
         let rows = |f: &mut fmt::Formatter<'_>, suspicious: &Suspicious| {
-            let found = suspicious.rows().into_iter().filter(|(_, count)| *count > 0);
-            found.into_iter().try_for_each(|(what, count)| writeln!(f, "  {count:>10} {what}"))
+            let mut found = suspicious.rows().into_iter().filter(|(_, count)| *count > 0);
+            found.try_for_each(|(what, count)| writeln!(f, "  {count:>10} {what}"))
         };
         let faulty: Vec<_> = self.meshes.iter().filter(|mesh| mesh.suspicious != Suspicious::default()).collect();
         for mesh in faulty.iter().take(MESHES_SHOWN) {

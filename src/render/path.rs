@@ -136,8 +136,10 @@ impl Renderer<'_> {
                 });
                 let sent =
                     Sent { source: chosen.source, arriving: &arriving, point: vertex.point, pixel: path.pixel, worth };
-                let parts = || Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found));
-                shadows.add(&sent, radiance, tally.as_deref_mut().map(|tally| (tally, parts())));
+                let told = tally.as_deref_mut().map(|tally| {
+                    (tally, Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found)))
+                });
+                shadows.add(&sent, radiance, told);
             }
             if let (true, Some((ray, path))) = (depth < self.plan.depth, self.go_on(&vertex, lobe)) {
                 if let Some(tally) = &tally {

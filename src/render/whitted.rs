@@ -219,8 +219,10 @@ impl Renderer<'_> {
                     contribution: reflected,
                 });
                 let sent = Sent { source: light, arriving: &arriving, point, pixel: path.pixel, worth: reflected };
-                let parts = || Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO]);
-                shadows.add(&sent, radiance, tally.as_deref_mut().map(|tally| (tally, parts())));
+                let told = tally
+                    .as_deref_mut()
+                    .map(|tally| (tally, Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO])));
+                shadows.add(&sent, radiance, told);
             }
         }
         self.add_unshadowed(tracer, batch, buffers);

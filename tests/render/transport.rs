@@ -57,7 +57,7 @@ fn over_corner(a: f64, b: f64) -> f64 {
     (a / p * (b / p).atan() + b / q * (a / q).atan()) / std::f64::consts::TAU
 }
 
-/// A ball of flat facets with the normals of a round one, one share of which is met from nowhere: `rings` and twice as many and a third of meridians.
+/// A ball of flat facets with the normals of a round one: `rings` from pole to pole, of four thirds as many facets.
 fn faceted_ball(rings: u32) -> Mesh {
     let meridians = rings * 4 / 3;
     let place = |ring: u32, meridian: u32| {

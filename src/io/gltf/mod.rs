@@ -44,10 +44,10 @@ use crate::error::{Error, Result, Warning};
 use crate::memory::Mapped;
 use crate::scene::Scene;
 
-/// The extensions that are honoured; a file that requires another is refused.
 /// Extensions of which a picture shows nothing: how polygons were split, and who made the file.
 const UNSEEN_EXTENSIONS: [&str; 3] = ["FB_ngon_encoding", "KHR_xmp", "KHR_xmp_json_ld"];
 
+/// The extensions that are honoured; a file that requires another is refused.
 pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",

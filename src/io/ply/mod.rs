@@ -63,10 +63,9 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         Encoding::Little => read(path, &header, binary::Binary::<false>::new(file, begin), warnings)?,
         Encoding::Big => read(path, &header, binary::Binary::<true>::new(file, begin), warnings)?,
     };
-    let base = if mesh.colors.is_empty() { Material::default().diffuse } else { Vec3::ONE };
-    let (texture, left_out) = texture_of(path, &header, &mesh)?;
-    warnings.extend(left_out);
-    let base = if texture.is_some() { Vec3::ONE } else { base };
+    let texture = texture_of(path, &header, &mesh, warnings)?;
+    let is_plain = mesh.colors.is_empty() && texture.is_none();
+    let base = if is_plain { Material::default().diffuse } else { Vec3::ONE };
     let diffuse_texture = texture.is_some().then_some(0);
     let material = Material { ambient: base, diffuse: base, diffuse_texture, ..Material::default() };
     let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![material]);
@@ -77,26 +76,21 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     Ok(scene)
 }
 
-/// The picture that a comment names, for texture coordinates of vertices; or what is said where it is left out.
-fn texture_of(path: &Path, header: &Header, mesh: &Mesh) -> Result<(Option<Texture>, Option<Warning>)> {
-    let [(line, name), ..] = &header.textures[..] else { return Ok((None, None)) };
+/// The picture that a comment names, for texture coordinates of vertices; a warning where it is left out.
+fn texture_of(path: &Path, header: &Header, mesh: &Mesh, warnings: &mut Vec<Warning>) -> Result<Option<Texture>> {
+    let [(line, name), ..] = &header.textures[..] else { return Ok(None) };
     let place = format!("line {line}");
-    let left_out = |why: String| {
-        let message = format!("{why}; the mesh is rendered without it");
-        Ok((None, Some(Warning::new(path, &place, message))))
-    };
     let of_faces = header.elements.iter().any(|element| element.name == "face" && element.has("texcoord"));
-    if header.textures.len() > 1 {
-        return left_out("several textures (TextureFile) are named, of which none is read".to_owned());
-    }
-    if of_faces || mesh.uvs.is_empty() {
+    let opened = if header.textures.len() > 1 {
+        Err("several textures (TextureFile) are named, of which none is read".to_owned())
+    } else if of_faces || mesh.uvs.is_empty() {
         let has = if of_faces { "faces have" } else { "vertices do not have" };
-        return left_out(format!("texture {name:?} would need texture coordinates of vertices, and here {has} them"));
-    }
-    match texture::open(&texture::beside(path, name)).map_err(|error| error.named_in(path, &place))? {
-        Ok(texture) => Ok((Some(texture), None)),
-        Err(why) => left_out(why),
-    }
+        Err(format!("texture {name:?} would need texture coordinates of vertices, and here {has} them"))
+    } else {
+        texture::open(&texture::beside(path, name)).map_err(|error| error.named_in(path, &place))?
+    };
+    let without = |why| warnings.push(Warning::new(path, place, format!("{why}; the mesh is rendered without it")));
+    Ok(opened.map_err(without).ok())
 }
 
 /// What the header says of vertices and faces, if the file may hold as many; a face is a triangle at least.

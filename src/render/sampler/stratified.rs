@@ -83,7 +83,7 @@ mod tests {
             assert!(places.iter().all(|place| shuffled.contains(place)), "{spp}");
             let mean = places.iter().sum::<DVec2>() / f64::from(spp);
             assert!((mean - DVec2::splat(0.5)).abs().max_element() < 1e-12, "{spp}: {mean}");
-            // On either axis no strip has a share of the samples that differs from its width by more than two cells of a side.
+            // On either axis no strip has a share of the samples that differs from its width by more than the side of a cell.
             let side = 1.0 / f64::from(spp.isqrt());
             for edge in [0.3, 0.5, 0.7] {
                 let share = |is_below: &dyn Fn(&DVec2) -> bool| {

@@ -277,7 +277,7 @@ impl Kernel for PutTogether<'_> {
 }
 
 impl Numbers {
-    /// Not inlined, for it is long, and kernels ask for blocks in many places.
+    /// Block `index`, by a function of its own: it is long, and kernels ask for blocks in many places.
     #[inline(always)]
     fn put_together<'a, S: Simd>(&self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         let block = scratch.insert(Block::EMPTY);
@@ -313,7 +313,6 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::math::Vec3;
     use crate::trace::Primitives;
     use crate::trace::bvh::isa::{Present, dispatch};
     use crate::trace::bvh::random::Random;

@@ -185,7 +185,7 @@ fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer;
 /// that hit a placed one. The other lanes compute something harmless meanwhile.
 ///
 /// For fixed ones what remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough.
-/// It is: where a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::super::edges::Edges)). f64 rounds
+/// It is: where a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::edges::Edges)). f64 rounds
 /// 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50 roundings of the same products. For a ray by itself ([`single`](super::single)),
 /// [`woop`](super::super::woop) shows it.
 #[inline(always)]

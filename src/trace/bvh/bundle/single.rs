@@ -1,7 +1,7 @@
 //! Rays of a bundle one by one, each against eight triangles at once: for leaves that few of them enter.
 //!
 //! Where triangles are smaller than pixels, eight of them concern a ray or two each, and to make their edges ready for 64 rays
-//! ([`Edges`](super::super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`]) shears the
+//! ([`Edges`](super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`]) shears the
 //! corners by the ray's slopes, which are at hand, from the origin that all share. Of turned rays, which share their end, it takes
 //! the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody could tell on which side.
 //!
