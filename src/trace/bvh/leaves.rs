@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::block::{Block, LANES, Lane, rounded_up};
 use super::build::Record;
 use super::isa::Kernel;
-use super::meshes::Meshes;
+use super::meshes::{Mesh, Meshes};
 use super::node::{Child, Node, Tree, WIDTH};
 use super::room;
 use super::simd::{Array as _, Portable, Simd, Vector};
@@ -25,6 +25,8 @@ pub(super) enum Leaves {
 pub(super) struct Numbers {
     blocks: Array<[u32; LANES]>,
     meshes: Meshes,
+    /// Whether the meshes are of [`FAR`] bytes or more.
+    are_far: bool,
 }
 
 /// Blocks by their numbers.
@@ -35,6 +37,15 @@ pub(super) trait Blocks {
     fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
     fn address<S: Simd>(&self, index: u32) -> *const u8;
+    /// Whether corners are fetched from far, so that it helps to have them loaded before: first by which vertices a block's triangles are, then these.
+    #[inline(always)]
+    fn are_far(&self) -> bool {
+        false
+    }
+    #[inline(always)]
+    fn prefetch_triangles<S: Simd>(&self, _index: u32) {}
+    #[inline(always)]
+    fn prefetch_vertices<S: Simd>(&self, _index: u32) {}
 }
 
 impl Blocks for [Block] {
@@ -59,10 +70,39 @@ impl Blocks for Numbers {
     fn address<S: Simd>(&self, index: u32) -> *const u8 {
         S::address(&self.blocks, index)
     }
+    #[inline(always)]
+    fn are_far(&self) -> bool {
+        self.are_far
+    }
+    #[inline(always)]
+    fn prefetch_triangles<S: Simd>(&self, index: u32) {
+        self.for_each(
+            index,
+            #[inline(always)]
+            |mesh, primitive| S::prefetch_line(&mesh.triangles[primitive as usize]),
+        );
+    }
+    #[inline(always)]
+    fn prefetch_vertices<S: Simd>(&self, index: u32) {
+        self.for_each(
+            index,
+            #[inline(always)]
+            |mesh, primitive| {
+                let [a, b, c] = mesh.triangles[primitive as usize];
+                S::prefetch_line(&mesh.positions[a as usize]);
+                S::prefetch_line(&mesh.positions[b as usize]);
+                S::prefetch_line(&mesh.positions[c as usize]);
+            },
+        );
+    }
 }
 
 /// Fills a block's lanes that have no triangle.
 const NONE: u32 = u32::MAX;
+
+/// Bytes of meshes from which on their corners are fetched ahead: on nefertiti (2 MB) that costs diffuse rays a tenth, with 13 MB it gains as much, with 360 MB
+/// two thirds.
+const FAR: usize = 8 << 20;
 
 /// Nodes that are gone through by one thread.
 const CHUNK: usize = 64;
@@ -93,7 +133,8 @@ impl Leaves {
 
     /// Blocks of numbers of `meshes`' triangles.
     pub fn of_numbers(blocks: impl Into<Array<[u32; LANES]>>, meshes: Meshes) -> Self {
-        Self::Numbers(Numbers { blocks: blocks.into(), meshes })
+        let are_far = meshes.bytes() >= FAR;
+        Self::Numbers(Numbers { blocks: blocks.into(), meshes, are_far })
     }
 
     /// Block `index`, of those that the leaves name; `scratch` is where it may be put together.
@@ -247,7 +288,7 @@ impl Kernel for PutTogether<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         const NOWHERE: &Vec3 = &Vec3::ZERO;
-        let Self { numbers: Numbers { blocks, meshes }, index, block } = self;
+        let Self { numbers: Numbers { blocks, meshes, .. }, index, block } = self;
         let numbers = &blocks[index as usize];
         let (mut last, _) = meshes.find(numbers[0]);
         let mut triangles = [[NOWHERE; 3]; LANES];
@@ -291,6 +332,18 @@ impl Numbers {
             let (mesh, primitive) = self.meshes.find(number);
             mesh.corners(primitive)
         }))
+    }
+
+    /// Each triangle of a block.
+    #[inline(always)]
+    fn for_each(&self, index: u32, mut visit: impl FnMut(&Mesh, u32)) {
+        let numbers = &self.blocks[index as usize];
+        let (mut last, _) = self.meshes.find(numbers[0]);
+        // The used lanes come first.
+        for &number in numbers.iter().take_while(|number| **number != NONE) {
+            let (mesh, primitive) = self.meshes.find_near(number, &mut last);
+            visit(mesh, primitive);
+        }
     }
 
     /// The numbers in a block.
@@ -351,7 +404,7 @@ mod tests {
                 let number = |lane| if k % 3 == 0 { below(most, &mut random) } else { first + lane };
                 numbered((0..1 + k % 8).map(number))
             }));
-            let leaves = Numbers { blocks: blocks.clone().into(), meshes: meshes.clone() };
+            let leaves = Numbers { blocks: blocks.clone().into(), meshes: meshes.clone(), are_far: false };
             for (index, numbers) in blocks.iter().enumerate() {
                 let mut expected = Block::EMPTY;
                 numbers.iter().filter(|&&n| n != NONE).for_each(|&number| meshes.push(&mut expected, number));

@@ -75,6 +75,11 @@ impl Meshes {
         self.count
     }
 
+    /// Bytes of all vertices and triangles.
+    pub fn bytes(&self) -> usize {
+        self.meshes.iter().map(|mesh| size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..])).sum()
+    }
+
     /// The mesh that a part is.
     #[inline(always)]
     pub fn of_part(&self, part: u32) -> &Mesh {

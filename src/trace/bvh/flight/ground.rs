@@ -33,6 +33,15 @@ pub(super) trait Ground {
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
     fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    /// As [`Blocks::are_far`] and what follows it.
+    #[inline(always)]
+    fn are_far(&self) -> bool {
+        false
+    }
+    #[inline(always)]
+    fn prefetch_triangles<S: Simd>(&self, _index: u32) {}
+    #[inline(always)]
+    fn prefetch_vertices<S: Simd>(&self, _index: u32) {}
     /// Where in memory a node is, or a leaf's first block, or a placement.
     fn address(&self, space: Space, next: Child) -> *const u8;
 }
@@ -71,6 +80,18 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
     #[inline(always)]
     fn block<'a, S: Simd>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         self.leaves.block::<S>(index, scratch)
+    }
+    #[inline(always)]
+    fn are_far(&self) -> bool {
+        self.leaves.are_far()
+    }
+    #[inline(always)]
+    fn prefetch_triangles<S: Simd>(&self, index: u32) {
+        self.leaves.prefetch_triangles::<S>(index);
+    }
+    #[inline(always)]
+    fn prefetch_vertices<S: Simd>(&self, index: u32) {
+        self.leaves.prefetch_vertices::<S>(index);
     }
     #[inline(always)]
     fn address(&self, _: Space, next: Child) -> *const u8 {

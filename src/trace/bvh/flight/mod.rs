@@ -308,6 +308,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
         }
         let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
         let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
+        let are_far = G::IS_PUT_TOGETHER && ground.are_far();
         while !flying.is_empty() {
             let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
             for k in arrived {
@@ -320,10 +321,20 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                     flying.remove(k);
                 }
             }
+            if are_far {
+                for k in at_leaves {
+                    ground.prefetch_triangles::<S>(flight.next[k].first());
+                }
+            }
             for k in at_nodes {
                 let (traveller, next) = (&mut flight.travellers[k], flight.next[k]);
                 let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
                 flight.send::<S, G>(k, next, ground);
+            }
+            if are_far {
+                for k in at_leaves {
+                    ground.prefetch_vertices::<S>(flight.next[k].first());
+                }
             }
             if G::IS_PUT_TOGETHER {
                 for k in at_leaves {

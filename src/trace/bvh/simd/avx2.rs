@@ -37,6 +37,11 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn prefetch_line<T>(value: &T) {
+        memory::prefetch(std::ptr::from_ref(value).cast());
+    }
+
+    #[inline(always)]
     fn far_to_near(
         near: V8,
         mask: M8,

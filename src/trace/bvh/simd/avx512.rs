@@ -40,6 +40,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn prefetch_line<T>(value: &T) {
+        Avx2::prefetch_line(value);
+    }
+
+    #[inline(always)]
     fn far_to_near(
         near: V8,
         mask: <V8 as Vector>::Mask,

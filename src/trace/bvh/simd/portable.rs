@@ -25,6 +25,9 @@ impl Simd for Portable {
     fn prefetch(_: *const u8) {}
 
     #[inline(always)]
+    fn prefetch_line<T>(_: &T) {}
+
+    #[inline(always)]
     fn far_to_near(
         near: [f32; 8],
         mask: Bits,
