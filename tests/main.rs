@@ -12,6 +12,8 @@ mod documents;
 #[cfg(feature = "embree")]
 mod embree;
 mod image;
+#[cfg(target_os = "linux")]
+mod interrupt;
 mod io;
 mod layering;
 mod minray;

@@ -1,40 +1,10 @@
 //! The program is killed while it renders, and started again.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::program::command;
-
-/// A program that is ended when the test is, whatever becomes of it.
-struct Running(Option<Child>);
-
-impl Running {
-    fn kill(&mut self) {
-        if let Some(child) = &mut self.0 {
-            let _ = child.kill();
-        }
-    }
-
-    fn id(&self) -> u32 {
-        self.0.as_ref().expect("it runs").id()
-    }
-
-    /// Exit code, none for a signal, and what it says on stderr.
-    fn end(mut self) -> (Option<i32>, String) {
-        let output = self.0.take().expect("it runs").wait_with_output().expect("it ends");
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.kill();
-        if let Some(mut child) = self.0.take() {
-            let _ = child.wait();
-        }
-    }
-}
+use crate::program::{Running, command};
 
 fn render(output: &Path, flags: &[&str]) -> Running {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/box.toml");
@@ -48,7 +18,7 @@ fn render(output: &Path, flags: &[&str]) -> Running {
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn();
-    Running(Some(child.expect("the binary runs")))
+    Running::new(child.expect("the binary runs"))
 }
 
 /// Until a checkpoint is there that was not there before.
@@ -144,7 +114,7 @@ fn an_interrupted_render_leaves_a_checkpoint() {
             .stdout(std::fs::File::create(folder.path().join("said")).expect("a file"))
             .stderr(Stdio::piped())
             .spawn();
-        let child = Running(Some(child.expect("the binary runs")));
+        let child = Running::new(child.expect("the binary runs"));
         // While it renders: what the first took until there was a checkpoint is enough for the second.
         match ready {
             None => {
@@ -153,9 +123,7 @@ fn an_interrupted_render_leaves_a_checkpoint() {
             }
             Some(time) => std::thread::sleep(2 * time + Duration::from_secs(1)),
         }
-        // The shell's own: a system may have no other.
-        let kill = format!("kill -INT {}", child.id());
-        assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
+        child.interrupt();
         let (code, said) = child.end();
         assert_eq!(code, Some(130), "{said}");
         assert_eq!((kept.exists(), output.exists()), (is_kept, false));

@@ -238,7 +238,8 @@ mod with_embree {
         kinds.dedup();
         let mut reports = Vec::new();
         for name in &args.scenes {
-            let (subject, warnings) = Subject::new(name, args.up_axis.axis())?;
+            let subject = interrupt::while_reading(|| Subject::new(name, args.up_axis.axis()));
+            let (subject, warnings) = subject?;
             warn(&warnings);
             interrupt::check()?;
             let costs = Arc::default();

@@ -95,7 +95,7 @@ pub(crate) fn needs((flag, is_given): (&str, bool), (other, is_there): (&str, bo
 impl SceneArgs {
     /// Reads the scene. If `has_shutter`, what an animation moves is to move.
     pub(crate) fn load(&self, has_shutter: bool) -> Result<(Scene, Vec<Warning>)> {
-        io::load(&self.scene, &self.options(has_shutter))
+        interrupt::while_reading(|| io::load(&self.scene, &self.options(has_shutter)))
     }
 
     /// Reads the scene with a bar over the bytes of the file.
