@@ -18,6 +18,7 @@ mod ellipsoid;
 mod exactly;
 mod flat;
 mod line;
+mod outline;
 mod plane;
 mod polygon;
 mod quadric;
@@ -170,7 +171,7 @@ impl Shape {
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         let corners = match self {
-            Self::Polygon(polygon) => size_of::<Polygon>() + size_of_val(polygon.corners()),
+            Self::Polygon(polygon) => polygon.bytes(),
             Self::Sphere(_)
             | Self::Plane(_)
             | Self::Disk(_)

@@ -1,13 +1,6 @@
 //! A polygon with any number of corners, convex or not, also one that crosses itself.
 //!
-//! Looked at along the ray, the corners are points of a plane and the line is one point of it. A half-line from that
-//! point crosses the outline an odd number of times where the point is inside (Shimrat 1962, *Algorithm 112*; Haines
-//! 1994, *Point in polygon strategies*). Which edges it crosses is told by signs: on which side of the half-line's own
-//! line the corners are, where one on it counts as above, and for edges with an end on either side the sign of the
-//! volume d . (b x c), as for triangles. All signs are exact, so a ray through a corner is counted once, and a point on
-//! an edge or a corner is seen as such: it is inside. Two polygons that share an edge leave no gap.
-//!
-//! Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the
+//! Whether the line passes inside is the outline's to say ([`Outline`]). Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the
 //! polygon's is that of Newell's normal (Sutherland, Sproull, Schumacker 1974, *A characterization of ten
 //! hidden-surface algorithms*) through the mean of the corners, in f64, and corners may be off it by
 //! [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the corners. Triangulating, the simpler
@@ -16,15 +9,15 @@
 use super::distance::Support;
 use super::flat::Flat;
 use super::line::{Interval, Line, NO_ROOTS, Roots};
+use super::outline::Outline;
 use super::{InvalidShape, in_f32};
-use crate::math::number::{Formula, Number, cross, dot, minus, vector};
 use crate::math::{Aabb, DVec2, DVec3, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// A polygon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon {
-    corners: Vec<Vec3>,
+    outline: Outline,
     /// A point of its plane.
     centre: DVec3,
     /// Of length 1, to the side from which the corners run counter-clockwise.
@@ -80,12 +73,17 @@ impl Polygon {
                 name(farthest)
             )
         })?;
-        Ok(Self { corners, centre, normal, bounds })
+        Ok(Self { outline: Outline::new(corners), centre, normal, bounds })
     }
 
     /// The corners, in order.
     pub fn corners(&self) -> &[Vec3] {
-        &self.corners
+        self.outline.corners()
+    }
+
+    /// Memory it holds.
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Self>() + self.outline.bytes()
     }
 
     /// A point of the polygon's plane, and its unit normal.
@@ -100,8 +98,12 @@ impl Polygon {
     /// The corners are rounded in their new place. Where that leaves no polygon (it is smaller than a step of f32
     /// there), it keeps the plane, and is not hit.
     pub(super) fn translated(&self, offset: DVec3) -> Self {
-        let corners: Vec<Vec3> = self.corners.iter().map(|p| in_f32(p.as_dvec3() + offset)).collect();
-        Self::new(corners.clone()).unwrap_or_else(|_| Self { corners, bounds: Aabb::EMPTY, ..self.clone() })
+        let corners: Vec<Vec3> = self.corners().iter().map(|p| in_f32(p.as_dvec3() + offset)).collect();
+        Self::new(corners.clone()).unwrap_or_else(|_| Self {
+            outline: Outline::new(corners),
+            bounds: Aabb::EMPTY,
+            ..self.clone()
+        })
     }
 
     pub(super) fn roots(&self, ray: &Ray) -> Roots {
@@ -110,7 +112,7 @@ impl Polygon {
         }
         let flat = self.flat(ray);
         match flat.t() {
-            Some(t) if self.contains(&flat.line) => [Some(self.within_bounds(ray, t)), None],
+            Some(t) if self.outline.contains(&flat.line) => [Some(self.within_bounds(ray, t)), None],
             _ => NO_ROOTS,
         }
     }
@@ -143,37 +145,6 @@ impl Polygon {
         t.max(inside.enter).min(inside.exit.max(inside.enter))
     }
 
-    /// Whether the line passes inside the outline, or through it.
-    fn contains(&self, line: &Line) -> bool {
-        let size = line.direction.abs();
-        let mut axes = [0, 1, 2];
-        axes.sort_by(|&i, &j| size[i].total_cmp(&size[j]));
-        // The half-line goes along the axis that is farthest from the direction.
-        let [along, across, _] = axes;
-        let side = |p: Vec3, axis: usize| Side { line, axis, corner: line.place(p) }.signs()[0];
-        let mut is_inside = false;
-        let Some(&last) = self.corners.last() else { return false };
-        let (mut from, mut from_side) = (last, side(last, along));
-        for &to in &self.corners {
-            let to_side = side(to, along);
-            if (from_side >= 0) != (to_side >= 0) {
-                let volume = Volume { line, ends: [from, to].map(|p| line.place(p)) }.signs()[0];
-                if volume == 0 {
-                    return true;
-                }
-                is_inside ^= (volume > 0) == (to_side >= 0);
-            } else if to_side == 0 {
-                // In a corner, or on an edge along the half-line.
-                let place = side(to, across);
-                if place == 0 || from_side == 0 && side(from, across) * place < 0 {
-                    return true;
-                }
-            }
-            (from, from_side) = (to, to_side);
-        }
-        is_inside
-    }
-
     pub(super) fn normal(&self) -> DVec3 {
         self.normal
     }
@@ -181,43 +152,10 @@ impl Polygon {
     /// Coordinates in the plane, in units of length: from the first corner, along the first edge that has a length and
     /// across.
     pub(super) fn uv(&self, at: DVec3) -> DVec2 {
-        let first = self.corners[0].as_dvec3();
-        let edge = self.corners.iter().map(|p| p.as_dvec3() - first).find(|edge| *edge != DVec3::ZERO);
+        let first = self.corners()[0].as_dvec3();
+        let edge = self.corners().iter().map(|p| p.as_dvec3() - first).find(|edge| *edge != DVec3::ZERO);
         let x = edge.and_then(|edge| (edge - self.normal * edge.dot(self.normal)).try_normalize()).unwrap_or(DVec3::X);
         let from = at - first;
         DVec2::new(from.dot(x), from.dot(self.normal.cross(x)))
-    }
-}
-
-/// d . (e x v) for an axis e and v from the ray's origin to a corner: on which side of the plane of d and e the corner
-/// is.
-struct Side<'a> {
-    line: &'a Line,
-    axis: usize,
-    corner: DVec3,
-}
-
-impl Formula<1> for Side<'_> {
-    #[inline(always)]
-    fn evaluate<N: Number>(&self) -> [N; 1] {
-        let (i, j) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let v = |k: usize| N::new(self.corner[k]).sub(&N::new(self.line.origin[k]));
-        let d = |k: usize| N::new(self.line.direction[k]);
-        [d(j).mul(&v(i)).sub(&d(i).mul(&v(j)))]
-    }
-}
-
-/// d . (b x c), with the edge in place of c, which cancels less.
-struct Volume<'a> {
-    line: &'a Line,
-    ends: [DVec3; 2],
-}
-
-impl Formula<1> for Volume<'_> {
-    #[inline(always)]
-    fn evaluate<N: Number>(&self) -> [N; 1] {
-        let [from, to] = self.ends.map(vector::<N>);
-        let (b, edge) = (minus(&from, &vector(self.line.origin)), minus(&to, &from));
-        [dot(&vector(self.line.direction), &cross(&b, &edge))]
     }
 }

@@ -105,7 +105,8 @@ impl Piece {
             around.extend(positions[first..at].iter().map(|&i| obj.positions[i as usize]));
             parts.clear();
             polygon::triangulate(&around, &mut parts).ok_or_else(|| {
-                let message = format!("a face with {corners} corners is too concave to split; write smaller faces");
+                let message =
+                    format!("a face with {corners} corners crosses itself too often to be split; write smaller faces");
                 Error::input(path, format!("line {line}"), message)
             })?;
             parts.iter().for_each(|triangle| each(triangle.map(|k| first + k as usize)));
