@@ -1,4 +1,4 @@
-//! Pictures for textures: PNG, JPEG and WebP, from files or from bytes within another file.
+//! Pictures for textures: PNG, JPEG, WebP, BMP and Targa, from files or from bytes within another file.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -23,6 +23,9 @@ const MOST_MEMORY: u64 = 1 << 29;
 /// Of the memory that could be had, the share that pictures may take: what is rendered wants some, too.
 const SHARE: f64 = 0.75;
 
+/// The formats that are read, for messages.
+const FORMATS: &str = "PNG, JPEG, WebP, BMP or Targa picture";
+
 /// A picture; or why a material that names it may do without: it is missing, or in another format.
 pub(super) type Opened = std::result::Result<Texture, String>;
 
@@ -38,11 +41,10 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
         }
         Err(e) => return Err(Error::input(path, "", super::system_message(&e))),
     };
-    if !matches!(image::guess_format(&bytes), Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) {
-        let message = "is no PNG, JPEG or WebP picture; convert it to one of these";
-        return Ok(Err(format!("texture {:?} {message}", path.display())));
-    }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if format(&bytes, &name).is_none() {
+        return Ok(Err(format!("texture {:?} is no {FORMATS}; convert it to one of these", path.display())));
+    }
     decode(&bytes, &name).map(Ok).map_err(|message| Error::input(path, "", message))
 }
 
@@ -51,18 +53,35 @@ pub(super) fn beside(file: &Path, name: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
 }
 
-/// Decodes a picture. The format is told by the first bytes, since suffixes and MIME types lie.
+/// The format of a picture, if it is one that is read. It is told by the first bytes, since suffixes and MIME types lie; but Targa has none that tell, so that its
+/// name has to say it, and its header not to contradict.
+fn format(bytes: &[u8], name: &str) -> Option<ImageFormat> {
+    match image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Bmp)) => Some(format),
+        Ok(_) => None,
+        Err(_) => {
+            let is_named = Path::new(name).extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("tga"));
+            // Whether it has a palette, how it is stored, and the bits of a pixel (Truevision 1991, *TGA File Format Specification*, version 2.0).
+            let is_sound =
+                matches!(bytes, [_, 0 | 1, 1..=3 | 9..=11, ..]) && matches!(bytes.get(16), Some(8 | 15 | 16 | 24 | 32));
+            (is_named && is_sound).then_some(ImageFormat::Tga)
+        }
+    }
+}
+
+/// Decodes a picture.
 ///
 /// # Errors
 /// A message about what is wrong.
 pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
+    let format = format(bytes, name).ok_or_else(|| format!("is no {FORMATS}"))?;
     let reader = || {
-        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
         reader.limits(limits());
-        if reader.format().is_none() { Err("is not a PNG, JPEG or WebP picture".to_string()) } else { Ok(reader) }
+        reader
     };
     // The size first, and without limits of the library's, whose message would not say it.
-    let mut sizing = reader()?;
+    let mut sizing = reader();
     sizing.no_limits();
     let sizing = sizing.into_decoder().map_err(|e| broken(&e))?;
     let ((width, height), color) = (sizing.dimensions(), sizing.color_type());
@@ -79,7 +98,7 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     // As it is decoded, and as it stays. Each texture may be small enough, and all of them too many.
     let bytes = pixels * (u64::from(color.bytes_per_pixel()) + if is_deep { 8 } else { 4 });
     check_memory(bytes, process::available()).map_err(|m| format!("claims {width} x {height} pixels, {m}"))?;
-    let image = guarded(|| reader()?.decode().map_err(|e| broken(&e)))?;
+    let image = guarded(|| reader().decode().map_err(|e| broken(&e)))?;
     let pixels = if is_deep {
         Pixels::from(in_fours(image.into_rgba16().into_raw()))
     } else {
@@ -115,7 +134,7 @@ fn limits() -> Limits {
 
 fn broken(error: &ImageError) -> String {
     match error {
-        ImageError::Unsupported(_) => format!("is not a PNG, JPEG or WebP picture that can be read: {error}"),
+        ImageError::Unsupported(_) => format!("is no {FORMATS} that can be read: {}", one_line(&error.to_string())),
         _ => format!("is a broken picture: {}", one_line(&error.to_string())),
     }
 }

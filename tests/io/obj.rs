@@ -317,15 +317,68 @@ fn faults_in_what_it_refers_to_name_that() {
 #[test]
 fn textures_in_other_formats_are_left_out() {
     let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
-    for bytes in
-        [&b"BM\x46\0\0\0\0\0\0\0"[..], b"II*\0\x08\0\0\0", b"\0\0\x02\0\0\0\0\0\0\0\0\0\x01\0\x01\0\x18\0abc", b"x"]
-    {
+    // TIFF, which is as long as Targa's header; DDS; nothing.
+    for bytes in [&b"II*\0\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..], b"DDS |\0\0\0\x07\x10\0\0", b"x"] {
         let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl a\nmap_Kd a.tga\n").and("a.tga", bytes);
         let (scene, warnings) = files.load("a.obj");
         assert_eq!((scene.primitive_count(), scene.textures.len()), (1, 0));
         let [warning] = &warnings[..] else { panic!("{warnings:?}") };
         assert_eq!((&warning.path, warning.place.as_str()), (&files.path("a.mtl"), "line 2"));
-        assert!(warning.message.contains("a.tga\" is no PNG, JPEG or WebP picture; convert it"), "{warning}");
+        assert!(
+            warning.message.contains("a.tga\" is no PNG, JPEG, WebP, BMP or Targa picture; convert it"),
+            "{warning}"
+        );
+    }
+}
+
+/// BMP and Targa, from the top and from the bottom, with a palette and with runs: two pixels a row, red and green above blue and a white that is half transparent
+/// where the format has that.
+#[test]
+fn textures_in_bmp_and_targa() {
+    let bmp = [
+        &b"BM\x46\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x02\0\0\0\x02\0\0\0\x01\0\x18\0"[..],
+        &[0; 24],
+        // From the bottom, blue first, rows of a multiple of four bytes.
+        b"\xff\0\0\xff\xff\xff\0\0",
+        b"\0\0\xff\0\xff\0\0\0",
+    ]
+    .concat();
+    // Palette and its length, kind, size, bits of a pixel, origin.
+    let targa = |palette: u16, kind: u8, bits: u8, origin: u8, pixels: &[u8]| {
+        let [low, high] = palette.to_le_bytes();
+        let header = [0, u8::from(palette > 0), kind, 0, 0, low, high, if palette > 0 { 24 } else { 0 }, 0, 0, 0, 0];
+        [&header[..], &[2, 0, 2, 0, bits, origin], pixels].concat()
+    };
+    let deep = b"\0\0\xff\xff\0\xff\0\xff\xff\0\0\xff\xff\xff\xff\x80";
+    let from_below = b"\xff\0\0\xff\xff\xff\0\0\xff\0\xff\0";
+    let of_a_palette = b"\0\0\xff\0\xff\0\xff\0\0\xff\xff\xff\0\x01\x02\x03";
+    let runs = b"\x01\0\0\xff\0\xff\0\x80\xff\0\0\x80\xff\xff\xff";
+    let pictures = [
+        ("a.bmp", bmp, 255),
+        // Its suffix is all that tells Targa.
+        ("a.png", targa(0, 2, 32, 0x28, deep), 128),
+        ("a.tga", targa(0, 2, 32, 0x28, deep), 128),
+        ("b.TGA", targa(0, 2, 24, 0, from_below), 255),
+        ("c.tga", targa(4, 1, 8, 0x20, of_a_palette), 255),
+        ("d.tga", targa(0, 10, 24, 0x20, runs), 255),
+    ];
+    let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+    for (name, bytes, alpha) in pictures {
+        let mtl = format!("newmtl a\nmap_Kd {name}\n");
+        let files = |bytes: &[u8]| Files::one("a.obj", &obj).and("a.mtl", &mtl).and(name, bytes);
+        let (scene, warnings) = files(&bytes).load("a.obj");
+        if name == "a.png" {
+            assert!(scene.textures.is_empty() && warnings.len() == 1, "{warnings:?}");
+            continue;
+        }
+        assert!(warnings.is_empty(), "{name}: {warnings:?}");
+        let [texture] = &scene.textures[..] else { panic!("{name}") };
+        let expected = [[255u8, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, alpha]];
+        assert_eq!((texture.width, texture.height), (2, 2), "{name}");
+        assert_eq!(texture.pixels, twincast::scene::Pixels::from(expected.to_vec()), "{name}");
+        let cut = files(&bytes[..bytes.len() - 3]);
+        let error = twincast::io::load(&cut.path("a.obj"), &Default::default()).map(|_| ()).unwrap_err();
+        assert!(error.to_string().contains("broken picture"), "{name}: {error}");
     }
 }
 
