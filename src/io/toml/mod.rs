@@ -28,6 +28,7 @@ use self::group::{Body, Child, Groups, Place, Target};
 use self::include::{Include, Includes};
 use self::look::{Render, Shading};
 use self::pieces::Cut;
+use self::primitives::{SINGLES, Singles};
 use self::table::{Fault, Read, Table, Value};
 use super::parts::{Sorted, add_group};
 use super::suggest::suggestion;
@@ -60,10 +61,10 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     let fault = |at: usize, message: String| Error::input(path, line(at), message);
     let text = str::from_utf8(file).map_err(|e| fault(e.valid_up_to(), "bytes that are no UTF-8".to_owned()))?;
     let refused = |Fault { at, message }| fault(at, shortened(&message));
-    let cut = Cut::new(text);
+    let cut = Cut::new(text, &MANY);
     let mut document = parse(cut.as_ref().map_or(text, |cut| &cut.rest)).map_err(refused)?;
     let mut pieces = cut.as_ref().map_or(&[][..], |cut| &cut.pieces);
-    if !pieces.is_empty() && document.get_ref().contains_key("instance") {
+    if !pieces.is_empty() && MANY.iter().any(|&key| document.get_ref().contains_key(key)) {
         // Said twice, in two ways: for the parser to judge.
         document = parse(text).map_err(refused)?;
         pieces = &[];
@@ -78,8 +79,8 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
         includes: Includes::default(),
         bare: 0,
     };
-    let read = || placements(text, pieces).map_err(Stop::Here);
-    match read().and_then(|placed| reader.read(Table::new(document.get_ref(), 0, "the file"), placed)) {
+    let read = || Apart::read(text, pieces).map_err(Stop::Here);
+    match read().and_then(|apart| reader.read(Table::new(document.get_ref(), 0, "the file"), apart)) {
         Ok(()) => {
             let (scene, bare) = (reader.scene, reader.bare);
             warnings.extend(super::doubt_bare(path, bare));
@@ -101,22 +102,41 @@ fn parse(text: &str) -> Read<Spanned<DeTable<'_>>> {
     })
 }
 
-/// What stands in pieces of `[[instance]]` tables.
-fn placements(text: &str, pieces: &[Range<usize>]) -> Read<Vec<Child>> {
-    let read = |piece: &Range<usize>| {
-        let tree = parse(&text[piece.clone()])?;
-        let mut table = Table::new(tree.get_ref(), 0, "the file");
-        let placed = instances(&mut table)?;
-        table.finish().map(|()| placed)
-    };
-    let shifted = |piece: &Range<usize>| match read(piece) {
-        Ok(placed) => Ok(placed.into_iter().map(|child| Child { at: child.at + piece.start, ..child }).collect()),
-        Err(fault) => Err(Fault { at: fault.at + piece.start, ..fault }),
-    };
-    let read: Vec<Read<Vec<Child>>> = pieces.par_iter().map(shifted).collect();
-    // Of several faults the first.
-    let placed: Vec<Vec<Child>> = read.into_iter().collect::<Read<_>>()?;
-    Ok(placed.into_iter().flatten().collect())
+/// Lists of tables that files may have by the million.
+const MANY: [&str; 1 + SINGLES.len()] = {
+    let mut many = ["instance"; 1 + SINGLES.len()];
+    many.split_at_mut(1).1.copy_from_slice(&SINGLES);
+    many
+};
+
+/// What was cut out of a file.
+#[derive(Default)]
+struct Apart {
+    placed: Vec<Child>,
+    singles: Singles,
+}
+
+impl Apart {
+    /// What stands in pieces of a text.
+    fn read(text: &str, pieces: &[Range<usize>]) -> Read<Self> {
+        let read = |piece: &Range<usize>| {
+            let tree = parse(&text[piece.clone()])?;
+            let mut table = Table::new(tree.get_ref(), 0, "the file");
+            let apart = Self { placed: instances(&mut table)?, singles: primitives::singles(&mut table)? };
+            table.finish().map(|()| apart)
+        };
+        let read: Vec<Read<Self>> = pieces.par_iter().map(read).collect();
+        let mut all = Self::default();
+        for (apart, Range { start, .. }) in read.into_iter().zip(pieces) {
+            // Of several faults the first.
+            let apart = apart.map_err(|fault| Fault { at: fault.at + start, ..fault })?;
+            all.placed.extend(apart.placed.into_iter().map(|child| Child { at: child.at + start, ..child }));
+            for (all, singles) in all.singles.iter_mut().zip(apart.singles) {
+                all.extend(singles.into_iter().map(|single| single.after(*start)));
+            }
+        }
+        Ok(all)
+    }
 }
 
 /// The placements of `[[instance]]`.
@@ -158,8 +178,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// The whole file, of which `placed` was cut out.
-    fn read(&mut self, mut top: Table<'_>, placed: Vec<Child>) -> std::result::Result<(), Stop> {
+    /// The whole file, of which some stands apart.
+    fn read(&mut self, mut top: Table<'_>, apart: Apart) -> std::result::Result<(), Stop> {
         let render = Render::read(top.get("render").map(|value| value.table("[render]".to_owned())).transpose()?)?;
         (self.scene.ambient, self.scene.background) = (render.ambient, render.background);
         self.scene.request = render.request;
@@ -180,12 +200,16 @@ impl Reader<'_> {
         }
         let mut named = BTreeMap::new();
         for (name, mut table) in top.named_tables("group")? {
-            let body = self.body(name, &mut table)?;
+            let singles = primitives::singles(&mut table)?;
+            let body = self.body(name, &mut table, singles)?;
             table.finish()?;
             named.insert(name, body);
         }
-        let mut body = self.body("", &mut top)?;
-        body.children.extend(placed);
+        let mut singles = primitives::singles(&mut top)?;
+        // Each list is all here or all there.
+        singles.iter_mut().zip(apart.singles).for_each(|(here, apart)| here.extend(apart));
+        let mut body = self.body("", &mut top, singles)?;
+        body.children.extend(apart.placed);
         top.finish()?;
         Groups { top: body, named }.unroll(&mut self.scene)?;
         if render.shading == Shading::Minray {
@@ -228,9 +252,9 @@ impl Reader<'_> {
         Ok(Some(index))
     }
 
-    /// What stands in a group, or at the top of the file.
-    fn body(&mut self, name: &str, table: &mut Table<'_>) -> std::result::Result<Body, Stop> {
-        let Sorted { mut near, far } = primitives::singles(table, &mut |table| self.material_of(table))?;
+    /// What stands in a group, or at the top of the file, and the primitives of it.
+    fn body(&mut self, name: &str, table: &mut Table<'_>, singles: Singles) -> std::result::Result<Body, Stop> {
+        let Sorted { mut near, far } = primitives::sorted(singles, |name| self.material_of(name))?;
         for geometry in &mut near {
             if let Geometry::Mesh(mesh) = geometry
                 && self.scene.materials[mesh.material as usize].textures().next().is_some()
@@ -238,7 +262,7 @@ impl Reader<'_> {
                 *mesh = primitives::with_parameters(mesh);
             }
         }
-        let meshes = primitives::meshes(table, &mut |table| self.material_of(table))?;
+        let meshes = primitives::meshes(table, |name| self.material_of(name))?;
         self.bare += super::bare(&meshes, &self.scene.materials);
         near.extend(meshes);
         let mut body = Body::default();
@@ -256,7 +280,7 @@ impl Reader<'_> {
     }
 
     fn file(&mut self, table: &mut Table<'_>) -> std::result::Result<Child, Stop> {
-        let material = table.get("material").map(|value| self.named_material(value)).transpose()?;
+        let material = table.get("material").map(|value| self.named_material(value.text()?, value.at)).transpose()?;
         let include = Include::read(table, self.folder, material)?;
         let at = table.need("path")?.at;
         let name = table.optional("name", Value::text)?.unwrap_or_default().to_owned();
@@ -266,10 +290,10 @@ impl Reader<'_> {
         Ok(Child { name, place, target: Target::File(placed), at })
     }
 
-    /// The material that a primitive's table names, or the plain one.
-    fn material_of(&mut self, table: &mut Table<'_>) -> Read<u32> {
-        match table.get("material") {
-            Some(value) => self.named_material(value),
+    /// The material of a name that stands somewhere, or the plain one.
+    fn material_of(&mut self, name: Option<(&str, usize)>) -> Read<u32> {
+        match name {
+            Some((name, at)) => self.named_material(name, at),
             None => Ok(*self.plain.get_or_insert_with(|| {
                 self.scene.materials.push(Material::default());
                 self.scene.materials.len() as u32 - 1
@@ -277,12 +301,11 @@ impl Reader<'_> {
         }
     }
 
-    fn named_material(&self, value: Value<'_>) -> Read<u32> {
-        let name = value.text()?;
+    fn named_material(&self, name: &str, at: usize) -> Read<u32> {
         let found = self.materials.get(name).copied();
         found.ok_or_else(|| {
             let near = suggestion(name, self.materials.keys().map(String::as_str));
-            value.fault(format!("no [material.{name}]{near}"))
+            Fault { at, message: format!("no [material.{name}]{near}") }
         })
     }
 }

@@ -8,52 +8,97 @@ use crate::io::parts::{Parts, Sorted};
 use crate::math::{DMat3, DVec3, Vec2};
 use crate::scene::{Geometry, Mesh};
 
-/// Material of a primitive by its name.
-pub(super) type Materials<'a> = dyn FnMut(&mut Table<'_>) -> Read<u32> + 'a;
-
 /// Reads a shape of its table; material and unknown keys are left to the caller.
 type ReadShape = fn(&mut Table<'_>) -> Read<DShape>;
 
-/// Each shape by its key.
-const SHAPES: [(&str, ReadShape); 8] = [
-    ("sphere", sphere),
-    ("plane", plane),
-    ("disk", disk),
-    ("box", cuboid),
-    ("cylinder", cylinder),
-    ("cone", cone),
-    ("ellipsoid", ellipsoid),
-    ("polygon", polygon),
-];
+/// The keys of single primitives.
+pub(super) const SINGLES: [&str; 9] =
+    ["sphere", "plane", "disk", "box", "cylinder", "cone", "ellipsoid", "polygon", "triangle"];
 
-/// Single primitives of a body, sorted by material.
-pub(super) fn singles(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Sorted> {
-    let mut parts = Parts::default();
-    for (key, read) in SHAPES {
-        for mut table in body.tables(key)? {
-            let shape = read(&mut table)?;
-            let material = material(&mut table)?;
-            let added = parts.shape(material, shape);
-            added.map_err(|problem| table.fault(format!("{}: {problem}", table.name())))?;
-            table.finish()?;
-        }
-    }
-    for mut table in body.tables("triangle")? {
-        let corners = list(table.need("corners")?, Value::vector)?;
-        let corners: [DVec3; 3] =
-            corners.try_into().map_err(|_| table.fault("a [[triangle]] has three \"corners\""))?;
-        let material = material(&mut table)?;
-        parts.triangle(material, corners).map_err(|message| table.fault(message))?;
+/// How the shape of a key is read; triangles are none.
+fn shape(key: &str) -> Option<ReadShape> {
+    Some(match key {
+        "sphere" => sphere,
+        "plane" => plane,
+        "disk" => disk,
+        "box" => cuboid,
+        "cylinder" => cylinder,
+        "cone" => cone,
+        "ellipsoid" => ellipsoid,
+        "polygon" => polygon,
+        _ => return None,
+    })
+}
+
+/// A primitive with a table of its own.
+pub(super) struct Single {
+    what: What,
+    /// The name of its material, if it has one, and where that stands.
+    material: Option<(Box<str>, usize)>,
+    /// Where it stands in the text.
+    at: usize,
+}
+
+enum What {
+    Shape(DShape),
+    Triangle([DVec3; 3]),
+}
+
+impl Single {
+    fn read(key: &str, mut table: Table<'_>) -> Read<Self> {
+        let what = match shape(key) {
+            Some(read) => What::Shape(read(&mut table)?),
+            None => What::Triangle(triangle(&mut table)?),
+        };
+        let name = |value: Value<'_>| Ok((value.text()?.into(), value.at));
+        let (material, at) = (table.optional("material", name)?, table.at());
         table.finish()?;
+        Ok(Self { what, material, at })
+    }
+
+    /// The same, in a text in which `start` bytes come before.
+    pub(super) fn after(self, start: usize) -> Self {
+        Self { material: self.material.map(|(name, at)| (name, at + start)), at: self.at + start, ..self }
+    }
+}
+
+/// Primitives for each of [`SINGLES`].
+pub(super) type Singles = [Vec<Single>; SINGLES.len()];
+
+/// Those of a body.
+pub(super) fn singles(body: &mut Table<'_>) -> Read<Singles> {
+    let mut singles = SINGLES.map(|_| Vec::new());
+    for (key, singles) in SINGLES.into_iter().zip(&mut singles) {
+        *singles = body.tables(key)?.into_iter().map(|table| Single::read(key, table)).collect::<Read<_>>()?;
+    }
+    Ok(singles)
+}
+
+/// The same, sorted by what `material` makes of the names of their materials.
+pub(super) fn sorted(singles: Singles, mut material: impl FnMut(Option<(&str, usize)>) -> Read<u32>) -> Read<Sorted> {
+    let mut parts = Parts::default();
+    for (key, singles) in SINGLES.into_iter().zip(singles) {
+        for Single { what, material: name, at } in singles {
+            let material = material(name.as_ref().map(|(name, at)| (&**name, *at)))?;
+            let added = match what {
+                What::Shape(shape) => parts.shape(material, shape).map_err(|problem| format!("[[{key}]]: {problem}")),
+                What::Triangle(corners) => parts.triangle(material, corners),
+            };
+            added.map_err(|message| Fault { at, message })?;
+        }
     }
     Ok(parts.sorted())
 }
 
-/// The meshes of a body.
-pub(super) fn meshes(body: &mut Table<'_>, material: &mut Materials<'_>) -> Read<Vec<Geometry>> {
+/// The meshes of a body, with what `material` makes of the names of their materials.
+pub(super) fn meshes(
+    body: &mut Table<'_>,
+    mut material: impl FnMut(Option<(&str, usize)>) -> Read<u32>,
+) -> Read<Vec<Geometry>> {
     let mut geometries = Vec::new();
     for mut table in body.tables("mesh")? {
-        let mesh = Mesh { material: material(&mut table)?, ..mesh(&mut table)? };
+        let name = table.optional("material", |value| Ok((value.text()?, value.at)))?;
+        let mesh = Mesh { material: material(name)?, ..mesh(&mut table)? };
         table.finish()?;
         geometries.push(Geometry::Mesh(mesh));
     }
@@ -130,6 +175,11 @@ fn ellipsoid(table: &mut Table<'_>) -> Read<DShape> {
         }
     };
     Ok(DShape::Ellipsoid { centre, axes })
+}
+
+fn triangle(table: &mut Table<'_>) -> Read<[DVec3; 3]> {
+    let corners = list(table.need("corners")?, Value::vector)?;
+    corners.try_into().map_err(|_| table.fault("a [[triangle]] has three \"corners\""))
 }
 
 fn polygon(table: &mut Table<'_>) -> Read<DShape> {

@@ -114,8 +114,9 @@ impl<'t> Table<'t> {
         Fault { at: self.at, message: message.into() }
     }
 
-    pub(super) fn name(&self) -> &str {
-        &self.name
+    /// Where it stands.
+    pub(super) fn at(&self) -> usize {
+        self.at
     }
 }
 
