@@ -446,6 +446,26 @@ fn the_sun_casts_shadows() {
     assert!(left > 2.0 * dark && right > 2.0 * other, "{left} {dark} {other} {right}");
 }
 
+/// Where white is cut off, and nowhere else; what it advises helps.
+#[test]
+fn a_picture_that_is_mostly_white_says_so() {
+    let folder = Folder::new();
+    let lamp = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 10\nmaterial = \"a\"\n[material.a]\nemission = [40, 40, 40]\n";
+    std::fs::write(folder.path("lamp.toml"), lamp).unwrap();
+    let said = |name: &str, flags: &[&str]| {
+        let (scene, picture) = (folder.path("lamp.toml"), folder.path(name));
+        let view = ["render", &scene, "-o", &picture, "--size", "16x16", "--eye", "0,0,30", "--look-at", "0,0,0"];
+        let output = twincast(&[&view[..], flags].concat());
+        assert!(output.status.success());
+        text(&output.stderr)
+    };
+    let told = said("a.png", &[]);
+    assert!(told.starts_with("warning: ") && told.contains("a.png: 100 % of what is seen"), "{told}");
+    assert!(told.contains("--exposure -7 would"), "{told}");
+    assert_eq!(said("a.png", &["--exposure", "-7"]), "");
+    assert_eq!(said("a.exr", &[]), "");
+}
+
 #[test]
 fn a_printed_camera_gives_the_picture_again() {
     let folder = Folder::new();
@@ -620,4 +640,22 @@ fn frames_of_an_animation() {
     assert!(code == 3 && said.contains("/animations: no animation \"none\"; the file has 0"), "{said}");
     let (code, said) = render(&["--variant", "red", "-o", &path("one.exr")]);
     assert!(code == 3 && said.contains("the file has none"), "{said}");
+}
+
+/// Each of the first twenty, and the others together.
+#[test]
+fn many_faulty_meshes_are_told_together() {
+    let folder = Folder::new();
+    let mut obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\n".to_owned();
+    for k in 0..25 {
+        // A triangle, and one without area.
+        obj += &format!("usemtl {k}\nf 1 2 3\nf 1 2 4\n");
+    }
+    std::fs::write(folder.path("many.obj"), obj).unwrap();
+    let output = twincast(&["info", &folder.path("many.obj")]);
+    let told = text(&output.stdout);
+    assert_eq!(told.lines().filter(|line| line.starts_with("geometry ")).count(), 20, "{told}");
+    let (_, others) = told.split_once("5 other geometries (--json has each):\n").expect("the others");
+    assert!(others.trim_start().starts_with("5 degenerate triangles\n"), "{told}");
+    assert_eq!(told.matches("1 degenerate triangles").count(), 20, "{told}");
 }

@@ -21,16 +21,19 @@ pub fn text(bytes: &[u8]) -> String {
 pub struct Running(Option<Child>);
 
 impl Running {
+    /// Of a program that was started.
     pub fn new(child: Child) -> Self {
         Self(Some(child))
     }
 
+    /// At once, without a word.
     pub fn kill(&mut self) {
         if let Some(child) = &mut self.0 {
             let _ = child.kill();
         }
     }
 
+    /// Of the process.
     pub fn id(&self) -> u32 {
         self.0.as_ref().expect("it runs").id()
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use bytemuck::{Pod, try_cast_vec};
 use image::error::ImageError;
-use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use crate::error::{Error, Result, one_line};
 use crate::image::{guarded, is_cut_short};
@@ -26,6 +26,30 @@ const SHARE: f64 = 0.75;
 /// The formats that are read, for messages.
 const FORMATS: &str = "PNG, JPEG, WebP, BMP or Targa picture";
 
+/// Why a picture is none.
+enum Refusal {
+    /// It is in a format, or a kind of one, that is not read.
+    Unsupported(String),
+    /// It is broken, or too large.
+    Broken(String),
+}
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        Self::Broken(message)
+    }
+}
+
+impl From<ImageError> for Refusal {
+    fn from(error: ImageError) -> Self {
+        let message = one_line(&error.to_string());
+        match error {
+            ImageError::Unsupported(_) => Self::Unsupported(format!("is no {FORMATS} that can be read: {message}")),
+            _ => Self::Broken(format!("is a broken picture: {message}")),
+        }
+    }
+}
+
 /// A picture; or why a material that names it may do without: it is missing, or in another format.
 pub(super) type Opened = std::result::Result<Texture, String>;
 
@@ -42,10 +66,11 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
         Err(e) => return Err(Error::input(path, "", super::system_message(&e))),
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if format(&bytes, &name).is_none() {
-        return Ok(Err(format!("texture {:?} is no {FORMATS}; convert it to one of these", path.display())));
+    match read(&bytes, &name) {
+        Ok(texture) => Ok(Ok(texture)),
+        Err(Refusal::Unsupported(why)) => Ok(Err(format!("texture {:?} {why}", path.display()))),
+        Err(Refusal::Broken(why)) => Err(Error::input(path, "", why)),
     }
-    decode(&bytes, &name).map(Ok).map_err(|message| Error::input(path, "", message))
 }
 
 /// The file of a name that stands in `file`. Names from Windows have backslashes.
@@ -74,7 +99,12 @@ fn format(bytes: &[u8], name: &str) -> Option<ImageFormat> {
 /// # Errors
 /// A message about what is wrong.
 pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
-    let format = format(bytes, name).ok_or_else(|| format!("is no {FORMATS}"))?;
+    read(bytes, name).map_err(|(Refusal::Unsupported(message) | Refusal::Broken(message))| message)
+}
+
+fn read(bytes: &[u8], name: &str) -> std::result::Result<Texture, Refusal> {
+    let unsupported = || Refusal::Unsupported(format!("is no {FORMATS}; convert it to one of these"));
+    let format = format(bytes, name).ok_or_else(unsupported)?;
     let reader = || {
         let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
         reader.limits(limits());
@@ -83,22 +113,27 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
     // The size first, and without limits of the library's, whose message would not say it.
     let mut sizing = reader();
     sizing.no_limits();
-    let sizing = sizing.into_decoder().map_err(|e| broken(&e))?;
+    let sizing = sizing.into_decoder()?;
     let ((width, height), color) = (sizing.dimensions(), sizing.color_type());
     let pixels = u64::from(width) * u64::from(height);
     if width.max(height) > LONGEST_SIDE || pixels > MOST_PIXELS {
-        return Err(format!(
-            "claims {width} x {height} pixels; at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all are read"
-        ));
+        let most = format!("at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all are read");
+        return Err(format!("claims {width} x {height} pixels; {most}").into());
     }
     if is_cut_short(bytes) {
-        return Err("is a broken picture: it is cut short".to_owned());
+        return Err("is a broken picture: it is cut short".to_owned().into());
     }
     let is_deep = color.bytes_per_pixel() > color.channel_count();
     // As it is decoded, and as it stays. Each texture may be small enough, and all of them too many.
-    let bytes = pixels * (u64::from(color.bytes_per_pixel()) + if is_deep { 8 } else { 4 });
-    check_memory(bytes, process::available()).map_err(|m| format!("claims {width} x {height} pixels, {m}"))?;
-    let image = guarded(|| reader().decode().map_err(|e| broken(&e)))?;
+    let size = pixels * (u64::from(color.bytes_per_pixel()) + if is_deep { 8 } else { 4 });
+    check_memory(size, process::available()).map_err(|m| format!("claims {width} x {height} pixels, {m}"))?;
+    let mut image = guarded(|| reader().decode().map_err(Refusal::from))?;
+    if let (ImageFormat::Tga, Some(0), DynamicImage::ImageRgba8(image)) =
+        (format, bytes.get(17).map(|flags| flags & 15), &mut image)
+    {
+        // The fourth byte of a pixel is unused where the header counts no bits of alpha.
+        image.pixels_mut().for_each(|pixel| pixel.0[3] = 255);
+    }
     let pixels = if is_deep {
         Pixels::from(in_fours(image.into_rgba16().into_raw()))
     } else {
@@ -130,13 +165,6 @@ fn limits() -> Limits {
     limits.max_image_height = Some(LONGEST_SIDE);
     limits.max_alloc = Some(MOST_MEMORY);
     limits
-}
-
-fn broken(error: &ImageError) -> String {
-    match error {
-        ImageError::Unsupported(_) => format!("is no {FORMATS} that can be read: {}", one_line(&error.to_string())),
-        _ => format!("is a broken picture: {}", one_line(&error.to_string())),
-    }
 }
 
 #[cfg(test)]

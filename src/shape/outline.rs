@@ -8,7 +8,8 @@
 //! an edge or a corner is seen as such: it is inside. Two polygons that share an edge leave no gap.
 //!
 //! Of many corners, boxes around runs of them, in a binary tree, tell which edges the half-line's own line passes by: the
-//! sign of a box's corner that is farthest to a side is exact, too.
+//! sign of a box's corner that is farthest to a side is exact, too. An outline that runs to and fro across that line has all of
+//! its edges looked at.
 
 use std::ops::Range;
 
@@ -181,7 +182,7 @@ mod tests {
     use super::*;
     use crate::ray::Ray;
 
-    /// With boxes as without, also where lines pass through corners and along edges.
+    /// With boxes as without, also where lines pass through corners and along edges, whichever axes these run along.
     #[test]
     fn boxes_leave_out_nothing() {
         let mut state = 5u64;
@@ -190,22 +191,23 @@ mod tests {
             ((state >> 40) % most as u64) as i32 as f32
         };
         let (mut inside, mut outside) = (0, 0);
-        for count in [RUN, RUN + 1, 100, 1000] {
+        for (turn, count) in (0..3).flat_map(|turn| [RUN, RUN + 1, 100, 1000].map(|count| (turn, count))) {
+            let turned = |v: Vec3| Vec3::new(v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]);
             // A walk over a coarse grid, which crosses itself and goes along its axes.
             let mut at = Vec3::new(0.0, 0.0, 3.0);
-            let corners: Vec<Vec3> = (0..count)
-                .map(|k| {
-                    at[k % 2] += random(7) - 3.0;
-                    at
-                })
-                .collect();
+            let mut step = |k: usize| {
+                at[k % 2] += random(7) - 3.0;
+                turned(at)
+            };
+            let corners: Vec<Vec3> = (0..count).map(&mut step).collect();
             let outline = Outline::new(corners.clone());
             assert_eq!(outline.boxes.is_empty(), count <= RUN);
             let alone = Outline { corners: corners.clone(), boxes: Vec::new() };
-            for k in 0..2000 {
-                let target =
-                    corners[random(count as i32) as usize] + Vec3::new(random(5) - 2.0, random(5) - 2.0, 0.0) * 0.5;
-                let aside = Vec3::new(random(9) - 4.0, random(9) - 4.0, 8.0) * if k % 2 == 0 { 1.0 } else { -1.0 };
+            for k in 0..1000 {
+                let beside = Vec3::new(random(5) - 2.0, random(5) - 2.0, 0.0) * 0.5;
+                let target = corners[random(count as i32) as usize] + turned(beside);
+                let aside =
+                    turned(Vec3::new(random(9) - 4.0, random(9) - 4.0, 8.0)) * if k % 2 == 0 { 1.0 } else { -1.0 };
                 let line = Line::new(&Ray::new(target - aside, aside), 1000.0);
                 let expected = alone.contains(&line);
                 assert_eq!(outline.contains(&line), expected, "{count} corners, at {target} from {aside}");
@@ -213,5 +215,21 @@ mod tests {
             }
         }
         assert!(inside > 500 && outside > 500, "{inside} {outside}");
+    }
+
+    /// Of a circle a half-line's line comes near two runs of edges.
+    #[test]
+    fn most_edges_are_passed_by() {
+        let corner = |k: u32| {
+            let (sin, cos) = (k as f32 * std::f32::consts::TAU / 1600.0).sin_cos();
+            Vec3::new(sin, cos, 0.0)
+        };
+        let outline = Outline::new((0..1600).map(corner).collect());
+        let line = Line::new(&Ray::new(Vec3::new(0.3, 0.4, 5.0), Vec3::NEG_Z), 5.0);
+        let count = Count { outline: &outline, line: &line, along: 0, across: 1, is_inside: false };
+        let leaves = &outline.boxes[outline.boxes.len() / 2..];
+        let met = leaves.iter().filter(|bounds| !count.passes_by(bounds)).count();
+        assert_eq!((leaves.len(), met), (128, 2));
+        assert!(outline.contains(&line));
     }
 }

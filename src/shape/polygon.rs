@@ -1,10 +1,10 @@
 //! A polygon with any number of corners, convex or not, also one that crosses itself.
 //!
-//! Whether the line passes inside is the outline's to say ([`Outline`]). Where the line meets the plane is computed by itself. Four corners in f32 hardly ever lie in one plane: the
-//! polygon's is that of Newell's normal (Sutherland, Sproull, Schumacker 1974, *A characterization of ten
-//! hidden-surface algorithms*) through the mean of the corners, in f64, and corners may be off it by
-//! [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the corners. Triangulating, the simpler
-//! way, would choose among outlines that are not the polygon's where it is not flat.
+//! Whether the line passes inside is the outline's to say ([`Outline`]). Where the line meets the plane is computed by
+//! itself. Four corners in f32 hardly ever lie in one plane: the polygon's is that of Newell's normal (Sutherland,
+//! Sproull, Schumacker 1974, *A characterization of ten hidden-surface algorithms*) through the mean of the corners, in
+//! f64, and corners may be off it by [`Polygon::FLATNESS`] of the polygon's size. Hits stay within the bounds of the
+//! corners. Triangulating, the simpler way, would choose among outlines that are not the polygon's where it is not flat.
 
 use super::distance::Support;
 use super::flat::Flat;
@@ -101,8 +101,9 @@ impl Polygon {
         let corners: Vec<Vec3> = self.corners().iter().map(|p| in_f32(p.as_dvec3() + offset)).collect();
         Self::new(corners.clone()).unwrap_or_else(|_| Self {
             outline: Outline::new(corners),
+            centre: self.centre,
+            normal: self.normal,
             bounds: Aabb::EMPTY,
-            ..self.clone()
         })
     }
 

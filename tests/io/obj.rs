@@ -317,17 +317,21 @@ fn faults_in_what_it_refers_to_name_that() {
 #[test]
 fn textures_in_other_formats_are_left_out() {
     let obj = format!("mtllib a.mtl\n{VERTICES}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
-    // TIFF, which is as long as Targa's header; DDS; nothing.
-    for bytes in [&b"II*\0\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..], b"DDS |\0\0\0\x07\x10\0\0", b"x"] {
+    // TIFF, which is as long as Targa's header; DDS; Targa in 16 bits of grey; nothing.
+    for bytes in [
+        &b"II*\0\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..],
+        b"DDS |\0\0\0\x07\x10\0\0",
+        b"\0\0\x03\0\0\0\0\0\0\0\0\0\x01\0\x01\0\x10\0ab",
+        b"x",
+    ] {
         let files = Files::one("a.obj", &obj).and("a.mtl", "newmtl a\nmap_Kd a.tga\n").and("a.tga", bytes);
         let (scene, warnings) = files.load("a.obj");
         assert_eq!((scene.primitive_count(), scene.textures.len()), (1, 0));
         let [warning] = &warnings[..] else { panic!("{warnings:?}") };
         assert_eq!((&warning.path, warning.place.as_str()), (&files.path("a.mtl"), "line 2"));
-        assert!(
-            warning.message.contains("a.tga\" is no PNG, JPEG, WebP, BMP or Targa picture; convert it"),
-            "{warning}"
-        );
+        let (is_targa, message) = (bytes.starts_with(b"\0\0\x03"), &warning.message);
+        let why = if is_targa { "picture that can be read" } else { "picture; convert it" };
+        assert!(message.contains(&format!("a.tga\" is no PNG, JPEG, WebP, BMP or Targa {why}")), "{warning}");
     }
 }
 
@@ -358,6 +362,7 @@ fn textures_in_bmp_and_targa() {
         // Its suffix is all that tells Targa.
         ("a.png", targa(0, 2, 32, 0x28, deep), 128),
         ("a.tga", targa(0, 2, 32, 0x28, deep), 128),
+        ("e.tga", targa(0, 2, 32, 0x20, deep), 255),
         ("b.TGA", targa(0, 2, 24, 0, from_below), 255),
         ("c.tga", targa(4, 1, 8, 0x20, of_a_palette), 255),
         ("d.tga", targa(0, 10, 24, 0x20, runs), 255),

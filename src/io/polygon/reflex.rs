@@ -54,7 +54,8 @@ impl<'a> Reflex<'a> {
         }
     }
 
-    /// Whether one is in the triangle or on its edges, which none is beside the triangle's box, even if there is no telling from the edges. Corners that coincide with one of its own do not count: they are bridges to holes.
+    /// Whether one is in the triangle or on its edges. Rounding may put a corner that is far along an edge on the inner side of all three: outside the triangle's box
+    /// none counts. Corners that coincide with one of its own do not count: they are bridges to holes.
     pub fn any_in(&mut self, triangle: [DVec2; 3]) -> bool {
         self.any_below(0, 0..self.order.len(), triangle)
     }

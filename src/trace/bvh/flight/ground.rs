@@ -33,7 +33,7 @@ pub(super) trait Ground {
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
     fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
-    /// As [`Blocks::are_far`] and what follows it.
+    /// Whether corners are to be fetched ahead, in two steps before blocks are asked for ([`Blocks::are_far`]).
     #[inline(always)]
     fn are_far(&self) -> bool {
         false

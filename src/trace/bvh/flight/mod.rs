@@ -308,7 +308,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
         }
         let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
         let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
-        let are_far = G::IS_PUT_TOGETHER && ground.are_far();
+        let are_far = S::PREFETCHES && G::IS_PUT_TOGETHER && ground.are_far();
         while !flying.is_empty() {
             let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
             for k in arrived {

@@ -92,6 +92,8 @@ pub(super) trait Simd {
     fn by_component(triangles: &[[&Vec3; 3]; 8]) -> [[Self::V8; 3]; 3];
     /// Has four cache lines loaded that will be needed soon. A hint: there may be nothing.
     fn prefetch(address: *const u8);
+    /// Whether anything is loaded for it.
+    const PREFETCHES: bool = true;
     /// Has the cache line with this value loaded.
     fn prefetch_line<T>(value: &T);
     /// Has all of these loaded.

@@ -24,6 +24,8 @@ impl Simd for Portable {
     #[inline(always)]
     fn prefetch(_: *const u8) {}
 
+    const PREFETCHES: bool = false;
+
     #[inline(always)]
     fn prefetch_line<T>(_: &T) {}
 
