@@ -308,12 +308,6 @@ fn corner_count(statement: &mut Statement<'_>) -> Placeless<u32> {
 
 fn triangles(corners: &[DVec3]) -> Placeless<Vec<[u32; 3]>> {
     let mut triangles = Vec::new();
-    let divided = triangulate(corners, &mut triangles);
-    divided.ok_or_else(|| {
-        format!(
-            "a polygon of {} corners crosses itself too often to be divided into triangles; write smaller ones",
-            corners.len()
-        )
-    })?;
+    triangulate(corners, &mut triangles)?;
     Ok(triangles)
 }

@@ -104,11 +104,8 @@ impl Piece {
             around.clear();
             around.extend(positions[first..at].iter().map(|&i| obj.positions[i as usize]));
             parts.clear();
-            polygon::triangulate(&around, &mut parts).ok_or_else(|| {
-                let message =
-                    format!("a face with {corners} corners crosses itself too often to be split; write smaller faces");
-                Error::input(path, format!("line {line}"), message)
-            })?;
+            let split = polygon::triangulate(&around, &mut parts);
+            split.map_err(|message| Error::input(path, format!("line {line}"), message))?;
             parts.iter().for_each(|triangle| each(triangle.map(|k| first + k as usize)));
         }
         (at..self.corners.end).step_by(3).for_each(|k| each([k, k + 1, k + 2]));

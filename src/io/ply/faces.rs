@@ -40,12 +40,7 @@ impl Faces {
                     around.clear();
                     around.extend(corners.iter().map(|&i| positions.get(i)));
                     parts.clear();
-                    polygon::triangulate(&around, &mut parts).ok_or_else(|| {
-                        format!(
-                            "a face with {} corners crosses itself too often to be split; write smaller faces",
-                            corners.len()
-                        )
-                    })?;
+                    polygon::triangulate(&around, &mut parts)?;
                     self.triangles.extend(parts.iter().map(|t| t.map(|k| corners[k as usize])));
                 }
                 _ => self.small += 1,

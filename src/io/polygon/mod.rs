@@ -11,6 +11,7 @@ use std::collections::VecDeque;
 use std::iter;
 
 use self::reflex::Reflex;
+use super::Placeless;
 use crate::math::{DVec2, DVec3};
 
 /// Most corners and boxes of corners that are looked at for one polygon of so many corners: some seconds, and for a million corners some more. A hundred for
@@ -23,12 +24,14 @@ const fn most_looks(count: usize) -> usize {
 /// `triangles`. Polygons that cross themselves, have no area or have corners that are not finite get triangles too.
 ///
 /// # Errors
-/// None where the polygon is so large, and crosses itself so often, that it would take too long; nothing is appended then.
-pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Option<()> {
-    triangulate_within(most_looks(corners.len()), corners, triangles)
+/// A message where the polygon is so large, and crosses itself so often, that it would take too long; nothing is appended then.
+pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Placeless<()> {
+    let count = corners.len();
+    triangulate_within(most_looks(count), corners, triangles)
+        .ok_or_else(|| format!("a face with {count} corners crosses itself too often to be split; write smaller faces"))
 }
 
-/// The same, with a bound on how many corners and boxes of corners may be looked at.
+/// The same, with a bound on how many corners and boxes of corners may be looked at; none where these do not do.
 fn triangulate_within(most: usize, corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Option<()> {
     let count = corners.len();
     let projected = if count > 3 { project(corners) } else { Vec::new() };
@@ -218,7 +221,7 @@ mod tests {
         let mut triangles = vec![[7, 8, 9]];
         assert_eq!(triangulate_within(2000, &corners, &mut triangles), None);
         assert_eq!(triangles, [[7, 8, 9]]);
-        assert_eq!(triangulate(&corners, &mut triangles), Some(()));
+        assert_eq!(triangulate(&corners, &mut triangles), Ok(()));
         assert_eq!(triangles.len(), 1 + 298);
     }
 

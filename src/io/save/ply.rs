@@ -79,8 +79,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
                 for polygon in polygons(shapes) {
                     let corners: Vec<DVec3> = polygon.corners().iter().map(|p| p.as_dvec3()).collect();
                     let mut triangles = Vec::new();
-                    triangulate(&corners, &mut triangles)
-                        .ok_or_else(|| io::Error::other("a polygon is too large to divide into triangles"))?;
+                    triangulate(&corners, &mut triangles).map_err(io::Error::other)?;
                     triangles.iter().try_for_each(|corners| face(first, corners))?;
                     first += corners.len() as u32;
                 }

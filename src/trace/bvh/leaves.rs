@@ -37,15 +37,11 @@ pub(super) trait Blocks {
     fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// Where in memory it is.
     fn address<S: Simd>(&self, index: u32) -> *const u8;
-    /// Whether corners are fetched from far, so that it helps to have them loaded before: first by which vertices a block's triangles are, then these.
+    /// The numbers, where corners are fetched from so far that it helps to have them loaded before: first the triangles of a block, then their vertices.
     #[inline(always)]
-    fn are_far(&self) -> bool {
-        false
+    fn far(&self) -> Option<&Numbers> {
+        None
     }
-    #[inline(always)]
-    fn prefetch_triangles<S: Simd>(&self, _index: u32) {}
-    #[inline(always)]
-    fn prefetch_vertices<S: Simd>(&self, _index: u32) {}
 }
 
 impl Blocks for [Block] {
@@ -71,29 +67,8 @@ impl Blocks for Numbers {
         S::address(&self.blocks, index)
     }
     #[inline(always)]
-    fn are_far(&self) -> bool {
-        self.are_far
-    }
-    #[inline(always)]
-    fn prefetch_triangles<S: Simd>(&self, index: u32) {
-        self.for_each(
-            index,
-            #[inline(always)]
-            |mesh, primitive| S::prefetch_line(&mesh.triangles[primitive as usize]),
-        );
-    }
-    #[inline(always)]
-    fn prefetch_vertices<S: Simd>(&self, index: u32) {
-        self.for_each(
-            index,
-            #[inline(always)]
-            |mesh, primitive| {
-                let [a, b, c] = mesh.triangles[primitive as usize];
-                S::prefetch_line(&mesh.positions[a as usize]);
-                S::prefetch_line(&mesh.positions[b as usize]);
-                S::prefetch_line(&mesh.positions[c as usize]);
-            },
-        );
+    fn far(&self) -> Option<&Numbers> {
+        self.are_far.then_some(self)
     }
 }
 
@@ -332,6 +307,31 @@ impl Numbers {
             let (mesh, primitive) = self.meshes.find(number);
             mesh.corners(primitive)
         }))
+    }
+
+    /// Has loaded by which vertices a block's triangles are.
+    #[inline(always)]
+    pub fn prefetch_triangles<S: Simd>(&self, index: u32) {
+        self.for_each(
+            index,
+            #[inline(always)]
+            |mesh, primitive| S::prefetch_line(&mesh.triangles[primitive as usize]),
+        );
+    }
+
+    /// Has these loaded.
+    #[inline(always)]
+    pub fn prefetch_vertices<S: Simd>(&self, index: u32) {
+        self.for_each(
+            index,
+            #[inline(always)]
+            |mesh, primitive| {
+                let [a, b, c] = mesh.triangles[primitive as usize];
+                S::prefetch_line(&mesh.positions[a as usize]);
+                S::prefetch_line(&mesh.positions[b as usize]);
+                S::prefetch_line(&mesh.positions[c as usize]);
+            },
+        );
     }
 
     /// Each triangle of a block.

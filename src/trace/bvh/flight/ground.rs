@@ -7,7 +7,7 @@ use crate::trace::bvh::Bvh;
 use crate::trace::bvh::addresses::Addresses;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::filter::{Candidates, Filter};
-use crate::trace::bvh::leaves::Blocks;
+use crate::trace::bvh::leaves::{Blocks, Numbers};
 use crate::trace::bvh::node::{Child, Node, Tree};
 use crate::trace::bvh::query::Verdict;
 use crate::trace::bvh::simd::Simd;
@@ -33,15 +33,11 @@ pub(super) trait Ground {
     fn node(&self, space: Space, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
     fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
-    /// Whether corners are to be fetched ahead, in two steps before blocks are asked for ([`Blocks::are_far`]).
+    /// What corners are to be fetched ahead from ([`Blocks::far`]).
     #[inline(always)]
-    fn are_far(&self) -> bool {
-        false
+    fn far(&self) -> Option<&Numbers> {
+        None
     }
-    #[inline(always)]
-    fn prefetch_triangles<S: Simd>(&self, _index: u32) {}
-    #[inline(always)]
-    fn prefetch_vertices<S: Simd>(&self, _index: u32) {}
     /// Where in memory a node is, or a leaf's first block, or a placement.
     fn address(&self, space: Space, next: Child) -> *const u8;
 }
@@ -82,16 +78,8 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
         self.leaves.block::<S>(index, scratch)
     }
     #[inline(always)]
-    fn are_far(&self) -> bool {
-        self.leaves.are_far()
-    }
-    #[inline(always)]
-    fn prefetch_triangles<S: Simd>(&self, index: u32) {
-        self.leaves.prefetch_triangles::<S>(index);
-    }
-    #[inline(always)]
-    fn prefetch_vertices<S: Simd>(&self, index: u32) {
-        self.leaves.prefetch_vertices::<S>(index);
+    fn far(&self) -> Option<&Numbers> {
+        self.leaves.far()
     }
     #[inline(always)]
     fn address(&self, _: Space, next: Child) -> *const u8 {

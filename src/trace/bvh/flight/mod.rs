@@ -308,7 +308,7 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
         }
         let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
         let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
-        let are_far = S::PREFETCHES && G::IS_PUT_TOGETHER && ground.are_far();
+        let far = ground.far().filter(|_| S::PREFETCHES);
         while !flying.is_empty() {
             let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
             for k in arrived {
@@ -321,9 +321,9 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                     flying.remove(k);
                 }
             }
-            if are_far {
+            if let Some(numbers) = far {
                 for k in at_leaves {
-                    ground.prefetch_triangles::<S>(flight.next[k].first());
+                    numbers.prefetch_triangles::<S>(flight.next[k].first());
                 }
             }
             for k in at_nodes {
@@ -331,9 +331,9 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                 let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
                 flight.send::<S, G>(k, next, ground);
             }
-            if are_far {
+            if let Some(numbers) = far {
                 for k in at_leaves {
-                    ground.prefetch_vertices::<S>(flight.next[k].first());
+                    numbers.prefetch_vertices::<S>(flight.next[k].first());
                 }
             }
             if G::IS_PUT_TOGETHER {
