@@ -1,8 +1,11 @@
 //! Leaving out vertices that no triangle uses.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
+
+use crate::scene::Mesh;
 
 /// Corners or vertices that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -38,6 +41,26 @@ pub(super) fn compact(corners: &mut [u32], count: usize) -> Option<Vec<u32>> {
 /// What becomes of the vertices with these indices.
 pub(super) fn pick<T: Send>(used: &[u32], make: impl Fn(usize) -> T + Sync) -> Vec<T> {
     used.par_iter().with_min_len(TASK).map(|&i| make(i as usize)).collect()
+}
+
+/// The values with these indices; none where there are none.
+pub(super) fn choose<T: Copy + Send + Sync>(used: &[u32], values: &[T]) -> Vec<T> {
+    if values.is_empty() { Vec::new() } else { pick(used, |i| values[i]) }
+}
+
+/// The mesh of the vertices with these indices, and of triangles over them.
+pub(super) fn with_vertices(mesh: &Mesh, used: &[u32], triangles: Vec<[u32; 3]>) -> Mesh {
+    Mesh {
+        name: mesh.name.clone(),
+        origin: mesh.origin,
+        positions: Arc::new(choose(used, &mesh.positions)),
+        normals: choose(used, &mesh.normals),
+        uvs: choose(used, &mesh.uvs),
+        second_uvs: choose(used, &mesh.second_uvs),
+        colors: choose(used, &mesh.colors),
+        triangles: Arc::new(triangles),
+        material: mesh.material,
+    }
 }
 
 #[cfg(test)]

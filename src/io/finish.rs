@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::Normals;
-use super::compact::{compact, pick};
+use super::compact::{compact, with_vertices};
 use super::weld::weld;
 use crate::error::Warning;
 use crate::math::{Vec2, Vec3};
@@ -21,16 +21,11 @@ pub(super) fn drop_strays(mesh: &mut Mesh) {
     if mesh.triangles.is_empty() || outermost_are_used(&mesh.positions, mesh.triangles.as_flattened()) {
         return;
     }
-    let count = mesh.positions.len();
-    let Some(used) = compact(Arc::make_mut(&mut mesh.triangles).as_flattened_mut(), count) else { return };
-    fn keep<T: Copy + Send + Sync>(used: &[u32], values: &[T]) -> Vec<T> {
-        if values.is_empty() { Vec::new() } else { pick(used, |i| values[i]) }
-    }
-    mesh.positions = Arc::new(keep(&used, &mesh.positions));
-    mesh.normals = keep(&used, &mesh.normals);
-    mesh.uvs = keep(&used, &mesh.uvs);
-    mesh.second_uvs = keep(&used, &mesh.second_uvs);
-    mesh.colors = keep(&used, &mesh.colors);
+    let mut triangles = Arc::unwrap_or_clone(std::mem::take(&mut mesh.triangles));
+    *mesh = match compact(triangles.as_flattened_mut(), mesh.positions.len()) {
+        Some(used) => with_vertices(mesh, &used, triangles),
+        None => Mesh { triangles: Arc::new(triangles), ..std::mem::take(mesh) },
+    };
 }
 
 /// Whether, of those that are farthest along each axis, one each way is a triangle's corner. Most often all vertices are: to look for six of them among the

@@ -34,6 +34,13 @@ impl Key for [u32; 3] {
     }
 }
 
+impl Key for [u32; 4] {
+    fn hash(&self) -> u64 {
+        let [a, b, c, d] = self.map(u64::from);
+        mix(mix(a | b << 32) ^ (c | d << 32))
+    }
+}
+
 impl Key for [u64; 3] {
     fn hash(&self) -> u64 {
         self.iter().fold(0, |hash, word| mix(hash ^ word))

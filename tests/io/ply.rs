@@ -1,6 +1,7 @@
 //! PLY, in its three encodings.
 
 use twincast::math::{DVec3, Vec2, Vec3, Vec4};
+use twincast::scene::Mesh;
 
 use super::{Files, corners, meshes, refused_bytes};
 
@@ -92,18 +93,170 @@ fn a_texture_that_a_comment_names() {
     let scene = Files::one("a.ply", text(named, "", "")).and("my picture.png", super::obj::picture()).scene("a.ply");
     assert_eq!((scene.materials[0].diffuse_texture, scene.textures.len()), (Some(0), 1));
     assert_eq!((scene.materials[0].diffuse, meshes(&scene)[0].uvs[1]), (Vec3::ONE, Vec2::X));
-    let coordinates = "property list uchar float texcoord\n";
     for (text, place, words) in [
         (text(named, "", ""), "line 3", "my picture.png\" is missing"),
-        (text(named, coordinates, " 6 0 0 1 0 0 1"), "line 3", "faces have them"),
-        (text(named, "", "").replace("texture_u", "other"), "line 3", "vertices do not have them"),
+        (text(named, "", "").replace("texture_u", "other"), "line 3", "neither vertices nor faces have them"),
         (text(&named.repeat(2), "", ""), "line 3", "several textures"),
-        (text("", "property uchar red\n", " 255"), "line 9", "colours of faces"),
     ] {
         let (scene, warnings) = Files::one("a.ply", text).load("a.ply");
         assert_eq!((scene.primitive_count(), scene.textures.len()), (1, 0));
         let [warning] = &warnings[..] else { panic!("{words}: {warnings:?}") };
         assert!(warning.place == place && warning.message.contains(words), "{warning}");
+    }
+}
+
+/// Faces over two squares side by side, in the three encodings: their corners, and the values of the properties that are
+/// declared. Vertices may have properties that are bytes, which are 200.
+fn with_faces(comments: &str, of_vertex: &str, of_face: &str, faces: [(&[u32], &[Value]); 3]) -> [Vec<u8>; 3] {
+    let vertices = [[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [2.0, 0.0], [2.0, 1.0]];
+    let encodings = ["ascii", "binary_little_endian", "binary_big_endian"];
+    encodings.map(|encoding| {
+        let mut bytes = format!(
+            "ply\nformat {encoding} 1.0\n{comments}element vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+             {of_vertex}element face 3\nproperty list uchar int vertex_indices\n{of_face}end_header\n"
+        )
+        .into_bytes();
+        let mut put = |value: &Value| match encoding {
+            "ascii" => bytes.extend(value.text().bytes()),
+            "binary_big_endian" => bytes.extend(value.bytes().iter().rev()),
+            _ => bytes.extend(value.bytes()),
+        };
+        for [x, y] in vertices {
+            [x, y, 0.0].iter().for_each(|&x| put(&Value::Float(x)));
+            of_vertex.lines().for_each(|_| put(&Value::Byte(200)));
+        }
+        for (corners, values) in faces {
+            put(&Value::Byte(corners.len() as u8));
+            corners.iter().for_each(|&corner| put(&Value::Int(corner as i32)));
+            values.iter().for_each(&mut put);
+        }
+        bytes
+    })
+}
+
+/// A value in a PLY file.
+#[derive(Clone, Copy)]
+enum Value {
+    Byte(u8),
+    Int(i32),
+    Float(f32),
+}
+
+impl Value {
+    fn text(self) -> String {
+        match self {
+            Self::Byte(value) => format!("{value} "),
+            Self::Int(value) => format!("{value} "),
+            Self::Float(value) => format!("{value}\n"),
+        }
+    }
+
+    /// Little-endian.
+    fn bytes(self) -> Vec<u8> {
+        match self {
+            Self::Byte(value) => vec![value],
+            Self::Int(value) => value.to_le_bytes().to_vec(),
+            Self::Float(value) => value.to_le_bytes().to_vec(),
+        }
+    }
+}
+
+/// Texture coordinates as MeshLab and OpenMVS write them: at a face's corners.
+fn coordinates(uvs: &[[f32; 2]], number: Option<i32>) -> Vec<Value> {
+    let list =
+        [Value::Byte(2 * uvs.len() as u8)].into_iter().chain(uvs.as_flattened().iter().map(|&x| Value::Float(x)));
+    list.chain(number.map(Value::Int)).collect()
+}
+
+const TEXCOORD: &str = "property list uchar float texcoord\n";
+
+/// A seam runs between the triangles, none between the second and the square.
+#[test]
+fn texture_coordinates_of_faces() {
+    let uvs: [&[[f32; 2]]; 3] = [
+        &[[0.0, 0.0], [0.5, 0.0], [0.5, 0.5]],
+        &[[0.75, 0.0], [0.875, 0.5], [0.75, 0.5]],
+        &[[0.5, 0.0], [1.0, 0.0], [1.0, 0.5], [0.875, 0.5]],
+    ];
+    let values = uvs.map(|uvs| coordinates(uvs, None));
+    let faces = [(&[0, 1, 2][..], &values[0][..]), (&[0, 2, 3], &values[1]), (&[1, 4, 5, 2], &values[2])];
+    let named = "comment TextureFile my picture.png\n";
+    for bytes in with_faces(named, "", TEXCOORD, faces) {
+        let scene = Files::one("a.ply", bytes).and("my picture.png", super::obj::picture()).scene("a.ply");
+        let mesh = meshes(&scene)[0];
+        let found: Vec<_> = mesh.triangles.iter().map(|t| t.map(|i| mesh.uvs[i as usize].to_array())).collect();
+        let [a, b, c] = uvs;
+        assert_eq!(found[..2], [[a[0], a[1], a[2]], [b[0], b[1], b[2]]]);
+        // However the square is divided, its corners are where they were.
+        for (&corner, uv) in mesh.triangles[2..].as_flattened().iter().zip(found[2..].as_flattened()) {
+            let place = mesh.positions[corner as usize].truncate();
+            let k = [Vec2::X, Vec2::new(2.0, 0.0), Vec2::new(2.0, 1.0), Vec2::ONE].iter().position(|p| *p == place);
+            assert_eq!(*uv, c[k.unwrap()]);
+        }
+        // Two vertices at (0, 0), two at (1, 1), one at each of the others.
+        assert_eq!((mesh.positions.len(), found.len()), (8, 4));
+        assert_eq!((scene.materials[0].diffuse_texture, scene.materials[0].diffuse), (Some(0), Vec3::ONE));
+    }
+    let odd = with_faces(named, "", TEXCOORD, [faces[0], (&[0, 2, 3, 1], &values[1]), faces[2]]);
+    for (bytes, place) in odd.into_iter().zip(["line 41", "byte 391", "byte 388"]) {
+        refused_bytes("a.ply", bytes, place, "6 numbers for a face of 4 corners");
+    }
+}
+
+#[test]
+fn several_textures() {
+    let uvs: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let [one, none, two] = [Some(1), Some(-1), Some(2)].map(|number| coordinates(&uvs[..3], number));
+    let zero = coordinates(&uvs, Some(0));
+    let property = format!("{TEXCOORD}property int texnumber\n");
+    let named = "comment TextureFile a.png\ncomment TextureFile b.png\n";
+    let load = |second: &[Value], bytes: usize| {
+        let faces = [(&[0, 1, 2][..], &one[..]), (&[0, 2, 3], second), (&[1, 4, 5, 2], &zero)];
+        let bytes = with_faces(named, "", &property, faces)[bytes].clone();
+        Files::one("a.ply", bytes).and("a.png", super::obj::picture()).and("b.png", super::obj::picture()).load("a.ply")
+    };
+    for encoding in 0..3 {
+        let (scene, warnings) = load(&none, encoding);
+        assert_eq!(warnings, []);
+        let names: Vec<_> = scene.files[scene.files.len() - 2..].iter().map(|file| file.file_name().unwrap()).collect();
+        assert_eq!(names, ["a.png", "b.png"]);
+        // The square, the first triangle, and the one that has no texture.
+        let [square, first, bare] = meshes(&scene)[..] else { panic!("three meshes are expected") };
+        let of = |mesh: &Mesh| scene.materials[mesh.material as usize].diffuse_texture;
+        assert_eq!([square, first, bare].map(of), [Some(0), Some(1), None]);
+        assert_eq!(corners(first), [[Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0)]]);
+        assert_eq!(corners(bare), [[Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]]);
+        assert_eq!((square.positions.len(), square.triangles.len(), first.positions.len()), (4, 2, 3));
+        let (scene, warnings) = load(&two, encoding);
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.message.contains("1 triangles have a texnumber past the last TextureFile, 1"), "{warning}");
+        assert_eq!((scene.textures.len(), scene.materials[2].diffuse_texture), (2, None));
+    }
+}
+
+/// As of segmented meshes.
+#[test]
+fn colours_of_faces() {
+    let colors = ["red", "green", "blue"].map(|name| format!("property uchar {name}\n")).concat();
+    let [red, blue] = [[255, 0, 0], [0, 0, 255]].map(|rgb: [u8; 3]| rgb.map(Value::Byte));
+    let faces = [(&[0, 1, 2][..], &red[..]), (&[0, 2, 3], &blue), (&[1, 4, 5, 2], &red)];
+    for bytes in with_faces("", "", &colors, faces) {
+        let scene = Files::one("a.ply", bytes).scene("a.ply");
+        let mesh = meshes(&scene)[0];
+        let of = |i: u32| mesh.colors[i as usize].truncate();
+        let found: Vec<_> = mesh.triangles.iter().map(|t| t.map(of)).collect();
+        assert_eq!(found, [[Vec3::X; 3], [Vec3::Z; 3], [Vec3::X; 3], [Vec3::X; 3]]);
+        // The square shares two vertices with the red triangle, the blue one none.
+        assert_eq!((mesh.positions.len(), scene.materials[0].diffuse), (8, Vec3::ONE));
+    }
+    for bytes in with_faces("", &colors, &colors, faces) {
+        let (scene, warnings) = Files::one("a.ply", bytes).load("a.ply");
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.place == "line 10" && warning.message.contains("vertices have colours as well"), "{warning}");
+        let mesh = meshes(&scene)[0];
+        assert!(
+            mesh.positions.len() == 6 && mesh.colors.iter().all(|c| *c == mesh.colors[0] && c.x == c.y && c.x < 1.0)
+        );
     }
 }
 

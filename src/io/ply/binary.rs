@@ -3,6 +3,7 @@
 use bytemuck::Zeroable;
 
 use super::Items;
+use super::color::Color;
 use super::header::{Element, Scalar};
 use super::vertices::{Layout, Positions, Vertices};
 use crate::io::Placeless;
@@ -133,12 +134,12 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
         };
         let normal = |normal| self.each(count, stride, &fields, |value| Layout::normal(normal, value));
         let uv = |uv| self.each(count, stride, &fields, |value| Layout::uv(uv, value));
-        let color = |rgb| self.each(count, stride, &fields, |value| layout.color(rgb, value));
+        let color = |color: &Color| self.each(count, stride, &fields, |value| color.linear(value));
         let vertices = Vertices {
             positions,
             normals: layout.normal.map_or(Vec::new(), normal),
             uvs: layout.uv.map_or(Vec::new(), uv),
-            colors: layout.rgb.map_or(Vec::new(), color),
+            colors: layout.color.as_ref().map_or(Vec::new(), color),
         };
         self.skip(count * stride);
         Some(vertices)

@@ -1,24 +1,66 @@
 //! The elements face and tristrips: lists of corners.
 
-use super::header::Element;
+use super::header::{Element, Header};
+use super::item::Item;
 use super::vertices::Positions;
-use super::{Items, TELL, read_list};
+use super::wedges::Wedges;
+use super::{Items, TELL};
 use crate::io::{Placeless, polygon};
 
 /// The face and tristrips elements.
 #[derive(Default)]
 pub(super) struct Faces {
+    /// Indices of vertices, or of wedges where there are such.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// What faces have of their own.
+    pub(super) wedges: Option<Wedges>,
     /// Faces with fewer than three corners.
     pub(super) small: u64,
 }
 
 impl Faces {
+    /// None so far, of a file with this header.
+    pub(super) fn new(header: &Header) -> Self {
+        Self { wedges: Wedges::of(header), ..Self::default() }
+    }
+
     pub(super) fn read(&mut self, element: &Element, items: &mut impl Items, positions: &Positions) -> Placeless<()> {
         let list = indices(element)?;
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
-        // Behind those of strips that came first.
+        let read = if self.wedges.is_some() { 0 } else { self.read_at_once(element, items, positions) };
+        let coordinates = self.wedges.as_ref().and_then(|wedges| wedges.coordinates);
+        let lists: Vec<usize> = [list].into_iter().chain(coordinates).collect();
+        let mut item = Item::of(element);
+        let (mut corners, mut around, mut parts) = (Vec::new(), Vec::new(), Vec::new());
+        for i in read..count {
+            if i % TELL == 0 {
+                items.tell();
+            }
+            item.read(element, items, &lists)?;
+            whole(&item.lists[list], positions.len(), &mut corners)?;
+            if corners.len() < 3 {
+                self.small += 1;
+                continue;
+            }
+            parts.clear();
+            if corners.len() > 3 {
+                around.clear();
+                around.extend(corners.iter().map(|&i| positions.get(i)));
+                polygon::triangulate(&around, &mut parts)?;
+            } else {
+                parts.push([0, 1, 2]);
+            }
+            if let Some(wedges) = &mut self.wedges {
+                wedges.face(&item, &mut corners, parts.len())?;
+            }
+            self.triangles.extend(parts.iter().map(|t| t.map(|k| corners[k as usize])));
+        }
+        Ok(())
+    }
+
+    /// Reads the triangles at the beginning that are records of one size, behind those of strips that came first, and gives their number.
+    fn read_at_once(&mut self, element: &Element, items: &mut impl Items, positions: &Positions) -> usize {
         let at_once = items.triangles(element, positions.len());
         let read = at_once.len();
         if self.triangles.is_empty() {
@@ -26,27 +68,7 @@ impl Faces {
         } else {
             self.triangles.extend(at_once)
         }
-        let (mut values, mut corners) = (Vec::new(), Vec::new());
-        let (mut around, mut parts) = (Vec::new(), Vec::new());
-        for i in read..count {
-            if i % TELL == 0 {
-                items.tell();
-            }
-            read_list(element, items, list, &mut values)?;
-            whole(&values, positions.len(), &mut corners)?;
-            match corners[..] {
-                [a, b, c] => self.triangles.push([a, b, c]),
-                [_, _, _, _, ..] => {
-                    around.clear();
-                    around.extend(corners.iter().map(|&i| positions.get(i)));
-                    parts.clear();
-                    polygon::triangulate(&around, &mut parts)?;
-                    self.triangles.extend(parts.iter().map(|t| t.map(|k| corners[k as usize])));
-                }
-                _ => self.small += 1,
-            }
-        }
-        Ok(())
+        read
     }
 
     /// Strips of triangles, one after the other in each list; -1 ends a strip.
@@ -57,10 +79,11 @@ impl Faces {
         positions: &Positions,
     ) -> Placeless<()> {
         let list = indices(element)?;
-        let (mut values, mut strip) = (Vec::new(), Vec::new());
+        let mut item = Item::of(element);
+        let mut strip = Vec::new();
         for _ in 0..element.count {
-            read_list(element, items, list, &mut values)?;
-            for part in values.split(|&i| i == -1.0) {
+            item.read(element, items, &[list])?;
+            for part in item.lists[list].split(|&i| i == -1.0) {
                 whole(part, positions.len(), &mut strip)?;
                 self.triangles.extend(strip.windows(3).enumerate().filter_map(|(k, w)| {
                     // Every other triangle turns the other way; strips are stitched with triangles without area.
@@ -76,7 +99,7 @@ impl Faces {
 /// The list of corners among an element's properties.
 pub(super) fn indices(element: &Element) -> Placeless<usize> {
     let names = ["vertex_indices", "vertex_index"];
-    let index = element.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()));
+    let index = element.list(&names);
     index.ok_or_else(|| format!("element {} needs the list property {}", element.name, names[0]))
 }
 

@@ -105,15 +105,22 @@ impl Scalar {
     }
 }
 
-impl Element {
-    /// Whether it has a property of this name, be it a value or a list.
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.properties.iter().any(|p| p.name == name)
+impl Header {
+    /// The element of this name.
+    pub(super) fn element(&self, name: &str) -> Option<&Element> {
+        self.elements.iter().find(|element| element.name == name)
     }
+}
 
+impl Element {
     /// The first property that is a value and has one of the names.
     pub(super) fn index(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|p| p.list.is_none() && names.contains(&p.name.as_str()))
+    }
+
+    /// The first property that is a list and has one of the names.
+    pub(super) fn list(&self, names: &[&str]) -> Option<usize> {
+        self.properties.iter().position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
     }
 }
 

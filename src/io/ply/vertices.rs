@@ -1,10 +1,15 @@
 //! The element vertex: positions, and what else a mesh has at its vertices.
 
+use std::sync::Arc;
+
+use super::color::Color;
 use super::header::{Element, Scalar};
-use super::{Items, TELL, read_item};
-use crate::image::srgb;
+use super::item::Item;
+use super::{Items, TELL};
 use crate::io::Placeless;
+use crate::io::compact::{choose, pick};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::scene::Mesh;
 
 /// Which of an element's properties is what.
 pub(super) struct Layout {
@@ -12,10 +17,8 @@ pub(super) struct Layout {
     /// As all other attributes, none unless all its parts are there.
     pub(super) normal: Option<[usize; 3]>,
     pub(super) uv: Option<[usize; 2]>,
-    pub(super) rgb: Option<[usize; 3]>,
-    alpha: Option<usize>,
-    /// The types of all properties.
-    scalars: Vec<Scalar>,
+    pub(super) color: Option<Color>,
+    is_double: bool,
 }
 
 impl Layout {
@@ -27,20 +30,18 @@ impl Layout {
         };
         let normal = ["nx", "ny", "nz"].map(|axis| index(&[axis]));
         let uv = [["u", "s", "texture_u", "texcoord_u"], ["v", "t", "texture_v", "texcoord_v"]];
-        let rgb = [["red", "r", "diffuse_red"], ["green", "g", "diffuse_green"], ["blue", "b", "diffuse_blue"]];
         Ok(Self {
             position: [x, y, z],
             normal: all(normal),
             uv: all(uv.map(|names| index(&names))),
-            rgb: all(rgb.map(|names| index(&names))),
-            alpha: index(&["alpha", "a", "diffuse_alpha"]),
-            scalars: element.properties.iter().map(|p| p.scalar).collect(),
+            color: Color::of(element),
+            is_double: [x, y, z].iter().any(|&i| element.properties[i].scalar == Scalar::F64),
         })
     }
 
     /// Whether positions are f64.
     pub(super) fn is_double(&self) -> bool {
-        self.position.iter().any(|&i| self.scalars[i] == Scalar::F64)
+        self.is_double
     }
 
     // Each takes a function that gives the values of properties by their index.
@@ -56,24 +57,11 @@ impl Layout {
     pub(super) fn uv(uv: [usize; 2], value: impl Fn(usize) -> f64) -> Vec2 {
         Vec2::from(uv.map(|i| value(i) as f32))
     }
-
-    pub(super) fn color(&self, rgb: [usize; 3], value: impl Fn(usize) -> f64) -> Vec4 {
-        let alpha = self.alpha.map_or(1.0, |i| value(i) / self.scalars[i].full());
-        Vec3::from(rgb.map(|i| channel(self.scalars[i], value(i)))).extend(alpha.clamp(0.0, 1.0) as f32)
-    }
 }
 
-fn all<const N: usize>(indices: [Option<usize>; N]) -> Option<[usize; N]> {
+/// The indices, unless one is missing.
+pub(super) fn all<const N: usize>(indices: [Option<usize>; N]) -> Option<[usize; N]> {
     indices.iter().all(Option::is_some).then(|| indices.map(Option::unwrap_or_default))
-}
-
-/// A colour channel as linear light: whole numbers are sRGB-encoded, floats linear already.
-fn channel(scalar: Scalar, value: f64) -> f32 {
-    match scalar {
-        Scalar::U8 => srgb::srgb_to_linear(value as u8),
-        Scalar::F32 | Scalar::F64 => (value / scalar.full()).max(0.0) as f32,
-        _ => srgb::decode((value / scalar.full()).clamp(0.0, 1.0)) as f32,
-    }
 }
 
 /// As precise as the file has them.
@@ -126,15 +114,39 @@ impl Vertices {
             vertices.positions = Positions::Double(Vec::new());
         }
         vertices.reserve(element.count as usize, &layout);
-        let mut values = vec![0.0; element.properties.len()];
+        let mut item = Item::of(element);
         for i in 0..element.count as usize {
-            read_item(element, items, |_| false, |index, value| values[index] = value)?;
-            vertices.push(&layout, |index| values[index]);
+            item.read(element, items, &[])?;
+            vertices.push(&layout, |index| item.values[index]);
             if i % TELL == 0 {
                 items.tell();
             }
         }
         Ok(vertices)
+    }
+
+    /// Those with these indices.
+    pub(super) fn of(self, indices: &[u32]) -> Self {
+        Self {
+            positions: match self.positions {
+                Positions::Single(positions) => Positions::Single(pick(indices, |i| positions[i])),
+                Positions::Double(positions) => Positions::Double(pick(indices, |i| positions[i])),
+            },
+            normals: choose(indices, &self.normals),
+            uvs: choose(indices, &self.uvs),
+            colors: choose(indices, &self.colors),
+        }
+    }
+
+    /// The mesh of triangles over them.
+    pub(super) fn mesh(self, triangles: Vec<[u32; 3]>) -> Mesh {
+        let Self { positions, normals, uvs, colors } = self;
+        let mut mesh = Mesh { triangles: Arc::new(triangles), normals, uvs, colors, ..Mesh::default() };
+        match positions {
+            Positions::Single(positions) => mesh.positions = Arc::new(positions),
+            Positions::Double(positions) => mesh.set_positions(&positions),
+        }
+        mesh
     }
 
     fn reserve(&mut self, count: usize, layout: &Layout) {
@@ -144,7 +156,7 @@ impl Vertices {
         }
         self.normals.reserve_exact(layout.normal.map_or(0, |_| count));
         self.uvs.reserve_exact(layout.uv.map_or(0, |_| count));
-        self.colors.reserve_exact(layout.rgb.map_or(0, |_| count));
+        self.colors.reserve_exact(layout.color.as_ref().map_or(0, |_| count));
     }
 
     fn push(&mut self, layout: &Layout, value: impl Fn(usize) -> f64) {
@@ -154,6 +166,6 @@ impl Vertices {
         }
         self.normals.extend(layout.normal.map(|normal| Layout::normal(normal, &value)));
         self.uvs.extend(layout.uv.map(|uv| Layout::uv(uv, &value)));
-        self.colors.extend(layout.rgb.map(|rgb| layout.color(rgb, &value)));
+        self.colors.extend(layout.color.as_ref().map(|color| color.linear(&value)));
     }
 }
