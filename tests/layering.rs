@@ -24,11 +24,9 @@ const LAYERS: &[&[&str]] = &[
 /// Files and folders that may say `unsafe`.
 const UNSAFE: &[&str] = &[
     "trace/embree/",
-    "trace/bvh/isa.rs",
     "trace/bvh/simd/",
     "trace/bvh/build/lanes.rs",
-    "trace/bvh/room.rs",
-    "trace/bvh/stack.rs",
+    "trace/bvh/walk/stack.rs",
     "cli/leave.rs",
     "image/loading.rs",
     "image/oiio/bridge.rs",

@@ -12,6 +12,7 @@ mod file;
 mod mapped;
 mod prefetch;
 pub(crate) mod process;
+pub(crate) mod room;
 
 pub(crate) use array::Array;
 #[cfg(all(feature = "oiio", target_os = "linux"))]

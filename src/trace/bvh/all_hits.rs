@@ -5,16 +5,16 @@
 
 use super::Bvh;
 use super::block::LANES;
-use super::filter::Filter;
-use super::isa::{self, Kernel};
-use super::level::{Level, Through};
+use super::levels::place::{Blur, Place};
+use super::levels::placements::walk_over;
+use super::levels::triangles::TriangleTree;
+use super::levels::{Level, Through};
 use super::node::Child;
-use super::place::{Blur, Place};
-use super::placements::walk_over;
 use super::query::Closest;
+use super::reject::filter::Filter;
+use super::reject::slab::SlabRay;
 use super::simd::Simd;
-use super::slab::SlabRay;
-use super::triangles::TriangleTree;
+use super::simd::isa::{self, Kernel};
 use super::walk::{self, Visit};
 use crate::ray::{Hit, Ray};
 use crate::shape::crossing;

@@ -7,14 +7,14 @@
 use std::fmt;
 
 use super::alone::Search;
+use super::build::preset::Options;
 use super::build::{self, Record};
-use super::isa::{self, Kernel, Present};
+use super::levels::place::Blur;
 use super::node::{Child, Tree};
-use super::place::Blur;
-use super::preset::Options;
 use super::query::Closest;
+use super::reject::slab::SlabRay;
 use super::simd::Simd;
-use super::slab::SlabRay;
+use super::simd::isa::{self, Kernel, Present};
 use super::walk::{self, Visit};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::Ray;

@@ -6,20 +6,20 @@
 //! all hits are wanted, open triangles are told with the sure ones: to fetch corners one by one, while rays wait, took an eighth. Ids are told, and bounds on t; the caller computes t.
 //!
 //! What no single triangle can tell is left to the caller: which of several hits at nearly the same t is first, who are told together; and how often a ray crosses
-//! at an edge, for which it decides the ray by [`super::candidates`].
+//! at an edge, for which it decides the ray by [`super::alone::candidates`].
 
 use std::marker::PhantomData;
 
 use super::Bvh;
 use super::block::{Block, LANES};
-use super::filter::Candidates;
 use super::flight::{self, Decide};
-use super::found::{Found, NONE};
-use super::isa::{self, Kernel};
-use super::listed::Listed;
-use super::place::Blur;
+use super::hits::found::{Found, NONE};
+use super::hits::listed::Listed;
+use super::levels::place::Blur;
 use super::query::{Query, Verdict};
+use super::reject::filter::Candidates;
 use super::simd::Simd;
+use super::simd::isa::{self, Kernel};
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 

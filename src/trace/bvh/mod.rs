@@ -1,111 +1,84 @@
 //! The native tracer: a bounding volume hierarchy with eight children a node.
 //!
-//! | file | idea |
+//! | of the tree | |
 //! | --- | --- |
-//! | `node` | the tree: 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*) |
-//! | `build` | binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*), and which branches become nodes |
-//! | `preset` | what a tree is built for: speed of building, of tracing, or memory |
-//! | `clusters` | the fast preset: triangles along a curve |
-//! | `cache` | a tree in a file, for the next time |
+//! | `node`, `block` | 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*); eight triangles together |
+//! | `build/` | binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*), and which branches become nodes; what a tree is built for (`preset`): speed of building, of tracing, or memory |
+//! | `levels/` | what a world becomes: triangles and shapes of one coordinate system (`triangles`, `shapes`, `leaves`; along a curve, `clusters`), placed objects (`place`, `placements`), those that move (`moving`), how far objects reach (`support`, `farthest`) |
+//! | `meshes` | where corners are fetched from the mesh |
+//! | `cache/` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
-//! | `slab` | boxes against a ray, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*) |
-//! | `ready` | rays made ready eight at a time |
-//! | `batch`, `arrivals`, `query` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle; the two questions |
-//! | `flight`, `set`, `addresses` | single rays, several of them in turn; which of them take a step; where what they need next lies in memory |
-//! | `bundle` | 64 rays that start, or end, in one point, at once |
-//! | `walk`, `stack` | one ray by itself, from the root to the leaves; what waits meanwhile |
-//! | `level` | triangles and shapes of one coordinate system |
-//! | `triangles`, `shapes`, `placements` | what leaves hold: triangles, shapes, placed objects |
-//! | `support`, `farthest` | how far objects reach, for the boxes around them where they are placed; the search for that |
-//! | `moving` | placed objects that move |
-//! | `place` | an object in its place, and how far rays in its coordinates may be off |
-//! | `leaves`, `meshes`, `room` | where blocks are kept, or fetched from the mesh; arrays written in place by all threads |
-//! | `alone` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
-//! | `packet` | eight or sixteen rays of a caller's that go the same way, at once |
-//! | `boxes` | a tree over boxes of the caller's |
-//! | `certain`, `candidates`, `listed` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
-//! | `all_hits` | all crossings of a ray, in order, each of them once |
-//! | `near`, `discs` | the triangles that may be nearest to a point, eight boxes and eight discs at a time |
-//! | `closest_point` | the point of all triangles that is nearest to a given one |
-//! | `block`, `woop`, `planes`, `filter`, `found` | eight triangles together, what a single ray rejects of them, and what it keeps |
-//! | `coplanar` | surfaces that lie on each other |
-//! | `quad`, `noted` | t, u and v of four hits, of which only the triangles are noted |
-//! | `steps` | what a ray cannot but look at, counted |
-//! | `simd`, `isa` | the same code compiled for AVX-512, for AVX2 and for any processor |
 //!
-//! Three trees and not one with mixed leaves: each leaf loop knows its kind, and a scene without shapes or without
-//! instances has none of the second and third.
+//! | of rays and what they meet | |
+//! | --- | --- |
+//! | `simd/` | the same code compiled for AVX-512, for AVX2 and for any processor, and which of them runs (`isa`) |
+//! | `reject/` | what a ray cannot hit: boxes, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*), and triangles |
+//! | `hits/` | what it has hit: noted, listed, decided, computed |
+//! | `query` | what is asked: the closest hit, or whether there is one; and all that a query of another kind has to say |
+//!
+//! | how rays travel | |
+//! | --- | --- |
+//! | `batch/` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle (`arrivals`) |
+//! | `bundle/` | 64 rays that start, or end, in one point, at once |
+//! | `flight/` | single rays, several of them in turn; which of them take a step (`set`); where what they need next lies in memory (`addresses`) |
+//! | `packet/` | eight or sixteen rays of a caller's that go the same way, at once |
+//! | `alone/` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
+//! | `walk/` | one ray by itself, from the root to the leaves, through any tree; what waits meanwhile (`stack`) |
+//!
+//! | other questions | |
+//! | --- | --- |
+//! | `all_hits` | all crossings of a ray, in order, each of them once |
+//! | `near/` | the triangles that may be nearest to points, eight boxes and eight discs at a time; the nearest point of all triangles (`closest_point`) |
+//! | `certain` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
+//! | `boxes` | a tree over boxes of the caller's |
+//! | `steps` | what a ray cannot but look at, counted |
+//!
+//! Trees for triangles, shapes and placed objects, still and moving, and not one with mixed leaves: each leaf loop knows its kind, and a
+//! scene without shapes or instances has none for them.
 //!
 //! Boxes only ever reject what cannot be hit, and `shape::triangle::intersect` depends on
 //! the ray and the corners alone, so the answer is the same for every order of traversal, packet width and
 //! instruction set.
 
-mod addresses;
 mod all_hits;
 mod alone;
-mod arrivals;
 mod batch;
 mod block;
 mod boxes;
 mod build;
 mod bundle;
 mod cache;
-mod candidates;
 mod certain;
-mod closest_point;
-mod clusters;
-mod coplanar;
-mod discs;
-mod farthest;
-mod filter;
 mod flight;
-mod found;
-mod isa;
-mod leaves;
-mod level;
-mod listed;
+mod hits;
+mod levels;
 mod meshes;
-mod moving;
 mod near;
 mod node;
-mod noted;
 mod packet;
-mod place;
-mod placements;
-mod planes;
-mod preset;
-mod quad;
 mod query;
 #[cfg(test)]
 mod random;
-mod ready;
 mod refit;
-mod room;
-mod set;
-mod shapes;
+mod reject;
 mod simd;
-mod slab;
-mod stack;
 mod steps;
-mod support;
-mod triangles;
 mod walk;
-mod woop;
 
 pub use alone::{Search, SingleRay, Travel, TriangleFound};
 pub(crate) use batch::prepare_thread;
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
-pub(super) use discs::Discs;
+pub(super) use levels::place::Blur;
+pub(super) use near::discs::Discs;
 pub(super) use near::{NearestTriangle, Sought, Surveyor};
-pub(super) use place::Blur;
 pub(super) use query::Verdict;
 
+pub use build::preset::{Options, Preset};
 pub use cache::{Cache, CacheReport, CacheUse};
-pub use closest_point::ClosestPoint;
-pub use isa::Isa;
+pub use near::closest_point::ClosestPoint;
 pub use packet::{Asked, Packet, PacketHits};
-pub use preset::{Options, Preset};
+pub use simd::isa::Isa;
 pub use steps::Steps;
 
 use std::fmt;
@@ -117,12 +90,12 @@ use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
-use isa::Present;
-use level::Level;
-use moving::MovingTree;
-use placements::PlacementTree;
+use levels::Level;
+use levels::moving::MovingTree;
+use levels::placements::PlacementTree;
+use levels::triangles::TriangleTree;
 use query::{Closest, Occluded};
-use triangles::TriangleTree;
+use simd::isa::Present;
 
 /// The native tracer.
 pub struct Bvh {

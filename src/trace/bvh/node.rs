@@ -7,9 +7,9 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::build::{NODE_COST, Record};
-use super::room;
 use crate::math::{Aabb, UNIT_ROUNDOFF, Vec3};
 use crate::memory::Array;
+use crate::memory::room;
 use crate::trace::limits;
 
 /// Children of a node.

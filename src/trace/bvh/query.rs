@@ -1,10 +1,11 @@
-//! The two questions a ray asks, as types: kernels are compiled once for each.
+//! What a ray asks, as types: kernels are compiled once for each. The two questions of every tracer are here, those in f64 in
+//! [`certain`](super::certain).
 
 use super::Bvh;
 use super::block::Block;
-use super::filter::Candidates;
-use super::found::Found;
-use super::listed::Listed;
+use super::hits::found::Found;
+use super::hits::listed::Listed;
+use super::reject::filter::Candidates;
 use crate::ray::{Hit, Ray};
 use crate::trace::nearest::Nearest;
 

@@ -6,11 +6,11 @@
 //! scenes*), the alternative, would change the tree's layout under a cached file.
 
 use super::Bvh;
-use super::level::Level;
-use super::moving::MovingTree;
-use super::placements::PlacementTree;
-use super::preset::Options;
-use super::shapes::ShapeTree;
+use super::build::preset::Options;
+use super::levels::Level;
+use super::levels::moving::MovingTree;
+use super::levels::placements::PlacementTree;
+use super::levels::shapes::ShapeTree;
 use crate::error::{Error, Result};
 use crate::trace::unbounded::Unbounded;
 use crate::trace::{Part, World};

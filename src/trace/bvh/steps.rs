@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::Bvh;
-use super::level::Level;
+use super::levels::Level;
+use super::levels::place::{Blur, Place};
+use super::levels::placements::among_boxes;
 use super::node::{Child, Tree};
-use super::place::{Blur, Place};
-use super::placements::among_boxes;
+use super::reject::slab::SlabRay;
 use super::simd::{Mask, Portable};
-use super::slab::SlabRay;
 use crate::ray::Ray;
 use crate::trace::Tracer;
 

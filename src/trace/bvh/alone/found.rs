@@ -6,7 +6,7 @@ use crate::math::{Vec3, triangle_normal};
 use crate::ray::Hit;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{LANES, Lane};
-use crate::trace::bvh::found::Found;
+use crate::trace::bvh::hits::found::Found;
 use crate::trace::bvh::simd::{Array, Doubles, Simd, Three, Vector};
 
 /// A triangle that is hit.

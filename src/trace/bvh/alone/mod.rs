@@ -12,6 +12,7 @@
 //! A caller's single ray is asked of the fixed triangles only: shapes and placements are those of [`Tracer`](crate::Tracer), whose many rays
 //! go on from place to place.
 
+pub(super) mod candidates;
 mod found;
 mod row;
 mod some;
@@ -20,18 +21,17 @@ use std::ops::ControlFlow;
 
 use super::Bvh;
 use super::block::{Block, LANES};
-use super::candidates;
-use super::coplanar::Spot;
-use super::filter::{Candidates, Filter};
-use super::found::{Found, NONE};
-use super::isa::{self, Kernel};
-use super::place::Blur;
-use super::placements::FIXED;
+use super::hits::coplanar::Spot;
+use super::hits::found::{Found, NONE};
+use super::levels::place::Blur;
+use super::levels::placements::FIXED;
+use super::levels::triangles::TriangleTree;
 use super::query::{Closest, Occluded, Query};
-use super::ready::ReadyRay;
+use super::reject::filter::{Candidates, Filter};
+use super::reject::ready::ReadyRay;
+use super::reject::slab::{SlabRay, most_t};
 use super::simd::Simd;
-use super::slab::{SlabRay, most_t};
-use super::triangles::TriangleTree;
+use super::simd::isa::{self, Kernel};
 use super::walk::{self, Entered, Visit};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle;

@@ -1,16 +1,16 @@
 //! A ray by itself, made ready for nodes and triangles in as few instructions as will do.
 //!
 //! An axis a lane. Most rays have directions of which no component is small against the largest, and are where products do not overflow: for
-//! these the bounds of [`slab`](super::super::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The
+//! these the bounds of [`slab`](crate::trace::bvh::reject::slab) need neither replacements nor open axes, and numbers that are not finite fail the same tests. The
 //! others are made ready as those of everyone else, out of the way.
 
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::filter::{self, Filter};
-use crate::trace::bvh::place::Blur;
+use crate::trace::bvh::levels::place::Blur;
+use crate::trace::bvh::reject::filter::{self, Filter};
+use crate::trace::bvh::reject::slab::{HUGE, SLIGHT, SlabRay, least_t};
+use crate::trace::bvh::reject::woop::{Margin, SLACK};
 use crate::trace::bvh::simd::{Array, Mask, Portable, Simd, Three, Turned, Vector};
-use crate::trace::bvh::slab::{HUGE, SLIGHT, SlabRay, least_t};
-use crate::trace::bvh::woop::{Margin, SLACK};
 
 /// A ray by itself, in the order in which Embree's `RTCRay` begins: a caller's can be read where it is.
 #[repr(C)]

@@ -1,17 +1,17 @@
 //! Some rays that make no bundle, one after the other.
 //!
-//! A few rays make no flight ([`super::super::flight`]) worth its name: while one waits, none of the others has a step to take.
+//! A few rays make no flight ([`crate::trace::bvh::flight`]) worth its name: while one waits, none of the others has a step to take.
 
 use super::{Doubted, Noted, SingleRay};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::found::{Found, NONE};
-use crate::trace::bvh::place::{Blur, EightRays, Place};
-use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::hits::found::{Found, NONE};
+use crate::trace::bvh::levels::place::{Blur, EightRays, Place};
+use crate::trace::bvh::levels::placements::FIXED;
+use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::query::{Closest, Query};
-use crate::trace::bvh::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
+use crate::trace::bvh::reject::ready::{ReadyRay, ReadyRays, columns_of, ready_blurred};
 use crate::trace::bvh::simd::{Simd, everywhere};
-use crate::trace::bvh::triangles::TriangleTree;
 use crate::trace::bvh::walk::{self, Visit};
 
 /// How rays travel that make no bundle. Hits do not depend on it.

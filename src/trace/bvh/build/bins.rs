@@ -165,8 +165,8 @@ mod tests {
     use super::*;
     use crate::math::{Aabb, Vec3};
     use crate::trace::bvh::build::record::aabb;
-    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     struct Fill<'a>(&'a mut Bins<8>, &'a [Record], Grid);
 

@@ -122,9 +122,9 @@ mod tests {
     use super::*;
     use crate::math::Aabb;
     use crate::trace::bvh::build::record::aabb;
-    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
+    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     const RULE: Rule = Rule { block: 2, leaf: 6 };
 

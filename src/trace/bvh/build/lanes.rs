@@ -147,7 +147,7 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn both_give_the_same_bits() {
-        use crate::trace::bvh::isa::{self, Kernel, Present};
+        use crate::trace::bvh::simd::isa::{self, Kernel, Present};
         use crate::trace::bvh::simd::{Array, Simd};
         struct All([[f32; 8]; 3], [f32; RANKED]);
         impl Kernel for All {

@@ -29,6 +29,7 @@ mod children;
 mod collapse;
 pub(super) mod lanes;
 pub(super) mod morton;
+pub(super) mod preset;
 pub(super) mod presplit;
 mod record;
 mod split;
@@ -38,9 +39,9 @@ mod top;
 
 use rayon::prelude::*;
 
+use self::preset::Options;
 use super::node::{Child, Node, Tree};
-use super::preset::Options;
-use super::room;
+use crate::memory::room;
 use children::Children;
 pub(super) use record::{Record, triangle_items};
 use split::{Range, Rule};
@@ -207,9 +208,9 @@ mod tests {
 
     use super::*;
     use crate::math::{Aabb, Vec3};
-    use crate::trace::bvh::isa::Isa;
     use crate::trace::bvh::node::widened;
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::isa::Isa;
 
     /// Boxes of a size, scattered by a linear congruence; numbered in order.
     fn items(count: u32, size: f32) -> Vec<Record> {

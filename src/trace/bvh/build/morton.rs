@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
 use crate::memory;
+use crate::memory::room;
 use crate::trace::bvh::meshes::{Mesh, Meshes};
-use crate::trace::bvh::room;
 
 /// Bits of a code for the three axes together.
 const BITS: u32 = 30;

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use super::record::Record;
 use crate::math::{Aabb, Vec3};
+use crate::memory::room;
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::Child;
-use crate::trace::bvh::room;
 
 /// New references for each triangle, at most.
 const BUDGET: f64 = 0.3;

@@ -193,7 +193,7 @@ impl Split {
         let centres = S::V8::load(&range.centres);
         let (mut left_centres, mut right_centres) = (left.add(left).min(centres), right.add(right).min(centres));
         if let Cut::Plane { axis, at } = self.cut {
-            // No single lane is stored: see `Grid::new`.
+            // No single lane is stored: see `bins`.
             let [others, opposite_others] = [S::V8::load(&ALL_BUT[axis + 4]), S::V8::load(&ALL_BUT[axis])];
             left_centres = S::V8::splat(at).max(others).min(left_centres);
             right_centres = S::V8::splat(-at).max(opposite_others).min(right_centres);
@@ -240,9 +240,9 @@ mod tests {
     use crate::math::Aabb;
     use crate::trace::bvh::build::record::aabb;
     use crate::trace::bvh::build::top::PartitionKernel;
-    use crate::trace::bvh::isa::{Present, dispatch};
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
+    use crate::trace::bvh::simd::isa::{Present, dispatch};
 
     /// Costs of which many are equal, and some are no cost.
     fn cost() -> impl Strategy<Value = f32> {

@@ -5,9 +5,9 @@ use super::bins::{self, Bins, Grid};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::sweep;
-use crate::trace::bvh::isa::{self, Kernel, Present};
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::isa::{self, Kernel, Present};
 
 /// Ranges of at most this many items are pieces of one thread.
 const PIECE: u32 = 1 << 11;

@@ -8,7 +8,7 @@ use super::bins::{Bins, MANY};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::subtree::binned;
-use crate::trace::bvh::isa::{self, Kernel, Present};
+use crate::trace::bvh::simd::isa::{self, Kernel, Present};
 use crate::trace::bvh::simd::{Portable, Simd, Vector};
 
 /// Items in a chunk.

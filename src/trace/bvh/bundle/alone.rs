@@ -6,11 +6,11 @@ use super::rays::RAYS;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
-use crate::trace::bvh::found::{Found, NONE};
+use crate::trace::bvh::hits::found::{Found, NONE};
 use crate::trace::bvh::query::Closest;
-use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::reject::ready::{MANY, ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::reject::slab::most_t;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::slab::most_t;
 
 /// The closest hits of the rays of a bit mask in one placed object.
 #[inline(always)]

@@ -12,8 +12,8 @@ use super::rays::{Bundle, axes};
 use super::rows::{ROWS, Rows};
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::LANES;
+use crate::trace::bvh::reject::slab::HUGE;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
-use crate::trace::bvh::slab::HUGE;
 
 /// Rectangles of slopes around eight triangles.
 pub(super) struct Footprints {

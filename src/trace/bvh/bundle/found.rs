@@ -4,12 +4,12 @@ use super::rays::{Bundle, PerRay, RAYS};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::found::NONE;
-use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::noted::{FourHits, Rays, Shared, splat, widen};
-use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::hits::found::NONE;
+use crate::trace::bvh::hits::noted::{FourHits, Rays, Shared, splat, widen};
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::nearest::Nearest;
 
 /// What the rays of a bundle have hit so far.
@@ -187,7 +187,7 @@ fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer;
 /// For fixed ones what remains of [`triangle::intersect`](crate::shape::triangle::intersect) is whether f64 is precise enough.
 /// It is: where a hit is sure, height and slope are known to a quarter of themselves in f32 ([`Edges`](super::edges::Edges)). f64 rounds
 /// 2^29 times finer, and a t known to 2^-27 is wanted; both count some 50 roundings of the same products. For a ray by itself ([`single`](super::single)),
-/// [`woop`](super::super::woop) shows it.
+/// [`woop`](crate::trace::bvh::reject::woop) shows it.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "four lanes of everything")]
 fn answer_some<S: Simd, Q: Query>(

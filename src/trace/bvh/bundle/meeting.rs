@@ -13,9 +13,9 @@ use super::rays::{Bundle, TINY, axes};
 use super::rows;
 use super::walk::Walk;
 use crate::trace::bvh::block::LANES;
-use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
 
 /// Block `index` of a leaf that rays of these rows enter, before `most`.

@@ -11,7 +11,7 @@
 //! - **Decisions**: edge functions and t' carry bounds on their rounding errors. Where these leave no doubt, a hit is only
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
 //!   and v of what was noted are computed four rays at a time
-//!   ([`TriangleTree::hits`](super::triangles::TriangleTree::hits)), with the bits that a single ray would get.
+//!   ([`TriangleTree::hits`](super::levels::triangles::TriangleTree::hits)), with the bits that a single ray would get.
 //! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
 //!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`alone`]).
 //!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
@@ -37,8 +37,8 @@ use std::marker::PhantomData;
 use super::Bvh;
 use super::build::MAX_DEPTH;
 use super::flight::Visitors;
+use super::levels::placements::FIXED;
 use super::node::WIDTH;
-use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
 use super::simd::Simd;
 use crate::ray::Ray;

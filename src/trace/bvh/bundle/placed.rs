@@ -5,8 +5,8 @@ use super::range::Range;
 use super::rays::{Bundle, PerRay};
 use super::way::{Entry, Goal, Way};
 use crate::trace::bvh::Bvh;
+use crate::trace::bvh::levels::placements::{FIXED, PlacementTree};
 use crate::trace::bvh::node::{Child, Tree};
-use crate::trace::bvh::placements::{FIXED, PlacementTree};
 use crate::trace::bvh::simd::Simd;
 
 /// The placements, as what a bundle looks for.

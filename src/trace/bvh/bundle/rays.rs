@@ -19,13 +19,13 @@ use super::range::Range;
 use super::rows::Rows;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::filter::largest_axis;
-use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::place::Place;
+use crate::trace::bvh::levels::place::Place;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::columns;
+use crate::trace::bvh::reject::filter::largest_axis;
+use crate::trace::bvh::reject::ready::columns;
+use crate::trace::bvh::reject::slab::HUGE;
+use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
-use crate::trace::bvh::slab::HUGE;
 
 /// Rays in a bundle.
 pub(in crate::trace::bvh) const RAYS: usize = 64;

@@ -20,12 +20,12 @@ use super::walk::Walk;
 use super::way::Entry;
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::place::Blur;
-use crate::trace::bvh::placements::FIXED;
-use crate::trace::bvh::planes::{Heights, Planes};
+use crate::trace::bvh::levels::place::Blur;
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::planes::{Heights, Planes};
+use crate::trace::bvh::reject::woop::{Judged, Margin, Met, Sheared, Sides, Span};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
-use crate::trace::bvh::woop::{Judged, Margin, Met, Sheared, Sides, Span};
 
 /// A block as an origin sees it, on a bundle's axes.
 struct Seen<V> {

@@ -3,8 +3,8 @@
 use super::rays::{Bundle, axes};
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL, WIDTH};
+use crate::trace::bvh::reject::slab::HUGE;
 use crate::trace::bvh::simd::{Array, Simd, Vector};
-use crate::trace::bvh::slab::HUGE;
 
 /// A bundle made ready for slab tests in one tree, on its own axes.
 pub(super) struct BundleSlab {

@@ -11,11 +11,11 @@ use super::way::{Entry, Goal, Way};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::coplanar::Spot;
+use crate::trace::bvh::hits::coplanar::Spot;
+use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::node::{Child, Tree};
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::triangles::TriangleTree;
 
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;

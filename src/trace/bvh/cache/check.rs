@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
 use crate::trace::Part;
 use crate::trace::bvh::build::{MAX_DEPTH, presplit, triangle_items};
-use crate::trace::bvh::leaves::Leaves;
+use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::{Child, Node, Tree, WIDTH, widened, widened_corners};
 

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
-use crate::trace::bvh::preset::Preset;
+use crate::trace::bvh::build::preset::Preset;
 use crate::trace::{Part, Primitives};
 
 /// 128 bits, little endian.

@@ -25,11 +25,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::block::LANES;
-use super::leaves::Leaves;
+use super::build::preset::{Options, Preset};
+use super::levels::leaves::Leaves;
+use super::levels::triangles::TriangleTree;
 use super::meshes::Meshes;
 use super::node::{Node, Tree};
-use super::preset::{Options, Preset};
-use super::triangles::TriangleTree;
 use super::{Bvh, levels};
 use crate::error::{Error, Result, Warning};
 use crate::trace::{Part, World};

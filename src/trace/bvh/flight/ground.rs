@@ -2,17 +2,17 @@
 //!
 //! Rounds are compiled once for each, so that scenes without placements pay nothing for them.
 
+use super::addresses::Addresses;
 use super::traveller::Space;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::addresses::Addresses;
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::filter::{Candidates, Filter};
-use crate::trace::bvh::leaves::{Blocks, Numbers};
+use crate::trace::bvh::levels::leaves::{Blocks, Numbers};
+use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::node::{Child, Node, Tree};
 use crate::trace::bvh::query::Verdict;
+use crate::trace::bvh::reject::filter::{Candidates, Filter};
+use crate::trace::bvh::reject::woop::Sides;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::triangles::TriangleTree;
-use crate::trace::bvh::woop::Sides;
 
 /// What rays travel through.
 pub(super) trait Ground {

@@ -18,26 +18,28 @@
 //! **Visitors.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`visit`]). Those of several bundles set out
 //! together, in the objects' coordinates from the beginning.
 
+pub(super) mod addresses;
 mod ground;
+pub(super) mod set;
 mod traveller;
 mod visitors;
 
 use std::cell::Cell;
 use std::marker::PhantomData;
 
+use self::set::{Set, TRAVELLERS};
 use super::Bvh;
-use super::found::Found;
-use super::isa::Kernel;
-use super::leaves::Leaves;
-use super::listed::Listed;
+use super::hits::found::Found;
+use super::hits::listed::Listed;
+use super::levels::leaves::Leaves;
+use super::levels::place::{Blur, EightRays, Place};
+use super::levels::placements::FIXED;
 use super::node::Child;
-use super::place::{Blur, EightRays, Place};
-use super::placements::FIXED;
 use super::query::{Query, SOMETHING};
-use super::ready::{MANY, ReadyRay, ReadyRays, ready_blurred};
-use super::set::{Set, TRAVELLERS};
+use super::reject::ready::{MANY, ReadyRay, ReadyRays, ready_blurred};
+use super::reject::woop::Sides;
+use super::simd::isa::Kernel;
 use super::simd::{Array, Simd, Vector};
-use super::woop::Sides;
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 pub(in crate::trace) use ground::Decide;

@@ -10,14 +10,14 @@ use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::build::MAX_DEPTH;
-use crate::trace::bvh::found::Found;
-use crate::trace::bvh::listed::Listed;
+use crate::trace::bvh::hits::found::Found;
+use crate::trace::bvh::hits::listed::Listed;
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::node::{Child, Node, WIDTH};
-use crate::trace::bvh::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::ReadyRay;
+use crate::trace::bvh::reject::ready::ReadyRay;
+use crate::trace::bvh::reject::woop::Sides;
 use crate::trace::bvh::simd::{Mask, Simd};
-use crate::trace::bvh::woop::Sides;
 
 /// Places on a stack: every level of a tree leaves at most seven siblings waiting; an object's tree stands upon that of the
 /// placements, and each has [`Child::NONE`] at its bottom.
@@ -290,8 +290,8 @@ impl Traveller {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     struct Shorten<'a>(&'a mut Traveller);
 

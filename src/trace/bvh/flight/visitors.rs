@@ -7,7 +7,7 @@ use super::traveller::{Space, Start};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::ready::{MANY, ReadyRay, eight, lowest_eight};
+use crate::trace::bvh::reject::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::simd::Simd;
 
 /// Rays that are to go through one placed object, which has triangles.

@@ -5,9 +5,9 @@
 //! the height above the plane, times the normal N, by 32 u L S S, and the side of an edge that the point is on, likewise multiplied, by 32 u L L S S.
 //! What cancels in a sliver thus leaves the plane without a say, and its distance counts as 0.
 
+use super::discs::Discs;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::discs::Discs;
 use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, size};
 

@@ -134,8 +134,8 @@ impl<D: Doubles> Measured<D> {
 mod tests {
     use super::*;
     use crate::shape::closest::closest_point;
-    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     struct Measure(DVec3, [DVec3; 3], f64);
 

@@ -1,25 +1,27 @@
 //! The triangle that is nearest to each of many points: the others are left out in f32, those that remain are measured in f64.
 //!
 //! The nearest child is gone down to first, the others wait with the distance of their boxes and discs (Roussopoulos, Kelley, Vincent 1995,
-//! *Nearest neighbor queries*), eight at a time. [`closest_point`](super::closest_point) opens boxes strictly by distance: it
+//! *Nearest neighbor queries*), eight at a time. [`closest_point`](self::closest_point) opens boxes strictly by distance: it
 //! opens fewer, and pays for a queue. Of the eight triangles of a block those are left out whose distance, in f32 with a bound on its error, is
 //! larger than what was measured ([`bounds`]).
 //!
 //! Points are in flight together, as rays are ([`super::flight`]): alone, one waits for each node until it knows the next.
 
 mod bounds;
+pub(super) mod closest_point;
+pub(super) mod discs;
 mod measure;
 mod seeker;
 mod waiting;
 
+use self::discs::Discs;
 use super::Bvh;
-use super::addresses::Addresses;
-use super::discs::Discs;
-use super::isa::{self, Kernel};
+use super::flight::addresses::Addresses;
+use super::flight::set::{Set, TRAVELLERS};
+use super::levels::triangles::TriangleTree;
 use super::node::Child;
-use super::set::{Set, TRAVELLERS};
+use super::simd::isa::{self, Kernel};
 use super::simd::{Doubles, Simd};
-use super::triangles::TriangleTree;
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::shape::closest::TrianglePoint;
 use bounds::{Lower, lower_bounds};

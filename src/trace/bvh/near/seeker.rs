@@ -1,12 +1,12 @@
 //! A point of a flight, and what is nearest to it so far.
 
 use super::bounds::enter;
+use super::discs::Discs;
 use super::measure::{Corners, Measured};
 use super::waiting::Waiting;
 use super::{NearestTriangle, Sought};
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::shape::closest::TrianglePoint;
-use crate::trace::bvh::discs::Discs;
 use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::simd::{Doubles, Simd};
 
@@ -49,7 +49,7 @@ impl Seeker {
     /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near this one too.
     #[inline(always)]
     pub fn start<S: Simd>(&mut self, Sought { point, local, error }: Sought, scale: f64) {
-        // What differences round relative to a box is in the box ([`super::super::node::widened`]).
+        // What differences round relative to a box is in the box ([`crate::trace::bvh::node::widened`]).
         let away = local.abs().max_element();
         (self.local, self.error, self.pad) = (local, error, error + 4.0 * UNIT_ROUNDOFF * away);
         self.point = point;

@@ -82,8 +82,8 @@ impl Waiting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::bvh::isa::{Kernel, Present, dispatch};
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     struct Shorten<'a>(&'a mut Waiting, f32);
 

@@ -3,10 +3,10 @@
 use super::{Packet, PacketHits, RAYS, each};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{SingleRay, TriangleFound};
-use crate::trace::bvh::isa::Kernel;
-use crate::trace::bvh::place::Blur;
-use crate::trace::bvh::ready::{ReadyRay, ready};
+use crate::trace::bvh::levels::place::Blur;
+use crate::trace::bvh::reject::ready::{ReadyRay, ready};
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::isa::Kernel;
 
 /// The nearest hits of those rays that `lanes` has a bit for.
 pub(super) struct ClosestAlone<'a> {

@@ -4,11 +4,11 @@
 //! least that a slab's distance from an origin may be, no ray enters it before x times the least magnitude of 1 / d, if it is ahead of the
 //! origins; with x the largest, none leaves it after x times the largest. What is behind gives something below 0 either way, which as an entry means
 //! the same as 0, and as an exit that nothing is met.
-//! The one origin and the one reciprocal of a side belong together, so the product may be computed as that of a single ray is ([`super::super::slab`]), bound
+//! The one origin and the one reciprocal of a side belong together, so the product may be computed as that of a single ray is ([`crate::trace::bvh::reject::slab`]), bound
 //! times reciprocal and an offset. Intervals of origin / d and of 1 / d would vary apart from each other, which rays that start in one point do not.
 //!
 //! With u = 2^-24, the moved origin, the reciprocal, both products and the sum round by less than 5 u |1/d| (|bound| + |origin|) together, fused or
-//! not; the origin is moved by 10 u of itself, and boxes, in the tree ([`super::super::node::widened`]) and around triangles, are wide by as much of their bounds, which leaves room for
+//! not; the origin is moved by 10 u of itself, and boxes, in the tree ([`crate::trace::bvh::node::widened`]) and around triangles, are wide by as much of their bounds, which leaves room for
 //! the rounding of the hit's own t. The origin is moved by another 2^-126, and each offset by 2^-124,
 //! for lengths and t that are no normal numbers, be they flushed to zero. Small components of directions are replaced as for single rays.
 
@@ -17,8 +17,8 @@ use crate::math::{Aabb, UNIT_ROUNDOFF};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::axes;
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL};
+use crate::trace::bvh::reject::slab::{HUGE, SMALLEST, least_t};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
-use crate::trace::bvh::slab::{HUGE, SMALLEST, least_t};
 use crate::trace::bvh::walk::Enter;
 
 /// Rays that go the same way.

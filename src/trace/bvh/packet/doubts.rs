@@ -4,9 +4,9 @@ use super::octet::{Met, Octet};
 use super::{MOST, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::coplanar::Spot;
-use crate::trace::bvh::found::Found;
-use crate::trace::bvh::placements::FIXED;
+use crate::trace::bvh::hits::coplanar::Spot;
+use crate::trace::bvh::hits::found::Found;
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Vector};
 

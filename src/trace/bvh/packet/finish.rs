@@ -4,8 +4,8 @@ use super::octet::Octet;
 use super::{Doubts, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Lane;
-use crate::trace::bvh::noted::{Rays, widen};
-use crate::trace::bvh::quad::{Numbers, Quad};
+use crate::trace::bvh::hits::noted::{Rays, widen};
+use crate::trace::bvh::hits::quad::{Numbers, Quad};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// Tells of all hits of packet `number`.

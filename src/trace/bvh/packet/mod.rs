@@ -6,7 +6,7 @@
 //! - **Nodes** are tested against the [`Beam`] of all rays, an interval for each component of origins and reciprocal directions, at
 //!   little more than what a single ray costs. Rays are asked only if any hit will do, and at leaves ([`Party`](party::Party)).
 //! - **Triangles**: the beam rejects most of a block by their boxes. Of the others each is tested against eight rays, a lane a ray
-//!   ([`Octet`]), by the test and with the bounds of single rays ([`super::woop`]).
+//!   ([`Octet`]), by the test and with the bounds of single rays ([`super::reject::woop`]).
 //! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
 //!   ([`Doubts`]). So the bits are those of single rays.
 //!
@@ -24,8 +24,8 @@ mod way;
 
 use super::Bvh;
 use super::alone::{SingleRay, TriangleFound};
-use super::isa::{self, Kernel};
 use super::query::{Closest, Occluded};
+use super::simd::isa::{self, Kernel};
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::Vec3;
 use crate::ray::Ray;

@@ -1,16 +1,16 @@
 //! Eight rays of a packet against one triangle after the other, and what they have hit.
 //!
 //! A lane a ray, so that a triangle is looked at once for all of them. What is in doubt is told, a bit a ray; the caller decides it as
-//! for a single ray ([`Found`](crate::trace::bvh::found::Found)).
+//! for a single ray ([`Found`](crate::trace::bvh::hits::found::Found)).
 
 use super::{Packet, RAYS};
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::found::NONE;
-use crate::trace::bvh::place::Blur;
-use crate::trace::bvh::planes;
+use crate::trace::bvh::hits::found::NONE;
+use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::planes;
+use crate::trace::bvh::reject::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
 use crate::trace::bvh::simd::{Array, Mask, Vector};
-use crate::trace::bvh::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
 
 /// Eight rays made ready for triangles, and what they have hit so far.
 #[derive(Clone, Copy)]

@@ -12,8 +12,8 @@ use super::{Asked, RAYS};
 use crate::math::Vec3;
 use crate::trace::bvh::node::{Node, WIDTH};
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::slab::Slabs;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, everywhere};
-use crate::trace::bvh::slab::Slabs;
 use crate::trace::bvh::walk::Enter;
 
 /// What walks.

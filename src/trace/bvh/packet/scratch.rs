@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 
 use super::{MOST, PacketHits, RAYS};
-use crate::trace::bvh::found::Found;
+use crate::trace::bvh::hits::found::Found;
 
 /// Room for what rays have hit of which there was doubt, and for the hits of packets.
 pub(super) struct Scratch {

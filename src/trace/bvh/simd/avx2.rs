@@ -6,12 +6,12 @@
 use std::arch::x86_64::*;
 use std::mem::offset_of;
 
+use super::isa::{self, Kernel};
 use super::x86::{D4, M8, V4, V8};
 use super::{Mask, Simd};
 use crate::math::Vec3;
 use crate::memory;
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::{Child, Node};
 
 /// AVX2 and FMA.

@@ -2,7 +2,7 @@
 //!
 //! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, [`Avx2`]
 //! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so what is fused serves only tests
-//! that reject conservatively; where bits of f32 are kept, as by [`super::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
+//! that reject conservatively; where bits of f32 are kept, as by [`super::levels::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 
 #[cfg(target_arch = "x86_64")]
@@ -10,6 +10,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 pub(super) mod doubles;
+pub(super) mod isa;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -23,10 +24,10 @@ pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::V8;
 
+use self::isa::Kernel;
 use super::block::Block;
 use super::build::lanes::Boxes;
 use super::bundle::{PerRay, RAYS, axes};
-use super::isa::Kernel;
 use super::node::{Child, Node};
 use crate::math::Vec3;
 
@@ -43,7 +44,7 @@ pub(super) trait Simd {
     /// Runs a part of a kernel in a function of its own. All else ends up in one, in which nothing that lives long stays in a register: what
     /// is done once for many rays, and has a loop in it, is better apart.
     fn apart<K: Kernel>(kernel: K) -> K::Output;
-    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](super::isa::dispatch_narrow) runs it: with another instruction set than
+    /// The same of a part in which nothing is wider than eight lanes, as [`dispatch_narrow`](self::isa::dispatch_narrow) runs it: with another instruction set than
     /// this, perhaps, so nothing that the part is given may be of this one.
     #[inline(always)]
     fn apart_narrow<K: Kernel>(kernel: K) -> K::Output {
@@ -205,8 +206,8 @@ pub(super) trait Group: Vector {
 
 #[cfg(test)]
 mod tests {
+    use super::isa::{Present, dispatch};
     use super::*;
-    use crate::trace::bvh::isa::{Present, dispatch};
     use crate::trace::bvh::random::Random;
 
     #[derive(Clone, Copy)]

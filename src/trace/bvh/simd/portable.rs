@@ -1,10 +1,10 @@
 //! Plain arrays, for any processor.
 
+use super::isa::{self, Kernel};
 use super::{Array, Doubles, Group, Mask, Simd, TURNED, Three, Turned, Vector};
 use crate::math::Vec3;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::bundle::{PerRay, RAYS};
-use crate::trace::bvh::isa::{self, Kernel};
 use crate::trace::bvh::node::{Child, Node};
 
 /// Plain arrays.
