@@ -6,6 +6,7 @@
 //! second. A sweep (O(n log n)) would have a bound for outlines that cross themselves, too, and be a page of cases for the corners on which it fails.
 
 mod reflex;
+mod spikes;
 
 use std::collections::VecDeque;
 use std::iter;
@@ -21,13 +22,25 @@ const fn most_looks(count: usize) -> usize {
 }
 
 /// Splits the polygon with the given corners into `corners.len() - 2` triangles of indices into `corners`, appended to
-/// `triangles`. Polygons that cross themselves, have no area or have corners that are not finite get triangles too.
+/// `triangles`. Polygons that cross themselves, have no area or have corners that are not finite get triangles too. Where
+/// an outline goes somewhere and straight back, triangles without area stand for the way.
 ///
 /// # Errors
 /// A message where the polygon is so large, and crosses itself so often, that it would take too long; nothing is appended then.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Placeless<()> {
     let count = corners.len();
-    triangulate_within(most_looks(count), corners, triangles)
+    let split = if spikes::are_there(corners) {
+        let (kept, flat) = spikes::cut(corners);
+        let (around, mut parts) = (kept.iter().map(|&i| corners[i as usize]).collect::<Vec<_>>(), Vec::new());
+        let split = if kept.len() > 2 { triangulate_within(most_looks(count), &around, &mut parts) } else { Some(()) };
+        split.map(|()| {
+            triangles.extend(flat);
+            triangles.extend(parts.iter().map(|triangle| triangle.map(|i| kept[i as usize])));
+        })
+    } else {
+        triangulate_within(most_looks(count), corners, triangles)
+    };
+    split
         .ok_or_else(|| format!("a face with {count} corners crosses itself too often to be split; write smaller faces"))
 }
 
@@ -180,6 +193,66 @@ mod tests {
             &[[0., 0.], [3., 0.], [3., 3.], [0., 3.], [0., 0.], [1., 1.], [1., 2.], [2., 2.], [2., 1.], [1., 1.]],
             8.0,
         );
+    }
+
+    /// A way out of a square or into it and back, at a corner, within a side, of several edges, and across the end of the list.
+    #[test]
+    fn ways_there_and_back_have_no_area() {
+        let square = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]];
+        let ways: [&[[f64; 2]]; 8] = [
+            &[[2., 0.]],
+            &[[2., -1.]],
+            &[[1., -1.]],
+            &[[0.5, 0.5]],
+            &[[1., 0.5]],
+            &[[2., 0.], [3., 0.]],
+            &[[1.5, -0.5], [2., 0.], [2., 3.]],
+            &[[0.75, 0.25], [0.5, 0.75], [0.25, 0.5]],
+        ];
+        for way in ways {
+            let back = way.iter().rev().skip(1).copied();
+            let at_corner: Vec<_> = square[..2]
+                .iter()
+                .chain(way)
+                .copied()
+                .chain(back)
+                .chain([[1., 0.]])
+                .chain(square[2..].to_vec())
+                .collect();
+            let side = |p: &[f64; 2]| [p[0] - 0.5, p[1]];
+            let mut in_side: Vec<_> = at_corner[1..at_corner.len() - 2].iter().map(side).collect();
+            in_side.splice(0..0, [square[0]]);
+            in_side.extend(&square[1..]);
+            for outline in [at_corner, in_side] {
+                for shift in 0..outline.len() {
+                    let mut turned = outline.clone();
+                    turned.rotate_left(shift);
+                    check(&turned, 1.0);
+                    turned.reverse();
+                    check(&turned, 1.0);
+                }
+            }
+        }
+        // Nothing but ways there and back, of an even number of corners and of an odd one.
+        let [a, b, c, d] = [[0., 0.], [1., 0.], [1., 1.], [0., 1.]].map(|[x, y]| DVec3::new(x, y, 0.0));
+        for outline in [&[a, b, c, b][..], &[a, b, a, c, a, d], &[a, b, c, b, a], &[b, a, b, c, d, c]] {
+            let mut triangles = Vec::new();
+            triangulate(outline, &mut triangles).unwrap();
+            assert_eq!((triangles.len(), area(outline, &triangles).0), (outline.len() - 2, 0.0), "{outline:?}");
+        }
+    }
+
+    /// Within the time that others take, however the list begins.
+    #[test]
+    fn long_ways_there_and_back() {
+        let way = (1..300_000).map(|i| [1.0 + f64::from(i), 0.0]);
+        let mut outline: Vec<[f64; 2]> = vec![[0., 0.], [1., 0.]];
+        outline.extend(way.clone().chain(way.rev().skip(1)).chain([[1., 0.], [1., 1.], [0., 1.]]));
+        for shift in [0, 150_000, 300_000, 450_000] {
+            let mut turned = outline.clone();
+            turned.rotate_left(shift);
+            check(&turned, 1.0);
+        }
     }
 
     #[test]
