@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{LoadOptions, Promised, course, gltf, nff, obj, ply, stl, toml};
-use crate::error::{Result, Warning};
+use crate::error::{Error, Result, Warning};
 use crate::memory::Mapped;
 use crate::scene::Scene;
 
@@ -77,6 +77,10 @@ impl Format {
         options: &LoadOptions,
         warnings: &mut Vec<Warning>,
     ) -> Result<Scene> {
+        let told = Self::told_by(file).filter(|(format, _)| *format != self);
+        if let Some((_, suffix)) = told {
+            return Err(Error::input(path, "", format!("by its first bytes this is a .{suffix} file; name it so")));
+        }
         match self {
             Self::Gltf => gltf::load(path, file, options, warnings),
             Self::Nff => nff::load(path, file, warnings),
@@ -86,6 +90,12 @@ impl Format {
             Self::Course => course::load(path, file),
             Self::Toml => toml::load(path, file, warnings),
         }
+    }
+
+    /// The format that the first bytes of a file tell, and its suffix, where no other format may begin so.
+    fn told_by(bytes: &[u8]) -> Option<(Self, &'static str)> {
+        let is_ply = bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r");
+        if bytes.starts_with(b"glTF") { Some((Self::Gltf, "glb")) } else { is_ply.then_some((Self::Ply, "ply")) }
     }
 
     /// What the head of a file promises, of formats whose heads are no work to read.

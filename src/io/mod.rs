@@ -35,7 +35,7 @@ pub use self::format::SUFFIXES;
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
-use self::finish::{bare, doubt_bare, drop_strays, make_finite, meshes};
+use self::finish::{bare, brightest_color, doubt_bare, drop_strays, make_finite, meshes};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
@@ -109,6 +109,9 @@ pub enum Normals {
 /// A result whose error is a message that has no file and no place yet.
 type Placeless<T> = std::result::Result<T, String>;
 
+/// What compression may make of a colour of full strength: half a code of 256 too much, and some.
+const MOST_BY_ROUNDING: f32 = 1.0 + 1.0 / 255.0;
+
 /// Of a file without a primitive; with what was left out of it, which may be why.
 fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
     let mut message =
@@ -163,6 +166,14 @@ pub fn load_watched(
     if vague > 0 {
         let message = format!(
             "{vague} colours or texture coordinates are not finite; what is not counts as 0, and as 1 where it is alpha"
+        );
+        warnings.push(Warning::new(path, "", message));
+    }
+    let brightest = meshes(&scene).map(brightest_color).fold(0.0, f32::max);
+    // Of meshes that a scene includes it has been told.
+    if brightest > MOST_BY_ROUNDING && format != Format::Toml {
+        let message = format!(
+            "colours of vertices go up to {brightest}, where 1 is full strength; bytes have to be divided by 255"
         );
         warnings.push(Warning::new(path, "", message));
     }

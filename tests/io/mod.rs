@@ -145,6 +145,8 @@ fn files_that_are_no_scenes() {
     for name in ["empty.ply", "empty.stl", "empty.gltf", "empty.glb", "empty.nff", "empty.test", "empty.toml"] {
         refused_bytes(name, "", "", "empty");
     }
+    refused_bytes("a.obj", "ply\nformat", "", "this is a .ply file");
+    refused_bytes("a.stl", "glTF\x02\0\0\0", "", "this is a .glb file");
     for suffix in ["obj", "ply", "stl", "glb", "gltf", "nff", "test", "toml"] {
         let files = Files::one(&format!("noise.{suffix}"), [0x9e, 0, 0xff, b'\n', 7, 0x80, 0]);
         assert!(load(&files.path(&format!("noise.{suffix}")), &LoadOptions::default()).is_err(), "{suffix}");

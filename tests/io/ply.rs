@@ -109,29 +109,38 @@ fn a_texture_that_a_comment_names() {
 /// declared. Vertices may have properties that are bytes, which are 200.
 fn with_faces(comments: &str, of_vertex: &str, of_face: &str, faces: [(&[u32], &[Value]); 3]) -> [Vec<u8>; 3] {
     let vertices = [[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [2.0, 0.0], [2.0, 1.0]];
-    let encodings = ["ascii", "binary_little_endian", "binary_big_endian"];
-    encodings.map(|encoding| {
-        let mut bytes = format!(
-            "ply\nformat {encoding} 1.0\n{comments}element vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
-             {of_vertex}element face 3\nproperty list uchar int vertex_indices\n{of_face}end_header\n"
-        )
-        .into_bytes();
-        let mut put = |value: &Value| match encoding {
-            "ascii" => bytes.extend(value.text().bytes()),
-            "binary_big_endian" => bytes.extend(value.bytes().iter().rev()),
-            _ => bytes.extend(value.bytes()),
-        };
-        for [x, y] in vertices {
-            [x, y, 0.0].iter().for_each(|&x| put(&Value::Float(x)));
-            of_vertex.lines().for_each(|_| put(&Value::Byte(200)));
-        }
-        for (corners, values) in faces {
-            put(&Value::Byte(corners.len() as u8));
-            corners.iter().for_each(|&corner| put(&Value::Int(corner as i32)));
-            values.iter().for_each(&mut put);
-        }
-        bytes
-    })
+    let mut values = Vec::new();
+    for [x, y] in vertices {
+        values.extend([x, y, 0.0].map(Value::Float));
+        values.extend(of_vertex.lines().map(|_| Value::Byte(200)));
+    }
+    for (corners, of_face) in faces {
+        values.extend(list(corners));
+        values.extend(of_face);
+    }
+    let head = format!(
+        "{comments}element vertex 6\nproperty float x\nproperty float y\nproperty float z\n{of_vertex}element face 3\n\
+         property list uchar int vertex_indices\n{of_face}"
+    );
+    encoded(&head, &values)
+}
+
+/// A file of these values, in the three encodings.
+fn encoded(head: &str, values: &[Value]) -> [Vec<u8>; 3] {
+    let all = |encoding: &str, bytes: &dyn Fn(&Value) -> Vec<u8>| {
+        let head = format!("ply\nformat {encoding} 1.0\n{head}end_header\n");
+        head.bytes().chain(values.iter().flat_map(bytes)).collect()
+    };
+    let reversed = |value: &Value| value.bytes().into_iter().rev().collect();
+    [
+        all("ascii", &|value| value.text().into()),
+        all("binary_little_endian", &|value| value.bytes()),
+        all("binary_big_endian", &reversed),
+    ]
+}
+
+fn list(corners: &[u32]) -> Vec<Value> {
+    [Value::Byte(corners.len() as u8)].into_iter().chain(corners.iter().map(|&i| Value::Int(i as i32))).collect()
 }
 
 /// A value in a PLY file.
@@ -197,9 +206,12 @@ fn texture_coordinates_of_faces() {
         assert_eq!((mesh.positions.len(), found.len()), (8, 4));
         assert_eq!((scene.materials[0].diffuse_texture, scene.materials[0].diffuse), (Some(0), Vec3::ONE));
     }
-    let odd = with_faces(named, "", TEXCOORD, [faces[0], (&[0, 2, 3, 1], &values[1]), faces[2]]);
-    for (bytes, place) in odd.into_iter().zip(["line 41", "byte 391", "byte 388"]) {
-        refused_bytes("a.ply", bytes, place, "6 numbers for a face of 4 corners");
+    // A list of another length is none.
+    for bytes in with_faces(named, "", TEXCOORD, [faces[0], (&[0, 2, 3, 1], &values[1]), faces[2]]) {
+        let (scene, warnings) = Files::one("a.ply", bytes).and("my picture.png", super::obj::picture()).load("a.ply");
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.message.starts_with("1 faces whose texcoord"), "{warning}");
+        assert_eq!((scene.primitive_count(), scene.textures.len()), (5, 1));
     }
 }
 
@@ -234,6 +246,41 @@ fn several_textures() {
     }
 }
 
+/// Triangles alone are read at once from binary files, and one by one from text; whatever comes first in a face.
+#[test]
+fn triangles_with_texture_coordinates_at_once() {
+    let head = "comment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement face 3\n";
+    let [texcoord, number, indices] =
+        [TEXCOORD, "property uchar texnumber\n", "property list uchar int vertex_indices\n"];
+    let vertices = SQUARE.as_flattened().iter().map(|&x| Value::Float(x));
+    let faces =
+        [([0, 1, 2], [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5]], 1), ([0, 2, 3], [[0.0, 0.0], [0.5, 0.5], [1.0, 0.0]], 1)];
+    let faces = faces.into_iter().chain([([1, 2, 3], [[0.25, 0.0], [0.5, 0.5], [1.0, 0.0]], 0)]);
+    for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
+        let head = order.iter().fold(head.to_owned(), |head, &k| head + [texcoord, number, indices][k]);
+        let of_face = |(corners, uvs, number): ([u32; 3], [[f32; 2]; 3], u8)| {
+            let parts = [coordinates(&uvs, None), vec![Value::Byte(number)], list(&corners)];
+            order.iter().flat_map(|&k| parts[k].clone()).collect::<Vec<_>>()
+        };
+        let values: Vec<_> = vertices.clone().chain(faces.clone().flat_map(of_face)).collect();
+        let found = encoded(&head, &values).map(|bytes| {
+            let files =
+                Files::one("a.ply", bytes).and("a.png", super::obj::picture()).and("b.png", super::obj::picture());
+            let scene = files.scene("a.ply");
+            meshes(&scene)
+                .iter()
+                .map(|mesh| (corners(mesh), mesh.triangles.to_vec(), mesh.uvs.clone()))
+                .collect::<Vec<_>>()
+        });
+        let [text, little, big] = &found;
+        assert!(text == little && text == big, "{found:?}");
+        // Of texture 0 the last face; of texture 1 the others, which share two vertices.
+        assert_eq!((text[0].0.len(), text[0].2.len(), text[1].0.len(), text[1].2.len()), (1, 3, 2, 4));
+        assert_eq!(text[1].2[3], Vec2::X);
+    }
+}
+
 /// As of segmented meshes.
 #[test]
 fn colours_of_faces() {
@@ -249,6 +296,19 @@ fn colours_of_faces() {
         // The square shares two vertices with the red triangle, the blue one none.
         assert_eq!((mesh.positions.len(), scene.materials[0].diffuse), (8, Vec3::ONE));
     }
+    // Triangles alone are read at once from binary files.
+    let alpha = format!("{colors}property uchar alpha\n");
+    let clear = [[255, 0, 0, 255], [0, 128, 255, 51], [255, 0, 0, 255]].map(|rgba: [u8; 4]| rgba.map(Value::Byte));
+    let faces_alone = [(&[0, 1, 2][..], &clear[0][..]), (&[0, 2, 3], &clear[1]), (&[1, 4, 5], &clear[2])];
+    let found = with_faces("", "", &alpha, faces_alone).map(|bytes| {
+        let scene = Files::one("a.ply", bytes).scene("a.ply");
+        let mesh = meshes(&scene)[0];
+        (corners(mesh), mesh.triangles.to_vec(), mesh.colors.clone())
+    });
+    assert!(found[0] == found[1] && found[0] == found[2], "{found:?}");
+    let colors_of: Vec<Vec4> = [0, 3, 6].map(|k| found[0].2[k.min(found[0].2.len() - 1)]).to_vec();
+    assert!(colors_of[0].abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-6), "{colors_of:?}");
+    assert!(colors_of[1].abs_diff_eq(Vec4::new(0.0, 0.2159, 1.0, 0.2), 1e-3), "{colors_of:?}");
     for bytes in with_faces("", &colors, &colors, faces) {
         let (scene, warnings) = Files::one("a.ply", bytes).load("a.ply");
         let [warning] = &warnings[..] else { panic!("{warnings:?}") };
@@ -315,6 +375,20 @@ fn binary_attributes_are_those_of_the_text() {
         assert_eq!((&mesh.normals, &mesh.uvs, &mesh.colors), (&expected.normals, &expected.uvs, &expected.colors));
         assert_eq!(mesh.positions[1], Vec3::new(0.255, -0.5, 2.0));
     }
+}
+
+/// Bytes in floating point are told, not guessed.
+#[test]
+fn colours_above_one_and_clouds_are_told() {
+    let colors = ["red", "green", "blue"].map(|name| format!("property float {name}\n")).concat();
+    let head = header("ascii", 3, 1).replace("property float z\n", &format!("property float z\n{colors}"));
+    let (scene, warnings) =
+        Files::one("a.ply", head + "0 0 0 200 100 0\n1 0 0 0 0 0\n0 1 0 1 1 1\n3 0 1 2\n").load("a.ply");
+    assert_eq!(meshes(&scene)[0].colors[0], Vec4::new(200.0, 100.0, 0.0, 1.0));
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(warning.message.contains("go up to 200"), "{warning}");
+    let cloud = header("ascii", 2, 0) + "0 0 0\n1 0 0\n";
+    refused_bytes("a.ply", cloud, "", "2 vertices without faces");
 }
 
 /// Some write bytes as words.

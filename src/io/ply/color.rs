@@ -22,6 +22,24 @@ impl Color {
         })
     }
 
+    /// Whether every channel is a byte.
+    pub(super) fn is_bytes(&self) -> bool {
+        self.rgb.iter().chain(&self.alpha).all(|(_, scalar)| *scalar == Scalar::U8)
+    }
+
+    /// All channels in one word, of a colour of bytes; by a function that gives the values of properties by their index.
+    #[inline]
+    pub(super) fn packed(&self, value: impl Fn(usize) -> f64) -> u32 {
+        let [r, g, b] = self.rgb.map(|(index, _)| value(index) as u8);
+        u32::from_le_bytes([r, g, b, self.alpha.map_or(u8::MAX, |(index, _)| value(index) as u8)])
+    }
+
+    /// The colour that a word holds, linear.
+    pub(super) fn unpacked(word: u32) -> Vec4 {
+        let [r, g, b, a] = word.to_le_bytes();
+        Vec3::from([r, g, b].map(srgb::srgb_to_linear)).extend(f32::from(a) / 255.0)
+    }
+
     /// Linear, with alpha, by a function that gives the values of properties by their index.
     pub(super) fn linear(&self, value: impl Fn(usize) -> f64) -> Vec4 {
         let alpha = self.alpha.map_or(1.0, |(index, scalar)| value(index) / scalar.full());

@@ -28,6 +28,12 @@ impl Faces {
         let list = indices(element)?;
         // Bounded by the size of the file: `read` has compared them.
         let count = element.count as usize;
+        if let Some(wedges) = &mut self.wedges
+            && let Some(triangles) = wedges.read_at_once(element, items, positions.len())
+        {
+            self.triangles = triangles;
+            return Ok(());
+        }
         let read = if self.wedges.is_some() { 0 } else { self.read_at_once(element, items, positions) };
         let coordinates = self.wedges.as_ref().and_then(|wedges| wedges.coordinates);
         let lists: Vec<usize> = [list].into_iter().chain(coordinates).collect();

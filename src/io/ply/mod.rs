@@ -24,7 +24,7 @@ use self::faces::Faces;
 use self::header::{Element, Encoding, Header, Scalar};
 use self::item::Item;
 use self::vertices::{Layout, Vertices};
-use self::wedges::Part;
+use self::wedges::{AtOnce, Part, Wedges};
 use crate::error::{Error, Result, Warning};
 use crate::io::{Placeless, Promised};
 use crate::memory::Mapped;
@@ -55,6 +55,11 @@ trait Items {
     /// not below `vertices`.
     fn triangles(&mut self, _element: &Element, _vertices: usize) -> Vec<[u32; 3]> {
         Vec::new()
+    }
+    /// All triangles at once with what they have of their own, where the faces are records of one size, and all indices
+    /// are below `vertices`.
+    fn wedges(&mut self, _element: &Element, _wanted: &Wedges, _vertices: usize) -> Option<AtOnce> {
+        None
     }
 }
 
@@ -115,6 +120,15 @@ fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<
     }
     if let Some((element, message)) = wedges::left_out(header) {
         warnings.push(Warning::new(path, format!("line {}", element.line), message));
+    }
+    if faces.triangles.is_empty() && faces.small == 0 && vertices.positions.len() > 0 {
+        let message =
+            format!("{} vertices without faces: points have no area; make a surface of them", vertices.positions.len());
+        warnings.push(Warning::new(path, "", message));
+    }
+    if let Some(odd) = faces.wedges.as_ref().map(|wedges| wedges.odd).filter(|odd| *odd > 0) {
+        let message = format!("{odd} faces whose texcoord has not two numbers for each corner are without coordinates");
+        warnings.push(Warning::new(path, "", message));
     }
     if faces.small > 0 {
         let message = format!("{} faces with fewer than 3 corners are left out", faces.small);

@@ -1,9 +1,10 @@
 //! The pictures that comments name as textures (`TextureFile`, MeshLab), and the parts of a mesh that they are for.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::header::Header;
-use super::wedges::{NUMBER, Part};
+use super::wedges::{self, NUMBER, Part};
 use crate::error::{Result, Warning};
 use crate::io::texture;
 use crate::math::Vec3;
@@ -14,9 +15,12 @@ pub(super) fn scene(path: &Path, header: &Header, parts: Vec<Part>, warnings: &m
     let named = named(path, header, &parts, warnings);
     let (mut geometries, mut materials) = (Vec::new(), Vec::new());
     let (mut textures, mut files) = (Vec::new(), Vec::new());
+    // By name: what they have become, if anything.
+    let mut known: HashMap<&str, Option<u32>> = HashMap::new();
     for (Part { mesh, texture }, material) in parts.into_iter().zip(0..) {
-        let mut diffuse_texture = None;
-        if let Some((line, name)) = texture.and_then(|number| named.get(number as usize)) {
+        let wanted = texture.and_then(|number| named.get(number as usize));
+        let mut diffuse_texture = wanted.and_then(|(_, name)| known.get(name.as_str()).copied().flatten());
+        if let Some((line, name)) = wanted.filter(|(_, name)| !known.contains_key(name.as_str())) {
             let (file, place) = (texture::beside(path, name), format!("line {line}"));
             match texture::open(&file).map_err(|error| error.named_in(path, &place))? {
                 Ok(texture) => {
@@ -26,6 +30,7 @@ pub(super) fn scene(path: &Path, header: &Header, parts: Vec<Part>, warnings: &m
                 }
                 Err(why) => warnings.push(Warning::new(path, place, format!("{why}; the mesh is rendered without it"))),
             }
+            known.insert(name, diffuse_texture);
         }
         let is_plain = mesh.colors.is_empty() && diffuse_texture.is_none();
         let base = if is_plain { Material::default().diffuse } else { Vec3::ONE };
@@ -40,7 +45,7 @@ pub(super) fn scene(path: &Path, header: &Header, parts: Vec<Part>, warnings: &m
 /// The lines and names of the pictures that the parts can have; where that is none or not all, a warning says why.
 fn named<'a>(path: &Path, header: &'a Header, parts: &[Part], warnings: &mut Vec<Warning>) -> &'a [(usize, String)] {
     let Some((line, _)) = header.textures.first() else { return &[] };
-    let is_numbered = header.element("face").is_some_and(|face| face.index(&[NUMBER]).is_some());
+    let is_numbered = wedges::heeded(header).is_some_and(|face| face.index(&[NUMBER]).is_some());
     let count = header.textures.len();
     let why = if parts.iter().all(|part| part.mesh.uvs.is_empty()) {
         "TextureFile would need texture coordinates, and neither vertices nor faces have them"

@@ -6,10 +6,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::Items;
 use super::color::Color;
 use super::header::{Element, Header};
 use super::item::Item;
-use super::vertices::Vertices;
+use super::vertices::{Layout, Vertices};
 use crate::io::Placeless;
 use crate::io::compact::{compact, with_vertices};
 use crate::io::weld::Weld;
@@ -22,19 +23,38 @@ pub(super) const NUMBER: &str = "texnumber";
 /// In place of that number, where a face has no texture.
 const NONE: u32 = u32::MAX;
 
+/// Numbers of corners, of which [`Weld`] keeps two.
+pub(super) const MOST_CORNERS: u64 = u32::MAX as u64 - 2;
+
 /// What faces have of their own.
 pub(super) struct Wedges {
     /// The property `texcoord`, a list.
     pub(super) coordinates: Option<usize>,
     /// The property `texnumber`.
-    texture: Option<usize>,
-    color: Option<Color>,
-    /// Vertices: the index of their position, the bits of u and v, the index of their colour.
+    pub(super) texture: Option<usize>,
+    pub(super) color: Option<Color>,
+    /// Vertices: the index of their position, the bits of u and v, and their colour: packed, or its index.
     vertices: Weld<[u32; 4]>,
-    /// The bits of colours.
+    /// In place of these, where all were read at once.
+    at_once: Vec<[u32; 4]>,
+    /// The bits of colours that are not packed.
     colors: Weld<[u32; 4]>,
+    /// Corners so far.
+    corners: u64,
+    /// Faces with another number of texture coordinates than their corners take.
+    pub(super) odd: u64,
     /// The number of each triangle's texture; empty where faces have none.
     textures: Vec<u32>,
+}
+
+/// All triangles of a file whose faces are records of one size.
+pub(super) struct AtOnce {
+    /// Indices into `vertices`.
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// As [`Wedges`] tells them apart.
+    pub(super) vertices: Vec<[u32; 4]>,
+    /// Of each triangle, if it was asked for.
+    pub(super) textures: Vec<u32>,
 }
 
 /// The triangles that have the same texture.
@@ -47,57 +67,89 @@ pub(super) struct Part {
 impl Wedges {
     /// None read yet; nothing where faces have nothing of their own that a mesh would have a use for.
     pub(super) fn of(header: &Header) -> Option<Self> {
-        let face = header.element("face").filter(|_| header.element("tristrips").is_none())?;
+        let face = heeded(header)?;
         let coordinates = face.list(&["texcoord"]);
-        let texture = face.index(&[NUMBER]).filter(|_| !header.textures.is_empty());
+        let has_uvs = || Layout::new(header.element("vertex")?).ok()?.uv;
+        let is_textured = !header.textures.is_empty() && (coordinates.is_some() || has_uvs().is_some());
+        let texture = face.index(&[NUMBER]).filter(|_| is_textured);
         let color = Color::of(face).filter(|_| !has_colored_vertices(header));
         if coordinates.is_none() && texture.is_none() && color.is_none() {
             return None;
         }
-        let (vertices, colors) = (Weld::new(), Weld::new());
-        Some(Self { coordinates, texture, color, vertices, colors, textures: Vec::new() })
+        Some(Self {
+            coordinates,
+            texture,
+            color,
+            vertices: Weld::new(),
+            at_once: Vec::new(),
+            colors: Weld::new(),
+            corners: 0,
+            odd: 0,
+            textures: Vec::new(),
+        })
+    }
+
+    /// Reads all faces at once, where that can be; gives the triangles.
+    pub(super) fn read_at_once(
+        &mut self,
+        element: &Element,
+        items: &mut impl Items,
+        positions: usize,
+    ) -> Option<Vec<[u32; 3]>> {
+        let AtOnce { triangles, vertices, textures } = items.wedges(element, self, positions)?;
+        (self.at_once, self.textures) = (vertices, textures);
+        Some(triangles)
     }
 
     /// Puts vertices in place of the positions of a face's corners, and notes the texture of the triangles that it is made of.
     pub(super) fn face(&mut self, face: &Item, corners: &mut [u32], triangles: usize) -> Placeless<()> {
-        let coordinates = self.coordinates.map_or(&[][..], |list| &face.lists[list]);
-        let (corner_count, has) = (corners.len(), coordinates.len());
-        if has != 0 && has != 2 * corner_count {
+        self.corners += corners.len() as u64;
+        if self.corners >= MOST_CORNERS {
             return Err(format!(
-                "texcoord has {has} numbers for a face of {corner_count} corners, which takes two each"
+                "more than {MOST_CORNERS} corners of faces with attributes of their own; divide the file"
             ));
         }
-        let color = self.color.as_ref().map_or(Vec4::ONE, |color| color.linear(|index| face.values[index]));
-        let color = self.colors.index(color.to_array().map(f32::to_bits));
+        let mut coordinates = self.coordinates.map_or(&[][..], |list| &face.lists[list]);
+        if !coordinates.is_empty() && coordinates.len() != 2 * corners.len() {
+            self.odd += 1;
+            coordinates = &[];
+        }
+        let value = |index: usize| face.values[index];
+        let color = match &self.color {
+            Some(color) if color.is_bytes() => color.packed(value),
+            Some(color) => self.colors.index(color.linear(value).to_array().map(f32::to_bits)),
+            None => 0,
+        };
         for (corner, k) in corners.iter_mut().zip(0..) {
             let uv = coordinates.get(2 * k..2 * k + 2).unwrap_or(&[0.0; 2]);
             *corner = self.vertices.index([*corner, (uv[0] as f32).to_bits(), (uv[1] as f32).to_bits(), color]);
         }
         if let Some(texture) = self.texture {
-            // Whatever is no index, as -1 (MeshLab), is none.
-            let number = face.values[texture];
-            let number = if (0.0..f64::from(NONE)).contains(&number) { number as u32 } else { NONE };
-            self.textures.extend(std::iter::repeat_n(number, triangles));
+            self.textures.extend(std::iter::repeat_n(texture_number(face.values[texture]), triangles));
         }
         Ok(())
     }
 
     /// The meshes, by rising number of their texture, of triangles whose corners this has named.
     pub(super) fn parts(self, vertices: Vertices, triangles: Vec<[u32; 3]>) -> Vec<Part> {
-        let keys = self.vertices.into_keys();
+        let keys = if self.at_once.is_empty() { self.vertices.into_keys() } else { self.at_once };
         let positions: Vec<u32> = keys.iter().map(|key| key[0]).collect();
         let mut vertices = vertices.of(&positions);
         if self.coordinates.is_some() {
             vertices.uvs = keys.iter().map(|&[_, u, v, _]| Vec2::new(f32::from_bits(u), f32::from_bits(v))).collect();
         }
-        if self.color.is_some() {
-            let colors: Vec<Vec4> =
-                self.colors.into_keys().iter().map(|bits| bits.map(f32::from_bits).into()).collect();
-            vertices.colors = keys.iter().map(|key| colors[key[3] as usize]).collect();
+        if let Some(color) = self.color {
+            let table = self.colors.into_keys();
+            let of_table = |index: u32| Vec4::from(table[index as usize].map(f32::from_bits));
+            let linear = |word| if color.is_bytes() { Color::unpacked(word) } else { of_table(word) };
+            vertices.colors = keys.iter().map(|key| linear(key[3])).collect();
         }
         let mesh = vertices.mesh(triangles);
-        if self.textures.is_empty() {
-            return vec![Part { mesh, texture: Some(0) }];
+        let numbered = |number: u32| (number != NONE).then_some(number);
+        // Of one texture is what has none to choose from, and most of what has.
+        let first = self.textures.first().copied().unwrap_or(0);
+        if self.textures.iter().all(|number| *number == first) {
+            return vec![Part { mesh, texture: numbered(first) }];
         }
         let mut by_texture: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
         for (&triangle, texture) in mesh.triangles.iter().zip(self.textures) {
@@ -109,21 +161,29 @@ impl Wedges {
                 Some(used) => with_vertices(&mesh, &used, triangles),
                 None => Mesh { triangles: Arc::new(triangles), ..mesh.clone() },
             };
-            Part { mesh, texture: (texture != NONE).then_some(texture) }
+            Part { mesh, texture: numbered(texture) }
         };
         by_texture.into_iter().map(part).collect()
     }
+}
+
+/// The element face, if its attributes are heeded: not beside strips, which have none.
+pub(super) fn heeded(header: &Header) -> Option<&Element> {
+    header.element("face").filter(|_| header.element("tristrips").is_none())
+}
+
+/// A texture's number by the value of [`NUMBER`]. Whatever is no index, as -1 (MeshLab), is none.
+pub(super) fn texture_number(value: f64) -> u32 {
+    if (0.0..f64::from(NONE)).contains(&value) { value as u32 } else { NONE }
 }
 
 /// What faces have of their own and the mesh does not get, if anything: the element, and a warning.
 pub(super) fn left_out(header: &Header) -> Option<(&Element, &'static str)> {
     let face = header.element("face")?;
     let is_colored = Color::of(face).is_some();
-    if header.element("tristrips").is_some() && (is_colored || face.list(&["texcoord"]).is_some()) {
-        return Some((
-            face,
-            "colours and texture coordinates of faces are left out, since the file has tristrips as well",
-        ));
+    let has_more = face.list(&["texcoord"]).is_some() || face.index(&[NUMBER]).is_some();
+    if heeded(header).is_none() && (is_colored || has_more) {
+        return Some((face, "colours and textures of faces are left out, since the file has tristrips as well"));
     }
     let twice = is_colored && has_colored_vertices(header);
     twice.then_some((face, "colours of faces are left out: vertices have colours as well, which are taken"))
