@@ -170,13 +170,28 @@ fn is_space(b: u8) -> bool {
     matches!(b, b' ' | b'\t'..=b'\r')
 }
 
-/// A word as a number; floats may be `nan` and `inf`.
+/// A word as a number; floats may be `nan` and `inf`, and what Microsoft's libraries write for them.
 #[inline]
 pub(super) fn number<T: Number>(word: &[u8]) -> Option<T> {
     match T::leading(word) {
         Some((number, length)) if length == word.len() => Some(number),
-        _ => str::from_utf8(word).ok()?.parse().ok(),
+        _ => {
+            let word = str::from_utf8(word).ok()?;
+            word.parse().ok().or_else(|| not_finite(word)?.parse().ok())
+        }
     }
+}
+
+/// The usual spelling of `-nan(ind)`, `1.#QNAN`, `-1.#INF000` and the like.
+fn not_finite(word: &str) -> Option<&'static str> {
+    let lower = word.to_ascii_lowercase();
+    let (is_negative, size) = lower.strip_prefix('-').map_or((false, &lower[..]), |size| (true, size));
+    let size = size.strip_prefix('+').unwrap_or(size);
+    let kind = size.strip_prefix("1.#").unwrap_or_default();
+    if size.starts_with("nan(") || ["ind", "qnan", "snan"].iter().any(|nan| kind.starts_with(nan)) {
+        return Some("nan");
+    }
+    kind.starts_with("inf").then_some(if is_negative { "-inf" } else { "inf" })
 }
 
 /// Bytes for a message: as text, shortened to 40 characters.
@@ -221,6 +236,20 @@ mod tests {
                 (7, b"e".to_vec())
             ]
         );
+    }
+
+    #[test]
+    fn what_is_not_finite_is_written_in_many_ways() {
+        for word in ["nan", "-NaN", "-nan(ind)", "nan(snan)", "1.#QNAN", "-1.#IND", "1.#SNAN00", "+1.#IND"] {
+            assert!(number::<f64>(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        for (word, sign) in [("inf", 1.0), ("-inf", -1.0), ("1.#INF", 1.0), ("-1.#INF00", -1.0)] {
+            assert_eq!(number::<f32>(word.as_bytes()), Some(f32::INFINITY * sign), "{word}");
+        }
+        for word in ["1.#", "1.#x", "n", "1.5#QNAN", ""] {
+            assert_eq!(number::<f64>(word.as_bytes()), None, "{word}");
+        }
+        assert_eq!(number::<i32>(b"1.#QNAN"), None);
     }
 
     #[test]

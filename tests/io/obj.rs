@@ -137,7 +137,7 @@ fn materials_and_textures() {
     assert_eq!(texture.transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 3.0), "scaled, then moved");
     assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::Clamp, Wrap::Clamp));
     let shapes: Vec<_> = meshes(&scene).iter().map(|m| (m.name.as_str(), m.material, m.triangles.len())).collect();
-    assert_eq!(shapes, [("left", 0, 2), ("right", 1, 1)]);
+    assert_eq!(shapes, [("left", 0, 2), ("left", 1, 1)]);
 }
 
 /// What exporters write beside a `Ks` that none of them shows: MeshLab 0, trimesh 1, Blender's physical materials nothing but a roughness.
@@ -409,6 +409,51 @@ fn crc(bytes: &[u8]) -> u32 {
     })
 }
 
+/// Objects stay apart where they have a material in common; the parts of one that have several keep its name. Groups
+/// name what is in no object.
+#[test]
+fn objects_are_meshes() {
+    let faces = [
+        "g a",
+        "f 1 2 3",
+        "g b",
+        "usemtl red",
+        "f 1 2 4",
+        "o left",
+        "f 1 2 3",
+        "usemtl blue",
+        "f 1 2 3",
+        "g c",
+        "f 1 2 4",
+    ];
+    let more = ["o right", "f 2 3 4", "usemtl red", "f 1 3 4", "o left", "f 2 3 4"];
+    let obj = format!("{VERTICES}{}\n{}\n", faces.join("\n"), more.join("\n"));
+    let scene = Files::one("a.obj", obj).scene("a.obj");
+    let found: Vec<_> = meshes(&scene).iter().map(|m| (m.name.as_str(), m.material, m.triangles.len())).collect();
+    assert_eq!(found, [("a", 0, 1), ("b", 1, 1), ("left", 1, 2), ("left", 2, 2), ("right", 2, 1), ("right", 1, 1)]);
+    let materials: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!(materials, ["", "red", "blue"]);
+}
+
+/// As Windows writes them, and words that mean no smoothing.
+#[test]
+fn numbers_that_are_none_and_words_for_off() {
+    let obj = format!("{VERTICES}vn -nan(ind) -1.#IND 0\ns OFF\nf 1//1 2//1 3//1\ns null\nf 2 3 4\n");
+    let scene = Files::one("a.obj", obj).scene("a.obj");
+    assert_eq!(meshes(&scene)[0].normals, [Vec3::ZERO; 6]);
+    refused_bytes("a.obj", "v 0 1,5 2\n", "line 1", "v needs 3 numbers, x y z, and \"1,5\" is none");
+}
+
+/// Bytes where shares belong are told, not guessed.
+#[test]
+fn colours_above_one_are_told() {
+    let (scene, warnings) =
+        Files::one("a.obj", "v 0 0 0 0 0 0\nv 1 0 0 200 100 50\nv 0 1 0 1 1 1\nf 1 2 3\n").load("a.obj");
+    assert_eq!(meshes(&scene)[0].colors[1].truncate(), Vec3::ONE);
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(warning.place == "line 2" && warning.message.contains("1 colours are above 1"), "{warning}");
+}
+
 #[test]
 fn a_folder_as_a_library_is_refused() {
     let files = Files::one("a.obj", format!("mtllib b.mtl\n{VERTICES}f 1 2 3\n"));
@@ -446,12 +491,13 @@ fn large_files_are_read_as_small_ones() {
     let files = Files::one("a.obj", &text);
     let scene = files.load("a.obj").0;
     let meshes = meshes(&scene);
-    // Before the first material, smooth; then a, b, flat.
+    // Before the first object, smooth; then of materials a, b, a, flat.
     let names: Vec<_> = meshes.iter().map(|mesh| mesh.name.as_str()).collect();
-    assert_eq!(names, ["", "first", "second"]);
+    assert_eq!(names, ["", "first", "second", "third"]);
+    assert_eq!(meshes.iter().map(|mesh| mesh.material).collect::<Vec<_>>(), [0, 1, 2, 1]);
     let has_normals: Vec<_> = meshes.iter().map(|mesh| !mesh.normals.is_empty()).collect();
-    assert_eq!(has_normals, [true, false, false]);
-    let expected = |patches: &[std::ops::Range<usize>]| -> Vec<[Vec3; 3]> {
+    assert_eq!(has_normals, [true, false, false, false]);
+    let expected = |patches: std::ops::Range<usize>| -> Vec<[Vec3; 3]> {
         let patch = |i: usize| {
             let [a, b, c, d] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[y, z]| Vec3::new(i as f32, y, z));
             match i % 3 {
@@ -460,12 +506,11 @@ fn large_files_are_read_as_small_ones() {
                 _ => vec![[c, d, a]],
             }
         };
-        patches.iter().cloned().flatten().flat_map(patch).collect()
+        patches.flat_map(patch).collect()
     };
-    let empty = PATCHES..PATCHES;
-    let ranges = [[0..1000, empty.clone()], [1000..30_000, 45_000..PATCHES], [30_000..45_000, empty]];
-    for (mesh, ranges) in meshes.iter().zip(ranges) {
-        assert!(corners(mesh) == expected(&ranges), "{}", mesh.name);
+    let ranges = [0..1000, 1000..30_000, 30_000..45_000, 45_000..PATCHES];
+    for (mesh, range) in meshes.iter().zip(ranges) {
+        assert!(corners(mesh) == expected(range), "{}", mesh.name);
         // Every second corner of a patch is red.
         for (position, color) in mesh.positions.iter().zip(&mesh.colors) {
             let is_red = (position.y, position.z) == (1.0, 0.0);

@@ -57,15 +57,17 @@ pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut 
     let is_plain = triangles.iter().all(|triangles| matches!(triangles, Triangles::Plain(_)));
     let mut chains = Chains::new(if is_plain { 0 } else { obj.positions.len() });
     let mut geometries = Vec::new();
-    let mut used = Vec::new();
+    let (mut used, mut numbers) = (Vec::new(), HashMap::new());
     for (section, triangles) in sections.into_iter().zip(triangles) {
-        let material = geometries.len() as u32;
+        let material = *numbers.entry(section.material).or_insert_with_key(|name: &String| {
+            used.push(name.clone());
+            used.len() as u32 - 1
+        });
         let mesh = match triangles {
             Triangles::Plain(triangles) => plain(&obj, triangles, origin),
             Triangles::Detailed(pieces) => detailed(&obj, &smooth, &pieces, origin, &mut chains),
         };
         geometries.push(Geometry::Mesh(Mesh { name: section.name, material, ..mesh }));
-        used.push(section.material);
     }
     let mut scene = Scene::from_geometries(geometries, Vec::new());
     library.resolve(path, used, !obj.colors.is_empty(), &mut scene, warnings)?;

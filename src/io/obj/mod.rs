@@ -3,7 +3,7 @@
 //! Reading takes four steps, of which all but the third run in parallel over stretches of whole lines: statements are
 //! counted, so that each stretch knows its first line and what relative indices count from ([`stretch`]); they are read
 //! into lists ([`statement`]); materials, smoothing groups and names, which hold until they are changed, are carried from
-//! stretch to stretch ([`Obj::new`]); lists become meshes ([`build`]), one for each material. Faces may name vertices that
+//! stretch to stretch ([`Obj::new`]); lists become meshes ([`build`]), one for each material of an object. Faces may name vertices that
 //! come after them, so their indices are compared with the counts at the end.
 //!
 //! Read: v (with colours, sRGB-encoded as Blender and MeshLab write them), vt, vn, f, o, g, s, usemtl, mtllib. Points
@@ -40,15 +40,15 @@ struct Obj {
     normals: Vec<Vec3>,
     /// Of each stretch.
     faces: Vec<Faces>,
-    /// One for each material that a face has.
+    /// One for each material that a face has, in each object.
     sections: Vec<Section>,
 }
 
-/// The faces of one material.
+/// The faces of one material in one object.
 struct Section {
     /// What `usemtl` said; empty before the first.
     material: String,
-    /// The object or group of the first face.
+    /// Of the object; outside of objects, of the group of the first face.
     name: String,
     /// Not empty, in the order of the file.
     pieces: Vec<Piece>,
@@ -64,7 +64,7 @@ struct Piece {
     smoothing: u32,
 }
 
-/// Statements that were left out: how many, and the first one's line and word.
+/// Statements that were left out, or are doubtful: how many, and the first one's line and word.
 #[derive(Clone, Default)]
 struct Skipped {
     count: usize,
@@ -112,6 +112,13 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     Skipped::warn(&parts, |part| &part.flat_elements, path, warnings, "points or lines, which have no area,");
     Skipped::warn(&parts, |part| &part.small_faces, path, warnings, "faces with fewer than 3 corners");
     Skipped::warn(&parts, |part| &part.unknown, path, warnings, "statements that this reader does not know");
+    if let Some(line) = parts.iter().find(|part| part.bright.count > 0).map(|part| part.bright.line) {
+        let count: usize = parts.iter().map(|part| part.bright.count).sum();
+        let message = format!(
+            "{count} colours are above 1, which is full strength, and are taken for 1; bytes have to be divided by 255"
+        );
+        warnings.push(Warning::new(path, format!("line {line}"), message));
+    }
     let mut library = mtl::Library::default();
     let mut known: Vec<&str> = Vec::new();
     for (line, name) in parts.iter().flat_map(|part| &part.libraries) {
@@ -137,19 +144,19 @@ fn check_indices(path: &Path, parts: &[Part], counts: [usize; 3]) -> Result<()> 
 }
 
 impl Obj {
-    /// Carries what holds until it is changed from stretch to stretch, and sorts the faces by material.
+    /// Carries what holds until it is changed from stretch to stretch, and sorts the faces by object and material.
     fn new(parts: Vec<Part>, positions: Vec<DVec3>, uvs: Vec<Vec2>, normals: Vec<Vec3>) -> Self {
         let mut sections: Vec<Section> = Vec::new();
-        let mut known: HashMap<String, usize> = HashMap::new();
-        let (mut material, mut name, mut smoothing) = (String::new(), String::new(), 0);
+        let mut known: HashMap<[String; 2], usize> = HashMap::new();
+        // The object and the material, and what the group is called.
+        let (mut key, mut group, mut smoothing) = <([String; 2], String, u32)>::default();
         for (stretch, part) in parts.iter().enumerate() {
             let mut begin = 0;
             for run in &part.runs {
-                if let Some(index) = run.material {
-                    material.clone_from(&part.names[index as usize]);
-                }
-                if let Some(index) = run.name {
-                    name.clone_from(&part.names[index as usize]);
+                for (name, index) in key.iter_mut().chain([&mut group]).zip([run.object, run.material, run.group]) {
+                    if let Some(index) = index {
+                        name.clone_from(&part.names[index as usize]);
+                    }
                 }
                 smoothing = run.smoothing.unwrap_or(smoothing);
                 let corners = begin..run.end;
@@ -157,11 +164,12 @@ impl Obj {
                 if corners.is_empty() {
                     continue;
                 }
-                let section = match known.get(&material) {
+                let section = match known.get(&key) {
                     Some(&section) => section,
                     None => {
-                        known.insert(material.clone(), sections.len());
-                        let (material, name) = (material.clone(), name.clone());
+                        known.insert(key.clone(), sections.len());
+                        let [object, material] = key.clone();
+                        let name = if object.is_empty() { group.clone() } else { object };
                         sections.push(Section { material, name, pieces: Vec::new() });
                         sections.len() - 1
                     }

@@ -41,7 +41,10 @@ pub(super) struct Polygon {
 pub(super) struct Run {
     /// Indices into [`Part::names`].
     pub(super) material: Option<u32>,
-    pub(super) name: Option<u32>,
+    /// Of the object (`o`).
+    pub(super) object: Option<u32>,
+    /// Of the group (`g`).
+    pub(super) group: Option<u32>,
     pub(super) smoothing: Option<u32>,
     /// Where it ends among the corners; it begins where the one before ends.
     pub(super) end: usize,
@@ -62,6 +65,8 @@ pub(super) struct Part {
     pub(super) highest: [Option<(u32, usize)>; 3],
     /// Names of material libraries, and their lines.
     pub(super) libraries: Vec<(usize, String)>,
+    /// Colours above 1.
+    pub(super) bright: Skipped,
     pub(super) flat_elements: Skipped,
     pub(super) small_faces: Skipped,
     pub(super) unknown: Skipped,
@@ -123,7 +128,7 @@ impl Reader<'_> {
         let mut words = Words::new(text, line);
         let Some(keyword) = words.next() else { return Ok(()) };
         match keyword {
-            b"v" => self.vertex(&mut words)?,
+            b"v" => self.vertex(line, &mut words)?,
             b"vt" => {
                 let u = words.number().ok_or("vt needs a number, the texture coordinate u")?;
                 let v = words.next().filter(|word| !word.starts_with(b"#"));
@@ -132,19 +137,24 @@ impl Reader<'_> {
                 self.counts[1] += 1;
             }
             b"vn" => {
-                let normal = three(&mut words).ok_or("vn needs 3 numbers, x y z")?;
+                let normal = three("vn", &mut words)?;
                 self.slots.normals[self.counts[2] - self.begin.counts[2]] = normal.normalize_or_zero().as_vec3();
                 self.counts[2] += 1;
             }
             b"f" => self.face(line, &mut words)?,
-            b"o" | b"g" => {
+            b"o" => {
                 let name = self.name(name(words.rest()));
-                self.change().name = Some(name);
+                self.change().object = Some(name);
+            }
+            b"g" => {
+                let name = self.name(name(words.rest()));
+                self.change().group = Some(name);
             }
             b"s" => {
                 let group = match words.next() {
-                    None | Some(b"off") => 0,
-                    Some(b"on") => 1,
+                    None => 0,
+                    Some(word) if [&b"off"[..], b"null"].iter().any(|off| word.eq_ignore_ascii_case(off)) => 0,
+                    Some(word) if word.eq_ignore_ascii_case(b"on") => 1,
                     Some(word) => number(word).ok_or_else(|| {
                         format!("s {} is not a smoothing group; write a number, on or off", quoted(word))
                     })?,
@@ -189,8 +199,8 @@ impl Reader<'_> {
     }
 
     /// `x y z`, `x y z w` or `x y z r g b`.
-    fn vertex(&mut self, words: &mut Words<'_>) -> Placeless<()> {
-        let position = three(words).ok_or("v needs 3 numbers, x y z")?;
+    fn vertex(&mut self, line: usize, words: &mut Words<'_>) -> Placeless<()> {
+        let position = three("v", words)?;
         let index = self.counts[0] - self.begin.counts[0];
         self.slots.positions[index] = position;
         self.counts[0] += 1;
@@ -201,6 +211,9 @@ impl Reader<'_> {
             count += 1;
         }
         if count == 3 {
+            if rest.iter().any(|&channel| channel > 1.0) {
+                self.part.bright.add(line, b"v");
+            }
             self.part.colors.resize(index, Vec3::ONE);
             self.part.colors.push(Vec3::from(rest.map(|c| srgb::decode(f64::from(c).clamp(0.0, 1.0)) as f32)));
         }
@@ -246,8 +259,14 @@ impl Reader<'_> {
     }
 }
 
-fn three(words: &mut Words<'_>) -> Option<DVec3> {
-    Some(DVec3::new(words.number()?, words.number()?, words.number()?))
+fn three(keyword: &str, words: &mut Words<'_>) -> Placeless<DVec3> {
+    let mut next = || {
+        words.number_or_word().map_err(|word| {
+            let found = word.map_or(String::new(), |word| format!(", and {} is none", quoted(word)));
+            format!("{keyword} needs 3 numbers, x y z{found}")
+        })
+    };
+    Ok(DVec3::new(next()?, next()?, next()?))
 }
 
 /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; indices count from 1, or from -1 backwards.
