@@ -97,9 +97,13 @@ fn format(bytes: &[u8], name: &str) -> Option<ImageFormat> {
 /// Decodes a picture.
 ///
 /// # Errors
-/// A message about what is wrong.
-pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Texture> {
-    read(bytes, name).map_err(|(Refusal::Unsupported(message) | Refusal::Broken(message))| message)
+/// A message about what is wrong, before which the picture's name belongs, where it is broken or too large.
+pub(super) fn decode(bytes: &[u8], name: &str) -> Placeless<Opened> {
+    match read(bytes, name) {
+        Ok(texture) => Ok(Ok(texture)),
+        Err(Refusal::Unsupported(why)) => Ok(Err(why)),
+        Err(Refusal::Broken(why)) => Err(why),
+    }
 }
 
 fn read(bytes: &[u8], name: &str) -> std::result::Result<Texture, Refusal> {

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
 use twincast::math::{DVec3, Vec2, Vec3};
-use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Pixels, Projection, Wrap};
+use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Mesh, Pixels, Projection, Wrap};
 
 use super::gltf_maker::Maker;
 use super::{Files, corners, meshes, obj, refused};
@@ -392,11 +392,40 @@ fn a_scale_of_zero_along_one_axis_presses_flat() {
     maker.json["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "scale": [2, 3, 0], "translation": [0, 0, 5]}]);
     let scene = maker.files().scene("a.gltf");
     let [slanted, flat] = meshes(&scene)[..] else { panic!("{:?}", scene.geometries) };
+    let check_flat = |flat: &Mesh| {
+        let placed: Vec<_> = flat.positions.iter().map(|&offset| flat.point(offset)).collect();
+        assert_eq!(placed, [DVec3::Z * 5.0, DVec3::new(2.0, 0.0, 5.0), DVec3::new(0.0, 3.0, 5.0)]);
+        assert_eq!(flat.normals, [Vec3::Z; 3]);
+    };
     assert_eq!(corners(slanted), [[Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 2.0)]]);
-    let placed: Vec<_> = flat.positions.iter().map(|&offset| flat.point(offset)).collect();
-    assert_eq!(placed, [DVec3::Z * 5.0, DVec3::new(2.0, 0.0, 5.0), DVec3::new(0.0, 3.0, 5.0)]);
-    assert_eq!(flat.normals, [Vec3::Z; 3]);
+    check_flat(flat);
     assert_eq!(scene.group_geometries(scene.instances[1].group).map(|(index, _)| index).collect::<Vec<_>>(), [1]);
+    // Where it is nowhere else, the mesh itself is no part of the scene.
+    maker.json["scenes"] = json!([{"nodes": [1]}]);
+    let scene = maker.files().scene("a.gltf");
+    let [flat] = meshes(&scene)[..] else { panic!("{:?}", scene.geometries) };
+    check_flat(flat);
+    assert_eq!((scene.groups.len(), scene.instances[0].group, scene.groups[0].geometries.clone()), (1, 0, 0..1));
+}
+
+/// A picture that is somewhere else, or in another format, wherever it lies, is left out as one that is missing.
+#[test]
+fn pictures_that_cannot_be_had_are_told() {
+    let gif = data_uri("image/gif", b"GIF89a\x01\0\x01\0\0\0\0;");
+    let of_view = [("/images/0", json!({"bufferView": 0, "mimeType": "image/ktx2"}))];
+    let of_uri = |uri: &str| [("/images/0/uri", json!(uri))];
+    for (changes, place, words) in [
+        (of_uri("http://example.org/a.png"), "/images/0/uri", "relative path"),
+        (of_uri(""), "/images/0/uri", "empty file name"),
+        (of_uri("50%.png"), "/images/0/uri", "hexadecimal"),
+        (of_uri(&gif), "/images/0/uri", "image \"two\" is no PNG"),
+        (of_view, "/images/0", "the image is no PNG"),
+    ] {
+        let (scene, warnings) = changed(&changes).load("a.gltf");
+        assert_eq!((scene.materials[0].diffuse_texture, scene.textures.len()), (None, 0));
+        let [warning] = &warnings[..] else { panic!("{words}: {warnings:?}") };
+        assert!(warning.place == place && warning.message.contains(words), "{warning}");
+    }
 }
 
 #[test]
@@ -436,6 +465,8 @@ fn faults_are_told_with_their_pointer() {
     fault("/nodes/1/mesh", json!(1), "/nodes/1/mesh", "no mesh 1");
     fault("/nodes/1/rotation", json!([0, 0, 0, 0]), "/nodes/1/rotation", "unit quaternion");
     fault("/nodes/2/matrix/15", json!(2), "/nodes/2/matrix", "0 0 0 1");
+    fault("/nodes/2/matrix/15", json!(1.00001), "/nodes/2/matrix", "0 0 0 1");
+    changed(&[("/nodes/2/matrix/15", json!(1.0000001)), ("/nodes/2/matrix/3", json!(-1e-17))]).scene("a.gltf");
     fault("/nodes/3/camera", json!(1), "/nodes/3/camera", "no camera 1");
     fault("/cameras/0/perspective/yfov", json!(4), "/cameras/0/perspective/yfov", "between 0 and pi");
     fault("/scene", json!(2), "/scene", "no scene 2");
@@ -463,7 +494,6 @@ fn faults_are_told_with_their_pointer() {
         "/images/0",
         "\"two\" claims 100000 x 100000",
     );
-    fault("/images/0/uri", json!("http://example.org/a.png"), "/images/0", "relative path");
     fault("/buffers/0/byteLength", json!(105), "/buffers/0/byteLength", "promises 105 bytes, but has 104");
     fault("/buffers/0", json!({"byteLength": 104}), "/buffers/0/uri", "neither");
     fault("/scenes", json!([]), "/scenes", "nothing to render");

@@ -281,6 +281,9 @@ fn morph_targets_add_up() {
     assert_eq!(shape(&maker.files(), at(0.5)), both, "by the animation's");
     maker.json["nodes"][0]["weights"] = json!([1.0]);
     fault(&maker.files(), Animation::default(), "/nodes/0/weights", "1 weights for 2 morph targets");
+    maker.json["nodes"][0].as_object_mut().unwrap().remove("weights");
+    maker.json["meshes"][0]["weights"] = json!([1.0]);
+    fault(&maker.files(), Animation::default(), "/meshes/0/weights", "1 weights for 2 morph targets");
 }
 
 /// By half of a target; colours stay within theirs, and what no target displaces stays.

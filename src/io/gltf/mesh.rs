@@ -69,14 +69,17 @@ impl<'a> Groups<'a> {
         document.check_index(&format!("{pointer}/mesh"), mesh, document.root.meshes.len(), "mesh")?;
         let node = &document.root.nodes[index];
         let targets = document.root.meshes[mesh].primitives.iter().map(|p| p.targets.len()).max().unwrap_or(0);
-        let weights = pose.weights(index, node).unwrap_or(&document.root.meshes[mesh].weights);
+        let (weights, told_by) = match pose.weights(index, node) {
+            Some(weights) => (weights, pointer.clone()),
+            None => (&document.root.meshes[mesh].weights[..], format!("/meshes/{mesh}")),
+        };
         let weights = if targets == 0 { &[] } else { weights };
         if !weights.is_empty() && weights.len() != targets {
             let message = format!("{} weights for {targets} morph targets", weights.len());
-            return Err(document.error(format!("{pointer}/weights"), message));
+            return Err(document.error(format!("{told_by}/weights"), message));
         }
         if !weights.iter().all(|weight| weight.is_finite()) {
-            return Err(document.error(format!("{pointer}/weights"), "a weight that is not finite"));
+            return Err(document.error(format!("{told_by}/weights"), "a weight that is not finite"));
         }
         let weights = if weights.iter().all(|weight| *weight == 0.0) { &[] } else { weights };
         let shape = Shape { mesh, weights: weights.iter().map(|weight| weight.to_bits()).collect(), skin: node.skin };

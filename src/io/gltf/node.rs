@@ -55,7 +55,31 @@ pub(super) fn place(
             stage.scene.lights.push(punctual::move_light(&light, &transform));
         }
     }
+    drop_unplaced(stage.scene);
     Ok(())
+}
+
+/// Leaves out groups that nothing places: of which only copies that are pressed flat stand in the scene, or not even those.
+fn drop_unplaced(scene: &mut Scene) {
+    let mut is_placed = vec![false; scene.groups.len()];
+    scene.instances.iter().for_each(|instance| is_placed[instance.group as usize] = true);
+    if is_placed.iter().all(|is_placed| *is_placed) {
+        return;
+    }
+    let (mut numbers, mut groups, mut geometries) = (Vec::new(), Vec::new(), Vec::new());
+    // Each group's follow those of the one before.
+    let mut all = std::mem::take(&mut scene.geometries).into_iter();
+    for (group, is_placed) in std::mem::take(&mut scene.groups).into_iter().zip(is_placed) {
+        numbers.push(groups.len() as u32);
+        let own: Vec<Geometry> = all.by_ref().take(group.geometries.len()).collect();
+        if is_placed {
+            let begin = geometries.len() as u32;
+            geometries.extend(own);
+            groups.push(Group { geometries: begin..geometries.len() as u32, ..group });
+        }
+    }
+    scene.instances.iter_mut().for_each(|instance| instance.group = numbers[instance.group as usize]);
+    (scene.groups, scene.geometries) = (groups, geometries);
 }
 
 impl Stage<'_, '_> {

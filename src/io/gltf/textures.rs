@@ -204,7 +204,7 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// Decodes an image. None, and a warning, where its file is missing.
+/// Decodes an image. None, and a warning, where it is somewhere else or in another format, or its file is missing.
 fn decoded(
     document: &Document<'_>,
     index: usize,
@@ -214,24 +214,25 @@ fn decoded(
     let image = &document.root.images[index];
     let pointer = format!("/images/{index}");
     let decode = |bytes: &[u8]| {
+        let shown = if image.name.is_empty() { "the image".to_owned() } else { format!("image {:?}", image.name) };
+        let named = |why| format!("{shown} {why}");
         let name = if image.name.is_empty() { &pointer } else { &image.name };
-        let told = |m| document.error(&pointer, format!("image {:?} {m}", image.name));
-        texture::decode(bytes, name).map(Some).map_err(told)
+        let decoded = texture::decode(bytes, name).map_err(|why| document.error(&pointer, named(why)))?;
+        Ok::<_, Error>(decoded.map_err(named))
     };
-    match *source {
-        Source::Uri(uri) => match uri::resolve(document.path, uri).map_err(|m| document.error(&pointer, m))? {
-            Target::Data(bytes) => decode(&bytes),
-            Target::File(file) => {
-                let texture = texture::open(&file).map_err(|e| about(document, &pointer, e))?;
-                let without = |why| {
-                    let message = format!("{why}; the material is rendered without it");
-                    warnings.push(document.warning(format!("{pointer}/uri"), message));
-                };
-                Ok(texture.map_err(without).ok())
-            }
+    let opened = match *source {
+        Source::Uri(uri) => match uri::resolve(document.path, uri) {
+            Ok(Target::Data(bytes)) => decode(&bytes)?,
+            Ok(Target::File(file)) => texture::open(&file).map_err(|e| about(document, &pointer, e))?,
+            Err(why) => Err(why),
         },
-        Source::Bytes(bytes) => decode(bytes),
-    }
+        Source::Bytes(bytes) => decode(bytes)?,
+    };
+    let without = |why| {
+        let place = if matches!(source, Source::Uri(_)) { format!("{pointer}/uri") } else { pointer.clone() };
+        warnings.push(document.warning(place, format!("{why}; the material is rendered without it")));
+    };
+    Ok(opened.map_err(without).ok())
 }
 
 /// An error about a picture file, as one about the document that names it.

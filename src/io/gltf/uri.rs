@@ -41,7 +41,11 @@ pub(super) fn resolve(base: &Path, uri: &str) -> Placeless<Target> {
     if name.len() > LONGEST_NAME {
         return Err(format!("a file name of {} bytes; data within the file begin with data:", name.len()));
     }
-    Ok(Target::File(base.parent().unwrap_or(Path::new("")).join(name)))
+    let beside = |name: &str| base.parent().unwrap_or(Path::new("")).join(name);
+    let file = beside(&name);
+    // From Windows, against the specification.
+    let is_foreign = name.contains('\\') && !file.exists();
+    Ok(Target::File(if is_foreign { beside(&name.replace('\\', "/")) } else { file }))
 }
 
 /// Undoes percent-encoding.
@@ -114,6 +118,7 @@ mod tests {
             assert_eq!(resolve(base, &format!("{head},Zg==")), Ok(Target::Data(b"f".to_vec())), "{head}");
         }
         assert_eq!(resolve(base, "data:base64,Zg=="), Ok(Target::Data(b"Zg==".to_vec())));
+        assert_eq!(resolve(base, "maps\\a.png"), Ok(Target::File("models/maps/a.png".into())));
         for bad in ["http://example.org/a.png", "file:///a", "a%2", "data:x", "", &"a".repeat(1025)] {
             assert!(resolve(base, bad).is_err(), "{bad}");
         }

@@ -95,7 +95,8 @@ impl Pose {
         let animated = self.animated.get(&index).unwrap_or(&still);
         if let Some(matrix) = node.matrix {
             let matrix = DMat4::from_cols_array(&matrix);
-            if matrix.row(3) != DMat4::IDENTITY.row(3) {
+            // Products and inverses of matrices are seldom exact.
+            if !matrix.row(3).abs_diff_eq(DMat4::IDENTITY.row(3), 1e-6) {
                 return Err(document.error(format!("{pointer}/matrix"), "the last row has to be 0 0 0 1"));
             }
             return Ok(DAffine3::from_mat4(matrix));
