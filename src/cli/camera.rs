@@ -165,6 +165,11 @@ impl CameraArgs {
             ("--fov-x", self.fov_x.is_some(), ProjectionArg::Perspective),
             ("--height", self.height.is_some(), ProjectionArg::Orthographic),
         ];
+        if self.shift.is_some() && self.projection == ProjectionArg::Equirectangular {
+            let message =
+                "--shift is not for --projection equirectangular, which shows the whole sphere; turn the camera";
+            return Err(Error::Usage(message.to_owned()));
+        }
         let alien = flags.into_iter().find(|(_, is_given, projection)| *is_given && *projection != self.projection);
         let Some((flag, _, projection)) = alien else { return Ok(()) };
         let name = |projection: ProjectionArg| {
@@ -389,6 +394,7 @@ mod tests {
             (&["--height", "3"][..], "--height is for --projection orthographic, and the projection is perspective"),
             (&["--projection", "orthographic", "--fov", "30"], "--fov is for --projection perspective"),
             (&["--projection", "equirectangular", "--fov-x", "30"], "the projection is equirectangular"),
+            (&["--projection", "equirectangular", "--shift", "0,0.25"], "--shift is not for"),
         ] {
             let error = parsed(flags).flagged(DVec3::X, &bounds).unwrap_err();
             assert!(error.exit_code() == 2 && error.to_string().contains(words), "{error}");

@@ -210,7 +210,7 @@ fn check_radius(radius: f64) -> Placeless<()> {
         return Ok(());
     }
     let also = if radius > 0.0 && rounded == 0.0 { ", in f32 too" } else { "" };
-    Err(format!("the radius is {radius}; it must be above 0 and finite{also}"))
+    Err(format!("the radius is {radius:?}; it must be above 0 and at most {LARGEST_COORDINATE:e}{also}"))
 }
 
 fn check_ends([base, apex]: &[DVec3; 2]) -> Placeless<()> {

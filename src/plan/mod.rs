@@ -226,7 +226,8 @@ impl Case<'_> {
     /// How far light is followed, and why.
     fn integrator(&self) -> (Integrator, &'static str) {
         let Self { scene, wishes, census, .. } = self;
-        let is_meant_dark = scene.unlit == Unlit::Darkness || !scene.lights.is_empty();
+        let has_lights = !scene.lights.is_empty() || scene.environment.is_some();
+        let is_meant_dark = scene.unlit == Unlit::Darkness || has_lights;
         let asked = integrator::Needs {
             sends_on: census.materials.sending_on > 0,
             is_lit: census.materials.lit > 0,
@@ -251,7 +252,7 @@ impl Case<'_> {
         if !self.reflects(integrator) {
             return Lighting::None;
         }
-        let is_unlit = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && !census.environment;
+        let is_unlit = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && scene.environment.is_none();
         // To paths, what is behind everything is light too.
         let shines = || self.background().is_some_and(|color| color != Vec3::ZERO);
         let finds_light = || integrator == Integrator::Path && (shines() || self.has_bodies());
@@ -368,9 +369,20 @@ mod tests {
         };
         for (pixel, intensity) in [(Vec4::W, 1.0), (Vec4::ONE, 0.0)] {
             let plan = around(pixel, intensity);
-            assert_eq!((plan.environment, plan.lighting), (false, Lighting::Headlight), "{pixel} times {intensity}");
+            // It is the file's light all the same, as a black lamp is.
+            assert_eq!(
+                (plan.environment, plan.lighting),
+                (false, Lighting::Lights(vec![])),
+                "{pixel} times {intensity}"
+            );
         }
         assert!(around(Vec4::Z, 1.0).environment);
+        // With it, what glows is the only light, as where all lamps are black.
+        let mut glowing = scene();
+        glowing.materials[0].emission = Vec3::ONE;
+        let around = |environment| plan(&Scene { environment, ..glowing.clone() }).integrator;
+        let black = Environment::new(Image { pixels: vec![Vec4::W; 2], ..Image::new(2, 1) });
+        assert_eq!([around(None), around(Some(black))], [Integrator::RayCast, Integrator::Path]);
     }
 
     #[test]

@@ -385,7 +385,7 @@ fn faults_name_the_numbers_of_the_file() {
             "between [4500000.3, 0, 0] and [4500000.3, 0, 1]",
         ),
         ("[[sphere]]\ncentre = [1e30, 0, 0]\nradius = 1\n", "may be up to 1.844e18"),
-        ("[[sphere]]\ncentre = [4500000.3, 0, 0]\nradius = 1e-50\n", "above 0 and finite, in f32 too"),
+        ("[[sphere]]\ncentre = [4500000.3, 0, 0]\nradius = 1e-50\n", "above 0 and at most 1.844e18, in f32 too"),
         ("[[cone]]\nbase = [4500000.3, 0, 0]\napex = [0, 0, 0]\nbase_radius = -0.1\n", "a radius is -0.1"),
         ("[[plane]]\npoint = [4500000.3, 0, 0]\nnormal = [0, 0, 0]\n", "it must be finite and not zero"),
         (

@@ -1,8 +1,10 @@
 //! Scenes that are written and read again.
 
 use twincast::io::save;
-use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Camera, Fov, Geometry, Material, Mesh, Projection, RECIPES, Scene, Unlit};
+use twincast::math::{DVec2, DVec3, Vec3};
+use twincast::scene::{
+    Absorption, Camera, Fov, Geometry, Interface, Material, Mesh, Projection, RECIPES, Scene, Unlit,
+};
 use twincast::{Error, Shape};
 
 use super::Files;
@@ -145,6 +147,32 @@ fn what_a_format_cannot_say_is_bad_usage() {
     let glowing = Material { emission: Vec3::ONE, ..Material::default() };
     let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
     refused(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![glowing]), "a.nff", "emission");
+}
+
+/// What a scene file refuses is not written: of surfaces that show their colour as it is, of thin glass, of a view of the
+/// whole sphere, and a name twice.
+#[test]
+fn what_is_saved_is_read_again() {
+    let unlit =
+        Material { unlit: true, diffuse: Vec3::new(0.25, 0.5, 1.0), ior: 1.2, shininess: 3.0, ..Material::default() };
+    let pane = Material {
+        interface: Interface::Thin,
+        absorption: Some(Absorption { color: Vec3::splat(0.5), distance: 1.0 }),
+        ..Material::glass(1.5)
+    };
+    let mesh =
+        |material| Geometry::Mesh(Mesh { material, ..Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]) });
+    let mut scene = Scene::from_geometries(vec![mesh(0), mesh(1)], vec![unlit, pane]);
+    let front = Camera { name: "front".to_owned(), ..Camera::framing(&scene.bounds(), 1.0) };
+    let around = Camera { projection: Projection::Equirectangular, shift: DVec2::X, ..front.clone() };
+    scene.cameras = vec![front, around];
+    let files = Files::one("none", "");
+    save(&scene, &files.path("a.toml")).unwrap();
+    let again = files.scene("a.toml");
+    assert_eq!((again.materials[0].unlit, again.materials[0].diffuse), (true, scene.materials[0].diffuse));
+    assert_eq!((again.materials[1].interface, again.materials[1].absorption), (Interface::Thin, None));
+    let cameras: Vec<_> = again.cameras.iter().map(|camera| (camera.name.as_str(), camera.shift)).collect();
+    assert_eq!(cameras, [("front", DVec2::ZERO), ("", DVec2::ZERO)]);
 }
 
 /// All shapes there are, and a name that needs care, through the format that has words for all.

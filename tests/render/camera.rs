@@ -234,6 +234,7 @@ fn cameras_that_cannot_be_are_bad_usage() {
         (Camera { lens: lens(0.1, f64::NAN), ..base.clone() }, "focus"),
         (Camera { projection: Projection::Orthographic(0.0), ..base.clone() }, "height 0"),
         (Camera { projection: Projection::Equirectangular, lens: lens(0.1, 1.0), ..base.clone() }, "whole sphere"),
+        (Camera { projection: Projection::Equirectangular, shift: DVec2::X, ..base.clone() }, "no lens shift"),
         (Camera { projection: narrow, ..base.clone() }, "neighbouring pixels"),
         (Camera { eye: DVec3::NAN, ..base.clone() }, "its place must be finite"),
         (Camera { frame: DMat3::ZERO, ..base.clone() }, "unit vectors"),

@@ -27,8 +27,10 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
 
 pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     render(scene, out)?;
-    for camera in &scene.cameras {
-        write_camera(camera, out)?;
+    for (i, camera) in scene.cameras.iter().enumerate() {
+        // Names tell cameras apart, and the first of a name is the one that is meant by it.
+        let is_known = scene.cameras[..i].iter().any(|before| before.name == camera.name);
+        write_camera(camera, if is_known { "" } else { &camera.name }, out)?;
     }
     for light in &scene.lights {
         write_light(light, out)?;
@@ -156,8 +158,8 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "ambient = {}\n", list(scene.ambient))
 }
 
-fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(&camera.name), list_f64(camera.eye))?;
+fn write_camera(camera: &Camera, name: &str, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(name), list_f64(camera.eye))?;
     let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
     if let Some(Pose { eye, frame }) = camera.end {
@@ -183,7 +185,7 @@ fn write_camera(camera: &Camera, out: &mut dyn Write) -> io::Result<()> {
         let [open, close] = camera.shutter;
         writeln!(out, "shutter = [{open}, {close}]")?;
     }
-    if camera.shift != DVec2::ZERO {
+    if camera.shift != DVec2::ZERO && camera.projection != Projection::Equirectangular {
         writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;
     }
     writeln!(out)
@@ -234,26 +236,12 @@ fn write_light(light: &Light, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::Result<()> {
-    let Material { ambient, diffuse, specular, reflection, transmission, emission, shininess, ior, .. } = material;
-    writeln!(out, "[material.m{index}]\nambient = {}\ndiffuse = {}", list(*ambient), list(*diffuse))?;
-    writeln!(out, "specular = {}\nshininess = {shininess}", list(*specular))?;
-    let model = match material.model {
-        Specular::Phong => "phong",
-        Specular::BlinnPhong => "blinn-phong",
-    };
-    writeln!(out, "model = \"{model}\"\nreflection = {}", list(*reflection))?;
-    writeln!(out, "transmission = {}\nior = {ior}\nemission = {}", list(*transmission), list(*emission))?;
-    match material.interface {
-        Interface::Shares if material.unlit => writeln!(out, "type = \"unlit\"")?,
-        Interface::Shares => {}
-        Interface::Fresnel => writeln!(out, "type = \"glass\"")?,
-        Interface::Thin => writeln!(out, "type = \"glass\"\nthin = true")?,
-    }
-    if let Some(Absorption { color, distance }) = material.absorption.filter(|_| *transmission != Vec3::ZERO) {
-        writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
-    }
-    if let Some(gloss) = material.gloss {
-        writeln!(out, "gloss = {gloss}")?;
+    writeln!(out, "[material.m{index}]")?;
+    if material.unlit {
+        let Material { diffuse, emission, .. } = material;
+        writeln!(out, "type = \"unlit\"\ndiffuse = {}\nemission = {}", list(*diffuse), list(*emission))?;
+    } else {
+        write_lit(material, out)?;
     }
     match material.alpha {
         Alpha::Opaque => {}
@@ -262,7 +250,36 @@ fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::R
         }
         Alpha::Blend => writeln!(out, "alpha = \"blend\"\nopacity = {}", material.opacity)?,
     }
-    writeln!(out, "energy_conserving = {}\n", material.energy_conserving)
+    if !material.unlit {
+        writeln!(out, "energy_conserving = {}", material.energy_conserving)?;
+    }
+    writeln!(out)
+}
+
+/// What a surface has on which light falls.
+fn write_lit(material: &Material, out: &mut dyn Write) -> io::Result<()> {
+    let Material { ambient, diffuse, specular, reflection, transmission, emission, shininess, ior, .. } = material;
+    writeln!(out, "ambient = {}\ndiffuse = {}", list(*ambient), list(*diffuse))?;
+    writeln!(out, "specular = {}\nshininess = {shininess}", list(*specular))?;
+    let model = match material.model {
+        Specular::Phong => "phong",
+        Specular::BlinnPhong => "blinn-phong",
+    };
+    writeln!(out, "model = \"{model}\"\nreflection = {}", list(*reflection))?;
+    writeln!(out, "transmission = {}\nior = {ior}\nemission = {}", list(*transmission), list(*emission))?;
+    match material.interface {
+        Interface::Shares => {}
+        Interface::Fresnel => writeln!(out, "type = \"glass\"")?,
+        Interface::Thin => writeln!(out, "type = \"glass\"\nthin = true")?,
+    }
+    let has_inside = *transmission != Vec3::ZERO && material.interface != Interface::Thin;
+    if let Some(Absorption { color, distance }) = material.absorption.filter(|_| has_inside) {
+        writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
+    }
+    if let Some(gloss) = material.gloss {
+        writeln!(out, "gloss = {gloss}")?;
+    }
+    Ok(())
 }
 
 fn write_mesh(mesh: &Mesh, prefix: &str, out: &mut dyn Write) -> io::Result<()> {

@@ -253,6 +253,9 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
             return Err(value.fault("\"shutter\" wants two times from 0 to 1, the earlier first"));
         }
     }
+    if camera.projection == Projection::Equirectangular {
+        table.refuse("shift", "is not for equirectangular cameras, which see the whole sphere; turn the camera")?;
+    }
     camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
     table.finish()?;
     Ok(camera)

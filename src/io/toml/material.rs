@@ -16,6 +16,14 @@ enum Kind {
 pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
     let kinds = [("phong", Kind::Phong), ("glass", Kind::Glass), ("unlit", Kind::Unlit)];
     let kind = table.optional("type", |value| value.choice(&kinds))?.unwrap_or(Kind::Phong);
+    if kind == Kind::Unlit {
+        for key in LIT {
+            table.refuse(
+                key,
+                "means nothing to type = \"unlit\", which shows \"diffuse\" as it is; leave one of them out",
+            )?;
+        }
+    }
     let plain = match kind {
         Kind::Phong | Kind::Unlit => Material::default(),
         Kind::Glass => Material::glass(Material::default().ior),
@@ -26,7 +34,7 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
     let reflection = color("reflection")?.unwrap_or(plain.reflection);
     let transmission = color("transmission")?.unwrap_or(plain.transmission);
     let emission = color("emission")?.unwrap_or_default();
-    let alpha = alpha(table)?;
+    let (alpha, interface) = (alpha(table)?, interface(table, kind)?);
     let models = [("phong", Specular::Phong), ("blinn-phong", Specular::BlinnPhong)];
     Ok(Material {
         name: name.to_owned(),
@@ -40,8 +48,8 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         transmission,
         ior: above_zero(table, "ior")?.unwrap_or(plain.ior),
         gloss: table.optional("gloss", |value| value.share())?,
-        interface: interface(table, kind)?,
-        absorption: absorption(table, transmission)?,
+        interface,
+        absorption: absorption(table, transmission, interface)?,
         unlit: kind == Kind::Unlit,
         normal_scale: table.optional("normal_scale", |value| value.number())?.unwrap_or(1.0) as f32,
         alpha,
@@ -50,6 +58,23 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         ..plain
     })
 }
+
+/// What only a surface has on which light falls.
+const LIT: [&str; 13] = [
+    "ambient",
+    "specular",
+    "shininess",
+    "model",
+    "energy_conserving",
+    "reflection",
+    "transmission",
+    "ior",
+    "gloss",
+    "normal_texture",
+    "normal_scale",
+    "attenuation_color",
+    "attenuation_distance",
+];
 
 fn interface(table: &mut Table<'_>, kind: Kind) -> Read<Interface> {
     let Some(thin) = table.get("thin") else {
@@ -94,7 +119,7 @@ fn unit(table: &mut Table<'_>, key: &'static str) -> Read<Option<f32>> {
 }
 
 /// `attenuation_color` and `attenuation_distance`, which stand together, for what lets light through.
-fn absorption(table: &mut Table<'_>, transmission: Vec3) -> Read<Option<Absorption>> {
+fn absorption(table: &mut Table<'_>, transmission: Vec3, interface: Interface) -> Read<Option<Absorption>> {
     let color = table.optional("attenuation_color", |value| {
         let color = value.color()?;
         if color.cmple(Vec3::ONE).all() { Ok(color) } else { Err(value.unlike("shares from 0 to 1")) }
@@ -104,6 +129,9 @@ fn absorption(table: &mut Table<'_>, transmission: Vec3) -> Read<Option<Absorpti
         (Some(_), Some(_)) if transmission == Vec3::ZERO => {
             Err(table.fault("\"attenuation_color\" is for what lets light through: give it a \"transmission\""))
         }
+        (Some(_), Some(_)) if interface == Interface::Thin => Err(table.fault(
+            "\"attenuation_color\" is for what has an inside, and \"thin\" glass has none; give it a \"transmission\"",
+        )),
         (Some(color), Some(distance)) => Ok(Some(Absorption { color, distance })),
         (None, None) => Ok(None),
         _ => Err(table.fault("\"attenuation_color\" and \"attenuation_distance\" go together; one of them is missing")),

@@ -36,7 +36,7 @@ use super::texture;
 use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
 use crate::memory::Mapped;
-use crate::scene::{Attenuation, Geometry, Light, Material, Scene, Unlit};
+use crate::scene::{Attenuation, Camera, Geometry, Light, Material, Scene, Unlit};
 use crate::shape::Shape;
 
 /// What stops the reading of a file: something in it, or in a file it names.
@@ -154,8 +154,12 @@ fn instances(table: &mut Table<'_>) -> Read<Vec<Child>> {
 
 /// Names in a file may be of any length; messages may not.
 fn shortened(message: &str) -> String {
-    let mut short: String = message.chars().take(600).collect();
-    if short.len() < message.len() {
+    let mut short = String::new();
+    for c in message.chars().take(600) {
+        // Names may hold what would move the cursor or colour the rest.
+        if c.is_control() { short.extend(c.escape_debug()) } else { short.push(c) }
+    }
+    if message.chars().nth(600).is_some() {
         short.push('…');
     }
     short
@@ -184,7 +188,15 @@ impl Reader<'_> {
         (self.scene.ambient, self.scene.background) = (render.ambient, render.background);
         self.scene.request = render.request;
         for table in top.tables("camera")? {
-            self.scene.cameras.push(look::camera(table)?);
+            let twice = table.fault("");
+            let camera = look::camera(table)?;
+            let is_known = |known: &Camera| !known.name.is_empty() && known.name == camera.name;
+            if self.scene.cameras.iter().any(is_known) {
+                let message =
+                    format!("a camera before this one has the name {:?}, too; call it something else", camera.name);
+                return Err(Fault { message, ..twice }.into());
+            }
+            self.scene.cameras.push(camera);
         }
         for table in top.tables("light")? {
             self.scene.lights.push(look::light(table)?);

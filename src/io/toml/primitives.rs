@@ -165,7 +165,14 @@ fn cone(table: &mut Table<'_>) -> Read<DShape> {
 
 fn ellipsoid(table: &mut Table<'_>) -> Read<DShape> {
     let centre = point(table, "centre")?;
-    let radii = table.optional("radii", Value::vector)?;
+    let radii = table.optional("radii", |value| {
+        let radii = value.vector()?;
+        if radii.cmpgt(DVec3::ZERO).all() {
+            Ok(radii)
+        } else {
+            Err(value.fault("\"radii\" wants three numbers above 0"))
+        }
+    })?;
     let axes = table.optional("axes", |value| list(value, Value::vector))?;
     let axes = match (radii, axes.as_deref()) {
         (Some(radii), None) => DMat3::from_diagonal(radii),

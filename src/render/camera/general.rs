@@ -40,6 +40,9 @@ impl General {
                 ));
             }
         }
+        if shift != DVec2::ZERO && projection == Projection::Equirectangular {
+            return Err(Error::Usage("a view of the whole sphere has no lens shift: turn the camera".into()));
+        }
         if distortion.is_some() && !matches!(projection, Projection::Perspective(_)) {
             return Err(Error::Usage("lens distortion is for perspective views alone".into()));
         }
