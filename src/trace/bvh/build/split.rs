@@ -303,7 +303,7 @@ mod tests {
             let mut cheapest = Cheapest::<Portable>::new();
             let mut least = None::<(usize, usize, f32)>;
             for (place, costs) in costs.iter().enumerate() {
-                cheapest.offer(place, *costs);
+                cheapest.offer(place, <Portable as Simd>::V4::load(costs));
                 for (axis, &cost) in costs[..3].iter().enumerate() {
                     if cost < least.map_or(f32::INFINITY, |(_, _, least)| least) {
                         least = Some((axis, place, cost));

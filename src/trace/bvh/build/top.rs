@@ -9,7 +9,7 @@ use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::subtree::binned;
 use crate::trace::bvh::simd::isa::{self, Kernel, Present};
-use crate::trace::bvh::simd::{Portable, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Portable, Simd, Vector};
 
 /// Items in a chunk.
 const CHUNK: usize = 1 << 15;
@@ -57,7 +57,8 @@ impl Shared<'_> {
         }
         let union = |[left, right]: [Range; 2], [l, r]: [Range; 2]| [left.union(l), right.union(r)];
         let [left, right] = sides.into_iter().fold([Range::EMPTY; 2], union);
-        split.sides::<Portable>(range, left_len, left.bounds, right.bounds)
+        let load = <Portable as Simd>::V8::load;
+        split.sides::<Portable>(range, left_len, load(&left.bounds), load(&right.bounds))
     }
 }
 

@@ -431,12 +431,13 @@ mod tests {
                     continue;
                 }
                 known += 1;
-                let [x, y, z, dx, dy, dz, ..] = eight.columns.map(|column| column[i]);
+                let [x, y, z, dx, dy, dz, ..] = eight.columns.map(|column| column.to_array()[i]);
+                let (off, turn) = (eight.off.to_array()[i], eight.turn.to_array()[i]);
                 let [origin, direction] = [Vec3::new(x, y, z), Vec3::new(dx, dy, dz)];
                 assert_eq!([origin, direction], [local.origin, local.direction], "{case}");
-                check([origin, direction], Blur { origin: eight.off[i], direction: eight.turn[i] });
+                check([origin, direction], Blur { origin: off, direction: turn });
                 if shear == 0.0 {
-                    worst = worst.max(f64::from(blur.direction)).max(f64::from(eight.turn[i]));
+                    worst = worst.max(f64::from(blur.direction)).max(f64::from(turn));
                 }
             }
         }

@@ -1,10 +1,11 @@
 //! Several numbers at a time, by whatever the processor has.
 //!
-//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`], plain arrays, [`Avx2`]
+//! Kernels are generic over [`Simd`] and compiled once for each implementation: [`Portable`] (SSE2 on x86-64, plain arrays elsewhere), [`Avx2`]
 //! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so what is fused serves only tests
 //! that reject conservatively; where bits of f32 are kept, as by [`super::levels::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
 
+mod arrays;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -12,6 +13,8 @@ mod avx512;
 pub(super) mod doubles;
 pub(super) mod isa;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -341,6 +344,124 @@ mod tests {
                     expected,
                     "{isa:?}: {count} of {entries:?}"
                 );
+            }
+        }
+    }
+
+    /// Numbers that are special, and some that are not.
+    const NUMBERS: [f32; 16] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        -f32::NAN,
+        f32::MIN_POSITIVE / 4.0,
+        -f32::MAX,
+        16_777_217.0,
+        0.1,
+        -2.5,
+        3.000_000_2,
+        1e-30,
+        7.0,
+    ];
+
+    /// The bits of numbers, but of what is none only that.
+    fn bits<const N: usize>(numbers: [f32; N]) -> Vec<u64> {
+        numbers.iter().map(|x| if x.is_nan() { u64::MAX } else { x.to_bits().into() }).collect()
+    }
+
+    fn bits_of_doubles(numbers: [f64; 4]) -> Vec<u64> {
+        numbers.iter().map(|x| if x.is_nan() { u64::MAX } else { x.to_bits() }).collect()
+    }
+
+    /// What operations on f32 make of two vectors.
+    #[inline(always)]
+    fn of_vectors<V: Vector + Array<N>, const N: usize>(a: &[f32; N], b: &[f32; N]) -> Vec<Vec<u64>> {
+        let (p, q) = (V::load(a), V::load(b));
+        let mut found = Vec::new();
+        for v in [p.add(q), p.sub(q), p.mul(q), p.div(q), p.max(q), p.min(q), p.abs(), p.sqrt(), p.flip(q)] {
+            found.push(bits(v.to_array()));
+        }
+        for mask in [p.less(q), p.at_most(q), p.differs_in_sign(q), p.less(q).or(p.differs_in_sign(q))] {
+            found.push(vec![mask.bits().into()]);
+            found.push(bits(V::select(mask, p, q).to_array()));
+            let others = [mask.and(p.at_most(q)), mask.without(p.less(q))];
+            found.push(others.map(|mask| mask.bits().into()).to_vec());
+        }
+        if a.iter().all(|x| !x.is_nan()) {
+            // Of zeros either is the largest.
+            found.push(bits([p.largest() + 0.0, p.smallest() + 0.0]));
+        }
+        let mut stored = *b;
+        p.overwrite(&mut stored);
+        found.push(bits(stored));
+        found
+    }
+
+    /// What operations on f64 make of two vectors, and on f32 what there is of four alone.
+    #[inline(always)]
+    fn of_four<V: Vector + Array<4> + Three + Turned, D: Doubles<F = V>>(a: &[f32; 4], b: &[f32; 4]) -> Vec<Vec<u64>> {
+        let mut found = of_vectors::<V, 4>(a, b);
+        found.push(bits(V::load(a).yzx().to_array()));
+        for axis in 0..3 {
+            found.push(bits(V::load(a).turned(axis).to_array())[..3].to_vec());
+        }
+        // A third has more bits than an f32.
+        let (p, q) = (D::widen(V::load(a)).div(D::splat(3.0)), D::widen(V::load(b)));
+        for d in [p.add(q), p.sub(q), p.mul(q), p.div(q), p.max(q), p.min(q), p.abs(), p.first(), p.yzx()] {
+            found.push(bits_of_doubles(d.to_array()));
+        }
+        found.push(bits_of_doubles(D::load(&p.to_array()).less_select(q, p, q).to_array()));
+        found.push(vec![p.less(q).into()]);
+        found.push(bits_of_doubles(D::sums([p, q, p.mul(q), p.sub(q)]).to_array()));
+        found.push(bits(p.narrow().to_array()));
+        found
+    }
+
+    struct Operations<'a>(&'a [f32; 8], &'a [f32; 8]);
+
+    impl Kernel for Operations<'_> {
+        type Output = Vec<Vec<u64>>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Vec<Vec<u64>> {
+            let Self(a, b) = self;
+            let mut found = of_vectors::<S::V8, 8>(a, b);
+            found.extend(of_four::<S::V4, S::D4>(&[a[0], a[1], a[2], a[3]], &[b[0], b[1], b[2], b[3]]));
+            let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| if i % 2 == 0 { a } else { b }.map(|x| x * i as f32));
+            found.extend(S::transpose(rows.map(|row| S::V8::load(&row))).map(|row| bits(row.to_array())));
+            let mut groups = PerRay([0.0; RAYS]);
+            S::Wide::at(&PerRay(std::array::from_fn(|i| a[i % 8])), 1).put(&mut groups, 1);
+            found.push(bits(groups.0));
+            found
+        }
+    }
+
+    /// Plain arrays, lane by lane: what other vectors are compared with.
+    fn by_arrays(a: &[f32; 8], b: &[f32; 8], wide: usize) -> Vec<Vec<u64>> {
+        let mut found = of_vectors::<[f32; 8], 8>(a, b);
+        found.extend(of_four::<[f32; 4], [f64; 4]>(&[a[0], a[1], a[2], a[3]], &[b[0], b[1], b[2], b[3]]));
+        let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| if i % 2 == 0 { a } else { b }.map(|x| x * i as f32));
+        found.extend(arrays::transpose(rows).map(bits));
+        let second = wide..2 * wide;
+        found.push(bits::<RAYS>(std::array::from_fn(|i| if second.contains(&i) { a[i % 8] } else { 0.0 })));
+        found
+    }
+
+    /// Whatever has lanes does to each of them what is done to a number alone.
+    #[test]
+    fn vectors_do_what_arrays_do() {
+        for shift in 0..NUMBERS.len() {
+            for start in 0..NUMBERS.len() {
+                let a = std::array::from_fn(|i| NUMBERS[(start + i) % 16]);
+                let b = std::array::from_fn(|i| NUMBERS[(start + 3 * i + shift) % 16]);
+                for isa in Present::all() {
+                    let wide = if isa.isa() == isa::Isa::Avx512 { 16 } else { 8 };
+                    assert_eq!(dispatch(isa, Operations(&a, &b)), by_arrays(&a, &b, wide), "{isa:?}: {a:?}, {b:?}");
+                }
             }
         }
     }
