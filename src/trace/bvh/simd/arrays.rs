@@ -69,15 +69,6 @@ impl<const N: usize> Vector for [f32; N] {
         [value; N]
     }
     #[inline(always)]
-    fn mul_add(self, factor: Self, summand: Self) -> Self {
-        // Not f32::mul_add: without the instruction that is a call.
-        self.mul(factor).add(summand)
-    }
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
-        self.mul(factor).sub(subtrahend)
-    }
-    #[inline(always)]
     fn abs(self) -> Self {
         self.map(f32::abs)
     }

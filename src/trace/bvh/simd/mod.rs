@@ -132,10 +132,16 @@ pub(super) trait Vector: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
-    /// self * factor + summand, rounded once or twice.
-    fn mul_add(self, factor: Self, summand: Self) -> Self;
-    /// self * factor - subtrahend, rounded once or twice.
-    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self;
+    /// self * factor + summand, rounded once or twice: twice where no instruction does both.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        self.mul(factor).add(summand)
+    }
+    /// self * factor - subtrahend, rounded likewise.
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
+        self.mul(factor).sub(subtrahend)
+    }
     fn max(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn abs(self) -> Self;

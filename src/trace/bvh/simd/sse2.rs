@@ -7,6 +7,7 @@ use std::arch::x86_64::*;
 
 use bytemuck::cast;
 
+use super::x86::lanewise;
 use super::{Array, Doubles, Group, Mask, Three, Turned, Vector};
 use crate::trace::bvh::build::lanes::{Boxes, RANKED};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
@@ -30,16 +31,6 @@ pub struct M4(__m128);
 /// One truth a lane of eight.
 #[derive(Clone, Copy)]
 pub struct M8([M4; 2]);
-
-/// A function of two vectors by its intrinsic, as a method.
-macro_rules! lanewise {
-    ($($name:ident: $intrinsic:ident;)*) => {
-        $(#[inline(always)]
-        fn $name(self, other: Self) -> Self {
-            Self(unsafe { $intrinsic(self.0, other.0) })
-        })*
-    };
-}
 
 /// A function of two vectors, half by half, as a method.
 macro_rules! by_halves {
@@ -91,14 +82,6 @@ impl Vector for V4 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self(unsafe { _mm_set1_ps(value) })
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, summand: Self) -> Self {
-        self.mul(factor).add(summand)
-    }
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
-        self.mul(factor).sub(subtrahend)
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -194,14 +177,6 @@ impl Vector for V8 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self([V4::splat(value); 2])
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, summand: Self) -> Self {
-        self.mul(factor).add(summand)
-    }
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
-        self.mul(factor).sub(subtrahend)
     }
     #[inline(always)]
     fn abs(self) -> Self {
