@@ -1,7 +1,7 @@
 //! What glTF files keep small: quantised and compressed meshes, and many instances of one.
 //!
-//! The compressed files were made with other people's encoders: `meshopt.gltf` with meshoptimizer 1.3's, `draco.gltf` with draco3d
-//! 1.5.9's, both as published for JavaScript.
+//! The compressed files were made with other people's encoders: `meshopt.gltf` and `meshopt_khr.gltf` with meshoptimizer 1.3's, `draco.gltf` with
+//! draco3d 1.5.9's, all as published for JavaScript.
 
 use std::path::Path;
 
@@ -72,6 +72,31 @@ fn meshopt_streams_hold_what_was_put_in() {
     }
 }
 
+/// Differences of bytes, of words and of bits, each way of packing them, and colours: `KHR_meshopt_compression`.
+#[test]
+fn meshopt_streams_of_the_second_version_hold_what_was_put_in() {
+    let (scene, warnings) = fixture("meshopt_khr.gltf");
+    assert_eq!(warnings, []);
+    let is = meshes(&scene);
+    assert_eq!(is.len(), 2);
+    // Positions as f32, then in quarter millimetres of 16 bits; colours of 8 bits, then of 12.
+    for (mesh, (scale, turn, shade)) in
+        is.iter().zip([(1.0, 1.0 / 32767.0, 1.0 / 255.0), (4000.0, 1.0 / 64.0, 1.0 / 4095.0)])
+    {
+        assert_eq!(mesh.triangles.iter().map(|t| lowest_first(*t)).collect::<Vec<_>>(), grid());
+        assert_eq!(mesh.positions.len(), SIDE * SIDE);
+        for i in 0..SIDE * SIDE {
+            let (got, expected) = (mesh.positions[i], position(i) * scale);
+            assert_eq!(got, expected, "{i}");
+            let (got, expected) = (mesh.normals[i], normal(i));
+            assert!(got.abs_diff_eq(expected, 2.0 * turn), "{got} where {expected} belongs");
+            let shares = |k: usize, most: usize| k as f32 / most as f32;
+            let color = Vec4::new(shares(i % SIDE, 16), shares(i / SIDE, 16), shares(i % 5, 4), shares(i % 3, 2));
+            assert!(mesh.colors[i].abs_diff_eq(color, 2.0 * shade), "{} where {color} belongs", mesh.colors[i]);
+        }
+    }
+}
+
 #[test]
 fn broken_meshopt_streams_are_refused() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/meshopt.gltf");
@@ -89,6 +114,17 @@ fn broken_meshopt_streams_are_refused() {
     refused(&with(3, "byteLength", json!(20)), "a.gltf", "/accessors/2/bufferView", "too early");
     refused(&with(4, "byteLength", json!(20)), "a.gltf", "/accessors/3/bufferView", "too early");
     refused(&with(0, "buffer", json!(7)), "a.gltf", "/accessors/0/bufferView", "buffer 7");
+
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/meshopt_khr.gltf");
+    let text = std::fs::read_to_string(path).unwrap();
+    let with = |view: usize, key: &str, value: serde_json::Value| {
+        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        json["bufferViews"][view]["extensions"]["KHR_meshopt_compression"][key] = value;
+        Files::one("a.gltf", json.to_string())
+    };
+    refused(&with(0, "byteLength", json!(640)), "a.gltf", "/accessors/0/bufferView", "KHR_meshopt_compression");
+    refused(&with(0, "byteLength", json!(20)), "a.gltf", "/accessors/0/bufferView", "too early");
+    refused(&with(0, "filter", json!("COLOR")), "a.gltf", "/accessors/0/bufferView", "do not suit");
 }
 
 /// By the edge breaker's walk, then in sequence: positions of 14 bits over 16 metres, normals of 10, coordinates of 12.

@@ -48,7 +48,7 @@ use crate::scene::Scene;
 const UNSEEN_EXTENSIONS: [&str; 3] = ["FB_ngon_encoding", "KHR_xmp", "KHR_xmp_json_ld"];
 
 /// The extensions that are honoured; a file that requires another is refused.
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 16] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -63,6 +63,7 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 15] = [
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_texture_transform",
 ];
 

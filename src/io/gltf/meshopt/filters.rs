@@ -43,6 +43,34 @@ pub(super) fn quaternion(bytes: &mut [u8]) {
     }
 }
 
+/// Colours and alpha from brightness and two differences of colours (YCoCg; Malvar, Sullivan and Srinivasan 2008, *Lifting-based reversible color
+/// transformations for image compression*), as bytes (stride 4) or 16-bit numbers (stride 8). The highest bit of the fourth number that is set says how
+/// many bits each has, and what is below it is alpha, of one bit less.
+pub(super) fn color(bytes: &mut [u8], stride: usize) {
+    if stride == 4 {
+        for v in bytes.as_chunks_mut::<4>().0 {
+            let color = from_ycocg([v[0].into(), (v[1] as i8).into(), (v[2] as i8).into(), v[3].into()], 255.0);
+            *v = color.map(|value| value as u8);
+        }
+        return;
+    }
+    for v in bytes.as_chunks_mut::<8>().0 {
+        let [y, co, cg, alpha] = [0, 1, 2, 3].map(|k| word(v, k));
+        let color = from_ycocg([(y as u16).into(), co.into(), cg.into(), (alpha as u16).into()], 65_535.0);
+        for (k, value) in color.into_iter().enumerate() {
+            v[2 * k..2 * k + 2].copy_from_slice(&(value as u16).to_le_bytes());
+        }
+    }
+}
+
+/// Whole numbers up to `most`, where the file is sound.
+fn from_ycocg([y, co, cg, alpha]: [i32; 4], most: f32) -> [f32; 4] {
+    let one = (1 << (32 - alpha.leading_zeros())) - 1;
+    let alpha = alpha & one >> 1;
+    let channels = [y + co - cg, y + cg, y - co - cg, alpha << 1 | alpha & 1];
+    channels.map(|channel| (channel as f32 * (most / one as f32)).round())
+}
+
 /// Floats from a mantissa of 24 bits and an exponent of 8.
 pub(super) fn exponential(bytes: &mut [u8]) {
     for float in bytes.as_chunks_mut::<4>().0 {

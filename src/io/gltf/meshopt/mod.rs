@@ -1,5 +1,6 @@
 //! `EXT_meshopt_compression` (Kapoulkine and St. Pierre 2022, *EXT_meshopt_compression*, with its bitstream in appendix A and its filters in
-//! appendix B).
+//! appendix B), and what came after it, `KHR_meshopt_compression` (Kapoulkine, St. Pierre, Knyazev and McCurdy 2025), which has a second version of
+//! the stream for elements, and one more filter.
 //!
 //! Three streams, one file each: [`attributes`](mod@attributes) for elements of any size, [`triangles`](mod@triangles) and
 //! [`indices`](mod@indices) for indices; and [`filters`], which elements may pass through after that. A stream does not say how much it
@@ -20,6 +21,9 @@ use crate::io::Placeless;
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Compressed {
+    /// The extension.
+    #[serde(skip)]
+    name: &'static str,
     pub(super) buffer: usize,
     #[serde(default)]
     pub(super) byte_offset: u64,
@@ -30,21 +34,23 @@ pub(super) struct Compressed {
     filter: Option<String>,
 }
 
-const NAME: &str = "EXT_meshopt_compression";
+const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
 /// What a buffer view's extensions say about its compressed contents; none where they are not compressed.
 ///
 /// # Errors
 /// What is wrong with the extension.
 pub(super) fn compressed(extensions: &Extensions) -> Placeless<Option<Compressed>> {
-    let Some(value) = extensions.get(NAME) else { return Ok(None) };
-    Compressed::deserialize(value).map(Some).map_err(|error| format!("{NAME}: {error}"))
+    let named = NAMES.into_iter().find_map(|name| Some((name, extensions.get(name)?)));
+    let Some((name, value)) = named else { return Ok(None) };
+    let compressed = Compressed::deserialize(value).map_err(|error| format!("{name}: {error}"))?;
+    Ok(Some(Compressed { name, ..compressed }))
 }
 
 /// Whether a buffer only stands in for readers that cannot decompress.
 pub(super) fn is_fallback(extensions: &Extensions) -> bool {
-    let fallback = extensions.get(NAME).and_then(|extension| extension.get("fallback"));
-    fallback.and_then(serde_json::Value::as_bool).unwrap_or(false)
+    let fallback = |name| extensions.get(name).and_then(|extension| extension.get("fallback")?.as_bool());
+    NAMES.into_iter().any(|name| fallback(name).unwrap_or(false))
 }
 
 impl Compressed {
@@ -53,22 +59,22 @@ impl Compressed {
     /// # Errors
     /// Where the two differ, or the stride does not suit the mode.
     pub(super) fn size(&self, length: u64) -> Placeless<u64> {
-        let Self { byte_stride: stride, count, mode, filter, .. } = self;
+        let Self { name, byte_stride: stride, count, mode, filter, .. } = self;
         let filter = filter.as_deref().unwrap_or("NONE");
         let suits = match (mode.as_str(), filter) {
             ("ATTRIBUTES", "NONE" | "EXPONENTIAL") => (4..=256).contains(stride) && stride % 4 == 0,
-            ("ATTRIBUTES", "OCTAHEDRAL") => matches!(stride, 4 | 8),
+            ("ATTRIBUTES", "OCTAHEDRAL" | "COLOR") => matches!(stride, 4 | 8),
             ("ATTRIBUTES", "QUATERNION") => *stride == 8,
             ("TRIANGLES", "NONE") => matches!(stride, 2 | 4) && count % 3 == 0,
             ("INDICES", "NONE") => matches!(stride, 2 | 4),
-            _ => return Err(format!("{NAME}: mode {mode:?} with filter {filter:?} is not known")),
+            _ => return Err(format!("{name}: mode {mode:?} with filter {filter:?} is not known")),
         };
         if !suits {
-            return Err(format!("{NAME}: {count} elements of {stride} bytes do not suit {mode} with filter {filter}"));
+            return Err(format!("{name}: {count} elements of {stride} bytes do not suit {mode} with filter {filter}"));
         }
         let size = stride.saturating_mul(*count);
         if size != length || u32::try_from(*count).is_err() {
-            return Err(format!("{NAME}: {count} elements of {stride} bytes, in a buffer view of {length} bytes"));
+            return Err(format!("{name}: {count} elements of {stride} bytes, in a buffer view of {length} bytes"));
         }
         Ok(size)
     }
@@ -85,6 +91,7 @@ impl Compressed {
                     Some("OCTAHEDRAL") => filters::octahedral(&mut bytes, stride),
                     Some("QUATERNION") => filters::quaternion(&mut bytes),
                     Some("EXPONENTIAL") => filters::exponential(&mut bytes),
+                    Some("COLOR") => filters::color(&mut bytes, stride),
                     _ => {}
                 }
                 bytes
@@ -92,7 +99,7 @@ impl Compressed {
             "TRIANGLES" => triangles::decode(source, count).map(|indices| packed(&indices, stride)),
             _ => indices::decode(source, count).map(|indices| packed(&indices, stride)),
         };
-        decoded.map_err(|message| format!("{NAME}: {message}"))
+        decoded.map_err(|message| format!("{}: {message}", self.name))
     }
 }
 
