@@ -25,8 +25,8 @@ const TELL: usize = 1 << 14;
 
 /// Reads an STL file.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
-    let mesh = if is_text(file) { text(path, file, warnings)? } else { binary(path, file, warnings)? };
-    Ok(Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]))
+    let meshes = if is_text(file) { text(path, file, warnings)? } else { vec![binary(path, file, warnings)?] };
+    Ok(Scene::from_geometries(meshes.into_iter().map(Geometry::Mesh).collect(), vec![Material::default()]))
 }
 
 /// Whether it is a text file. Binary files may begin with `solid` too, so their length is asked first; one whose length
@@ -95,13 +95,35 @@ fn vectors(bits: Vec<[u32; 3]>) -> Vec<Vec3> {
     bits.into_iter().map(|bits| Vec3::from_array(bits.map(f32::from_bits))).collect()
 }
 
-fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Mesh> {
+/// A `solid` of a text.
+struct Solid {
+    name: String,
+    corners: Weld<[u64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Solid {
+    fn new(name: String) -> Self {
+        Self { name, corners: Weld::new(), triangles: Vec::new() }
+    }
+
+    fn mesh(self) -> Mesh {
+        let Self { name, corners, triangles } = self;
+        let positions: Vec<_> =
+            corners.into_keys().into_iter().map(|bits| DVec3::from(bits.map(f64::from_bits))).collect();
+        let mut mesh = Mesh { name, triangles: Arc::new(triangles), ..Mesh::default() };
+        mesh.set_positions(&positions);
+        mesh
+    }
+}
+
+/// A mesh a solid, but for those without a facet; at least one.
+fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Vec<Mesh>> {
     let bytes = without_mark(file);
-    let mut told = 0;
+    let (mut read, mut told) = (0, 0);
     let mut words = Words::new(bytes, 1);
-    let mut weld = Weld::new();
-    let mut triangles = Vec::new();
-    let mut name = String::new();
+    let mut meshes = Vec::new();
+    let mut solid = Solid::new(String::new());
     let mut is_open = false;
     while let Some(word) = words.next() {
         match word.to_ascii_lowercase().as_slice() {
@@ -110,8 +132,10 @@ fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<M
                 let before = words.remaining();
                 let text = &bytes[bytes.len() - before..];
                 words.skip_line();
-                if name.is_empty() {
-                    name = super::text::name(&text[..before - words.remaining()]);
+                let next = Solid::new(super::text::name(&text[..before - words.remaining()]));
+                let last = std::mem::replace(&mut solid, next);
+                if !last.triangles.is_empty() {
+                    meshes.push(last.mesh());
                 }
             }
             b"endsolid" => {
@@ -119,26 +143,9 @@ fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<M
                 words.skip_line();
             }
             b"facet" => {
-                expect(path, &mut words, "normal")?;
-                // Not read: of a triangle without an area some programs write what is no number at all.
-                for _ in 0..3 {
-                    words.next();
-                }
-                expect(path, &mut words, "outer")?;
-                expect(path, &mut words, "loop")?;
-                let mut triangle = [0; 3];
-                for corner in &mut triangle {
-                    expect(path, &mut words, "vertex")?;
-                    let mut bits = [0; 3];
-                    for b in &mut bits {
-                        *b = (number(path, &mut words)? + 0.0).to_bits();
-                    }
-                    *corner = weld.index(bits);
-                }
-                expect(path, &mut words, "endloop")?;
-                expect(path, &mut words, "endfacet")?;
-                triangles.push(triangle);
-                if triangles.len() % TELL == 0 {
+                solid.triangles.push(facet(path, &mut words, &mut solid.corners)?);
+                read += 1;
+                if read % TELL == 0 {
                     let read = bytes.len() - words.remaining();
                     file.done(&bytes[told..read]);
                     told = read;
@@ -151,10 +158,33 @@ fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<M
         let message = "the file ends without endsolid: there may have been more of it";
         warnings.push(Warning::new(path, format!("line {}", words.line), message));
     }
-    let positions: Vec<_> = weld.into_keys().into_iter().map(|bits| DVec3::from(bits.map(f64::from_bits))).collect();
-    let mut mesh = Mesh { name, triangles: Arc::new(triangles), ..Mesh::default() };
-    mesh.set_positions(&positions);
-    Ok(mesh)
+    if meshes.is_empty() || !solid.triangles.is_empty() {
+        meshes.push(solid.mesh());
+    }
+    Ok(meshes)
+}
+
+/// What follows the word `facet`: its corners, by number.
+fn facet(path: &Path, words: &mut Words<'_>, corners: &mut Weld<[u64; 3]>) -> Result<[u32; 3]> {
+    expect(path, words, "normal")?;
+    // Not read: of a triangle without an area some programs write what is no number at all.
+    for _ in 0..3 {
+        words.next();
+    }
+    expect(path, words, "outer")?;
+    expect(path, words, "loop")?;
+    let mut triangle = [0; 3];
+    for corner in &mut triangle {
+        expect(path, words, "vertex")?;
+        let mut bits = [0; 3];
+        for b in &mut bits {
+            *b = (number(path, words)? + 0.0).to_bits();
+        }
+        *corner = corners.index(bits);
+    }
+    expect(path, words, "endloop")?;
+    expect(path, words, "endfacet")?;
+    Ok(triangle)
 }
 
 fn expect(path: &Path, words: &mut Words<'_>, wanted: &str) -> Result<()> {

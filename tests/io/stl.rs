@@ -44,6 +44,17 @@ fn both_kinds_hold_the_same() {
 }
 
 #[test]
+fn solids_of_a_text_are_meshes() {
+    let all = format!("solid nothing\nendsolid nothing\n{}{}", text(), text().replace("two words", "other"));
+    let scene = Files::one("a.stl", all).scene("a.stl");
+    let names: Vec<_> = meshes(&scene).iter().map(|mesh| mesh.name.as_str()).collect();
+    assert_eq!(names, ["two words", "other"]);
+    for mesh in meshes(&scene) {
+        assert_eq!((mesh.positions.len(), corners(mesh)), (4, FACETS.map(|f| f.map(Vec3::from)).to_vec()));
+    }
+}
+
+#[test]
 fn bytes_after_the_end_are_a_warning() {
     let mut bytes = binary(b"x");
     bytes.extend([0; 7]);

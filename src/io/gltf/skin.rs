@@ -55,7 +55,7 @@ pub(super) struct Skin<'v> {
 
 impl<'v> Skin<'v> {
     /// # Errors
-    /// Where the primitive has no joints, or joints that the skin does not have.
+    /// Where the primitive has no joints, or follows joints that the skin does not have.
     pub(super) fn new(
         document: &Document<'_>,
         attributes: &Attributes<'v>,
@@ -76,8 +76,9 @@ impl<'v> Skin<'v> {
         }
         let skin = Self { matrices, sets };
         let highest = |vertex: usize| {
-            let joints = skin.sets.iter().flat_map(|[joints, _]| joints.floats::<4>(vertex));
-            joints.fold(0.0, f32::max)
+            // Some exporters leave any number where the weight is 0.
+            let heeded = skin.weighted(vertex).filter(|(_, weight)| *weight > 0.0).map(|(joint, _)| joint);
+            heeded.reduce(f32::max).unwrap_or_else(|| skin.first(vertex))
         };
         let highest = attributes.each(highest).into_iter().fold(0.0, f32::max);
         // Negative numbers and NaN become 0 below.
@@ -92,20 +93,28 @@ impl<'v> Skin<'v> {
     pub(super) fn at(&self, vertex: usize) -> DAffine3 {
         let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut total = 0.0;
-        for [joints, weights] in &self.sets {
-            for (joint, weight) in joints.floats::<4>(vertex).into_iter().zip(weights.floats::<4>(vertex)) {
-                let weight = f64::from(weight);
-                if weight > 0.0 {
-                    let matrix = &self.matrices[joint as usize];
-                    sum.matrix3 += matrix.matrix3 * weight;
-                    sum.translation += matrix.translation * weight;
-                    total += weight;
-                }
-            }
+        for (joint, weight) in self.weighted(vertex).filter(|(_, weight)| *weight > 0.0) {
+            let (matrix, weight) = (&self.matrices[joint as usize], f64::from(weight));
+            sum.matrix3 += matrix.matrix3 * weight;
+            sum.translation += matrix.translation * weight;
+            total += weight;
         }
         if total > 0.0 && total.is_finite() {
             return DAffine3 { matrix3: sum.matrix3 * (1.0 / total), translation: sum.translation / total };
         }
-        self.matrices[self.sets[0][0].floats::<4>(vertex)[0] as usize]
+        // Checked, unless a weight is infinite.
+        *self.matrices.get(self.first(vertex) as usize).unwrap_or(&self.matrices[0])
+    }
+
+    /// The joints of a vertex, each with its weight.
+    fn weighted(&self, vertex: usize) -> impl Iterator<Item = (f32, f32)> {
+        self.sets
+            .iter()
+            .flat_map(move |[joints, weights]| joints.floats::<4>(vertex).into_iter().zip(weights.floats::<4>(vertex)))
+    }
+
+    /// The joint that comes first.
+    fn first(&self, vertex: usize) -> f32 {
+        self.sets[0][0].floats::<4>(vertex)[0]
     }
 }

@@ -66,8 +66,11 @@ fn percent(text: &str) -> Placeless<Vec<u8>> {
     Ok(out)
 }
 
-/// Decodes base64 (RFC 4648, section 4), padded or not.
+/// Decodes base64 (RFC 4648, section 4), padded or not, in lines or not.
 fn base64(text: &[u8]) -> Placeless<Vec<u8>> {
+    if text.iter().any(u8::is_ascii_whitespace) {
+        return base64(&text.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect::<Vec<_>>());
+    }
     let unpadded = text.iter().rposition(|&b| b != b'=').map_or(0, |last| last + 1);
     let mut out = Vec::with_capacity(unpadded / 4 * 3 + 2);
     for group in text[..unpadded].chunks(4) {
@@ -106,7 +109,8 @@ mod tests {
             assert_eq!(base64(encoded.as_bytes()).unwrap(), plain.as_bytes());
         }
         assert!(base64(b"Zm9vY").is_err());
-        assert!(base64(b"Zm 9").is_err());
+        assert!(base64(b"Zm.9").is_err());
+        assert_eq!(base64(b"Zm9v\r\n  Ym E=\n").unwrap(), b"fooba");
     }
 
     #[test]
