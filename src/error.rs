@@ -76,6 +76,14 @@ impl Error {
         }
     }
 
+    /// The same with the file that the scene came from, where it is [about a scene](Self::Scene), and came from a file.
+    pub(crate) fn told_of(self, file: Option<&PathBuf>) -> Self {
+        match (self, file) {
+            (Self::Scene(message), Some(file)) => Self::input(file, "", message),
+            (other, _) => other,
+        }
+    }
+
     /// An [`Error::Output`] about `path`.
     pub fn output(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
         Self::Output { path: path.into(), message: message.into() }

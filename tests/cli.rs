@@ -466,6 +466,21 @@ fn a_picture_that_is_mostly_white_says_so() {
     assert_eq!(said("a.exr", &[]), "");
 }
 
+/// Also where the file holds it as it is.
+#[test]
+fn light_that_f32_cannot_hold_is_told() {
+    let folder = Folder::new();
+    let glass = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n[material.m]\nreflection = 1e30\nambient = 1e30\n\
+                 [render]\nambient = 1\nintegrator = \"whitted\"\n[[sphere]]\ncentre = [1.5, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
+    let (scene, picture) = (folder.path("bright.toml"), folder.path("a.exr"));
+    std::fs::write(&scene, glass).unwrap();
+    let view = ["render", &scene, "-o", &picture, "--size", "16x16", "--eye", "0,0,4", "--look-at", "0,0,0"];
+    let output = twincast(&view);
+    let told = text(&output.stderr);
+    assert!(output.status.success() && told.starts_with("warning: ") && told.lines().count() == 1, "{told}");
+    assert!(told.contains("a.exr: ") && told.contains("are infinite or no number"), "{told}");
+}
+
 #[test]
 fn a_printed_camera_gives_the_picture_again() {
     let folder = Folder::new();

@@ -363,5 +363,6 @@ fn files_say_what_moves_and_are_refused_what_cannot() {
     std::fs::write(&path, text("{ rotate = [0, 1, 0, 180] }")).expect("written");
     let (scene, _) = load(&path, &LoadOptions::default()).expect("both ends are sound");
     let error = World::new(&scene).expect_err("it is flat on the way").to_string();
-    assert!(error.contains("pair/left") && error.contains("singular") && error.contains("time"), "{error}");
+    assert!(error.contains("motion.toml: instance 0") && error.contains("pair/left"), "{error}");
+    assert!(error.contains("singular") && error.contains("time"), "{error}");
 }

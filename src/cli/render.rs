@@ -25,7 +25,7 @@ use super::light::LightArgs;
 use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
-use super::response::{ResponseArgs, too_bright};
+use super::response::{ResponseArgs, beyond_numbers, too_bright};
 use super::summary::Rendered;
 use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
@@ -328,10 +328,13 @@ impl RenderArgs {
         let response = self.response.choose(&asked.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };
         outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
-        if let Some(path) = asked.pictures.iter().find(|path| !image::keeps_radiance(path)) {
-            let told = too_bright(&picture.image, &options.response).map(|message| Warning::new(path, "", message));
-            warn(told.as_slice());
-        }
+        let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
+        let told = [
+            asked.pictures.first().zip(beyond_numbers(&picture.image)),
+            of_codes.and_then(|path| Some((path, too_bright(&picture.image, &options.response)?))),
+        ];
+        let told = told.into_iter().flatten().map(|(path, message)| Warning::new(path, "", message));
+        warn(&told.collect::<Vec<_>>());
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         Ok(start.elapsed().as_secs_f64())
     }

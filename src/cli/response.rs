@@ -4,6 +4,7 @@ use clap::Args;
 
 use super::common::by_name;
 use crate::image::{Curve, Image, MOST_STOPS, Response, TEMPERATURES};
+use crate::math::Vec4;
 use crate::scene::Request;
 
 /// For pictures of 8 bits; OpenEXR and Radiance files keep radiance.
@@ -56,6 +57,19 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     Some(format!("{share} % of what is seen {message}; --exposure {exposure} would show it"))
 }
 
+/// Where there is light that f32 cannot hold: of how many pixels, and of which first.
+pub(super) fn beyond_numbers(image: &Image) -> Option<String> {
+    let is_beyond = |pixel: &Vec4| !pixel.is_finite();
+    let first = image.pixels.iter().position(is_beyond)?;
+    let count = image.pixels.iter().filter(|pixel| is_beyond(pixel)).count();
+    let (pixels, are) = if count == 1 { ("pixel", "is") } else { ("pixels", "are") };
+    let (x, y) = (first % image.width as usize, first / image.width as usize);
+    Some(format!(
+        "{count} {pixels} (first {x},{y}) {are} infinite or no number: lights, colours or a material's shares are so large that \
+         their products are not held by f32, which ends at 3.4e38"
+    ))
+}
+
 fn parse_stops(text: &str) -> Result<f32, String> {
     let stops = text.parse().ok().filter(|stops: &f32| stops.abs() <= MOST_STOPS);
     stops.ok_or_else(|| format!("expected stops from -{MOST_STOPS} to {MOST_STOPS}"))
@@ -74,7 +88,6 @@ fn parse_kelvin(text: &str) -> Result<f32, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec4;
 
     #[test]
     fn a_picture_that_is_mostly_white_is_told() {
@@ -91,6 +104,17 @@ mod tests {
         assert_eq!(told([2.0, 0.2, 0.3, 2.0], 0.0), None, "half of it is light that is meant to be bright");
         let filmic = Response { curve: Curve::Filmic, ..Response::default() };
         assert_eq!(too_bright(&image([100.0; 4]), &filmic), None);
+    }
+
+    #[test]
+    fn light_that_is_no_number_is_told() {
+        let mut image = Image::new(3, 2);
+        image.pixels[5] = Vec4::MAX;
+        assert_eq!(beyond_numbers(&image), None);
+        image.pixels[4].y = f32::INFINITY;
+        assert!(beyond_numbers(&image).unwrap().starts_with("1 pixel (first 1,1) is infinite"));
+        image.pixels[2].z = f32::NAN;
+        assert!(beyond_numbers(&image).unwrap().starts_with("2 pixels (first 2,0) are infinite"));
     }
 
     #[test]

@@ -132,13 +132,13 @@ impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
-    /// [`Error::Scene`] for an instance whose transform is singular or not finite, with its name; and for more
-    /// primitives in one place than tracers can name.
+    /// [`Error::Scene`], or [`Error::Input`] where the scene was read from a file, for an instance whose transform is singular or not finite, with its
+    /// name; and for more primitives in one place than tracers can name.
     ///
     /// # Panics
     /// Where the scene names a group, a geometry or a vertex that is not there, here or when a tracer is built; [`Scene::check`] finds those.
     pub fn new(scene: &Scene) -> Result<Self> {
-        Self::with(scene, true)
+        Self::with(scene, true).map_err(|error| error.told_of(scene.files.first()))
     }
 
     /// The same with everything placed by transforms: two levels, whether they are needed or not.
@@ -146,7 +146,7 @@ impl World {
     /// # Errors
     /// Those of [`World::new`].
     pub fn placed(scene: &Scene) -> Result<Self> {
-        Self::with(scene, false)
+        Self::with(scene, false).map_err(|error| error.told_of(scene.files.first()))
     }
 
     fn with(scene: &Scene, bakes: bool) -> Result<Self> {

@@ -1,5 +1,7 @@
 //! What is seen, and from where: lights, cameras, and what the file asks of a render.
 
+use std::path::Path;
+
 use super::table::{Read, Table, Value};
 use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -56,7 +58,7 @@ impl Render {
             max_depth: table
                 .optional("max_depth", |value| value.whole(0..=MOST_DEPTH.into()))?
                 .map(|depth| depth as u32),
-            output: table.optional("output", |value| value.text())?.map(str::to_owned),
+            output: table.optional("output", picture_name)?,
             exposure: table.optional("exposure", |value| {
                 let stops = value.number()? as f32;
                 let inside = stops.abs() <= MOST_STOPS;
@@ -83,6 +85,15 @@ impl Render {
         });
         table.finish()?;
         Ok(render)
+    }
+}
+
+/// Where a picture goes: a file.
+fn picture_name(value: Value<'_>) -> Read<String> {
+    let name = value.text()?;
+    match Path::new(name).file_name() {
+        Some(_) if !name.ends_with('/') => Ok(name.to_owned()),
+        _ => Err(value.unlike("the name of a picture, as in \"picture.exr\"")),
     }
 }
 
