@@ -18,8 +18,18 @@ pub(crate) fn assert_parity(scene: &Scene, rays: &[Ray]) -> usize {
 
 #[track_caller]
 pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> usize {
-    let expected: Vec<Option<Hit>> = rays.iter().map(|ray| brute.closest(ray)).collect();
-    for (ray, expected) in rays.iter().zip(&expected).take(100) {
+    assert_parity_of_batches(world, brute, &[rays.to_vec()])
+}
+
+/// The same of several batches, for which trees are built once.
+#[track_caller]
+fn assert_parity_of_batches(world: &World, brute: &Brute, batches: &[Vec<Ray>]) -> usize {
+    let expected = |rays: &Vec<Ray>| -> Vec<Option<Hit>> { rays.iter().map(|ray| brute.closest(ray)).collect() };
+    let expected: Vec<_> = batches.iter().map(expected).collect();
+    let batches = || batches.iter().zip(&expected);
+    // What is asked ray by ray.
+    let some = || batches().flat_map(|(rays, expected)| rays.iter().zip(expected).take(100));
+    for (ray, expected) in some() {
         assert_eq!(brute.occluded(ray), expected.is_some());
     }
     let every = Preset::ALL.into_iter().flat_map(|preset| Isa::ALL.map(|isa| (preset, isa)));
@@ -35,27 +45,27 @@ pub(crate) fn assert_parity_of(world: &World, brute: &Brute, rays: &[Ray]) -> us
         for (travel, coherent) in ways {
             bvh = bvh.travelling(travel);
             let batch = Batch { width: Width::One, coherent };
-            let mut hits = vec![None; rays.len()];
-            bvh.closest_batch(rays, &mut hits, batch);
-            for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(hits[i], expected[i], "{preset:?} {isa:?} {travel:?} {batch:?} {ray:?}");
-            }
-            let mut occluded = vec![false; rays.len()];
-            bvh.occluded_batch(rays, &mut occluded, batch);
-            for (i, ray) in rays.iter().enumerate() {
-                assert_eq!(
-                    occluded[i],
-                    expected[i].is_some(),
-                    "occluded {preset:?} {isa:?} {travel:?} {batch:?} {ray:?}"
-                );
+            for (rays, expected) in batches() {
+                let mut hits = vec![None; rays.len()];
+                bvh.closest_batch(rays, &mut hits, batch);
+                for (i, ray) in rays.iter().enumerate() {
+                    assert_eq!(hits[i], expected[i], "{preset:?} {isa:?} {travel:?} {batch:?} {ray:?}");
+                }
+                let mut occluded = vec![false; rays.len()];
+                bvh.occluded_batch(rays, &mut occluded, batch);
+                for (i, ray) in rays.iter().enumerate() {
+                    let is_hit = expected[i].is_some();
+                    assert_eq!(occluded[i], is_hit, "occluded {preset:?} {isa:?} {travel:?} {batch:?} {ray:?}");
+                }
             }
         }
-        for (ray, expected) in rays.iter().zip(&expected).take(100) {
+        for (ray, expected) in some() {
             assert_eq!(bvh.closest(ray), *expected);
             assert_eq!(bvh.occluded(ray), expected.is_some());
         }
     }
-    assert_accelerators(world, rays, &expected);
+    let (rays, expected): (Vec<_>, Vec<_>) = batches().flat_map(|(rays, expected)| rays.iter().zip(expected)).unzip();
+    assert_accelerators(world, &rays, &expected);
     expected.iter().flatten().count()
 }
 
@@ -399,7 +409,7 @@ fn bundles() {
         let world = World::new(&scene).expect("sound");
         let brute = Brute::new(&world);
         let mut random = Random::new(i as u64);
-        let mut hits = [0; 2];
+        let (mut views, mut shadows) = (Vec::new(), Vec::new());
         for view in 0..6 {
             let eye = random.vec3() * [0.3, 3.0, 30.0, 3.0, 3000.0, 2.5][view];
             let spread = 1.0 / eye.length().max(1.0) * 3.0;
@@ -409,17 +419,17 @@ fn bundles() {
                 corner + (across * (k % 8 + k / 64 % 6 * 8) as f32 + down * (k % 64 / 8 + k / 384 * 8) as f32) * spread
             };
             let rays: Vec<Ray> = (0..2304).map(|k| Ray::new(eye, pixel(k))).collect();
-            let seen = assert_parity_of(&world, &brute, &rays);
             let lit = rays.iter().filter_map(|ray| Some((ray, brute.closest(ray)?)));
-            let shadow = lit.map(|(ray, hit)| {
+            let shadow = |(ray, hit): (&Ray, Hit)| {
                 let point = ray.origin + ray.direction * (hit.t * 0.9999);
                 Ray { tmax: 0.999, ..Ray::new(point, eye * 1.5 + Vec3::ONE - point) }
-            });
-            let shaded = assert_parity_of(&world, &brute, &shadow.collect::<Vec<_>>());
-            hits = [hits[0] + seen, hits[1] + shaded];
+            };
+            shadows.push(lit.map(shadow).collect());
+            views.push(rays);
         }
+        let [seen, shaded] = [views, shadows].map(|batches| assert_parity_of_batches(&world, &brute, &batches));
         // Nothing is between the floor and the light.
-        assert!(hits[0] > 3000 && (hits[1] > 250 || i == 3), "scene {i}: {hits:?}");
+        assert!(seen > 3000 && (shaded > 250 || i == 3), "scene {i}: {seen}, {shaded}");
     }
 }
 
@@ -614,6 +624,7 @@ fn hits_of_small_triangles(scale: f32, views: usize) -> usize {
                 }
             }
         };
+        let mut batches = Vec::new();
         for view in 0..views {
             let eye = (Vec3::ONE + random.vec3() * 0.5) * [3.0, 30.0, 1000.0][view % 3] * scale;
             let corner = |random: &mut Random| {
@@ -636,8 +647,9 @@ fn hits_of_small_triangles(scale: f32, views: usize) -> usize {
             let mut shadows: Vec<Ray> = (0..256).map(shadow).collect();
             end_at_hits(&mut rays, &mut random);
             end_at_hits(&mut shadows, &mut random);
-            hits += assert_parity_of(&world, &brute, &rays) + assert_parity_of(&world, &brute, &shadows);
+            batches.extend([rays, shadows]);
         }
+        hits += assert_parity_of_batches(&world, &brute, &batches);
     }
     hits
 }
