@@ -313,6 +313,12 @@ fn faults_are_told_with_line_and_remedy() {
         ("[render]\noutput = \".\"\n", 2, "\".\" where \"output\" wants the name of a picture"),
         ("[render]\noutput = \"\"\n", 2, "the name of a picture, as in"),
         ("[render]\noutput = \"out/\"\n", 2, "the name of a picture, as in"),
+        ("[[light]]\ntype = \"sphere\"\nposition = [0, 0, 3]\nradius = 1e300\n", 4, "wants a length of at most"),
+        (
+            "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 3]\nhalf_edges = [[1e200, 0, 0], [0, 1, 0]]\n",
+            4,
+            "of at most",
+        ),
         ("[render]\nspp = 1.5\n", 2, "\"1.5\" where \"spp\" wants a whole number from 1 to"),
         ("[render]\naccel = \"octre\"\n", 2, "did you mean \"octree\"?"),
         ("[render]\ngrid = 5\n", 2, "write that, too"),

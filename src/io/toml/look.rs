@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::table::{Read, Table, Value};
 use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
-use crate::math::{DVec2, DVec3, Vec3};
+use crate::math::{DVec2, DVec3, LARGEST_COORDINATE, Vec3};
 use crate::scene::{
     Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, LARGEST_SIDE, Light, MOST_DEPTH, MOST_SPP,
     Pose, Projection, Request, Resolution, Search, ThinLens,
@@ -186,19 +186,23 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
             let centre = table.need("position")?.vector()?;
             let value = table.need("half_edges")?;
             let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
+            let is_held = |edge: &DVec3| edge.abs().max_element() <= LARGEST_COORDINATE.into();
             let half_edges = match edges[..] {
-                [a, b] if a.cross(b).length() > 0.0 => [a, b],
+                [a, b] if edges.iter().all(is_held) && a.cross(b).length() > 0.0 => [a, b],
+                [_, _] if !edges.iter().all(is_held) => {
+                    return Err(value.fault(format!("\"half_edges\" wants lengths of at most {LARGEST_COORDINATE:e}")));
+                }
                 _ => return Err(value.unlike("two vectors that are not parallel")),
             };
             area(AreaShape::Rectangle { centre, half_edges }, &mut table)?
         }
         Kind::Disk => {
             let (centre, normal) = (table.need("position")?.vector()?, table.need("direction")?.direction()?);
-            area(AreaShape::Disk { centre, normal, radius: length(table.need("radius")?)? }, &mut table)?
+            area(AreaShape::Disk { centre, normal, radius: radius(table.need("radius")?)? }, &mut table)?
         }
         Kind::Sphere => {
             let centre = table.need("position")?.vector()?;
-            area(AreaShape::Sphere { centre, radius: length(table.need("radius")?)? }, &mut table)?
+            area(AreaShape::Sphere { centre, radius: radius(table.need("radius")?)? }, &mut table)?
         }
     };
     table.finish()?;
@@ -334,6 +338,13 @@ fn lens(value: Value<'_>) -> Read<ThinLens> {
 fn length(value: Value<'_>) -> Read<f64> {
     let length = value.number()?;
     if length > 0.0 { Ok(length) } else { Err(value.unlike("a length above 0")) }
+}
+
+/// The radius of a light, as that of a shape.
+fn radius(value: Value<'_>) -> Read<f64> {
+    let radius = length(value)?;
+    let is_held = radius <= LARGEST_COORDINATE.into();
+    if is_held { Ok(radius) } else { Err(value.unlike(&format!("a length of at most {LARGEST_COORDINATE:e}"))) }
 }
 
 /// An angle of view, in radians.
