@@ -30,9 +30,10 @@ render: build ## render the README's scene to out/gallery.exr and out/gallery.pn
 test: packages ## run the tests of library and program
 	$(CARGO) test --locked
 
-# The longest tests of what neither a feature nor a library changes, the native tracer and how samples are spread: `make test` has run them.
-FEATURELESS = parity:: stress::native stress::the_matrix render::adaptive:: render::determinism::
-SKIPS = $(addprefix --skip ,$(FEATURELESS))
+# The longest tests of the native tracer alone and of how samples are spread, which are the same on every system: `make test` has run them.
+NATIVE = brute_force:: stress::native render::adaptive::
+# Those that no feature changes, either, but for what Embree itself does.
+FEATURELESS = $(NATIVE) stress::the_matrix render::determinism::
 # With the Python package, so that one library serves both: who depends on a crate decides on its features.
 WITHOUT_FEATURES = --no-default-features -p twincast -p twincast-python
 
@@ -43,7 +44,7 @@ check: packages ## formatting, lints, documentation, and the program once more w
 	$(CARGO) clippy --locked -p twincast-python -p twincast-rtc --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
-	$(CARGO) test --locked $(WITHOUT_FEATURES) --test twincast -- $(SKIPS)
+	$(CARGO) test --locked $(WITHOUT_FEATURES) --test twincast -- $(addprefix --skip ,$(FEATURELESS))
 	$(CARGO) test --locked $(WITHOUT_FEATURES) --doc
 
 stress: build ## every method on the cases on which ray casters fail: out/stress/matrix.svg
@@ -60,7 +61,7 @@ stress-long: build ## a hundred million random rays and ten million difficult on
 	$(TWINCAST) stress --search 3600 --seed 1 -o out/stress
 
 test-embree4: ## run the tests on Debian 13, with its Embree 4 and OpenImageIO 2.5; scripts/test-embree4.sh runs every one
-	@scripts/test-embree4.sh -- $(SKIPS)
+	@scripts/test-embree4.sh -- $(addprefix --skip ,$(NATIVE))
 
 install: build ## put binary, man pages and completions under PREFIX (/usr/local); honours DESTDIR
 	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'

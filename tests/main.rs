@@ -3,6 +3,7 @@
 mod accelerators;
 mod allocation;
 mod bench;
+mod brute_force;
 mod cache;
 mod camera_flags;
 mod cli;
@@ -20,7 +21,6 @@ mod minray;
 mod motion;
 mod mutation;
 mod openimageio;
-mod parity;
 mod program;
 mod queries;
 mod references;

@@ -8,7 +8,7 @@ use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
 use twincast::{Plane, Ray, Renderer, Scene, Settings, Shape, Tracer, World};
 
-use crate::parity::assert_parity;
+use crate::brute_force::assert_parity;
 use crate::scenes::{self, Random};
 
 /// Interpolates as f32 can say it without rounding: entries are small multiples of 2^-4, times of 2^-3.

@@ -9,7 +9,7 @@ use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
 use twincast::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Ray, Shape, Sphere, Tracer, World};
 
-use crate::parity::assert_parity;
+use crate::brute_force::assert_parity;
 use crate::scenes::{self, Random};
 
 /// `count` shapes of every bounded kind, without order, in the cube [-1, 1]^3.

@@ -114,6 +114,8 @@ fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum IsaArg {
+    /// What every processor has, as it is without AVX
+    Portable,
     /// Vectors of 8
     Avx2,
     /// Vectors of 16
@@ -200,7 +202,7 @@ mod with_embree {
     use crate::trace::World;
     use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
-    use crate::trace::embree::{self, Embree, Options, Quality};
+    use crate::trace::embree::{self, Embree, Instructions, Options, Quality};
 
     /// Every mode, native first.
     const MODES: [ModeArg; 9] = [
@@ -223,10 +225,11 @@ mod with_embree {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
-        let isa = match args.isa {
-            None => Isa::detect(),
-            Some(IsaArg::Avx2) => Isa::Avx2,
-            Some(IsaArg::Avx512) => Isa::Avx512,
+        let (isa, instructions) = match args.isa {
+            None => (Isa::detect(), Instructions::All),
+            Some(IsaArg::Portable) => (Isa::Portable, Instructions::Sse2),
+            Some(IsaArg::Avx2) => (Isa::Avx2, Instructions::Avx2),
+            Some(IsaArg::Avx512) => (Isa::Avx512, Instructions::All),
         };
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
@@ -244,7 +247,7 @@ mod with_embree {
             interrupt::check()?;
             let costs = Arc::default();
             let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
-            let modes = modes.map(|mode| contender(mode, threads, isa, &costs));
+            let modes = modes.map(|mode| contender(mode, threads, (isa, instructions), &costs));
             let others = args.accel.iter().map(|accel| other(accel.accel(), &options));
             let contenders: Vec<_> = modes.chain(others).collect();
             let setup = Setup {
@@ -290,10 +293,14 @@ mod with_embree {
         say(serde_json::to_string(document).map_err(|error| Error::output("<stdout>", error.to_string()))?)
     }
 
-    /// An engine as it is set up in `mode`.
-    fn contender(mode: ModeArg, threads: usize, isa: Isa, costs: &Arc<TreeCosts>) -> Contender {
-        let avx2_at_most = isa == Isa::Avx2;
-        let medium = Options { robust: false, threads: Some(threads), avx2_at_most, ..Options::default() };
+    /// An engine as it is set up in `mode`, with native's instructions and Embree's.
+    fn contender(
+        mode: ModeArg,
+        threads: usize,
+        (isa, instructions): (Isa, Instructions),
+        costs: &Arc<TreeCosts>,
+    ) -> Contender {
+        let medium = Options { robust: false, threads: Some(threads), instructions, ..Options::default() };
         let embree = |mode, options: Options| {
             let costs = Arc::clone(costs);
             let build = Box::new(move |world: &World| build_embree(world, &options, &costs));

@@ -329,12 +329,11 @@ impl RenderArgs {
         let options = WriteOptions { response, ..WriteOptions::default() };
         outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
         let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
-        let told = [
-            asked.pictures.first().zip(beyond_numbers(&picture.image)),
-            of_codes.and_then(|path| Some((path, too_bright(&picture.image, &options.response)?))),
-        ];
-        let told = told.into_iter().flatten().map(|(path, message)| Warning::new(path, "", message));
-        warn(&told.collect::<Vec<_>>());
+        let corner = asked.settings.crop.map_or([0, 0], |crop| [crop.x, crop.y]);
+        let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, corner));
+        let bright = |path| Some((path, too_bright(&picture.image, &options.response)?));
+        let told = beyond.or_else(|| of_codes.and_then(bright));
+        warn(told.map(|(path, message)| Warning::new(path, "", message)).as_slice());
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         Ok(start.elapsed().as_secs_f64())
     }

@@ -13,7 +13,7 @@ use twincast::trace::brute::Brute;
 use twincast::{Hit, Ray, Tracer, World};
 
 use super::subjects::{self, Class, Kind, Subject};
-use crate::parity::assert_parity_of;
+use crate::brute_force::assert_parity_of;
 use crate::scenes::Random;
 
 /// A scene of one kind of primitive, and what rays are aimed at, in the world.

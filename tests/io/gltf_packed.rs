@@ -125,6 +125,12 @@ fn broken_meshopt_streams_are_refused() {
     refused(&with(0, "byteLength", json!(640)), "a.gltf", "/accessors/0/bufferView", "KHR_meshopt_compression");
     refused(&with(0, "byteLength", json!(20)), "a.gltf", "/accessors/0/bufferView", "too early");
     refused(&with(0, "filter", json!("COLOR")), "a.gltf", "/accessors/0/bufferView", "do not suit");
+    // Also where the buffer does not say that it is none.
+    let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    json["buffers"][1].as_object_mut().unwrap().remove("extensions");
+    Files::one("a.gltf", json.to_string()).scene("a.gltf");
+    json["bufferViews"][0]["extensions"]["KHR_meshopt_compression"]["count"] = json!(-1);
+    refused(&Files::one("a.gltf", json.to_string()), "a.gltf", "/accessors/0/bufferView", "KHR_meshopt_compression: ");
 }
 
 /// By the edge breaker's walk, then in sequence: positions of 14 bits over 16 metres, normals of 10, coordinates of 12.

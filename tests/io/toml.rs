@@ -313,6 +313,8 @@ fn faults_are_told_with_line_and_remedy() {
         ("[render]\noutput = \".\"\n", 2, "\".\" where \"output\" wants the name of a picture"),
         ("[render]\noutput = \"\"\n", 2, "the name of a picture, as in"),
         ("[render]\noutput = \"out/\"\n", 2, "the name of a picture, as in"),
+        ("[render]\noutput = \"a.png/.\"\n", 2, "the name of a picture, as in"),
+        ("[render]\noutput = \"a\\u0000.png\"\n", 2, "the name of a picture, as in"),
         ("[[light]]\ntype = \"sphere\"\nposition = [0, 0, 3]\nradius = 1e300\n", 4, "wants a length of at most"),
         (
             "[[light]]\ntype = \"rectangle\"\nposition = [0, 0, 3]\nhalf_edges = [[1e200, 0, 0], [0, 1, 0]]\n",

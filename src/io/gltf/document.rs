@@ -145,7 +145,8 @@ impl<'a> Document<'a> {
         let mut views = self.root.buffer_views.iter().filter(|view| view.buffer == index).peekable();
         let is_empty = buffer.uri.is_none() && index > 0 && views.peek().is_some();
         meshopt::is_fallback(&buffer.extensions)
-            || is_empty && views.all(|view| matches!(meshopt::compressed(&view.extensions), Ok(Some(_))))
+            // Where it does not say how, that is what is wrong.
+            || is_empty && views.all(|view| !matches!(meshopt::compressed(&view.extensions), Ok(None)))
     }
 
     /// The file that a buffer view is mapped from.

@@ -78,7 +78,7 @@ impl<'v> Skin<'v> {
         let highest = |vertex: usize| {
             // Some exporters leave any number where the weight is 0.
             let heeded = skin.weighted(vertex).filter(|(_, weight)| *weight > 0.0).map(|(joint, _)| joint);
-            heeded.reduce(f32::max).unwrap_or_else(|| skin.first(vertex))
+            heeded.fold(0.0, f32::max)
         };
         let highest = attributes.each(highest).into_iter().fold(0.0, f32::max);
         // Negative numbers and NaN become 0 below.
@@ -102,8 +102,9 @@ impl<'v> Skin<'v> {
         if total > 0.0 && total.is_finite() {
             return DAffine3 { matrix3: sum.matrix3 * (1.0 / total), translation: sum.translation / total };
         }
-        // Checked, unless a weight is infinite.
-        *self.matrices.get(self.first(vertex) as usize).unwrap_or(&self.matrices[0])
+        // Whose number may be any where it weighs nothing.
+        let first = self.sets[0][0].floats::<4>(vertex)[0];
+        *self.matrices.get(first as usize).unwrap_or(&self.matrices[0])
     }
 
     /// The joints of a vertex, each with its weight.
@@ -111,10 +112,5 @@ impl<'v> Skin<'v> {
         self.sets
             .iter()
             .flat_map(move |[joints, weights]| joints.floats::<4>(vertex).into_iter().zip(weights.floats::<4>(vertex)))
-    }
-
-    /// The joint that comes first.
-    fn first(&self, vertex: usize) -> f32 {
-        self.sets[0][0].floats::<4>(vertex)[0]
     }
 }

@@ -1,5 +1,6 @@
 //! What is seen, and from where: lights, cameras, and what the file asks of a render.
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use super::table::{Read, Table, Value};
@@ -91,8 +92,10 @@ impl Render {
 /// Where a picture goes: a file.
 fn picture_name(value: Value<'_>) -> Read<String> {
     let name = value.text()?;
-    match Path::new(name).file_name() {
-        Some(_) if !name.ends_with('/') => Ok(name.to_owned()),
+    // Of `out/` and `out/.` that would be the folder.
+    let file = Path::new(name).file_name().and_then(OsStr::to_str);
+    match file {
+        Some(file) if name.ends_with(file) && !name.contains('\0') => Ok(name.to_owned()),
         _ => Err(value.unlike("the name of a picture, as in \"picture.exr\"")),
     }
 }

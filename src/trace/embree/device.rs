@@ -9,7 +9,7 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::sync::atomic::{AtomicBool, AtomicIsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{backend, sys};
+use super::{Instructions, backend, sys};
 use crate::error::{Error, Result};
 
 /// An Embree device, held by every scene made with it.
@@ -38,10 +38,14 @@ unsafe impl Sync for Device {}
 
 impl Device {
     /// A device whose scenes are built on `threads` threads, or on as many as there are processors, and which uses no
-    /// instructions beyond AVX2 if `avx2_at_most`.
-    pub(super) fn new(threads: Option<usize>, avx2_at_most: bool) -> Result<Arc<Self>> {
+    /// `instructions` but these.
+    pub(super) fn new(threads: Option<usize>, instructions: Instructions) -> Result<Arc<Self>> {
         let threads = threads.map(|count| format!("threads={}", count.max(1)));
-        let isa = avx2_at_most.then(|| "max_isa=avx2".to_owned());
+        let isa = match instructions {
+            Instructions::All => None,
+            Instructions::Avx2 => Some("max_isa=avx2".to_owned()),
+            Instructions::Sse2 => Some("max_isa=sse2".to_owned()),
+        };
         let config = threads.into_iter().chain(isa).collect::<Vec<_>>().join(",");
         let config = CString::new(config).map_err(|e| backend(e.to_string()))?;
         // SAFETY: the string ends in NUL and outlives the call.
@@ -220,7 +224,7 @@ mod tests {
 
     #[test]
     fn embrees_errors_come_out_once_with_code_and_step() {
-        let device = Device::new(Some(1), false).unwrap();
+        let device = Device::new(Some(1), Instructions::All).unwrap();
         // SAFETY: the device is alive; Embree refuses a type that does not exist and returns null.
         let geometry = unsafe { sys::rtcNewGeometry(device.raw(), 9999) };
         assert!(geometry.is_null());
@@ -249,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_callback_is_an_error_of_the_next_check() {
-        let device = Device::new(Some(1), false).unwrap();
+        let device = Device::new(Some(1), Instructions::All).unwrap();
         assert!(!device.state().has_panicked());
         device.state().report_panic();
         assert!(device.state().has_panicked());

@@ -57,13 +57,25 @@ pub struct Options {
     pub compact: bool,
     /// Threads that build; one for every processor by default. Queries run on the thread that asks.
     pub threads: Option<usize>,
-    /// Use no instructions beyond AVX2, to compare like with like.
-    pub avx2_at_most: bool,
+    /// Which instructions it may use, to compare like with like.
+    pub instructions: Instructions,
+}
+
+/// Which instructions Embree may use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Instructions {
+    /// The best that it finds.
+    #[default]
+    All,
+    /// None beyond AVX2.
+    Avx2,
+    /// None beyond SSE2, which every x86-64 has.
+    Sse2,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { quality: Quality::Medium, robust: true, compact: false, threads: None, avx2_at_most: false }
+        Self { quality: Quality::Medium, robust: true, compact: false, threads: None, instructions: Instructions::All }
     }
 }
 
@@ -115,7 +127,7 @@ impl Embree {
     /// [`Error::Unavailable`] where the library that was loaded lays out its hits in another way than the header that
     /// this build was made with.
     pub fn new(world: &World, options: &Options) -> Result<Self> {
-        let device = Device::new(options.threads, options.avx2_at_most)?;
+        let device = Device::new(options.threads, options.instructions)?;
         let build = |parts: &[Part]| -> Result<SceneBuilder> {
             let mut builder = SceneBuilder::new(&device, options)?;
             for (id, part) in parts.iter().enumerate() {

@@ -26,7 +26,7 @@ const MOST_IN_LEAF: u32 = 7 * BLOCK;
 /// # Errors
 /// [`Error::Backend`](crate::Error::Backend) for what Embree reports.
 pub fn sah_cost(world: &World, options: &Options, node_cost: f64) -> Result<f64> {
-    let device = Device::new(options.threads, options.avx2_at_most)?;
+    let device = Device::new(options.threads, options.instructions)?;
     let quality = match options.quality {
         Quality::High if options.robust || options.compact => Quality::Medium,
         quality => quality,
