@@ -572,6 +572,9 @@ fn a_benchmark_prints_a_table_or_one_document() {
         let cost = |engine: usize| report["builds"][engine]["sah_cost"].as_f64().expect("a cost");
         assert!(cost(0) > 1.0 && cost(0) < 1.05 * cost(1), "{report}");
     }
+    let output =
+        twincast(&[&["bench", "terrain20", "--isa", "portable", "--modes", "default,robust"][..], &quick].concat());
+    assert!(output.status.success() && text(&output.stdout).contains("0 native_wrong"), "{}", text(&output.stderr));
     let refused = |chart: &str| twincast(&[&["bench", &scene, "--chart", chart][..], &quick].concat()).status.code();
     assert_eq!(refused(&folder.path("no/folder.svg")), Some(4), "before anything is measured");
     assert_eq!(refused(&folder.path("rates.png")), Some(2));

@@ -20,7 +20,7 @@ pub enum Travel {
     /// By how many there are.
     #[default]
     Auto,
-    /// Several of them in turn, however few.
+    /// Several of them in turn, however few; but without AVX one after the other.
     InFlight,
     /// One after the other, however many; but shadow rays that bundles leave to placed objects fly.
     Alone,

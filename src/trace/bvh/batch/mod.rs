@@ -216,7 +216,7 @@ impl<Q: Query> Unbundled<'_, Q> {
         if !self.bvh.has_triangles() {
             return;
         }
-        if self.bvh.travel_alone(self.rays.len()) {
+        if !S::FLIES || self.bvh.travel_alone(self.rays.len()) {
             S::apart(OneByOne(self));
         } else {
             S::apart_narrow(InFlight(self));

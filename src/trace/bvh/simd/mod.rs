@@ -98,6 +98,8 @@ pub(super) trait Simd {
     fn prefetch(address: *const u8);
     /// Whether anything is loaded for it.
     const PREFETCHES: bool = true;
+    /// Whether many rays that go their own ways among triangles are answered sooner in flight than one after the other.
+    const FLIES: bool = true;
     /// Has the cache line with this value loaded.
     fn prefetch_line<T>(value: &T);
     /// Has all of these loaded.

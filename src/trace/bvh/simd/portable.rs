@@ -37,6 +37,9 @@ impl Simd for Portable {
 
     const PREFETCHES: bool = false;
 
+    /// Order and masks, which a flight asks for at every step, are made lane by lane.
+    const FLIES: bool = false;
+
     #[inline(always)]
     fn prefetch_line<T>(_: &T) {}
 
