@@ -40,9 +40,8 @@ WITHOUT_FEATURES = --no-default-features -p twincast -p twincast-python
 check: packages ## formatting, lints, documentation, and the program once more without default features
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
-	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
-	$(CARGO) clippy --locked -p twincast-python -p twincast-rtc --all-targets -- -D warnings
-	$(CARGO) clippy --locked -p twincast-rtc --no-default-features --features v4 --all-targets -- -D warnings
+	$(CARGO) clippy --locked $(WITHOUT_FEATURES) -p twincast-rtc --features twincast-rtc/v3 --all-targets -- -D warnings
+	$(CARGO) clippy --locked $(WITHOUT_FEATURES) -p twincast-rtc --features twincast-rtc/v4 --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --locked --no-deps
 	$(CARGO) test --locked $(WITHOUT_FEATURES) --test twincast -- $(addprefix --skip ,$(FEATURELESS))
 	$(CARGO) test --locked $(WITHOUT_FEATURES) --doc

@@ -97,15 +97,19 @@ fn meshopt_streams_of_the_second_version_hold_what_was_put_in() {
     }
 }
 
+fn fixture_json(name: &str) -> serde_json::Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
 #[test]
 fn broken_meshopt_streams_are_refused() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/meshopt.gltf");
-    let text = std::fs::read_to_string(path).unwrap();
-    let with = |view: usize, key: &str, value: serde_json::Value| {
-        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        json["bufferViews"][view]["extensions"]["EXT_meshopt_compression"][key] = value;
+    let altered = |name: &str, extension: &str, view: usize, key: &str, value: serde_json::Value| {
+        let mut json = fixture_json(name);
+        json["bufferViews"][view]["extensions"][extension][key] = value;
         Files::one("a.gltf", json.to_string())
     };
+    let with = |view, key: &str, value| altered("meshopt.gltf", "EXT_meshopt_compression", view, key, value);
     refused(&with(0, "byteLength", json!(800)), "a.gltf", "/accessors/0/bufferView", "EXT_meshopt_compression");
     refused(&with(0, "byteOffset", json!(1)), "a.gltf", "/accessors/0/bufferView", "0xa0 belongs");
     refused(&with(0, "mode", json!("POINTS")), "a.gltf", "/accessors/0/bufferView", "\"POINTS\"");
@@ -115,18 +119,12 @@ fn broken_meshopt_streams_are_refused() {
     refused(&with(4, "byteLength", json!(20)), "a.gltf", "/accessors/3/bufferView", "too early");
     refused(&with(0, "buffer", json!(7)), "a.gltf", "/accessors/0/bufferView", "buffer 7");
 
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/meshopt_khr.gltf");
-    let text = std::fs::read_to_string(path).unwrap();
-    let with = |view: usize, key: &str, value: serde_json::Value| {
-        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        json["bufferViews"][view]["extensions"]["KHR_meshopt_compression"][key] = value;
-        Files::one("a.gltf", json.to_string())
-    };
+    let with = |view, key: &str, value| altered("meshopt_khr.gltf", "KHR_meshopt_compression", view, key, value);
     refused(&with(0, "byteLength", json!(640)), "a.gltf", "/accessors/0/bufferView", "KHR_meshopt_compression");
     refused(&with(0, "byteLength", json!(20)), "a.gltf", "/accessors/0/bufferView", "too early");
     refused(&with(0, "filter", json!("COLOR")), "a.gltf", "/accessors/0/bufferView", "do not suit");
     // Also where the buffer does not say that it is none.
-    let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let mut json = fixture_json("meshopt_khr.gltf");
     json["buffers"][1].as_object_mut().unwrap().remove("extensions");
     Files::one("a.gltf", json.to_string()).scene("a.gltf");
     json["bufferViews"][0]["extensions"]["KHR_meshopt_compression"]["count"] = json!(-1);
@@ -164,11 +162,9 @@ fn draco_data_hold_what_was_put_in() {
 
 #[test]
 fn broken_draco_data_are_refused() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/draco.gltf");
-    let text = std::fs::read_to_string(path).unwrap();
     let place = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
     let broken = |pointer: &str, value: serde_json::Value, place: &str, words: &str| {
-        let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let mut json = fixture_json("draco.gltf");
         *json.pointer_mut(pointer).unwrap() = value;
         refused(&Files::one("a.gltf", json.to_string()), "a.gltf", place, words);
     };
