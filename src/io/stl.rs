@@ -20,8 +20,8 @@ const HEADER: usize = 84;
 const FACET: usize = 50;
 /// Corners are numbered in 32 bits.
 const MOST_FACETS: u64 = u32::MAX as u64 / 3;
-/// Facets of a text until the file is told that they have been read.
-const TELL: usize = 1 << 14;
+/// Bytes of a text until the file is told that they have been read.
+const TELL: usize = 1 << 21;
 
 /// Reads an STL file.
 pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Scene> {
@@ -120,7 +120,7 @@ impl Solid {
 /// A mesh a solid, but for those without a facet; at least one.
 fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Vec<Mesh>> {
     let bytes = without_mark(file);
-    let (mut read, mut told) = (0, 0);
+    let mut told = 0;
     let mut words = Words::new(bytes, 1);
     let mut meshes = Vec::new();
     let mut solid = Solid::new(String::new());
@@ -144,9 +144,8 @@ fn text(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<V
             }
             b"facet" => {
                 solid.triangles.push(facet(path, &mut words, &mut solid.corners)?);
-                read += 1;
-                if read % TELL == 0 {
-                    let read = bytes.len() - words.remaining();
+                let read = bytes.len() - words.remaining();
+                if read - told >= TELL {
                     file.done(&bytes[told..read]);
                     told = read;
                 }

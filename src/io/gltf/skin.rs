@@ -75,11 +75,7 @@ impl<'v> Skin<'v> {
             return Err(document.error(format!("{pointer}/attributes"), message));
         }
         let skin = Self { matrices, sets };
-        let highest = |vertex: usize| {
-            // Some exporters leave any number where the weight is 0.
-            let heeded = skin.weighted(vertex).filter(|(_, weight)| *weight > 0.0).map(|(joint, _)| joint);
-            heeded.fold(0.0, f32::max)
-        };
+        let highest = |vertex: usize| skin.heeded(vertex).map(|(joint, _)| joint).fold(0.0, f32::max);
         let highest = attributes.each(highest).into_iter().fold(0.0, f32::max);
         // Negative numbers and NaN become 0 below.
         if highest >= matrices.len() as f32 {
@@ -93,7 +89,7 @@ impl<'v> Skin<'v> {
     pub(super) fn at(&self, vertex: usize) -> DAffine3 {
         let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut total = 0.0;
-        for (joint, weight) in self.weighted(vertex).filter(|(_, weight)| *weight > 0.0) {
+        for (joint, weight) in self.heeded(vertex) {
             let (matrix, weight) = (&self.matrices[joint as usize], f64::from(weight));
             sum.matrix3 += matrix.matrix3 * weight;
             sum.translation += matrix.translation * weight;
@@ -107,10 +103,10 @@ impl<'v> Skin<'v> {
         *self.matrices.get(first as usize).unwrap_or(&self.matrices[0])
     }
 
-    /// The joints of a vertex, each with its weight.
-    fn weighted(&self, vertex: usize) -> impl Iterator<Item = (f32, f32)> {
-        self.sets
-            .iter()
-            .flat_map(move |[joints, weights]| joints.floats::<4>(vertex).into_iter().zip(weights.floats::<4>(vertex)))
+    /// The joints of a vertex that weigh anything, each with its weight: some exporters leave any number where the weight is 0.
+    fn heeded(&self, vertex: usize) -> impl Iterator<Item = (f32, f32)> {
+        let joints = self.sets.iter().flat_map(move |[joints, _]| joints.floats::<4>(vertex));
+        let weights = self.sets.iter().flat_map(move |[_, weights]| weights.floats::<4>(vertex));
+        joints.zip(weights).filter(|(_, weight)| *weight > 0.0)
     }
 }

@@ -190,11 +190,11 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
             let value = table.need("half_edges")?;
             let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
             let is_held = |edge: &DVec3| edge.abs().max_element() <= LARGEST_COORDINATE.into();
+            if !edges.iter().all(is_held) {
+                return Err(value.fault(format!("\"half_edges\" wants lengths of at most {LARGEST_COORDINATE:e}")));
+            }
             let half_edges = match edges[..] {
-                [a, b] if edges.iter().all(is_held) && a.cross(b).length() > 0.0 => [a, b],
-                [_, _] if !edges.iter().all(is_held) => {
-                    return Err(value.fault(format!("\"half_edges\" wants lengths of at most {LARGEST_COORDINATE:e}")));
-                }
+                [a, b] if a.cross(b).length() > 0.0 => [a, b],
                 _ => return Err(value.unlike("two vectors that are not parallel")),
             };
             area(AreaShape::Rectangle { centre, half_edges }, &mut table)?

@@ -38,17 +38,17 @@ enum Packing {
 
 /// `count` elements of `stride` bytes, a multiple of 4 up to 256.
 pub(super) fn decode(source: &[u8], count: usize, stride: usize) -> Placeless<Vec<u8>> {
-    let channels = stride / CHANNEL;
+    let channel_count = stride / CHANNEL;
     let is_second = source.first() == Some(&SECOND_HEADER);
-    let (mut stream, last, channels) = if is_second {
-        let (stream, tail) = Stream::open(source, SECOND_HEADER, (stride + channels).max(24))?;
-        let (last, modes) = tail.split_at(tail.len() - channels);
-        (stream, last, modes.iter().copied().map(Channel::of).collect::<Placeless<Vec<_>>>()?)
+    let (mut stream, baseline, channels) = if is_second {
+        let (stream, tail) = Stream::open(source, SECOND_HEADER, (stride + channel_count).max(24))?;
+        let (baseline, modes) = tail.split_at(tail.len() - channel_count);
+        (stream, baseline, modes.iter().copied().map(Channel::of).collect::<Placeless<Vec<_>>>()?)
     } else {
         let (stream, tail) = Stream::open(source, HEADER, stride.max(32))?;
-        (stream, tail, vec![Channel::Bytes; channels])
+        (stream, tail, vec![Channel::Bytes; channel_count])
     };
-    let mut last = last[last.len() - stride..].to_vec();
+    let mut last = baseline[baseline.len() - stride..].to_vec();
     let mut out = vec![0; count * stride];
     let block = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
     let mut codes = [[0; BLOCK]; CHANNEL];

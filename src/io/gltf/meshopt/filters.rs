@@ -14,7 +14,7 @@ pub(super) fn octahedral(bytes: &mut [u8], stride: usize) {
     }
     for v in bytes.as_chunks_mut::<8>().0 {
         let unit = from_octahedron([0, 1, 2].map(|k| f32::from(word(v, k))));
-        (0..3).for_each(|k| set_word(v, k, unit[k] * 32_767.0));
+        (0..3).for_each(|k| set_word(v, k, (unit[k] * 32_767.0).round() as i16 as u16));
     }
 }
 
@@ -38,7 +38,7 @@ pub(super) fn quaternion(bytes: &mut [u8]) {
         let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
         let largest = (last & 3) as usize;
         for (k, value) in [(1, x), (2, y), (3, z), (0, w)] {
-            set_word(q, (largest + k) % 4, value * 32_767.0);
+            set_word(q, (largest + k) % 4, (value * 32_767.0).round() as i16 as u16);
         }
     }
 }
@@ -58,7 +58,7 @@ pub(super) fn color(bytes: &mut [u8], stride: usize) {
         let [y, co, cg, alpha] = [0, 1, 2, 3].map(|k| word(v, k));
         let color = from_ycocg([(y as u16).into(), co.into(), cg.into(), (alpha as u16).into()], 65_535.0);
         for (k, value) in color.into_iter().enumerate() {
-            v[2 * k..2 * k + 2].copy_from_slice(&(value as u16).to_le_bytes());
+            set_word(v, k, value as u16);
         }
     }
 }
@@ -84,6 +84,6 @@ fn word(bytes: &[u8; 8], k: usize) -> i16 {
     i16::from_le_bytes([bytes[2 * k], bytes[2 * k + 1]])
 }
 
-fn set_word(bytes: &mut [u8; 8], k: usize, value: f32) {
-    bytes[2 * k..2 * k + 2].copy_from_slice(&(value.round() as i16).to_le_bytes());
+fn set_word(bytes: &mut [u8; 8], k: usize, value: u16) {
+    bytes[2 * k..2 * k + 2].copy_from_slice(&value.to_le_bytes());
 }
