@@ -34,7 +34,7 @@ use crate::image::{self, Metadata, Reference, Response, WriteOptions};
 use crate::io::Format;
 use crate::memory::process;
 use crate::plan;
-use crate::render::{Renderer, Settings};
+use crate::render::{Crop, Renderer, Settings};
 use crate::scene::{Camera, Geometry, Request, Scene};
 use crate::trace::accel::{Accel, Options as AccelOptions};
 use crate::trace::bvh::{Preset, prepare_thread};
@@ -276,8 +276,8 @@ struct Asked {
 impl Asked {
     /// Width and height of what is rendered, in pixels.
     fn size(&self) -> [u32; 2] {
-        let Settings { width, height, crop, .. } = self.settings;
-        crop.map_or([width, height], |crop| [crop.width, crop.height])
+        let Crop { width, height, .. } = self.settings.window();
+        [width, height]
     }
 
     fn pixels(&self) -> u64 {
@@ -329,8 +329,7 @@ impl RenderArgs {
         let options = WriteOptions { response, ..WriteOptions::default() };
         outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
         let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
-        let corner = asked.settings.crop.map_or([0, 0], |crop| [crop.x, crop.y]);
-        let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, corner));
+        let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, &asked.settings.window()));
         let bright = |path| Some((path, too_bright(&picture.image, &options.response)?));
         let told = beyond.or_else(|| of_codes.and_then(bright));
         warn(told.map(|(path, message)| Warning::new(path, "", message)).as_slice());

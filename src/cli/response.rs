@@ -5,6 +5,7 @@ use clap::Args;
 use super::common::by_name;
 use crate::image::{Curve, Image, MOST_STOPS, Response, TEMPERATURES};
 use crate::math::Vec4;
+use crate::render::Crop;
 use crate::scene::Request;
 
 /// For pictures of 8 bits; OpenEXR and Radiance files keep radiance.
@@ -57,13 +58,14 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     Some(format!("{share} % of what is seen {message}; --exposure {exposure} would show it"))
 }
 
-/// Where there is light that f32 cannot hold: of how many pixels, and of which first. `corner` is what of the whole picture the first pixel is.
-pub(super) fn beyond_numbers(image: &Image, corner: [u32; 2]) -> Option<String> {
+/// Where there is light that f32 cannot hold: of how many pixels, and of which first, by its place in the whole picture, of which `window` was rendered.
+pub(super) fn beyond_numbers(image: &Image, window: &Crop) -> Option<String> {
     let is_beyond = |pixel: &Vec4| !pixel.is_finite();
     let first = image.pixels.iter().position(is_beyond)?;
     let count = image.pixels.iter().filter(|pixel| is_beyond(pixel)).count();
     let (pixels, are) = if count == 1 { ("pixel", "is") } else { ("pixels", "are") };
-    let (x, y) = (first % image.width as usize + corner[0] as usize, first / image.width as usize + corner[1] as usize);
+    let (row, column) = (first / image.width as usize, first % image.width as usize);
+    let (x, y) = (window.x as usize + column, window.y as usize + row);
     Some(format!(
         "{count} {pixels} (first {x},{y}) {are} infinite or no number: lights, pictures of surroundings, colours or a material's shares are so \
          large that their products are not held by f32, which ends at 3.4e38"
@@ -109,12 +111,17 @@ mod tests {
     #[test]
     fn light_that_is_no_number_is_told() {
         let mut image = Image::new(3, 2);
+        let whole = Crop { x: 0, y: 0, width: 3, height: 2 };
         image.pixels[5] = Vec4::MAX;
-        assert_eq!(beyond_numbers(&image, [0, 0]), None);
+        assert_eq!(beyond_numbers(&image, &whole), None);
         image.pixels[4].y = f32::INFINITY;
-        assert!(beyond_numbers(&image, [0, 0]).unwrap().starts_with("1 pixel (first 1,1) is infinite"));
+        assert!(beyond_numbers(&image, &whole).unwrap().starts_with("1 pixel (first 1,1) is infinite"));
         image.pixels[2].z = f32::NAN;
-        assert!(beyond_numbers(&image, [40, 20]).unwrap().starts_with("2 pixels (first 42,20) are infinite"));
+        assert!(
+            beyond_numbers(&image, &Crop { x: 40, y: 20, ..whole })
+                .unwrap()
+                .starts_with("2 pixels (first 42,20) are infinite")
+        );
     }
 
     #[test]

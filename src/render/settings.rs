@@ -128,7 +128,7 @@ impl Settings {
     }
 
     /// The part of the picture that is rendered.
-    pub(super) fn window(&self) -> Crop {
+    pub(crate) fn window(&self) -> Crop {
         let Self { width, height, crop, .. } = *self;
         crop.unwrap_or(Crop { x: 0, y: 0, width, height })
     }
