@@ -97,8 +97,8 @@ install_in_root() {
         fail "apt-get failed in the Debian 13 root; the end of $cache/apt.log: $(tail -n 5 "$cache/apt.log")"
 }
 
-# What tests have been compiled with here serves there as well, but for this package and what was linked with a newer C library, which would
-# not load. It spares minutes and nothing else: where it fails, all is compiled.
+# What tests have been compiled with here serves there as well, the crate below ours too, of which no line asks for the system's libraries; but not this
+# package, and not what was linked with a newer C library, which would not load. It spares minutes and nothing else: where it fails, all is compiled.
 take_compiled() {
     local built=${CARGO_TARGET_DIR:-target}/debug part=$target/debug.part
     if [ -e "$target/debug" ] || [ ! -d "$built/deps" ] ||
@@ -107,7 +107,8 @@ take_compiled() {
     fi
     rm -rf "$part"
     mkdir "$part"
-    if tar -C "$built" --format=posix --exclude='*twincast*' -cf - .fingerprint build deps | tar -C "$part" -xpf -; then
+    if (cd "$built" && find .fingerprint build deps \( -name '*twincast*' ! -name '*twincast[-_]core*' -prune \) -o -print0) |
+        tar -C "$built" --format=posix --no-recursion --null --files-from=- -cf - | tar -C "$part" -xpf -; then
         say "took compiled dependencies from $built"
         chown "$OWNER" "$part"
         mv "$part" "$target/debug"

@@ -37,32 +37,22 @@
 
 #[doc(hidden)]
 pub mod cli;
-mod error;
 pub mod image;
 pub mod io;
 pub mod lab;
-pub mod math;
-mod memory;
-pub mod output;
 pub mod plan;
-mod ray;
 pub mod render;
-pub mod scene;
-pub mod shade;
-mod shape;
 pub mod trace;
 
-pub use error::{Error, Result, Warning};
 pub use image::Image;
-pub use ray::{Hit, Ray};
 pub use render::{Control, Renderer, Settings};
-pub use scene::Scene;
-pub use shape::triangle::TriangleHit;
-pub use shape::{
-    Cone, Cuboid, Cylinder, Disk, Ellipsoid, InvalidShape, Plane, Polygon, Shape, ShapeHit, Sphere, SphereMethod,
-    TriangleMethod,
+#[doc(inline)]
+pub use twincast_core::{
+    Batch, Cone, Cuboid, Cylinder, Disk, Ellipsoid, Error, Hit, InvalidShape, Plane, Polygon, Ray, Result, Scene,
+    Shape, ShapeHit, Sphere, SphereMethod, Tracer, TriangleHit, TriangleMethod, Warning, Width, World, math, output,
+    scene, shade,
 };
-pub use trace::{Batch, Tracer, Width, World};
+use twincast_core::{error, memory, ray, shape};
 
 /// The README's example runs as a test.
 #[cfg(doctest)]

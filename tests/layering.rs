@@ -31,16 +31,19 @@ const UNSAFE: &[&str] = &[
     "image/loading.rs",
     "image/oiio/bridge.rs",
     "image/oiio/shim.rs",
+    "image/oiio/unnamed.rs",
     "image/denoise/device.rs",
     "image/denoise/library.rs",
     "memory/",
 ];
 
-fn source() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
-}
+/// Where the two crates' source is. A module is in the same layer in both.
+const SOURCES: [&str; 2] = ["src", "core/src"];
 
-/// Every source file, by its path below `src`, without comments.
+/// The crate below, as the one above names it.
+const CORE: &str = "twincast_core::";
+
+/// Every source file, by its path below `src` or `core/src`, without comments.
 fn files() -> Vec<(String, String)> {
     fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).expect("a readable folder") {
@@ -52,17 +55,19 @@ fn files() -> Vec<(String, String)> {
             }
         }
     }
-    let mut paths = Vec::new();
-    walk(&source(), &mut paths);
-    paths.sort();
-    let relative = |path: &Path| {
-        let parts = path.strip_prefix(source()).expect("below src").components();
-        parts.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
+    let of_one = |source: &str| {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
+        let mut paths = Vec::new();
+        walk(&source, &mut paths);
+        paths.sort();
+        let relative = |path: &Path| {
+            let parts = path.strip_prefix(&source).expect("below it").components();
+            parts.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
+        };
+        let text = |path: &Path| without_comments(&fs::read_to_string(path).expect("readable text"));
+        paths.iter().map(|path| (relative(path), text(path))).collect::<Vec<_>>()
     };
-    paths
-        .iter()
-        .map(|path| (relative(path), without_comments(&fs::read_to_string(path).expect("readable text"))))
-        .collect()
+    SOURCES.iter().flat_map(|source| of_one(source)).collect()
 }
 
 fn without_comments(text: &str) -> String {
@@ -107,13 +112,15 @@ fn heads(rest: &str) -> Vec<&str> {
     names
 }
 
-/// Every name directly below the crate's root that `text`, in the module `path`, refers to.
+/// Every name directly below a crate's root that `text`, in the module `path`, refers to.
 fn uses<'t>(text: &'t str, path: &[&str]) -> Vec<&'t str> {
     let mut found = Vec::new();
-    for (i, _) in text.match_indices("crate::") {
-        // Not `$crate::` and not another crate's name.
-        if !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
-            found.extend(heads(&text[i + "crate::".len()..]));
+    for root in ["crate::", CORE] {
+        for (i, _) in text.match_indices(root) {
+            // Not `$crate::` and not another crate's name.
+            if !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
+                found.extend(heads(&text[i + root.len()..]));
+            }
         }
     }
     let climb = "super::".repeat(path.len());
@@ -127,11 +134,15 @@ fn uses<'t>(text: &'t str, path: &[&str]) -> Vec<&'t str> {
     found
 }
 
-/// From each name that `lib.rs` re-exports to its module.
+/// From each name that a `lib.rs` re-exports from a module to that module.
 fn reexports(lib: &str) -> BTreeMap<&str, &str> {
     let mut map = BTreeMap::new();
     for (i, _) in lib.match_indices("pub use ") {
-        let (module, names) = lib[i + "pub use ".len()..].split_once("::").expect("pub use module::names");
+        let rest = &lib[i + "pub use ".len()..];
+        if rest.starts_with(CORE) {
+            continue;
+        }
+        let (module, names) = rest.split_once("::").expect("pub use module::names");
         for name in heads(names) {
             map.insert(name, module);
         }
@@ -164,13 +175,14 @@ fn violations(file: &str, text: &str, exports: &BTreeMap<&str, &str>) -> Vec<Str
 #[test]
 fn imports_point_down() {
     let files = files();
-    let lib = &files.iter().find(|(file, _)| file == "lib.rs").expect("lib.rs").1;
-    let exports = reexports(lib);
+    let libs = files.iter().filter(|(file, _)| file == "lib.rs");
+    let exports: BTreeMap<&str, &str> = libs.flat_map(|(_, lib)| reexports(lib)).collect();
     // Test modules in files of their own are named so.
     let judged = files.iter().filter(|(file, _)| !file.ends_with("tests.rs"));
     let wrong: Vec<_> = judged.flat_map(|(file, text)| violations(file, text, &exports)).collect();
     assert!(wrong.is_empty(), "imports only ever point down:\n{}", wrong.join("\n"));
-    assert!(files.len() > 20 && exports.get("Ray") == Some(&"ray"), "the scan found the source");
+    assert!(files.len() > 400, "the scan found the source of both crates");
+    assert_eq!((exports.get("Ray"), exports.get("Renderer")), (Some(&"ray"), Some(&"render")));
 }
 
 #[test]
@@ -194,6 +206,7 @@ fn the_scan_itself_finds_what_it_should() {
     let wrong = |file: &str, text: &str| violations(file, &without_comments(text), &exports).len();
     assert_eq!(wrong("trace/bvh/mod.rs", "use crate::math::Vec3; use crate::{Ray, scene::{Scene, Mesh}};"), 0);
     assert_eq!(wrong("trace/bvh/mod.rs", "use crate::io::load;"), 1);
+    assert_eq!(wrong("trace/mod.rs", "use twincast_core::{math, trace, shade};"), 1);
     assert_eq!(wrong("trace/bvh/mod.rs", "use crate::{math, Renderer, lab::{a, b}, ray};"), 2);
     assert_eq!(wrong("trace/bvh/mod.rs", "use super::super::shade::x; use super::World;"), 1);
     assert_eq!(wrong("trace/bvh/walk.rs", "use super::super::super::shade::x; use super::super::World;"), 1);

@@ -9,9 +9,9 @@ use super::metadata::Placed;
 use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
 use super::pure as backend;
-use super::response::{Curve, Response};
 use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Image, Metadata, channels};
+use super::{Curve, Response};
 use crate::error::{Error, Result, one_line};
 use crate::memory::Mapped;
 use crate::output;

@@ -6,10 +6,8 @@
 //! same pixels, and read PNG by the same decoder (`picture.rs`). What else a pixel has goes into further channels of OpenEXR files (`channels.rs`). Noise is taken out by [`denoise`].
 
 mod channels;
-mod compare;
 pub mod denoise;
 mod file;
-pub mod flip;
 mod guarded;
 mod jpeg;
 #[cfg(any(feature = "oiio", feature = "oidn"))]
@@ -26,12 +24,12 @@ mod pure;
 #[cfg(any(test, not(feature = "oiio")))]
 mod pure_channels;
 mod reference;
-mod response;
 mod samples;
-pub mod srgb;
+
+#[doc(inline)]
+pub use twincast_core::image::{Curve, Developer, Difference, Image, MOST_STOPS, Response, TEMPERATURES, flip, srgb};
 
 pub use channels::{Channel, Channels, Plane};
-pub use compare::Difference;
 pub use file::{
     Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, read_whole, write,
     write_channels,
@@ -41,24 +39,3 @@ pub(crate) use guarded::guarded;
 pub(crate) use jpeg::is_cut_short;
 pub use metadata::{Metadata, Window};
 pub use reference::Reference;
-pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
-
-use crate::math::Vec4;
-
-/// Linear RGBA pixels (Rec. 709 primaries, alpha premultiplied), first row at the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Row by row, `width * height` of them.
-    pub pixels: Vec<Vec4>,
-}
-
-impl Image {
-    /// An image of transparent black.
-    pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, pixels: vec![Vec4::ZERO; width as usize * height as usize] }
-    }
-}

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use exr::prelude::f16;
 
+use super::Difference;
 use super::Image;
-use super::compare::Difference;
+use super::Response;
 use super::file;
-use super::response::Response;
 use super::samples::{self, Type, Values};
 use crate::error::Result;
 use crate::math::Vec3;

@@ -7,8 +7,8 @@
 use exr::prelude::f16;
 
 use super::Image;
-use super::response::{Developer, Response};
 use super::srgb;
+use super::{Developer, Response};
 use crate::math::Vec4;
 
 /// Samples as they are in a file: row by row from the top, the channels of a pixel side by side.

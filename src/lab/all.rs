@@ -15,8 +15,9 @@ use serde::Serialize;
 
 use super::classify::{Answers, Class, classify_closest, classify_occluded};
 use super::entrants::Entrant;
-use super::rays::{Aim, Query, Random};
+use super::rays::{Aim, Query};
 use crate::error::{Error, Result};
+use crate::math::Random;
 use crate::ray::{Hit, Ray};
 use crate::render::{Control, Renderer};
 use crate::trace::accel::Options;

@@ -23,6 +23,8 @@ mod pixels;
 pub mod rays;
 pub mod rounding;
 pub mod savings;
+#[cfg(test)]
+mod shape_tests;
 pub mod stress;
 pub mod suspicious;
 pub mod tree;

@@ -1,6 +1,6 @@
 //! Rays that start on surfaces, from 1e-8 to 1e8: none meets what it leaves, and none passes what is near.
 
-use twincast::lab::rays::Random;
+use twincast::math::Random;
 use twincast::math::{DVec3, Vec3};
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::shade::surface::{Attributes, SurfacePoint};

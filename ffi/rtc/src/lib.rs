@@ -14,7 +14,7 @@
 //! | `api` | the exported functions: a few lines each, over all that |
 //!
 //! A committed scene is a thing of its own, and never changes. Triangles, quads and grids that stand still are one native
-//! [`Bvh`](twincast::trace::bvh::Bvh), everything else are boxes in a second tree, whose leaves call the caller's functions, go through instances
+//! [`Bvh`](twincast_core::trace::bvh::Bvh), everything else are boxes in a second tree, whose leaves call the caller's functions, go through instances
 //! into other scenes, or meet curves and points. One tree with mixed leaves, the simpler structure, would have every ray of a plain mesh ask at
 //! each leaf what it holds. Masks and filters are heeded only where the scene has any that matter to the ray: other rays never look at a geometry.
 #![warn(missing_docs)]

@@ -13,6 +13,8 @@ mod bridge;
 mod formats;
 mod shim;
 mod unheard;
+#[cfg(target_os = "linux")]
+mod unnamed;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -185,7 +187,7 @@ fn read_jpeg(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samp
 fn in_memory(bytes: &[u8]) -> Option<(std::fs::File, PathBuf)> {
     use std::io::Write;
 
-    let (mut file, place) = crate::memory::in_memory(c"twincast-picture").ok()?;
+    let (mut file, place) = unnamed::create(c"twincast-picture").ok()?;
     file.write_all(bytes).ok()?;
     std::fs::metadata(&place).ok()?;
     Some((file, place))

@@ -17,9 +17,9 @@ use std::sync::OnceLock;
 use libloading::os::unix::RTLD_LAZY;
 
 use super::bridge::Functions;
-use crate::image::loading;
 #[cfg(target_os = "linux")]
-use crate::memory;
+use super::unnamed;
+use crate::image::loading;
 
 /// The shim as `build/oiio.rs` has made it.
 static SHIM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/oiio-shim"));
@@ -60,7 +60,7 @@ fn open() -> Result<&'static Functions, String> {
 /// By a file that has no name, and is nowhere but in memory.
 #[cfg(target_os = "linux")]
 fn from_memory() -> Result<&'static Functions, String> {
-    let (mut file, path) = memory::in_memory(c"twincast-oiio").map_err(|error| error.to_string())?;
+    let (mut file, path) = unnamed::create(c"twincast-oiio").map_err(|error| error.to_string())?;
     file.write_all(SHIM).map_err(|error| error.to_string())?;
     // It stays open. The loader takes files of one name for one file, and another library must not get this number.
     let _open = ManuallyDrop::new(file);

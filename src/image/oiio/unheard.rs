@@ -50,7 +50,7 @@ pub(super) fn write(path: &Path, size: [u32; 2], write: impl FnOnce(&Path) -> Re
 /// A file in memory, and `path` as a name of it; none where there are no such files, or no links to them.
 #[cfg(target_os = "linux")]
 fn memory(path: &Path) -> Option<File> {
-    let (file, place) = crate::memory::in_memory(c"twincast-picture").ok()?;
+    let (file, place) = super::unnamed::create(c"twincast-picture").ok()?;
     fs::metadata(&place).ok()?;
     std::os::unix::fs::symlink(place, path).ok()?;
     Some(file)

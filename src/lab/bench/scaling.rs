@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::lab::Entrant;
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::Vec3;
 use crate::memory::process;
 use crate::ray::Ray;

@@ -10,7 +10,7 @@ use super::heat::{Heat, Map};
 use super::{Figure, Setup, csv};
 use crate::error::Result;
 use crate::lab::oracle::{Body, Primitive, meet};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::ray::Ray;
 use crate::shape::TriangleMethod;
 

@@ -11,7 +11,7 @@ use super::{Figure, Setup, csv};
 use crate::error::Result;
 use crate::lab::bench::Spread;
 use crate::lab::oracle::{Body, Primitive, meet};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::shape::TriangleMethod;

@@ -76,7 +76,7 @@ pub fn ray_from_text(text: &str) -> Result<Ray, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::rays::Random;
+    use crate::math::Random;
 
     #[test]
     fn known_numbers() {

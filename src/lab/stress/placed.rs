@@ -2,7 +2,7 @@
 
 use super::triangles::bumpy_sphere;
 use super::{Case, Gate, Probe, towards};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::{Geometry, Group, Instance, Material, Scene};
 

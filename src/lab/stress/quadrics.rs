@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::{Mat3, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Scene};

@@ -2,7 +2,7 @@
 
 use super::triangles::bumpy_sphere;
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::Vec3;
 use crate::ray::Ray;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::lab::rays::Random;
+use crate::math::Random;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::scene::Mesh;

@@ -1,6 +1,6 @@
 //! Points and round linear curves, as they were when their scene was committed.
 
-use twincast::math::{Aabb, Vec3, is_traceable};
+use twincast_core::math::{Aabb, Vec3, is_traceable};
 
 use super::{State, TimeSteps};
 use crate::buffer::View;

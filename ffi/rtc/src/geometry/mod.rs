@@ -274,7 +274,7 @@ impl Geometry {
     }
 
     /// The transform of one instance at a time, as it was set last.
-    pub fn transform_at(&self, primitive: u32, time: f32) -> Result<twincast::math::Affine3> {
+    pub fn transform_at(&self, primitive: u32, time: f32) -> Result<twincast_core::math::Affine3> {
         self.demand(matches!(self.kind, Kind::Instance | Kind::InstanceArray))?;
         let state = self.state();
         Ok(Motion::of(self.kind, &state, &state.transforms, primitive as usize)?.at(time))

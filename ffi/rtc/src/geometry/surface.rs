@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use twincast::math::{Aabb, Vec3, is_traceable};
+use twincast_core::math::{Aabb, Vec3, is_traceable};
 
 use super::{Kind, State, TimeSteps};
 use crate::abi::RTCGrid;

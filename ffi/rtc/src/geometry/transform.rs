@@ -1,6 +1,6 @@
 //! Transforms of instances: how they are written down, and how they move.
 
-use twincast::math::{Affine3, DMat3, DQuat, Mat3, Vec3};
+use twincast_core::math::{Affine3, DMat3, DQuat, Mat3, Vec3};
 
 use super::{Kind, State, TimeSteps};
 use crate::abi::{RTCQuaternionDecomposition, format};

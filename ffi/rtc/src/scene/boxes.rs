@@ -1,7 +1,7 @@
 //! Boxes of what is no triangle that stands still: at all times, and at both ends of time.
 
-use twincast::math::{Aabb, Affine3, Vec3};
-use twincast::trace::Part;
+use twincast_core::math::{Aabb, Affine3, Vec3};
+use twincast_core::trace::Part;
 
 use super::committed::{Body, Instance, Item, Record};
 use super::path;

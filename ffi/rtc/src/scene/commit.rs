@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use twincast::World;
-use twincast::math::{Aabb, Vec3};
-use twincast::trace::bvh::{BoxTree, Bvh, Options, Preset};
-use twincast::trace::{Part, Primitives};
+use twincast_core::World;
+use twincast_core::math::{Aabb, Vec3};
+use twincast_core::trace::bvh::{BoxTree, Bvh, Options, Preset};
+use twincast_core::trace::{Part, Primitives};
 
 use super::boxes::other_boxes;
 use super::committed::{Body, Committed, Heeded, Instance, Record};

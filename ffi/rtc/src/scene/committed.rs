@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use twincast::math::{Aabb, DAffine3};
-use twincast::trace::bvh::{BoxTree, Bvh};
+use twincast_core::math::{Aabb, DAffine3};
+use twincast_core::trace::bvh::{BoxTree, Bvh};
 
 use crate::abi::RTCBounds;
 use crate::device::Device;

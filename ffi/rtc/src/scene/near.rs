@@ -4,8 +4,8 @@
 //! beside them; scenes that are asked for points are few, and get one more tree over all boxes then. It holds what moves by where it ever is;
 //! whether it is near at the time of the query is looked at before the caller is shown it.
 
-use twincast::math::{Aabb, Vec3};
-use twincast::trace::bvh::{BoxTree, Options, Search};
+use twincast_core::math::{Aabb, Vec3};
+use twincast_core::trace::bvh::{BoxTree, Options, Search};
 
 use super::committed::{Body, Committed, Item};
 use super::path;

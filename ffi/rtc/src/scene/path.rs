@@ -1,6 +1,6 @@
 //! Boxes that move: where they are at a time, and the two boxes between which they always are.
 
-use twincast::math::{Aabb, Vec3};
+use twincast_core::math::{Aabb, Vec3};
 
 use crate::geometry::around;
 

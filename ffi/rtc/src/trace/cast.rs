@@ -1,8 +1,8 @@
 //! One ray: the triangles, then everything else.
 
-use twincast::math::{DVec3, Vec3, triangle_normal};
-use twincast::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
-use twincast::{Ray, TriangleMethod};
+use twincast_core::math::{DVec3, Vec3, triangle_normal};
+use twincast_core::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
+use twincast_core::{Ray, TriangleMethod};
 
 use super::offer::Target;
 use super::{Query, round, user};

@@ -2,8 +2,8 @@
 
 use std::ffi::c_void;
 
-use twincast::math::Vec3;
-use twincast::trace::bvh::Search;
+use twincast_core::math::Vec3;
+use twincast_core::trace::bvh::Search;
 
 use crate::abi::{RTCCollideFunc, RTCCollision};
 use crate::failure::{Failure, Result};

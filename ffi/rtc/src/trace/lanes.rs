@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::mem::{size_of, transmute};
 
-use twincast::trace::bvh::Packet;
+use twincast_core::trace::bvh::Packet;
 
 use crate::abi::{HIT_WORDS, RAY_WORDS, RTCHit, RTCRay, RTCRayHit};
 

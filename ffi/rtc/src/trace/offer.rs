@@ -2,7 +2,7 @@
 
 use std::ffi::c_int;
 
-use twincast::trace::bvh::SingleRay;
+use twincast_core::trace::bvh::SingleRay;
 
 use super::Query;
 use crate::abi::{RTCContext, RTCFilterFunctionN, RTCFilterFunctionNArguments, RTCHit, RTCRay, RTCRayHit};

@@ -3,8 +3,8 @@
 //! Among triangles of which each counts, they are asked together, eight or sixteen at a time, in the caller's own layout: rows of words are copied
 //! into a [`Packet`] and back. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
 
-use twincast::math::Vec3;
-use twincast::trace::bvh::{Asked, Bvh, Packet, PacketHits};
+use twincast_core::math::Vec3;
+use twincast_core::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{Sight, after, cast_one, name_solid, sight};

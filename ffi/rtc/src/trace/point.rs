@@ -2,8 +2,8 @@
 
 use std::ffi::c_void;
 
-use twincast::math::{Affine3, DAffine3, Vec3};
-use twincast::trace::bvh::Search;
+use twincast_core::math::{Affine3, DAffine3, Vec3};
+use twincast_core::trace::bvh::Search;
 
 use crate::abi::{
     INVALID_ID, RTCPointQuery, RTCPointQueryContext, RTCPointQueryFunction, RTCPointQueryFunctionArguments,

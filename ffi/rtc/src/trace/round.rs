@@ -4,8 +4,8 @@
 //! three and inside none of the others, nor inside the neighbours: so joints are smooth, and a curve that is seen through is hit twice,
 //! going in and coming out. (Han, Wald, Usher, Wu, Wang, Pascucci, Hansen, Johnson 2019, *Ray tracing generalized tube primitives*.)
 
-use twincast::Ray;
-use twincast::math::{DVec3, Vec3};
+use twincast_core::Ray;
+use twincast_core::math::{DVec3, Vec3};
 
 use crate::geometry::{Ball, Linear, Named, Segment, Shape};
 

@@ -1,0 +1,234 @@
+//! Output files: all or nothing.
+//!
+//! A file is written beside its place under another name and renamed when it is whole, so that whoever reads it sees the
+//! old file or the new one, never half of one. The other name keeps the suffix, because image writers choose the format
+//! by it, and holds the process's number, so that two programs that write the same file do not write into each other's.
+//! Writing in place and restoring a backup on failure was rejected: it leaves half a file where the program is killed.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::{Error, Result};
+
+/// Has `write` make a file, and puts it at `path` if that succeeds.
+///
+/// `write` gets the name to write to: in the same folder as `path`, with the same suffix, not yet there. What stands at
+/// `path` keeps its permissions; a symbolic link stays one and its target is replaced. A device or a pipe
+/// (`/dev/stdout`) cannot be replaced and is written to directly.
+///
+/// # Errors
+/// What `write` returns, and [`Error::Output`] where the file cannot be put in place. The old file is then whole, and
+/// nothing is left beside it.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let part = match Part::beside(path)? {
+        Target::Special => return write(path),
+        Target::File(part) => part,
+    };
+    write(&part.name)?;
+    part.put_in_place().map_err(|e| Error::output(path, reason("cannot put the finished file in place", &e)))
+}
+
+/// Checks, before long work whose result goes to `path`, that a file can be created there.
+///
+/// It creates one beside it, and removes it again: only that is proof on every file system and for every user.
+///
+/// # Errors
+/// [`Error::Output`] where the folder does not exist or takes no new file, or where `path` is a folder.
+pub fn check_writable(path: &Path) -> Result<()> {
+    probe(path, |part| fs::write(part, b"").map_err(|e| cannot_create(path, &e)))
+}
+
+/// As [`check_writable`], but with a file that `write` makes.
+pub fn probe(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    match Part::beside(path)? {
+        Target::Special => Ok(()),
+        // Dropping the part removes it.
+        Target::File(part) => write(&part.name),
+    }
+}
+
+/// The message for a file that could not be created.
+fn cannot_create(path: &Path, error: &io::Error) -> Error {
+    Error::output(path, reason("cannot create the file", error))
+}
+
+fn reason(what: &str, error: &io::Error) -> String {
+    format!("{what}: {error}")
+}
+
+enum Target {
+    /// A device, a pipe or a socket.
+    Special,
+    /// A file, or nothing yet.
+    File(Part),
+}
+
+/// A file that is not yet whole. It is removed when dropped.
+struct Part {
+    name: PathBuf,
+    /// Where it belongs, links resolved.
+    place: PathBuf,
+    /// Those of the file that it replaces.
+    permissions: Option<fs::Permissions>,
+}
+
+impl Part {
+    fn beside(path: &Path) -> Result<Target> {
+        let Some(file_name) = path.file_name() else {
+            return Err(Error::output(path, "not the name of a file"));
+        };
+        let (place, permissions) = match fs::metadata(path) {
+            Ok(old) if old.is_dir() => return Err(Error::output(path, "is a folder; give the name of a file in it")),
+            Ok(old) if !old.is_file() => return Ok(Target::Special),
+            Ok(old) => match fs::canonicalize(path) {
+                Ok(place) => (place, Some(old.permissions())),
+                // Removed meanwhile by someone else.
+                Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
+                Err(e) => return Err(cannot_create(path, &e)),
+            },
+            Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
+            Err(e) => return Err(cannot_create(path, &e)),
+        };
+        let folder = match place.parent() {
+            Some(folder) if folder != Path::new("") => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        if !folder.is_dir() {
+            return Err(Error::output(path, format!("the folder {} does not exist", folder.display())));
+        }
+        let name = folder.join(part_name(Path::new(file_name)));
+        Ok(Target::File(Self { name, place, permissions }))
+    }
+
+    fn put_in_place(&self) -> io::Result<()> {
+        if let Some(permissions) = &self.permissions {
+            fs::set_permissions(&self.name, permissions.clone())?;
+        }
+        fs::rename(&self.name, &self.place)
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        // Gone after a successful rename, and never there if `write` failed early: neither is an error.
+        let _ = fs::remove_file(&self.name);
+    }
+}
+
+/// `.STEM.PROCESS-NUMBER.part.SUFFIX`.
+fn part_name(file_name: &Path) -> String {
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    // At most 60 letters of the stem: with all of it the name could be longer than a file system takes.
+    let stem: String = file_name.file_stem().unwrap_or_default().to_string_lossy().chars().take(60).collect();
+    let suffix = file_name.extension().map(|s| format!(".{}", s.to_string_lossy())).unwrap_or_default();
+    format!(".{stem}.{}-{}.part{suffix}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn success_replaces_and_leaves_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        fs::write(&path, "old").unwrap();
+        write_atomically(&path, |part| {
+            assert_eq!(part.extension().unwrap(), "json");
+            assert_eq!(part.parent(), path.canonicalize().unwrap().parent());
+            fs::write(part, "new").unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    #[test]
+    fn failure_and_panic_leave_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        fs::write(&path, "old").unwrap();
+        let failing = |part: &Path| {
+            fs::write(part, "half").unwrap();
+            Err(Error::output(&path, "disk full"))
+        };
+        assert!(write_atomically(&path, failing).is_err());
+        let panicking = std::panic::catch_unwind(|| {
+            write_atomically(&path, |part| {
+                fs::write(part, "half").unwrap();
+                panic!("on purpose")
+            })
+        });
+        assert!(panicking.is_err());
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    #[test]
+    fn a_writer_that_writes_nothing_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        assert_eq!(write_atomically(&path, |_| Ok(())).unwrap_err().exit_code(), 4);
+    }
+
+    #[test]
+    fn impossible_places() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        for (path, words) in [
+            (folder.path().to_owned(), "is a folder"),
+            (folder.path().join("missing/a.json"), "does not exist"),
+            (file.join("a.json"), "Not a directory"),
+            (folder.path().join(".."), "not the name of a file"),
+        ] {
+            let error = check_writable(&path).unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+            assert_eq!(error.exit_code(), 4);
+        }
+        check_writable(&folder.path().join("a.json")).unwrap();
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_devices_stay_devices() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("there")).unwrap();
+        let (target, link) = (folder.path().join("there/a.txt"), folder.path().join("a.txt"));
+        fs::write(&target, "old").unwrap();
+        fs::set_permissions(&target, fs::Permissions::from_mode(0o640)).unwrap();
+        symlink(&target, &link).unwrap();
+        write_atomically(&link, |part| fs::write(part, "new").map_err(|e| cannot_create(part, &e))).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&target).unwrap(), "new");
+        assert_eq!(fs::metadata(&target).unwrap().permissions().mode() & 0o777, 0o640);
+
+        let null = Path::new("/dev/null");
+        check_writable(null).unwrap();
+        write_atomically(null, |name| {
+            assert_eq!(name, null);
+            Ok(())
+        })
+        .unwrap();
+        assert!(!fs::metadata(null).unwrap().is_file());
+    }
+
+    #[test]
+    fn long_names_fit() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join(format!("{}.json", "é".repeat(120)))).unwrap();
+    }
+}

@@ -1,0 +1,159 @@
+//! A triangle mesh.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, cofactor, is_traceable};
+
+/// Vertices or triangles that are worth a task of their own.
+const TASK: usize = 1 << 14;
+
+/// Triangles over shared vertices. Attribute lists are empty or as long as `positions`.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name in the file, for messages; may be empty.
+    pub name: String,
+    /// What every position is relative to. Loaders of formats with f64 or decimal coordinates choose it so that the
+    /// offsets keep the mesh's shape ([`Mesh::set_positions`]); zero where the file holds f32.
+    pub origin: DVec3,
+    /// Vertex positions as offsets from `origin`. May hold NaN or infinities: such triangles are never hit.
+    pub positions: Arc<Vec<Vec3>>,
+    /// Unit shading normals; empty for flat shading.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, v up (OpenGL's and OBJ's convention, not glTF's).
+    pub uvs: Vec<Vec2>,
+    /// A second set of them, for textures that lie otherwise; empty where no texture does.
+    pub second_uvs: Vec<Vec2>,
+    /// Linear RGBA that multiplies the material's diffuse colour.
+    pub colors: Vec<Vec4>,
+    /// Corners of each triangle; every index is below `positions.len()` (loaders check).
+    pub triangles: Arc<Vec<[u32; 3]>>,
+    /// Index into [`Scene::materials`](crate::Scene::materials).
+    pub material: u32,
+}
+
+impl Mesh {
+    /// A bare mesh at the origin.
+    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
+    }
+
+    /// Stores f64 positions as f32 offsets from an origin in the middle of those that the mesh's triangles name, where these are far from zero; in the
+    /// middle of all of them where it has no triangles yet.
+    pub fn set_positions(&mut self, positions: &[DVec3]) {
+        let corners = self.triangles.as_flattened();
+        let bounds = if corners.is_empty() {
+            bounds_of(positions, |p| Some(*p))
+        } else {
+            bounds_of(corners, |&i| positions.get(i as usize).copied())
+        };
+        self.origin = choose_origin(&bounds);
+        let offset = |p: &DVec3| (p - self.origin).as_vec3();
+        self.positions = Arc::new(positions.par_iter().with_min_len(TASK).map(offset).collect());
+    }
+
+    /// Where a position is: the origin and the offset.
+    #[inline]
+    pub fn point(&self, offset: Vec3) -> DVec3 {
+        self.origin + offset.as_dvec3()
+    }
+
+    /// The bounds of the traceable vertices under `transform`.
+    pub fn bounds(&self, transform: &DAffine3) -> DAabb {
+        let place = |p: Vec3| transform.transform_point3(self.point(p));
+        let tasks = self.positions.par_chunks(TASK);
+        let m = &transform.matrix3;
+        let keeps_axes = (0..3).all(|row| (0..3).filter(|&column| m.col(column)[row] != 0.0).count() == 1);
+        if !keeps_axes {
+            let bounds = tasks.map(|part| {
+                let traceable = part.iter().copied().filter(|&p| is_traceable(p));
+                traceable.map(place).fold(DAabb::EMPTY, DAabb::include)
+            });
+            return bounds.reduce(|| DAabb::EMPTY, DAabb::union);
+        }
+        // Each coordinate is then a monotone function of one coordinate, and its rounding is monotone too: the extremes
+        // are those of the extremes, at a fraction of the work.
+        let bounds = tasks.map(|part| Aabb::around(part.iter().copied().filter(|&p| is_traceable(p))));
+        let bounds = bounds.reduce(|| Aabb::EMPTY, Aabb::union);
+        if bounds.is_empty() {
+            return DAabb::EMPTY;
+        }
+        DAabb::EMPTY.include(place(bounds.min)).include(place(bounds.max))
+    }
+
+    /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat, and a normal along which it
+    /// presses is zero, which shades as flat.
+    pub fn placed(&self, transform: &DAffine3) -> Self {
+        let positions: Vec<DVec3> =
+            self.positions.par_iter().map(|&offset| transform.transform_point3(self.point(offset))).collect();
+        let turn = cofactor(&transform.matrix3);
+        let normals = self.normals.par_iter().map(|normal| (turn * normal.as_dvec3()).normalize_or_zero().as_vec3());
+        let mut placed = Self { normals: normals.collect(), ..self.clone() };
+        placed.set_positions(&positions);
+        placed
+    }
+
+    /// Whether any of its triangles has an area.
+    pub fn has_area(&self) -> bool {
+        let corner = |i: u32| self.positions[i as usize].as_dvec3();
+        self.triangles.par_iter().with_min_len(TASK).any(|&[a, b, c]| {
+            let a = corner(a);
+            (corner(b) - a).cross(corner(c) - a) != DVec3::ZERO
+        })
+    }
+
+    /// Turns positions and normals, in place where nothing else holds them.
+    pub(crate) fn turn(&mut self, turn: &DMat3) {
+        self.origin = *turn * self.origin;
+        let turn = turn.as_mat3();
+        // Adding 0 makes one zero of the two.
+        let apply = |v: &mut Vec3| *v = turn * *v + Vec3::ZERO;
+        Arc::make_mut(&mut self.positions).par_iter_mut().with_min_len(TASK).for_each(apply);
+        self.normals.par_iter_mut().with_min_len(TASK).for_each(apply);
+    }
+
+    /// How many triangles have a corner that is NaN, infinite or too large to trace.
+    pub fn untraceable_triangles(&self) -> usize {
+        // Where all vertices are fine, which is nearly always, nothing needs to be looked up.
+        if self.positions.par_chunks(TASK).all(|part| part.iter().all(|&p| is_traceable(p))) {
+            return 0;
+        }
+        let bad = |&i: &u32| !is_traceable(self.positions[i as usize]);
+        self.triangles.par_iter().with_min_len(TASK).filter(|corners| corners.iter().any(bad)).count()
+    }
+
+    /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
+    /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
+    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat.
+    pub fn smooth_normals(&mut self) {
+        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+        for corners in self.triangles.iter() {
+            let p = corners.map(|i| self.positions[i as usize].as_dvec3());
+            let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+            if !normal.is_finite() {
+                continue;
+            }
+            for k in 0..3 {
+                let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+                // The angle by its tangent: accurate for slivers too.
+                sums[corners[k] as usize] += normal * libm::atan2(a.cross(b).length(), a.dot(b));
+            }
+        }
+        self.normals = sums.into_par_iter().with_min_len(TASK).map(|n| n.normalize_or_zero().as_vec3()).collect();
+    }
+}
+
+/// Around the finite ones of the points of these items.
+pub fn bounds_of<T: Sync>(items: &[T], point: impl Fn(&T) -> Option<DVec3> + Sync) -> DAabb {
+    let finite = |item: &T| point(item).filter(|p| p.is_finite());
+    let tasks = items.par_chunks(TASK).map(|part| part.iter().filter_map(finite).fold(DAabb::EMPTY, DAabb::include));
+    tasks.reduce(|| DAabb::EMPTY, DAabb::union)
+}
+
+/// The origin for positions within `bounds`: zero where f32 keeps the shape anyway, else the middle. "Anyway" is
+/// within 8 radii of zero, where at most 3 bits of the 24 are spent on the distance.
+pub fn choose_origin(bounds: &DAabb) -> DVec3 {
+    let centre = bounds.centre();
+    if centre.abs().max_element() <= 8.0 * bounds.radius() { DVec3::ZERO } else { centre }
+}

@@ -1,0 +1,137 @@
+//! Two questions, closest hit and occluded, answered by engines that know nothing of each other.
+//!
+//! A tracer is built from a [`World`] and answers [`Hit`]s. Every engine obeys the same conventions: a hit counts for
+//! `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive) wins; a ray that
+//! [is not valid](Ray::is_valid) misses.
+
+pub mod accel;
+pub mod brute;
+pub mod bvh;
+mod crossings;
+mod leaf;
+mod limits;
+mod motion;
+#[doc(hidden)]
+pub mod nearest;
+pub mod precise;
+mod spread;
+#[doc(hidden)]
+pub mod unbounded;
+mod world;
+
+pub use motion::Motion;
+pub use world::{Part, Placement, Primitives, World};
+
+use crate::ray::{Hit, Ray};
+
+/// An engine that finds where rays meet a scene.
+///
+/// The two required methods define the answer; the batch methods give the same answers for many rays at a time, and
+/// an engine overrides them where it has something faster.
+pub trait Tracer: Sync {
+    /// The nearest hit.
+    fn closest(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether there is any hit.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// The nearest hit of each ray, into `hits` of the same length. All by the thread that calls: who has many rays hands parts of them to several.
+    ///
+    /// # Panics
+    /// Where lengths differ.
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], _batch: Batch) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.closest(ray);
+        }
+    }
+
+    /// Whether each ray has any hit, into `occluded` of the same length; by the thread that calls.
+    ///
+    /// # Panics
+    /// Where lengths differ.
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], _batch: Batch) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        for (ray, answer) in rays.iter().zip(occluded) {
+            *answer = self.occluded(ray);
+        }
+    }
+}
+
+/// How a batch is traced. It changes the speed, never a native answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Batch {
+    /// Rays of a packet, for engines that trace packets; the native tracer chooses by itself: bundles where `coherent` promises some, else
+    /// flights of single rays, and each ray alone where they are few.
+    pub width: Width,
+    /// Whether neighbours in the batch start and point alike.
+    pub coherent: bool,
+}
+
+/// Of so many pairs of neighbours, or a few more, it is asked whether they are alike.
+const SAMPLES: usize = 16;
+
+/// Neighbours point alike where the cosine between them is at least this: that of 5 degrees.
+const ALIKE: f32 = 0.996;
+
+impl Batch {
+    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points, and points alike.
+    #[must_use]
+    pub fn of(rays: &[Ray]) -> Self {
+        let every = (rays.len() / SAMPLES).max(2);
+        let are_alike = |pair: &[Ray]| {
+            let (a, b) = (pair[0].direction, pair[1].direction);
+            pair[0].origin == pair[1].origin && a.dot(b) >= ALIKE * a.length() * b.length()
+        };
+        let alike = rays.chunks_exact(every).filter(|some| are_alike(some)).count();
+        Self { coherent: alike > 0 && 4 * alike >= 3 * (rays.len() / every), ..Self::default() }
+    }
+}
+
+/// Rays in a packet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Width {
+    /// Ray by ray.
+    #[default]
+    One,
+    /// Packets of 4.
+    Four,
+    /// Packets of 8.
+    Eight,
+    /// Packets of 16.
+    Sixteen,
+}
+
+impl Width {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::One, Self::Four, Self::Eight, Self::Sixteen];
+
+    /// How many rays.
+    pub const fn rays(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::Four => 4,
+            Self::Eight => 8,
+            Self::Sixteen => 16,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn rays_of_a_camera_are_coherent_and_others_are_not() {
+        let grid = || (0..4096).map(|i| Vec3::new((i % 64) as f32 / 64.0, (i / 64) as f32 / 64.0, 1.0));
+        let coherent = |rays: Vec<Ray>| Batch::of(&rays).coherent;
+        assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way)).collect()));
+        assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way * 1e-3)).collect()));
+        // From other points, to all sides, and too few to have neighbours.
+        assert!(!coherent(grid().map(|at| Ray::new(at, Vec3::Z)).collect()));
+        assert!(!coherent((0..4096).map(|i| Ray::new(Vec3::ONE, Vec3::AXES[i * i % 3])).collect()));
+        assert!(!coherent(vec![Ray::new(Vec3::ONE, Vec3::Z)]));
+        assert!(!coherent(Vec::new()));
+    }
+}
