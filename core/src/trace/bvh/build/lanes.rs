@@ -65,7 +65,7 @@ mod x86 {
     use std::arch::x86_64::*;
 
     use super::{Boxes, RANKED};
-    use crate::trace::bvh::simd::V8;
+    use crate::trace::bvh::simd::{V8, quad};
 
     /// SAFETY of every block below: these vectors are made only in kernels that `isa::dispatch` runs, of a `Present`
     /// instruction set; loads and stores go through references to arrays of the vector's size.
@@ -100,13 +100,7 @@ mod x86 {
             let mut areas = [0.0; 4];
             unsafe {
                 let size = |v: __m256| _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
-                let [a, b, c] = [size(boxes[0].0), size(boxes[1].0), size(boxes[2].0)];
-                // Transposed: all x, all y, all z.
-                let (ab_xy, ab_z) = (_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
-                let x = _mm_movelh_ps(ab_xy, c);
-                let y = _mm_shuffle_ps::<0b01_01_11_10>(ab_xy, c);
-                let z = _mm_shuffle_ps::<0b10_10_01_00>(ab_z, c);
-                let sum = _mm_add_ps(_mm_mul_ps(y, _mm_add_ps(x, z)), _mm_mul_ps(z, x));
+                let sum = quad::half_areas([size(boxes[0].0), size(boxes[1].0), size(boxes[2].0)]);
                 _mm_storeu_ps(areas.as_mut_ptr(), sum);
             }
             areas

@@ -14,6 +14,8 @@ pub(super) mod doubles;
 pub(super) mod isa;
 mod portable;
 #[cfg(target_arch = "x86_64")]
+pub(super) mod quad;
+#[cfg(target_arch = "x86_64")]
 mod sse2;
 #[cfg(target_arch = "x86_64")]
 mod x86;

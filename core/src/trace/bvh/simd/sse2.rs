@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 use bytemuck::cast;
 
 use super::x86::lanewise;
-use super::{Array, Doubles, Group, Mask, Three, Turned, Vector};
+use super::{Array, Doubles, Group, Mask, Three, Turned, Vector, quad};
 use crate::trace::bvh::build::lanes::{Boxes, RANKED};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
@@ -113,17 +113,11 @@ impl Vector for V4 {
     }
     #[inline(always)]
     fn largest(self) -> f32 {
-        unsafe {
-            let pair = _mm_max_ps(self.0, _mm_movehl_ps(self.0, self.0));
-            _mm_cvtss_f32(_mm_max_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
-        }
+        quad::largest(self.0)
     }
     #[inline(always)]
     fn smallest(self) -> f32 {
-        unsafe {
-            let pair = _mm_min_ps(self.0, _mm_movehl_ps(self.0, self.0));
-            _mm_cvtss_f32(_mm_min_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
-        }
+        quad::smallest(self.0)
     }
 }
 
@@ -280,15 +274,7 @@ impl Boxes for V8 {
     #[inline(always)]
     fn half_areas(boxes: [Self; 3]) -> [f32; 4] {
         let size = |V8([least, most]): V8| least.add(most).0;
-        let [a, b, c] = [size(boxes[0]), size(boxes[1]), size(boxes[2])];
-        // Transposed: all x, all y, all z.
-        let [x, y, z] = unsafe {
-            let (ab_xy, ab_z) = (_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
-            let y = _mm_shuffle_ps::<0b01_01_11_10>(ab_xy, c);
-            let z = _mm_shuffle_ps::<0b10_10_01_00>(ab_z, c);
-            [V4(_mm_movelh_ps(ab_xy, c)), V4(y), V4(z)]
-        };
-        y.mul(x.add(z)).add(z.mul(x)).to_array()
+        V4(quad::half_areas([size(boxes[0]), size(boxes[1]), size(boxes[2])])).to_array()
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@
 
 use std::arch::{asm, x86_64::*};
 
-use super::{Array, Doubles, Group, Mask, TURNED, Three, Turned, Vector};
+use super::{Array, Doubles, Group, Mask, TURNED, Three, Turned, Vector, quad};
 use crate::trace::bvh::bundle::{PerRay, RAYS};
 
 /// A function of two vectors by its intrinsic, as a method.
@@ -131,17 +131,11 @@ impl Vector for V4 {
     }
     #[inline(always)]
     fn largest(self) -> f32 {
-        unsafe {
-            let pair = _mm_max_ps(self.0, _mm_movehl_ps(self.0, self.0));
-            _mm_cvtss_f32(_mm_max_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
-        }
+        quad::largest(self.0)
     }
     #[inline(always)]
     fn smallest(self) -> f32 {
-        unsafe {
-            let pair = _mm_min_ps(self.0, _mm_movehl_ps(self.0, self.0));
-            _mm_cvtss_f32(_mm_min_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
-        }
+        quad::smallest(self.0)
     }
 }
 
