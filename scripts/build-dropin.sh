@@ -2,7 +2,7 @@
 # Builds target/dropin/libembree3.so.3 and target/dropin/libembree4.so.4 (RTCRayHit of 96 bytes; of 80 with COMPACT_RAY_HIT=1), and
 # holds what they export to what Embree exports.
 #
-# DROPIN_PROFILE=dev builds slower libraries with every debug assertion, on what the tests without default features are compiled with:
+# DROPIN_PROFILE=dev builds slower libraries with every debug assertion, on the core that the tests without default features are compiled with:
 # after `make check` nothing but the interface is left to compile, and the Python package, which cargo cannot leave out then.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 cargo=${CARGO:-cargo}
 profile=${DROPIN_PROFILE:-foreign}
 built=target/$profile
-# Beside all that the library is compiled for then, since what depends on a crate decides on its features.
+# Beside all that the core is compiled for then, since what depends on a crate decides on its features.
 beside=()
 if [[ $profile == dev ]]; then
     built=target/debug
@@ -22,7 +22,7 @@ if [[ $profile == test ]]; then
 fi
 mkdir -p target/dropin
 
-# One version at a time: the library is compiled once, the interface for each.
+# One version at a time: the core is compiled once, the interface for each.
 build() {
     local version=$1 features=twincast-rtc/$2 name=libembree$1.so.$1
     $cargo build --locked --profile "$profile" -p twincast-rtc "${beside[@]}" --no-default-features --features "$features"

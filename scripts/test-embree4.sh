@@ -97,8 +97,9 @@ install_in_root() {
         fail "apt-get failed in the Debian 13 root; the end of $cache/apt.log: $(tail -n 5 "$cache/apt.log")"
 }
 
-# What tests have been compiled with here serves there as well, the crate below ours too, of which no line asks for the system's libraries; but not this
-# package, and not what was linked with a newer C library, which would not load. It spares minutes and nothing else: where it fails, all is compiled.
+# The dependencies that tests were compiled with here serve there as well, and so does twincast-core with its tests, which asks for no library of the system.
+# Our other packages are left out, and nothing is taken where the C library here is the newer one: what was linked with it would not load. It spares
+# minutes and nothing else: where it fails, all is compiled.
 take_compiled() {
     local built=${CARGO_TARGET_DIR:-target}/debug part=$target/debug.part
     if [ -e "$target/debug" ] || [ ! -d "$built/deps" ] ||

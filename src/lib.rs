@@ -40,7 +40,6 @@ pub mod cli;
 pub mod image;
 pub mod io;
 pub mod lab;
-pub mod plan;
 pub mod render;
 pub mod trace;
 
@@ -50,7 +49,7 @@ pub use render::{Control, Renderer, Settings};
 pub use twincast_core::{
     Batch, Cone, Cuboid, Cylinder, Disk, Ellipsoid, Error, Hit, InvalidShape, Plane, Polygon, Ray, Result, Scene,
     Shape, ShapeHit, Sphere, SphereMethod, Tracer, TriangleHit, TriangleMethod, Warning, Width, World, math, output,
-    scene, shade,
+    plan, scene, shade,
 };
 use twincast_core::{error, memory, ray, shape};
 

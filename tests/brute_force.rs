@@ -116,14 +116,14 @@ fn instances_and_spheres() {
 /// corners.
 #[test]
 fn objects_finer_than_rays() {
-    use twincast::math::{DAffine3, DVec3};
+    use twincast::math::{DAffine3, DQuat, DVec3};
     let mut random = Random::new(12);
     let mut scene = scenes::of_mesh(scenes::bumpy_sphere(40, 0.3, 4));
     let corners = scenes::bumpy_sphere(40, 0.3, 4).positions.to_vec();
     let first = scene.instances.pop().expect("one instance");
     let mut targets = Vec::new();
     for _ in 0..30 {
-        let turn = glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0);
+        let turn = DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0);
         let place = random.vec3().as_dvec3() * DVec3::new(1.0, 0.2, 1.0);
         let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(0.1), turn, place);
         scene.instances.push(twincast::scene::Instance { transform, ..first.clone() });
@@ -153,7 +153,7 @@ fn objects_finer_than_rays() {
 /// bundles; some bundles cross octants in the object's coordinates and not in the world's.
 #[test]
 fn extreme_placements() {
-    use twincast::math::{DAffine3, DMat3, DVec3};
+    use twincast::math::{DAffine3, DMat3, DQuat, DVec3};
     let mut hits = 0;
     for (case, scale) in [1.0, 1e-12, 1e9].into_iter().enumerate() {
         let mut random = Random::new(case as u64 + 40);
@@ -161,7 +161,7 @@ fn extreme_placements() {
         let first = scene.instances.pop().expect("one instance");
         let mut targets = Vec::new();
         for i in 0..10 {
-            let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
+            let turn = DMat3::from_quat(DQuat::from_scaled_axis(random.vec3().as_dvec3() * 3.0));
             let shape = match i {
                 0 | 1 => DVec3::ONE,
                 2 => DVec3::new(1.0, 1e-4, 1.0),
@@ -591,14 +591,14 @@ fn triangles_smaller_than_pixels() {
 
 /// Hits of everything that is cast from so many views, scenes being as large as said.
 fn hits_of_small_triangles(scale: f32, views: usize) -> usize {
-    use twincast::math::{DAffine3, DVec3};
+    use twincast::math::{DAffine3, DQuat, DVec3};
     let mut mesh = scenes::bumpy_sphere(24, 0.2, 11);
     let positions = mesh.positions.iter().map(|position| *position * scale).collect();
     mesh.positions = std::sync::Arc::new(positions);
     let mut placed = scenes::of_mesh(mesh.clone());
     let first = placed.instances.pop().expect("one instance");
     let turned = |i: f64| {
-        let turn = glam::DQuat::from_scaled_axis(DVec3::new(i, 0.7, -0.2 * i));
+        let turn = DQuat::from_scaled_axis(DVec3::new(i, 0.7, -0.2 * i));
         DAffine3::from_scale_rotation_translation(
             DVec3::new(1.0, 0.8, 1.3),
             turn,

@@ -23,27 +23,27 @@ const LAYERS: &[&[&str]] = &[
 
 /// Files and folders that may say `unsafe`.
 const UNSAFE: &[&str] = &[
-    "trace/embree/",
-    "trace/bvh/simd/",
-    "trace/bvh/build/lanes.rs",
-    "trace/bvh/walk/stack.rs",
-    "cli/leave.rs",
-    "image/loading.rs",
-    "image/oiio/bridge.rs",
-    "image/oiio/shim.rs",
-    "image/oiio/unnamed.rs",
-    "image/denoise/device.rs",
-    "image/denoise/library.rs",
-    "memory/",
+    "core/src/memory/",
+    "core/src/trace/bvh/build/lanes.rs",
+    "core/src/trace/bvh/simd/",
+    "core/src/trace/bvh/walk/stack.rs",
+    "src/cli/leave.rs",
+    "src/image/denoise/device.rs",
+    "src/image/denoise/library.rs",
+    "src/image/loading.rs",
+    "src/image/oiio/bridge.rs",
+    "src/image/oiio/shim.rs",
+    "src/image/oiio/unnamed.rs",
+    "src/trace/embree/",
 ];
 
-/// Where the two crates' source is. A module is in the same layer in both.
-const SOURCES: [&str; 2] = ["src", "core/src"];
+/// Where the two crates' source is, below the repository. A module is in the same layer in both.
+const SOURCES: [&str; 2] = ["core/src/", "src/"];
 
 /// The crate below, as the one above names it.
 const CORE: &str = "twincast_core::";
 
-/// Every source file, by its path below `src` or `core/src`, without comments.
+/// Every source file, by its path below the repository, without comments.
 fn files() -> Vec<(String, String)> {
     fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).expect("a readable folder") {
@@ -56,12 +56,13 @@ fn files() -> Vec<(String, String)> {
         }
     }
     let of_one = |source: &str| {
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut paths = Vec::new();
-        walk(&source, &mut paths);
+        walk(&root.join(source), &mut paths);
         paths.sort();
+        assert!(paths.len() > 100, "the scan found the source below {source}");
         let relative = |path: &Path| {
-            let parts = path.strip_prefix(&source).expect("below it").components();
+            let parts = path.strip_prefix(root).expect("below it").components();
             parts.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/")
         };
         let text = |path: &Path| without_comments(&fs::read_to_string(path).expect("readable text"));
@@ -84,9 +85,10 @@ fn without_tests(text: &str) -> &str {
     text.match_indices("#[cfg(test)]\nmod ").find(is_here).map_or(text, |(start, _)| &text[..start])
 }
 
-/// The modules of a file's path: `trace/bvh/mod.rs` is `trace::bvh`.
+/// The modules of a file's path: `src/trace/bvh/mod.rs` is `trace::bvh`.
 fn module_path(file: &str) -> Vec<&str> {
-    file.trim_end_matches(".rs").split('/').filter(|part| !matches!(*part, "mod" | "lib")).collect()
+    let below = SOURCES.iter().find_map(|source| file.strip_prefix(source)).expect("a source file");
+    below.trim_end_matches(".rs").split('/').filter(|part| !matches!(*part, "mod" | "lib")).collect()
 }
 
 /// The first names in what follows `crate::`: one, or all those in braces.
@@ -175,13 +177,12 @@ fn violations(file: &str, text: &str, exports: &BTreeMap<&str, &str>) -> Vec<Str
 #[test]
 fn imports_point_down() {
     let files = files();
-    let libs = files.iter().filter(|(file, _)| file == "lib.rs");
+    let libs = files.iter().filter(|(file, _)| file.ends_with("src/lib.rs"));
     let exports: BTreeMap<&str, &str> = libs.flat_map(|(_, lib)| reexports(lib)).collect();
     // Test modules in files of their own are named so.
     let judged = files.iter().filter(|(file, _)| !file.ends_with("tests.rs"));
     let wrong: Vec<_> = judged.flat_map(|(file, text)| violations(file, text, &exports)).collect();
     assert!(wrong.is_empty(), "imports only ever point down:\n{}", wrong.join("\n"));
-    assert!(files.len() > 400, "the scan found the source of both crates");
     assert_eq!((exports.get("Ray"), exports.get("Renderer")), (Some(&"ray"), Some(&"render")));
 }
 
@@ -204,18 +205,21 @@ fn unsafe_stays_where_it_may_be() {
 fn the_scan_itself_finds_what_it_should() {
     let exports = BTreeMap::from([("Renderer", "render"), ("Ray", "ray")]);
     let wrong = |file: &str, text: &str| violations(file, &without_comments(text), &exports).len();
-    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::math::Vec3; use crate::{Ray, scene::{Scene, Mesh}};"), 0);
-    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::io::load;"), 1);
-    assert_eq!(wrong("trace/mod.rs", "use twincast_core::{math, trace, shade};"), 1);
-    assert_eq!(wrong("trace/bvh/mod.rs", "use crate::{math, Renderer, lab::{a, b}, ray};"), 2);
-    assert_eq!(wrong("trace/bvh/mod.rs", "use super::super::shade::x; use super::World;"), 1);
-    assert_eq!(wrong("trace/bvh/walk.rs", "use super::super::super::shade::x; use super::super::World;"), 1);
-    assert_eq!(wrong("trace/mod.rs", "// crate::render\nlet x = crate::render::y();"), 1);
-    assert_eq!(wrong("math/mod.rs", "fn f() {}\n#[cfg(test)]\nmod tests { use crate::lab; }"), 0);
+    assert_eq!(wrong("src/trace/bvh/mod.rs", "use crate::math::Vec3; use crate::{Ray, scene::{Scene, Mesh}};"), 0);
+    assert_eq!(wrong("src/trace/bvh/mod.rs", "use crate::io::load;"), 1);
+    assert_eq!(wrong("src/trace/mod.rs", "use twincast_core::{math, trace, shade};"), 1);
+    assert_eq!(wrong("src/trace/bvh/mod.rs", "use crate::{math, Renderer, lab::{a, b}, ray};"), 2);
+    assert_eq!(wrong("src/trace/bvh/mod.rs", "use super::super::shade::x; use super::World;"), 1);
+    assert_eq!(wrong("src/trace/bvh/walk.rs", "use super::super::super::shade::x; use super::super::World;"), 1);
+    assert_eq!(wrong("src/trace/mod.rs", "// crate::render\nlet x = crate::render::y();"), 1);
+    assert_eq!(wrong("src/math/mod.rs", "fn f() {}\n#[cfg(test)]\nmod tests { use crate::lab; }"), 0);
     assert_eq!(
-        wrong("math/mod.rs", "#[cfg(test)]\nmod tests;\nuse crate::lab;\n#[cfg(test)]\nmod more { use crate::lab; }"),
+        wrong(
+            "src/math/mod.rs",
+            "#[cfg(test)]\nmod tests;\nuse crate::lab;\n#[cfg(test)]\nmod more { use crate::lab; }"
+        ),
         1
     );
-    assert_eq!(wrong("novel.rs", ""), 1);
-    assert_eq!(wrong("ray.rs", "use crate::novel::x;"), 1);
+    assert_eq!(wrong("src/novel.rs", ""), 1);
+    assert_eq!(wrong("src/ray.rs", "use crate::novel::x;"), 1);
 }

@@ -1,6 +1,6 @@
 //! Scenes and rays for tests, from a seed.
 
-use twincast::math::{DAffine3, DVec3, Vec3};
+use twincast::math::{DAffine3, DQuat, DVec3, Vec3};
 use twincast::scene::{Geometry, Group, Instance, Material, Mesh, Scene};
 use twincast::{Ray, Shape, Sphere};
 
@@ -93,7 +93,7 @@ pub fn instanced(seed: u64) -> Scene {
         let v = |p: Vec3| p.as_dvec3();
         let transform = DAffine3::from_scale_rotation_translation(
             DVec3::splat(1.0) + v(random.vec3()) * 0.5,
-            glam::DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
+            DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
             v(random.vec3()) * 3.0,
         );
         instances.push(Instance { name: format!("node {i}"), group, transform, transform_end: None });

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use twincast::lab::oracle::{self, Primitive};
-use twincast::math::{DAffine3, DVec3, Mat3, Vec3};
+use twincast::math::{DAffine3, DQuat, DVec3, Mat3, Vec3};
 use twincast::scene::{Geometry, Group, Instance, Material, Scene};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::Bvh;
@@ -62,7 +62,7 @@ fn mixed(count: usize, size: f32, seed: u64) -> Scene {
         let v = |p: Vec3| p.as_dvec3();
         let transform = DAffine3::from_scale_rotation_translation(
             DVec3::splat(1.0) + v(random.vec3()) * 0.5,
-            glam::DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
+            DQuat::from_rotation_y(f64::from(random.unit()) * 6.0),
             v(random.vec3()) * 2.0,
         );
         instances.push(Instance { name: format!("node {i}"), group: 1, transform, transform_end: None });
@@ -109,7 +109,7 @@ fn planes_are_met_however_they_are_placed() {
     let floor = Shape::Plane(Plane::new(Vec3::ZERO, Vec3::Y).expect("a plane"));
     let mut scene =
         Scene::from_geometries(vec![Geometry::Shapes { shapes: vec![floor], material: 0 }], vec![Material::default()]);
-    let quarter = glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    let quarter = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let wall = DAffine3::from_rotation_translation(quarter, DVec3::new(5.0, 0.0, 0.0));
     scene.instances.push(Instance { name: "wall".into(), group: 0, transform: wall, transform_end: None });
     let world = World::new(&scene).expect("sound");

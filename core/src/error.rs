@@ -67,6 +67,7 @@ impl Error {
     }
 
     /// The same where the file was opened because `path` names it, at `place`: which is where a mended name belongs.
+    #[doc(hidden)]
     pub fn named_in(self, path: &Path, place: &str) -> Self {
         match self {
             Self::Input { path: file, place: at, message } => {

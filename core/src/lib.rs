@@ -1,4 +1,4 @@
-//! What [Twincast](https://docs.rs/twincast) is whatever it is built with: scenes as data, the native tracer, and shading.
+//! The part of Twincast that no feature changes: scenes as data, the native tracer, shading, and the plan of a render.
 //!
 //! A crate by itself so that it is compiled once, whichever of Embree, OpenImageIO and Open Image Denoise a build has. The crate `twincast`
 //! has all of it under its own names, and is what programs use.
@@ -12,6 +12,7 @@ pub mod math;
 #[doc(hidden)]
 pub mod memory;
 pub mod output;
+pub mod plan;
 #[doc(hidden)]
 pub mod ray;
 pub mod scene;

@@ -41,6 +41,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 }
 
 /// As [`check_writable`], but with a file that `write` makes.
+#[doc(hidden)]
 pub fn probe(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     match Part::beside(path)? {
         Target::Special => Ok(()),

@@ -10,8 +10,7 @@ use super::oiio as backend;
 #[cfg(not(feature = "oiio"))]
 use super::pure as backend;
 use super::samples::{self, Samples, Type};
-use super::{Channel, Channels, Image, Metadata, channels};
-use super::{Curve, Response};
+use super::{Channel, Channels, Curve, Image, Metadata, Response, channels};
 use crate::error::{Error, Result, one_line};
 use crate::memory::Mapped;
 use crate::output;

@@ -6,11 +6,8 @@ use std::path::Path;
 
 use exr::prelude::f16;
 
-use super::Difference;
-use super::Image;
-use super::Response;
-use super::file;
 use super::samples::{self, Type, Values};
+use super::{Difference, Image, Response, file};
 use crate::error::Result;
 use crate::math::Vec3;
 

@@ -6,9 +6,7 @@
 
 use exr::prelude::f16;
 
-use super::Image;
-use super::srgb;
-use super::{Developer, Response};
+use super::{Developer, Image, Response, srgb};
 use crate::math::Vec4;
 
 /// Samples as they are in a file: row by row from the top, the channels of a pixel side by side.

@@ -209,8 +209,7 @@ fn permanent(x: DVec3, y: DVec3, z: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::lab::oracle::meet;
-    use crate::math::Mat3;
-    use crate::math::Random;
+    use crate::math::{Mat3, Random};
     use crate::shape::{Shape, Sphere};
 
     /// Embree's robust test, in f32.

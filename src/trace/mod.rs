@@ -1,8 +1,7 @@
 //! Two questions, closest hit and occluded, answered by engines that know nothing of each other.
 //!
-//! A tracer is built from a [`World`] and answers [`Hit`](crate::Hit)s. Every engine obeys the same conventions: a hit counts for
-//! `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive) wins; a ray that
-//! [is not valid](crate::Ray::is_valid) misses.
+//! A [`Tracer`] is built from a [`World`] and answers [`Hit`](crate::Hit)s. Those of our own, the [`bvh`] and what it is compared with, are the core's;
+//! Embree is here.
 
 #[cfg(feature = "embree")]
 pub mod embree;
@@ -11,3 +10,5 @@ pub mod embree;
 pub use twincast_core::trace::{
     Batch, Motion, Part, Placement, Primitives, Tracer, Width, World, accel, brute, bvh, precise,
 };
+#[cfg(feature = "embree")]
+use twincast_core::trace::{nearest, unbounded};

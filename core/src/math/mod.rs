@@ -12,8 +12,8 @@ mod random;
 pub use random::Random;
 
 pub use glam::{
-    Affine2, Affine3, BVec3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat3, Mat4, UVec2, UVec3, Vec2, Vec3,
-    Vec4,
+    Affine2, Affine3, BVec3, BVec4A, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Mat2, Mat3, Mat4, UVec2, UVec3, Vec2,
+    Vec3, Vec4,
 };
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounded operation.

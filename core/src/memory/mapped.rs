@@ -14,7 +14,7 @@ use std::path::Path;
 use memmap2::{Mmap, UncheckedAdvice};
 
 /// What is told how many bytes have been read, from any thread.
-pub type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
+type OnBytes<'a> = &'a (dyn Fn(u64) + Sync);
 
 /// The bytes of a file.
 pub struct Mapped<'a> {

@@ -162,6 +162,7 @@ impl Material {
     }
 
     /// Gives the textures it uses other indices.
+    #[doc(hidden)]
     pub fn renumber_textures(&mut self, number: impl Fn(u32) -> u32) {
         let own = [&mut self.diffuse_texture, &mut self.emission_texture, &mut self.normal_texture];
         let physical = self.physical.iter_mut().flat_map(|physical| physical.textures.slots());
@@ -180,7 +181,7 @@ impl Material {
 
     /// What an energy-conserving highlight is scaled by: pi times the factor of its f, so that met head-on it sends on just `specular`. None for the classic one, which has
     /// no such factor.
-    pub fn highlight_scale(&self) -> Option<f32> {
+    pub(crate) fn highlight_scale(&self) -> Option<f32> {
         let n = self.shininess;
         self.energy_conserving.then(|| match self.model {
             Specular::Phong => (n + 2.0) / 2.0,

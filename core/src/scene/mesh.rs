@@ -95,6 +95,7 @@ impl Mesh {
     }
 
     /// Whether any of its triangles has an area.
+    #[doc(hidden)]
     pub fn has_area(&self) -> bool {
         let corner = |i: u32| self.positions[i as usize].as_dvec3();
         self.triangles.par_iter().with_min_len(TASK).any(|&[a, b, c]| {

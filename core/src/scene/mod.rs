@@ -22,6 +22,7 @@ mod search;
 mod texture;
 
 pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
+#[doc(hidden)]
 pub use check::fault;
 pub use environment::Environment;
 pub use fog::Fog;
@@ -29,6 +30,7 @@ pub use instance::{Group, Instance};
 pub use light::{AreaShape, Attenuation, Light, Unlit};
 pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
+#[doc(hidden)]
 pub use mesh::{bounds_of, choose_origin};
 pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossiness, Texels, Workflow};
 pub use pose::{Journey, Pose};
@@ -181,6 +183,7 @@ impl Scene {
 
     /// Gives meshes that are placed once, by a turn that only exchanges axes, the coordinates of the scene, so that
     /// tracing needs no turned copy of them. Such a turn rounds nothing.
+    #[doc(hidden)]
     pub fn bake_turns(&mut self) {
         let mut uses = vec![0; self.groups.len()];
         self.instances.iter().for_each(|instance| uses[instance.group as usize] += 1);

@@ -77,6 +77,7 @@ impl Pixels {
     }
 
     /// A number that is the same for those that are shared, and for no others.
+    #[doc(hidden)]
     pub fn address(&self) -> usize {
         match self {
             Self::Eight(pixels) => Arc::as_ptr(pixels).addr(),

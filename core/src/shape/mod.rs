@@ -3,7 +3,7 @@
 //! Triangles go to the accelerators as meshes; every other shape is a variant of [`Shape`], which answers
 //! [`bounds`](Shape::bounds) and [`intersect`](Shape::intersect) for the native leaves and for Embree's user geometry
 //! alike. A closed family is an enum and not a trait object, so that the compiler lists what a new shape must reach. It does not list how it
-//! is read from a file (`DShape` in `io/dshape.rs`, `SHAPES` in `io/toml/primitives.rs`), and which kinds tests go through: `KINDS` in `shape/tests.rs`, `shapes` in
+//! is read from a file (`DShape` in `src/io/dshape.rs`, `SHAPES` in `src/io/toml/primitives.rs`), and which kinds tests go through: `KINDS` in `src/lab/shape_tests.rs`, `shapes` in
 //! `tests/shapes.rs` and `Kind` in `tests/accelerators/subjects.rs`.
 
 mod axis;
@@ -232,12 +232,14 @@ impl Shape {
     /// The t of [`Shape::intersect_all`] by themselves. Angles cost more than the intersection, so tracers ask for the
     /// parameters of what is nearest so far, and of nothing else.
     #[inline]
+    #[doc(hidden)]
     pub fn crossings(&self, ray: &Ray) -> impl Iterator<Item = f64> + use<> {
         let ray = *ray;
         self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray))
     }
 
     /// The hit at a known `t`.
+    #[doc(hidden)]
     pub fn hit_at(&self, ray: &Ray, t: f64) -> ShapeHit {
         ShapeHit { t, uv: self.uv(ray.origin.as_dvec3() + ray.direction.as_dvec3() * t).as_vec2() }
     }
@@ -285,6 +287,7 @@ impl Shape {
     }
 
     /// Its parameters at `point` on the surface, before they are rounded.
+    #[doc(hidden)]
     pub fn uv(&self, point: DVec3) -> DVec2 {
         match self {
             Self::Sphere(sphere) => sphere.uv(point),

@@ -43,6 +43,7 @@ impl Polygon {
     ///
     /// # Errors
     /// As [`Polygon::new`].
+    #[doc(hidden)]
     pub fn with_names(corners: Vec<Vec3>, names: Option<&[DVec3]>) -> Result<Self, InvalidShape> {
         let name = |i: usize| names.map_or_else(|| corners[i].to_string(), |names| names[i].to_string());
         let count = corners.len();

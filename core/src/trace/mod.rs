@@ -1,8 +1,6 @@
 //! Two questions, closest hit and occluded, answered by engines that know nothing of each other.
 //!
-//! A tracer is built from a [`World`] and answers [`Hit`]s. Every engine obeys the same conventions: a hit counts for
-//! `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive) wins; a ray that
-//! [is not valid](Ray::is_valid) misses.
+//! A tracer is built from a [`World`] and answers [`Hit`]s.
 
 pub mod accel;
 pub mod brute;
@@ -25,6 +23,9 @@ pub use world::{Part, Placement, Primitives, World};
 use crate::ray::{Hit, Ray};
 
 /// An engine that finds where rays meet a scene.
+///
+/// Every engine obeys the same conventions: a hit counts for `tmin <= t <= tmax`; at equal t the lowest (instance, geometry, primitive)
+/// wins; a ray that [is not valid](Ray::is_valid) misses.
 ///
 /// The two required methods define the answer; the batch methods give the same answers for many rays at a time, and
 /// an engine overrides them where it has something faster.

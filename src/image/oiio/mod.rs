@@ -6,6 +6,7 @@
 //! | `bridge` | its functions and types |
 //! | `formats` | which formats are read |
 //! | `unheard` | formats whose writers do not tell what goes wrong |
+//! | `unnamed` | files that are in memory alone |
 //!
 //! The crate `oiio` was rejected: it needs OpenImageIO 3.1, and Debian 12 and 13 have 2.4 and 2.5.
 

@@ -14,7 +14,7 @@ use super::schema::TextureInfo;
 use super::uri::{self, Target};
 use crate::error::{Error, Result, Warning};
 use crate::io::{Placeless, texture};
-use crate::math::{Affine2, Vec2, Vec3, Vec4};
+use crate::math::{Affine2, Mat2, Vec2, Vec3, Vec4};
 use crate::scene::{Filter, Texture, Wrap};
 
 /// The textures of a document that materials have asked for.
@@ -96,7 +96,7 @@ impl Transform {
     fn matrix(&self) -> Affine2 {
         let flip = Affine2::from_scale_angle_translation(Vec2::new(1.0, -1.0), 0.0, Vec2::Y);
         let (sin, cos) = libm::sincosf(self.rotation);
-        let turn = glam::Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
+        let turn = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
         let placed = Affine2::from_mat2_translation(turn, self.offset.into()) * Affine2::from_scale(self.scale.into());
         flip * placed * flip
     }

@@ -17,8 +17,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::lab::Entrant;
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::memory::process;
 use crate::ray::Ray;
 use crate::scene::{self, Geometry, Material, Mesh, Scene};

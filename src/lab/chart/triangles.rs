@@ -11,8 +11,7 @@ use super::{Figure, Setup, csv};
 use crate::error::Result;
 use crate::lab::bench::Spread;
 use crate::lab::oracle::{Body, Primitive, meet};
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::ray::Ray;
 use crate::shape::TriangleMethod;
 

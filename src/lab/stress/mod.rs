@@ -36,8 +36,7 @@ pub use search::{Found, Search};
 pub use subject::{Column, columns};
 pub use verdict::{Fault, Gate, Tally, Verdict};
 
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 use crate::shape::Shape;

@@ -2,8 +2,7 @@
 
 use super::triangles::bumpy_sphere;
 use super::{Case, Gate, Probe, towards};
-use crate::math::Random;
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DVec3, Random, Vec3};
 use crate::scene::{Geometry, Group, Instance, Material, Scene};
 
 pub(super) const CASES: &[Case] = &[Case {

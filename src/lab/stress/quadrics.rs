@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::math::Random;
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Random, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Scene};
 use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Polygon, Shape, Sphere};

@@ -2,8 +2,7 @@
 
 use super::triangles::{bumpy_sphere, cube};
 use super::{Case, Gate, Probe, loose, towards};
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::ray::Ray;
 
 pub(super) const CASES: &[Case] = &[

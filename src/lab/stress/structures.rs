@@ -2,8 +2,7 @@
 
 use super::triangles::bumpy_sphere;
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::ray::Ray;
 
 pub(super) const CASES: &[Case] = &[

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Case, Gate, Probe, loose, nudged, towards};
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 use crate::ray::Ray;
 use crate::scene::Mesh;
 

@@ -33,6 +33,8 @@ use crate::error::{Error, Result};
 use crate::ray::{Hit, Ray};
 use crate::shape::distance::Distance;
 use crate::trace::accel::Accelerator;
+use crate::trace::nearest::Nearest;
+use crate::trace::unbounded::Unbounded;
 use crate::trace::{Batch, Part, Primitives, Tracer, Width, World};
 use device::Device;
 use packet::{Active, Packet, RayHits, Rays, Recent};
@@ -40,8 +42,6 @@ use query::{Mode, PacketQuery, Packets};
 use reach::Reach;
 use scene::{Scene, SceneBuilder};
 use single::{SingleRay, SingleRayHit};
-use twincast_core::trace::nearest::Nearest;
-use twincast_core::trace::unbounded::Unbounded;
 
 pub use sah::sah_cost;
 pub use sys::VERSION;

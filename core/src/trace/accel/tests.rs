@@ -12,8 +12,7 @@ use super::kd::KdTree;
 use super::octree::Octree;
 use super::ray::IndexRay;
 use super::{Accel, Index, Options, Resolution};
-use crate::math::Random;
-use crate::math::{Aabb, DVec3, UVec3, Vec3};
+use crate::math::{Aabb, DVec3, Random, UVec3, Vec3};
 use crate::scene::{Geometry, Mesh, Scene};
 use crate::trace::World;
 

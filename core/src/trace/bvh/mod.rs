@@ -66,6 +66,7 @@ mod steps;
 mod walk;
 
 pub use alone::{Search, SingleRay, Travel, TriangleFound};
+#[doc(hidden)]
 pub use batch::prepare_thread;
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};

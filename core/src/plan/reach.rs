@@ -55,8 +55,7 @@ fn faces(centre: DVec3, normal: DVec3, bounds: &DAabb, slack: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Random;
-    use crate::math::{DVec2, Vec3};
+    use crate::math::{DVec2, Random, Vec3};
     use crate::scene::Attenuation;
     use crate::shade::light::LightSource;
 
