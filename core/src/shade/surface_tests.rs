@@ -1,21 +1,18 @@
 use super::*;
-use crate::math::{self, Affine3};
+use crate::math::{Affine3, Random};
 use crate::scene::{Group, Instance, Material};
 use crate::shape::{Plane, Sphere};
 use crate::trace::Tracer;
 use crate::trace::brute::Brute;
 
-/// A stream of numbers in [0, 1).
-struct Random(math::Random);
+/// In [0, 1).
+fn unit(random: &mut Random) -> f64 {
+    random.unit().into()
+}
 
-impl Random {
-    fn next(&mut self) -> f64 {
-        (self.0.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.next() - 0.5, self.next() - 0.5, self.next() - 0.5)
-    }
+/// In the cube [-0.5, 0.5)^3.
+fn vector(random: &mut Random) -> DVec3 {
+    0.5 * random.vector().as_dvec3()
 }
 
 fn mesh_scene(corners: [Vec3; 3], transform: DAffine3) -> Scene {
@@ -58,28 +55,28 @@ fn meets_f64(ray: &Ray, corners: [Vec3; 3]) -> bool {
 
 /// A ray from a random side at a random point of the triangle.
 fn ray_at(random: &mut Random, [a, b, c]: [Vec3; 3]) -> Ray {
-    let (u, v) = (random.next(), random.next());
+    let (u, v) = (unit(random), unit(random));
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
     let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
     let target = a + (b - a) * u + (c - a) * v;
-    let origin = target + random.vector() * (b - a).length() * 5.0;
+    let origin = target + vector(random) * (b - a).length() * 5.0;
     Ray::new(origin.as_vec3(), (target - origin).as_vec3())
 }
 
 #[test]
 fn spawned_rays_leave_their_triangle() {
-    let mut random = Random(math::Random::new(0, 0));
+    let mut random = Random::new(0, 0);
     let mut spawned = 0;
     for scale in -8..=8 {
         for _ in 0..2000 {
             let size = 10f64.powi(scale);
             // Near zero, and away from it by up to 100 times its size.
-            let place = random.vector() * size * if random.next() < 0.5 { 0.0 } else { 100.0 };
-            let [a, b] = [(); 2].map(|()| place + random.vector() * size);
+            let place = vector(&mut random) * size * if unit(&mut random) < 0.5 { 0.0 } else { 100.0 };
+            let [a, b] = [(); 2].map(|()| place + vector(&mut random) * size);
             // Half of them slivers, down to a height of 10^-4 of their length.
-            let sliver = 10f64.powf(-4.0 * random.next());
-            let c =
-                if random.next() < 0.5 { place } else { a.lerp(b, random.next()) } + random.vector() * size * sliver;
+            let sliver = 10f64.powf(-4.0 * unit(&mut random));
+            let c = if unit(&mut random) < 0.5 { place } else { a.lerp(b, unit(&mut random)) }
+                + vector(&mut random) * size * sliver;
             let corners = [a, b, c].map(|p| p.as_vec3());
             let scene = mesh_scene(corners, DAffine3::IDENTITY);
             let world = World::new(&scene).unwrap();
@@ -88,7 +85,7 @@ fn spawned_rays_leave_their_triangle() {
             let ray = ray_at(&mut random, corners);
             let point = SurfacePoint::new(&scene, &world, &ray, &hit(1.0), Attributes::ALL);
             for _ in 0..4 {
-                let direction = random.vector().normalize().as_vec3();
+                let direction = vector(&mut random).normalize().as_vec3();
                 let away = point.spawn(direction, f32::INFINITY);
                 assert!(!meets_f32(&away, corners), "f32: {corners:?} {away:?} {}", point.error);
                 assert!(!meets_f64(&away, corners), "f64: {corners:?} {away:?} {}", point.error);
@@ -104,15 +101,15 @@ fn spawned_rays_leave_their_triangle() {
 /// The test above can fail: without the offset about half of the rays meet their triangle again.
 #[test]
 fn rays_without_an_offset_do_not_leave() {
-    let mut random = Random(math::Random::new(7, 0));
+    let mut random = Random::new(7, 0);
     let mut again = 0;
     for _ in 0..1000 {
-        let corners = [(); 3].map(|()| (random.vector() + DVec3::splat(3.0)).as_vec3());
+        let corners = [(); 3].map(|()| (vector(&mut random) + DVec3::splat(3.0)).as_vec3());
         let scene = mesh_scene(corners, DAffine3::IDENTITY);
         let world = World::new(&scene).unwrap();
         let ray = ray_at(&mut random, corners);
         let point = SurfacePoint::new(&scene, &world, &ray, &hit(1.0), Attributes::ALL);
-        let away = Ray::new(point.position.as_vec3(), random.vector().normalize().as_vec3());
+        let away = Ray::new(point.position.as_vec3(), vector(&mut random).normalize().as_vec3());
         again += usize::from(meets_f32(&away, corners));
     }
     assert!(again > 200, "{again}");

@@ -180,16 +180,14 @@ impl Formula<1> for Volume<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     use crate::ray::Ray;
 
     /// With boxes as without, also where lines pass through corners and along edges, whichever axes these run along.
     #[test]
     fn boxes_leave_out_nothing() {
-        let mut state = 5u64;
-        let mut random = |most: i32| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) % most as u64) as i32 as f32
-        };
+        let mut numbers = Random::new(5, 0);
+        let mut random = |most: u64| numbers.below(most) as f32;
         let (mut inside, mut outside) = (0, 0);
         for (turn, count) in (0..3).flat_map(|turn| [RUN, RUN + 1, 100, 1000].map(|count| (turn, count))) {
             let turned = |v: Vec3| Vec3::new(v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]);
@@ -205,7 +203,7 @@ mod tests {
             let alone = Outline { corners: corners.clone(), boxes: Vec::new() };
             for k in 0..1000 {
                 let beside = Vec3::new(random(5) - 2.0, random(5) - 2.0, 0.0) * 0.5;
-                let target = corners[random(count as i32) as usize] + turned(beside);
+                let target = corners[random(count as u64) as usize] + turned(beside);
                 let aside =
                     turned(Vec3::new(random(9) - 4.0, random(9) - 4.0, 8.0)) * if k % 2 == 0 { 1.0 } else { -1.0 };
                 let line = Line::new(&Ray::new(target - aside, aside), 1000.0);

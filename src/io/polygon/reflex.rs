@@ -121,15 +121,13 @@ fn arrange(corners: &[DVec2], reflex: &mut [usize], nodes: &mut [Node], node: us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
 
     /// As all corners that are left, gone through one by one.
     #[test]
     fn finds_what_brute_force_finds() {
-        let mut state = 1u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as usize
-        };
+        let mut numbers = Random::new(1, 0);
+        let mut random = || (numbers.bits() >> 40) as usize;
         let (mut found, mut missed) = (0, 0);
         for count in [1, 7, 8, 9, 40, 1000] {
             // Few different places: many coincide, and are on edges.

@@ -3,32 +3,16 @@
 use std::mem::offset_of;
 
 use super::*;
-use crate::math::{UNIT_ROUNDOFF, Vec3};
+use crate::math::{Random, UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Mesh, Scene, architecture, terrain};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::node::{Child, WIDTH};
 use crate::trace::{Batch, Tracer};
 
-/// SplitMix64 (Steele, Lea, Flood 2014, *Fast splittable pseudorandom number generators*).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end.max(1) as u64) as usize
-    }
-
-    /// In [-1, 1).
-    fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
+/// Below `end`, 0 where that is 0.
+fn below(random: &mut Random, end: usize) -> usize {
+    random.below(end.max(1) as u64) as usize
 }
 
 /// A world, the tree over it, and rays whose hits are known.
@@ -54,9 +38,9 @@ impl Case {
         let scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
         let world = World::new(&scene).expect("a sound scene");
         let bvh = Bvh::build_with(&world, preset.into());
-        let (bounds, mut random) = (world.bounds(), Random(7));
+        let (bounds, mut random) = (world.bounds(), Random::new(7, 0));
         let mut point = |scale: f32| {
-            let unit = Vec3::new(random.unit(), random.unit(), random.unit());
+            let unit = random.vector();
             bounds.centre() + unit * bounds.size() * scale
         };
         let rays: Vec<Ray> = (0..300)
@@ -244,32 +228,33 @@ fn whatever_is_accepted_gives_the_right_hits() {
     for (preset, mesh) in Preset::ALL.into_iter().flat_map(|preset| [(preset, terrain(12)), (preset, architecture(1))])
     {
         let case = Case::new(mesh, preset);
-        let mut random = Random(preset as u64);
+        let mut random = Random::new(preset as u64, 0);
         for _ in 0..200 {
             let (mut nodes, mut words) = (case.nodes.clone(), case.words.clone());
-            for _ in 0..1 + random.below(2) {
-                let (node, slot, other) = (random.below(nodes.len()), random.below(WIDTH), random.below(nodes.len()));
-                match random.below(10) {
+            for _ in 0..1 + below(&mut random, 2) {
+                let (node, slot, other) =
+                    (below(&mut random, nodes.len()), below(&mut random, WIDTH), below(&mut random, nodes.len()));
+                match below(&mut random, 10) {
                     0 => nodes[node].child[slot] = Child(random.bits() as u32),
-                    1 => nodes[node].child[slot] = nodes[other].child[random.below(WIDTH)],
+                    1 => nodes[node].child[slot] = nodes[other].child[below(&mut random, WIDTH)],
                     2 => nodes[node].child[slot] = Child::inner(other as u32),
                     3 => nodes.swap(node, other),
-                    4 => nodes[node].bounds[random.below(6)][slot] = f32::from_bits(random.bits() as u32),
+                    4 => nodes[node].bounds[below(&mut random, 6)][slot] = f32::from_bits(random.bits() as u32),
                     5 | 6 => {
-                        let component = random.below(6);
-                        let grown = nodes[node].bounds[component][slot] * (1.0 + 0.2 * random.unit());
+                        let component = below(&mut random, 6);
+                        let grown = nodes[node].bounds[component][slot] * (0.8 + 0.4 * random.unit());
                         nodes[node].bounds[component][slot] = grown;
                     }
                     7 => {
-                        let (a, b) = (random.below(words.len()), random.below(words.len()));
+                        let (a, b) = (below(&mut random, words.len()), below(&mut random, words.len()));
                         words[a] = words[b];
                     }
                     8 => {
-                        let (a, b) = (random.below(words.len()), random.below(words.len()));
+                        let (a, b) = (below(&mut random, words.len()), below(&mut random, words.len()));
                         words.swap(a, b);
                     }
                     _ => {
-                        let word = random.below(words.len());
+                        let word = below(&mut random, words.len());
                         words[word] = words[word].wrapping_add(1);
                     }
                 }
