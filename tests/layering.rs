@@ -24,7 +24,6 @@ const LAYERS: &[&[&str]] = &[
 /// Files and folders that may say `unsafe`.
 const UNSAFE: &[&str] = &[
     "core/src/memory/",
-    "core/src/trace/bvh/build/lanes.rs",
     "core/src/trace/bvh/simd/",
     "core/src/trace/bvh/walk/stack.rs",
     "src/cli/leave.rs",

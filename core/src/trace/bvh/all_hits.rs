@@ -5,12 +5,13 @@
 
 use super::Bvh;
 use super::block::LANES;
-use super::levels::place::{Blur, Place};
+use super::levels::place::Place;
 use super::levels::placements::walk_over;
 use super::levels::triangles::TriangleTree;
 use super::levels::{Level, Through};
 use super::node::Child;
 use super::query::Closest;
+use super::reject::Blur;
 use super::reject::filter::Filter;
 use super::reject::slab::SlabRay;
 use super::simd::Simd;

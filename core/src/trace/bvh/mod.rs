@@ -2,9 +2,9 @@
 //!
 //! | of the tree | |
 //! | --- | --- |
-//! | `node`, `block` | 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*); eight triangles together |
+//! | `node`, `tree`, `block` | 256-byte nodes, eight boxes each, component by component (Wald, Benthin, Boulos 2008, *Getting rid of packets*); a tree of them; eight triangles together |
 //! | `build/` | binned surface area heuristic (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*), and which branches become nodes; what a tree is built for (`preset`): speed of building, of tracing, or memory |
-//! | `levels/` | what a world becomes: triangles and shapes of one coordinate system (`triangles`, `shapes`, `leaves`; along a curve, `clusters`), placed objects (`place`, `placements`), those that move (`moving`), how far objects reach (`support`, `farthest`) |
+//! | `levels/` | what a world becomes: triangles and shapes of one coordinate system (`triangles`, `shapes`; `leaves`, of corners or of `numbers`; along a curve, `clusters`), placed objects (`place`, `placements`), those that move (`moving`), how far objects reach (`support`, `farthest`, `table`) |
 //! | `meshes` | where corners are fetched from the mesh |
 //! | `cache/` | a tree in a file, for the next time |
 //! | `refit` | the same tree for moved vertices |
@@ -63,6 +63,7 @@ mod refit;
 mod reject;
 mod simd;
 mod steps;
+mod tree;
 mod walk;
 
 pub use alone::{Search, SingleRay, Travel, TriangleFound};
@@ -70,10 +71,10 @@ pub use alone::{Search, SingleRay, Travel, TriangleFound};
 pub use batch::prepare_thread;
 pub use boxes::BoxTree;
 pub(super) use certain::{Certain, Wanted};
-pub(super) use levels::place::Blur;
 pub(super) use near::discs::Discs;
 pub(super) use near::{NearestTriangle, Sought, Surveyor};
 pub(super) use query::Verdict;
+pub(super) use reject::Blur;
 
 pub use build::preset::{Options, Preset};
 pub use cache::{Cache, CacheReport, CacheUse};
@@ -138,7 +139,7 @@ impl Bvh {
     pub const BLOCK: usize = block::LANES;
 
     /// What a node counts in [`Bvh::sah_cost`], in tests of a block.
-    pub const NODE_COST: f64 = build::NODE_COST as f64;
+    pub const NODE_COST: f64 = node::NODE_COST as f64;
 
     /// Builds the trees on rayon's current thread pool. The result does not depend on the number of threads.
     pub fn build(world: &World) -> Self {

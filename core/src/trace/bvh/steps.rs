@@ -4,11 +4,13 @@ use serde::Serialize;
 
 use super::Bvh;
 use super::levels::Level;
-use super::levels::place::{Blur, Place};
+use super::levels::place::Place;
 use super::levels::placements::among_boxes;
-use super::node::{Child, Tree};
+use super::node::Child;
+use super::reject::Blur;
 use super::reject::slab::SlabRay;
 use super::simd::{Mask, Portable};
+use super::tree::Tree;
 use crate::ray::Ray;
 use crate::trace::Tracer;
 

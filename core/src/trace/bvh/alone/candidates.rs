@@ -5,9 +5,9 @@
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::query::Closest;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::filter::{self, Filter};
 use crate::trace::bvh::reject::slab::SlabRay;
 use crate::trace::bvh::simd::Simd;

@@ -6,7 +6,7 @@
 
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::levels::place::Blur;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::filter::{self, Filter};
 use crate::trace::bvh::reject::slab::{HUGE, SLIGHT, SlabRay, least_t};
 use crate::trace::bvh::reject::woop::{Margin, SLACK};

@@ -86,7 +86,7 @@ impl<Q: Query> Answers<'_, Q> {
         let rays = Rays::new::<S>(each);
         let (t, hits) = if places[0] == FIXED {
             let four = self.bvh.fixed.triangles.hits::<S>(&rays, *ids);
-            (four.numbers.t, [Some(four.hit(0)), Some(four.hit(1)), Some(four.hit(2)), Some(four.hit(3))])
+            (four.quad.t, [Some(four.hit(0)), Some(four.hit(1)), Some(four.hit(2)), Some(four.hit(3))])
         } else {
             self.bvh.placed_hits::<S>(each, 0b1111, &rays, *ids, *places)
         };

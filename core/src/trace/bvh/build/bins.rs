@@ -1,9 +1,9 @@
 //! The best of the planes between bins (Wald 2007, *On fast construction of SAH-based bounding volume hierarchies*), on
 //! all three axes in one pass.
 
-use super::lanes::Boxes;
 use super::record::Record;
 use super::split::{Cheapest, Cut, Rule, Split, join};
+use crate::trace::bvh::simd::boxes::Boxes;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 
 /// Bins an axis of a large range is divided into.

@@ -1,9 +1,9 @@
 //! A node above the subtrees: the child with the largest surface is divided, until there are eight or none is worth it.
 
+use super::fill;
 use super::split::{Range, Rule};
 use super::top::Shared;
-use super::{NODE_COST, fill};
-use crate::trace::bvh::node::{Node, WIDTH};
+use crate::trace::bvh::node::{NODE_COST, Node, WIDTH};
 
 /// A child of the node that is made.
 #[derive(Clone, Copy, Debug)]

@@ -6,11 +6,10 @@
 //! more (see docs/PERFORMANCE.md).
 
 use super::binary::{Binary, Branch};
-use super::lanes::Boxes;
-use super::record::half_area;
 use super::split::Rule;
-use super::{NODE_COST, Slot, fill, point};
-use crate::trace::bvh::node::{Node, WIDTH};
+use super::{Slot, fill, point};
+use crate::trace::bvh::node::{NODE_COST, Node, WIDTH};
+use crate::trace::bvh::simd::boxes::{Boxes, half_area};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
 
 /// Of 1, 2 .. 8 slots half of them.

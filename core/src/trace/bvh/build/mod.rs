@@ -27,7 +27,6 @@ mod binary;
 mod bins;
 mod children;
 mod collapse;
-pub(super) mod lanes;
 pub(super) mod morton;
 pub(super) mod preset;
 pub(super) mod presplit;
@@ -40,7 +39,8 @@ mod top;
 use rayon::prelude::*;
 
 use self::preset::Options;
-use super::node::{Child, Node, Tree};
+use super::node::{Child, Node};
+use super::tree::Tree;
 use crate::memory::room;
 use children::Children;
 pub(super) use record::{Record, triangle_items};
@@ -65,9 +65,6 @@ const LEVELS: usize = MAX_DEPTH - 1;
 
 /// What is below [`TOP_LEVELS`] can be made in three times as many levels of a binary tree, by halves at least.
 const _: () = assert!(Child::NAMES as u64 >> (3 * (LEVELS - TOP_LEVELS)) == 0);
-
-/// Cost of visiting a node, in tests of a block. Measured: with a half rates are the same and a triangle takes a byte more, with two rays are 1 to 4 % slower.
-pub(super) const NODE_COST: f32 = 1.0;
 
 /// A slot of a node.
 #[derive(Clone, Copy)]

@@ -56,14 +56,6 @@ impl Record {
     }
 }
 
-/// Half the surface of a box; without order for an empty one.
-#[inline(always)]
-pub(super) fn half_area(bounds: &[f32; 8]) -> f32 {
-    let &[a, b, c, _, d, e, f, _] = bounds;
-    let (x, y, z) = (a + d, b + e, c + f);
-    y * (x + z) + z * x
-}
-
 /// The box as others know it.
 #[inline(always)]
 pub(super) fn aabb(bounds: &[f32; 8]) -> Aabb {

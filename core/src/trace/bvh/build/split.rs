@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use super::lanes::Boxes;
-use super::record::{EMPTY, Record, half_area};
+use super::record::{EMPTY, Record};
+use crate::trace::bvh::simd::boxes::{Boxes, half_area};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// What a tree costs.

@@ -3,9 +3,9 @@
 //!
 //! Bins would put neighbours together, and blocks could not be filled: of eight triangles, four go to each side.
 
-use super::lanes::{Boxes, RANKED};
 use super::record::Record;
 use super::split::{Cheapest, Cut, Rule, Split, join};
+use crate::trace::bvh::simd::boxes::{Boxes, RANKED};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// The largest number of items.

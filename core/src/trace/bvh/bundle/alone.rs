@@ -2,7 +2,6 @@
 
 use super::found::BundleFound;
 use super::range::Range;
-use super::rays::RAYS;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
@@ -10,7 +9,7 @@ use crate::trace::bvh::hits::found::{Found, NONE};
 use crate::trace::bvh::query::Closest;
 use crate::trace::bvh::reject::ready::{MANY, ReadyRay, eight, lowest_eight};
 use crate::trace::bvh::reject::slab::most_t;
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::{RAYS, Simd};
 
 /// The closest hits of the rays of a bit mask in one placed object.
 #[inline(always)]

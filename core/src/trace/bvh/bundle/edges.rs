@@ -19,10 +19,10 @@
 //! three are taken to be 64 u. That a ray's own origin is less precise is in the bundle's b. Nothing may overflow
 //! ([`Bundle::may_overflow`]) but C . N, whose C is as long as the ray: that counts only where it is finite.
 
-use super::rays::{Bundle, axes};
+use super::rays::Bundle;
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, size};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes, size};
 
 /// Numbers of a block of triangles; the sign is such that the bundle sees each from its front (slope > 0).
 pub(super) struct Edges {

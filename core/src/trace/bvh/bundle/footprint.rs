@@ -8,12 +8,12 @@
 //! slope. A component is off by e = u L + b, the quotient by e (1 + |g|) / z and 2 u |g| for reciprocal and product, and the ray's
 //! own slope by 4.25 u D, D >= 1 being the largest of a direction ([`Edges`](super::edges::Edges)).
 
-use super::rays::{Bundle, axes};
+use super::rays::Bundle;
 use super::rows::{ROWS, Rows};
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::reject::slab::HUGE;
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes};
 
 /// Rectangles of slopes around eight triangles.
 pub(super) struct Footprints {

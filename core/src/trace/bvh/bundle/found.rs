@@ -1,6 +1,6 @@
 //! What the rays of a bundle have hit so far: for the most part only noted, and computed at the end, four at a time.
 
-use super::rays::{Bundle, PerRay, RAYS};
+use super::rays::Bundle;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
@@ -8,8 +8,8 @@ use crate::trace::bvh::hits::found::NONE;
 use crate::trace::bvh::hits::noted::{FourHits, Rays, Shared, splat, widen};
 use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::simd::isa::Kernel;
+use crate::trace::bvh::simd::{PerRay, RAYS, Simd};
 use crate::trace::nearest::Nearest;
 
 /// What the rays of a bundle have hit so far.
@@ -175,7 +175,7 @@ impl<Q: Query> Kernel for Mixed<'_, Q> {
 
 #[inline(always)]
 fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer; 4]) {
-    *t = hits.numbers.t;
+    *t = hits.quad.t;
     for (i, answer) in answers.iter_mut().enumerate() {
         *answer = Q::answer(Some(hits.hit(i)));
     }
@@ -209,7 +209,7 @@ fn answer_some<S: Simd, Q: Query>(
     if fixed != 0 {
         let hits = bvh.fixed.triangles.hits::<S>(&four, repeated(ids, fixed));
         for lane in (0..4).filter(|lane| fixed >> lane & 1 != 0) {
-            (t[lane], answers[lane]) = (hits.numbers.t[lane], Q::answer(Some(hits.hit(lane))));
+            (t[lane], answers[lane]) = (hits.quad.t[lane], Q::answer(Some(hits.hit(lane))));
         }
     }
     if placed != 0 {

@@ -9,14 +9,14 @@
 use super::edges::Edges;
 use super::footprint::Footprints;
 use super::found::DONE;
-use super::rays::{Bundle, TINY, axes};
+use super::rays::{Bundle, TINY};
 use super::rows;
 use super::walk::Walk;
 use crate::trace::bvh::block::LANES;
 use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::isa::Kernel;
-use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Group, Mask, Simd, Vector, axes};
 
 /// Block `index` of a leaf that rays of these rows enter, before `most`.
 pub(super) struct Meeting<'a, 'b, Q> {

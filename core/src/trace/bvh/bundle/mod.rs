@@ -50,7 +50,7 @@ use rays::{Bundle, Fill, Fit};
 use walk::{Walk, few};
 use way::{Entry, Way};
 
-pub(super) use rays::{PerRay, RAYS, axes};
+pub(super) use super::simd::RAYS;
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {

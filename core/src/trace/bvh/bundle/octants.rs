@@ -1,8 +1,8 @@
 //! Rays that are no bundle as a whole, divided by the octant that they run into.
 
-use super::rays::RAYS;
 use crate::math::Vec3;
 use crate::ray::Ray;
+use crate::trace::bvh::simd::RAYS;
 
 /// Fewer rays than this are better traced one by one.
 const FEWEST: u32 = 6;

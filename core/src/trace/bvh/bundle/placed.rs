@@ -2,12 +2,13 @@
 //! in the object's coordinates.
 
 use super::range::Range;
-use super::rays::{Bundle, PerRay};
+use super::rays::Bundle;
 use super::way::{Entry, Goal, Way};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::levels::placements::{FIXED, PlacementTree};
-use crate::trace::bvh::node::{Child, Tree};
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::node::Child;
+use crate::trace::bvh::simd::{PerRay, Simd};
+use crate::trace::bvh::tree::Tree;
 
 /// The placements, as what a bundle looks for.
 struct Places<'a> {

@@ -1,7 +1,7 @@
 //! How far the rays of a bundle still look, in a unit that they share in all systems of coordinates: t.
 
-use super::rays::{Bundle, PerRay, RAYS, SLACK, TINY};
-use crate::trace::bvh::simd::{Group, Mask, Simd, Vector};
+use super::rays::{Bundle, SLACK, TINY};
+use crate::trace::bvh::simd::{Group, Mask, PerRay, RAYS, Simd, Vector};
 
 /// Which t of each ray are still of interest, in units of its direction; of the turned one where the bundle is turned.
 pub(super) struct Range {

@@ -25,22 +25,10 @@ use crate::trace::bvh::reject::filter::largest_axis;
 use crate::trace::bvh::reject::ready::columns;
 use crate::trace::bvh::reject::slab::HUGE;
 use crate::trace::bvh::simd::isa::Kernel;
-use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
-
-/// Rays in a bundle.
-pub(in crate::trace::bvh) const RAYS: usize = 64;
+use crate::trace::bvh::simd::{Array, Group, Mask, PerRay, RAYS, Simd, Vector, axes};
 
 /// How many rays ahead of those of a bundle others are fetched.
 const AHEAD: usize = 3 * RAYS;
-
-/// One number for each ray.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-pub(in crate::trace::bvh) struct PerRay(pub [f32; RAYS]);
-
-impl PerRay {
-    pub const ZERO: Self = Self([0.0; RAYS]);
-}
 
 /// The rays of a bundle, component by component.
 pub(super) struct Bundle {
@@ -298,12 +286,6 @@ impl Bundle {
         let most = far.max(self.largest);
         32.0 * most * far * far >= HUGE
     }
-}
-
-/// The two axes beside `axis`, and itself.
-#[inline(always)]
-pub(in crate::trace::bvh) const fn axes(axis: usize) -> [usize; 3] {
-    [(axis + 1) % 3, (axis + 2) % 3, axis]
 }
 
 #[inline(always)]

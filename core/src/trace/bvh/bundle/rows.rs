@@ -1,7 +1,6 @@
 //! The rays of a bundle row by row, eight rows of eight: what tells most of them at once that a triangle does not concern them.
 
-use super::rays::{PerRay, RAYS};
-use crate::trace::bvh::simd::{Array, Simd, Vector};
+use crate::trace::bvh::simd::{Array, PerRay, RAYS, Simd, Vector};
 
 /// Rows of a bundle: eight rays each.
 pub(super) const ROWS: usize = RAYS / 8;

@@ -15,17 +15,17 @@
 //! with its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that, and b N.
 
 use super::found::DONE;
-use super::rays::{Bundle, RAYS, SLACK, TINY, axes};
+use super::rays::{Bundle, SLACK, TINY};
 use super::walk::Walk;
 use super::way::Entry;
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::planes::{Heights, Planes};
 use crate::trace::bvh::reject::woop::{Judged, Margin, Met, Sheared, Sides, Span};
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, RAYS, Simd, Vector, axes};
 
 /// A block as an origin sees it, on a bundle's axes.
 struct Seen<V> {

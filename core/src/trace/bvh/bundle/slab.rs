@@ -1,10 +1,10 @@
 //! Boxes against all rays of a bundle at once, by the rectangle of their slopes.
 
-use super::rays::{Bundle, axes};
+use super::rays::Bundle;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL, WIDTH};
 use crate::trace::bvh::reject::slab::HUGE;
-use crate::trace::bvh::simd::{Array, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Simd, Vector, axes};
 
 /// A bundle made ready for slab tests in one tree, on its own axes.
 pub(super) struct BundleSlab {

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use super::found::{BundleFound, DONE};
 use super::meeting::Meeting;
-use super::rays::{Bundle, PerRay, RAYS, SLACK, TINY};
+use super::rays::{Bundle, SLACK, TINY};
 use super::rows;
 use super::way::{Entry, Goal, Way};
 use crate::math::Vec3;
@@ -13,9 +13,10 @@ use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::hits::coplanar::Spot;
 use crate::trace::bvh::levels::triangles::TriangleTree;
-use crate::trace::bvh::node::{Child, Tree};
+use crate::trace::bvh::node::Child;
 use crate::trace::bvh::query::Query;
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::simd::{PerRay, RAYS, Simd};
+use crate::trace::bvh::tree::Tree;
 
 /// Rays that are held against a block of eight triangles one by one; of more, each group is held against each triangle.
 const FEW: u32 = 8;

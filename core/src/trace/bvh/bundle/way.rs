@@ -5,10 +5,11 @@
 
 use std::hint::select_unpredictable;
 
-use super::rays::{Bundle, PerRay, RAYS};
+use super::rays::Bundle;
 use super::slab::{Boxes, BundleSlab};
-use crate::trace::bvh::node::{Child, Tree, WIDTH};
-use crate::trace::bvh::simd::{Array, Group, Mask, Simd, Vector};
+use crate::trace::bvh::node::{Child, WIDTH};
+use crate::trace::bvh::simd::{Array, Group, Mask, PerRay, RAYS, Simd, Vector};
+use crate::trace::bvh::tree::Tree;
 
 /// Rays of which each is held against the eight boxes of a node by itself.
 const ONE_BY_ONE: usize = 3;

@@ -26,7 +26,8 @@ use crate::trace::Part;
 use crate::trace::bvh::build::{MAX_DEPTH, presplit, triangle_items};
 use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
-use crate::trace::bvh::node::{Child, Node, Tree, WIDTH, widened, widened_corners};
+use crate::trace::bvh::node::{Child, Node, WIDTH, widened, widened_corners};
+use crate::trace::bvh::tree::Tree;
 
 /// Nodes that are gone through by one thread at a time.
 const CHUNK: usize = 512;

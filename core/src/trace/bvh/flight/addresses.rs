@@ -1,8 +1,9 @@
 //! Where in memory children are, so that they can be fetched before they are needed.
 
 use crate::trace::bvh::levels::triangles::TriangleTree;
-use crate::trace::bvh::node::{Child, Node, Tree};
+use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::tree::Tree;
 
 /// Of children, by their [kind](Child::kind): where the first is, and how far apart they are.
 pub(in crate::trace::bvh) struct Addresses {

@@ -6,13 +6,15 @@ use super::addresses::Addresses;
 use super::traveller::Space;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::levels::leaves::{Blocks, Numbers};
+use crate::trace::bvh::levels::leaves::Blocks;
+use crate::trace::bvh::levels::numbers::Numbers;
 use crate::trace::bvh::levels::triangles::TriangleTree;
-use crate::trace::bvh::node::{Child, Node, Tree};
+use crate::trace::bvh::node::{Child, Node};
 use crate::trace::bvh::query::Verdict;
 use crate::trace::bvh::reject::filter::{Candidates, Filter};
 use crate::trace::bvh::reject::woop::Sides;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::tree::Tree;
 
 /// What rays travel through.
 pub(super) trait Ground {

@@ -1,7 +1,7 @@
 //! Hits that are noted, four at a time: t, u and v of triangles that rays hit for sure, among the fixed ones or in placed
 //! objects.
 
-use super::quad::{Numbers, Quad, Seen};
+use super::quad::{Quad, QuadHits, Seen};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::trace::bvh::block::Lane;
@@ -47,7 +47,7 @@ pub(in crate::trace::bvh) fn widen<S: Simd>(values: &[f32; 4]) -> S::D4 {
 /// Hits of four rays, number by number.
 pub(in crate::trace::bvh) struct FourHits {
     /// t, u and v.
-    pub numbers: Numbers,
+    pub quad: QuadHits,
     primitive: [u32; 4],
     geometry: [u32; 4],
     instance: [u32; 4],
@@ -58,9 +58,9 @@ impl FourHits {
     #[inline(always)]
     pub fn hit(&self, i: usize) -> Hit {
         Hit {
-            t: self.numbers.t32[i],
-            u: self.numbers.u[i],
-            v: self.numbers.v[i],
+            t: self.quad.t32[i],
+            u: self.quad.u[i],
+            v: self.quad.v[i],
             primitive: self.primitive[i],
             geometry: self.geometry[i],
             instance: self.instance[i],
@@ -84,14 +84,14 @@ impl TriangleTree {
             leaves.lane(ids[3], &mut d),
         ];
         let corners = [corner::<S>(&triangles, 0), corner::<S>(&triangles, 1), corner::<S>(&triangles, 2)];
-        let numbers = Quad::new(rays.origin, rays.direction, corners).numbers();
+        let quad = Quad::new(rays.origin, rays.direction, corners).hits();
         let (mut primitive, mut geometry, mut instance) = ([0; 4], [0; 4], [0; 4]);
         for i in 0..4 {
             let (part, number) = triangles[i].number();
             let part = self.part(part);
             (primitive[i], geometry[i], instance[i]) = (number, part.geometry, part.instance);
         }
-        FourHits { numbers, primitive, geometry, instance }
+        FourHits { quad, primitive, geometry, instance }
     }
 
     /// A triangle that rays hit for sure which all start in `origin`; `id` is as in [`Self::offer_one`].
@@ -120,7 +120,7 @@ impl<D: Doubles> Shared<D> {
     #[inline(always)]
     pub fn hits(&self, direction: [D; 3]) -> FourHits {
         FourHits {
-            numbers: self.seen.along(direction).numbers(),
+            quad: self.seen.along(direction).hits(),
             primitive: [self.primitive; 4],
             geometry: [self.part.geometry; 4],
             instance: [self.part.instance; 4],
@@ -168,7 +168,7 @@ impl Bvh {
         let quad = Quad::new(rays.origin, rays.direction, corners);
         let slack = S::D4::load(&[la.slack, lb.slack, lc.slack, ld.slack]);
         let certain = quad.is_certain(rays.origin, rays.direction, corners, slack);
-        let Numbers { mut t, t32, u, v } = quad.numbers();
+        let QuadHits { mut t, t32, u, v } = quad.hits();
         let mut hits = [None; 4];
         let (trees, instances) = ([a, b, c, d], [la.instance, lb.instance, lc.instance, ld.instance]);
         for i in (0..4).filter(|i| lanes >> i & 1 != 0) {

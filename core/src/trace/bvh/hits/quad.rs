@@ -44,7 +44,7 @@ pub(in crate::trace::bvh) struct Quad<D> {
 }
 
 /// t, u and v of four hits.
-pub(in crate::trace::bvh) struct Numbers {
+pub(in crate::trace::bvh) struct QuadHits {
     pub t: [f64; 4],
     pub t32: [f32; 4],
     pub u: [f32; 4],
@@ -91,10 +91,10 @@ impl<D: Doubles> Quad<D> {
     }
 
     #[inline(always)]
-    pub fn numbers(&self) -> Numbers {
+    pub fn hits(&self) -> QuadHits {
         let inverse = D::splat(1.0).div(self.slope);
         let t = self.height.mul(inverse);
         let (u, v) = (self.volumes[0].mul(inverse), self.volumes[1].mul(inverse));
-        Numbers { t: t.to_array(), t32: t.narrow().to_array(), u: u.narrow().to_array(), v: v.narrow().to_array() }
+        QuadHits { t: t.to_array(), t32: t.narrow().to_array(), u: u.narrow().to_array(), v: v.narrow().to_array() }
     }
 }

@@ -2,14 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::leaves::{self, Leaves};
+use super::leaves::Leaves;
+use super::numbers::numbered;
 use crate::memory::room;
 use crate::trace::Part;
 use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::build::preset::Options;
 use crate::trace::bvh::build::{self, Record, morton};
 use crate::trace::bvh::meshes::Meshes;
-use crate::trace::bvh::node::{Child, Node, Tree, WIDTH};
+use crate::trace::bvh::node::{Child, Node, WIDTH};
+use crate::trace::bvh::tree::Tree;
 use morton::Coded;
 
 /// Clusters that are made by one thread.
@@ -22,7 +24,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
     let count = sorted.len();
     let lengths = morton::clusters(&sorted, WIDTH * LANES);
     let leaves = if options.preset.is_compact() {
-        let block = |items: &[Coded]| leaves::numbered(items.iter().map(|item| item.number));
+        let block = |items: &[Coded]| numbered(items.iter().map(|item| item.number));
         Leaves::of_numbers(blocks(&sorted, &lengths, options, block), meshes)
     } else {
         Leaves::of_blocks(blocks(&sorted, &lengths, options, |items| {
@@ -37,7 +39,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
     let mut items = crate::memory::with_capacity(nodes.len());
     items.par_extend(nodes.par_iter().enumerate().map(item));
     let above = build::build(&mut items, 1, 1, &Options { progress: None, ..*options });
-    (above.over(&items, nodes), leaves, count)
+    (above.over(nodes, |item| items[item as usize].primitive()), leaves, count)
 }
 
 /// The blocks of clusters of such lengths, each of up to eight items that follow one another.

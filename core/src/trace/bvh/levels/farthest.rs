@@ -3,8 +3,9 @@
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::build::MAX_DEPTH;
-use crate::trace::bvh::node::{Child, Node, Tree, WIDTH};
+use crate::trace::bvh::node::{Child, Node, WIDTH};
 use crate::trace::bvh::simd::{Array, Simd, Vector, everywhere};
+use crate::trace::bvh::tree::Tree;
 
 /// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it: the lowest three bits mean nothing, and without
 /// them it is a little less. Unlike where [points](crate::trace::bvh::near) wait, nobody goes through them when something farther is found: each is asked when it is its turn, since a

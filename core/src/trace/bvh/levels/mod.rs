@@ -4,14 +4,16 @@ pub(super) mod clusters;
 pub(super) mod farthest;
 pub(super) mod leaves;
 pub(super) mod moving;
+pub(super) mod numbers;
 pub(super) mod place;
 pub(super) mod placements;
 pub(super) mod shapes;
 pub(super) mod support;
+mod table;
 pub(super) mod triangles;
 
 use self::farthest::Waiting;
-use self::place::{Blur, Place};
+use self::place::Place;
 use self::shapes::ShapeTree;
 use self::triangles::TriangleTree;
 use super::build::preset::Options;
@@ -24,6 +26,7 @@ use super::walk::{self, Visit};
 use crate::math::{Aabb, Affine3, Vec3};
 use crate::ray::Ray;
 use crate::trace::Part;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::nearest::Nearest;
 
 /// Everything in one coordinate system.
@@ -66,7 +69,7 @@ impl Level {
         self.triangles.tree().bounds().union(self.shapes.tree().bounds())
     }
 
-    /// At least the scalar product of each of `ways` with any of its points, as [`Tree::farthest`](super::node::Tree::farthest) finds it: best in an
+    /// At least the scalar product of each of `ways` with any of its points, as [`Tree::farthest`](super::tree::Tree::farthest) finds it: best in an
     /// order in which neighbours differ little.
     pub fn farthest(&self, isa: Present, ways: &[Vec3], visits: usize, values: &mut [f64]) {
         isa::dispatch_narrow(isa, Farthest { level: self, ways, visits, values });

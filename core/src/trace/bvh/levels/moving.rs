@@ -11,9 +11,9 @@ use super::placements::{spread_over, tree_over, walk_over};
 use crate::ray::Ray;
 use crate::trace::Placement;
 use crate::trace::bvh::build::preset::Options;
-use crate::trace::bvh::node::Tree;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::tree::Tree;
 use crate::trace::bvh::walk::Visit;
 use crate::trace::spread::Spread;
 

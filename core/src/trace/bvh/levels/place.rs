@@ -15,30 +15,10 @@ use super::Through;
 use crate::math::{Affine3, DAffine3, DMat3, UNIT_ROUNDOFF, Vec3, gamma64};
 use crate::ray::Ray;
 use crate::trace::Placement;
-use crate::trace::bvh::bundle::{PerRay, RAYS};
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::ready::columns_of;
-use crate::trace::bvh::simd::{Array, Doubles, Mask, Simd, Vector, size};
+use crate::trace::bvh::simd::{Array, Doubles, Mask, PerRay, RAYS, Simd, Vector, size};
 use crate::trace::world::object_ray;
-
-/// How far a ray may be from the one that is meant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::trace) struct Blur {
-    /// In each component of the origin.
-    pub origin: f32,
-    /// In each component of the direction, relative to the largest of them; at most [`Blur::MOST`].
-    pub direction: f32,
-}
-
-impl Blur {
-    /// The ray is the one that is meant.
-    pub const NONE: Self = Self { origin: 0.0, direction: 0.0 };
-
-    /// Of a direction; a larger one is treated as unknown.
-    const MOST: f32 = 1.0 / 1024.0;
-
-    /// The ray may be anywhere: it meets all boxes, and no triangle is rejected or hit without doubt.
-    const UNKNOWN: Self = Self { origin: f32::INFINITY, direction: 0.0 };
-}
 
 /// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines, their hits the last two.
 #[derive(Clone, Copy, Debug)]

@@ -3,17 +3,18 @@
 use rayon::prelude::*;
 
 use super::Level;
-use super::place::{Blur, Place};
+use super::place::Place;
 use super::support::Outlines;
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::Placement;
 use crate::trace::bvh::build::preset::Options;
 use crate::trace::bvh::build::{self, Record};
-use crate::trace::bvh::node::Tree;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::slab::SlabRay;
 use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::tree::Tree;
 use crate::trace::bvh::walk::{self, Visit};
 use crate::trace::spread::Spread;
 

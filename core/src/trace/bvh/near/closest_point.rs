@@ -18,8 +18,9 @@ use crate::trace::Placement;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::levels::Through;
 use crate::trace::bvh::levels::triangles::TriangleTree;
-use crate::trace::bvh::node::{Child, Tree};
+use crate::trace::bvh::node::Child;
 use crate::trace::bvh::simd::Portable;
+use crate::trace::bvh::tree::Tree;
 use crate::trace::motion::bounds_placed;
 
 /// A point on a triangle.

@@ -3,7 +3,7 @@
 use super::{Packet, PacketHits, RAYS, each};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{SingleRay, TriangleFound};
-use crate::trace::bvh::levels::place::Blur;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::ready::{ReadyRay, ready};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::simd::isa::Kernel;

@@ -15,10 +15,9 @@
 use super::Packet;
 use crate::math::{Aabb, UNIT_ROUNDOFF};
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::bundle::axes;
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL};
 use crate::trace::bvh::reject::slab::{HUGE, SMALLEST, least_t};
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes};
 use crate::trace::bvh::walk::Enter;
 
 /// Rays that go the same way.
@@ -189,9 +188,10 @@ impl Enter for Beam {
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::trace::bvh::node::{Child, Tree};
+    use crate::trace::bvh::node::Child;
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::Portable;
+    use crate::trace::bvh::tree::Tree;
 
     /// As of single rays: the box around a point of a ray that makes up a beam is entered, in the tree and as that around a triangle, whatever lies far away.
     #[test]

@@ -5,7 +5,7 @@ use super::{Doubts, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Lane;
 use crate::trace::bvh::hits::noted::{Rays, widen};
-use crate::trace::bvh::hits::quad::{Numbers, Quad};
+use crate::trace::bvh::hits::quad::{Quad, QuadHits};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// Tells of all hits of packet `number`.
@@ -61,7 +61,7 @@ fn four<S: Simd>(bvh: &Bvh, packet: &Packet, half: usize, ids: [u32; 4], hits: &
     let [x, y, z] = &packet.direction;
     let rays: Rays<S::D4> = Rays { origin, direction: [lanes::<S>(x, half), lanes::<S>(y, half), lanes::<S>(z, half)] };
     let wide = [doubles::<S>(&corners[0]), doubles::<S>(&corners[1]), doubles::<S>(&corners[2])];
-    let Numbers { t32, u, v, .. } = Quad::new(rays.origin, rays.direction, wide).numbers();
+    let QuadHits { t32, u, v, .. } = Quad::new(rays.origin, rays.direction, wide).hits();
     put(&mut hits.t, half, t32);
     put(&mut hits.u, half, u);
     put(&mut hits.v, half, v);

@@ -6,8 +6,8 @@
 use super::{Packet, RAYS};
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::hits::found::NONE;
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::planes;
 use crate::trace::bvh::reject::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
 use crate::trace::bvh::simd::{Array, Mask, Vector};

@@ -1,13 +1,12 @@
 //! One ray against a block of eight triangles: rejected in f32 by the ray's own shear ([`super::woop`]).
 
+use super::Blur;
 use super::planes;
 use super::woop::{self, Aim, Judged, Margin, SLACK, Sheared, Sides};
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::bundle::axes;
-use crate::trace::bvh::levels::place::Blur;
-use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes};
 
 /// A ray made ready for the f32 reject test.
 #[derive(Clone, Copy, Debug)]
@@ -257,8 +256,8 @@ mod tests {
     fn computed(ray: &Ray, corners: [Vec3; 3]) -> [f32; 3] {
         let corners = corners.map(|p| p.to_array().map(|x| widen::<Portable>(&[x; 4])));
         let Rays { origin, direction } = Rays::new::<Portable>([ray; 4]);
-        let numbers = Quad::new(origin, direction, corners).numbers();
-        [numbers.t32[0], numbers.u[0], numbers.v[0]]
+        let hits = Quad::new(origin, direction, corners).hits();
+        [hits.t32[0], hits.u[0], hits.v[0]]
     }
 
     /// Held against the exact test, for triangles from larger than their distance to a millionth of it, at any scale, thin ones among them, by rays that

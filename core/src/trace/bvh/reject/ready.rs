@@ -2,12 +2,12 @@
 //!
 //! The numbers are those of [`SlabRay`] and [`Filter`]. A ray that comes by itself is made ready in fewer steps ([`crate::trace::bvh::alone`]), but not in an eighth.
 
+use super::Blur;
 use super::filter::{Filter, Filters};
 use super::slab::{MOST_T_SLACK, SlabRay, Slabs, least_t, most_t};
 use super::woop::Margin;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, everywhere, size};
 
 /// A ray made ready.

@@ -17,9 +17,9 @@
 //! by this over the component. Boxes are wider by 5 u of their largest coordinate, so that the span is the origin's largest coordinate unless r is more than [`SLIGHT`], and else that
 //! and the reach, the largest coordinate in the tree.
 
+use super::Blur;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::node::{Node, WIDENED, WIDENED_ALL};
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, size};
 
@@ -188,10 +188,11 @@ mod tests {
     use super::*;
     use crate::math::Aabb;
     use crate::trace::bvh::alone::SingleRay;
-    use crate::trace::bvh::node::{Child, Tree};
+    use crate::trace::bvh::node::Child;
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::reject::ready::ReadyRays;
     use crate::trace::bvh::simd::Portable;
+    use crate::trace::bvh::tree::Tree;
 
     /// The box around a point of a ray is entered at its t, whoever makes the ray ready, and whatever lies beside it far away; also where the ray is off.
     #[test]

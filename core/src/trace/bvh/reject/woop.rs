@@ -36,10 +36,10 @@
 //! by 2 c. What c is by the distance of corners, and not for all alike, is in r: with c = x (Z + S), 3 x in r is 6.3 c in a sheared component; of depths 3/2 of 3 c count besides, where
 //! x is taken to be u. Only the distance from a plane ([`Planes`](super::planes::Planes)) counts on edges that are exact, and is not asked for such corners.
 
+use super::Blur;
 use super::planes::Heights;
 use super::slab::HUGE;
 use crate::math::UNIT_ROUNDOFF;
-use crate::trace::bvh::levels::place::Blur;
 use crate::trace::bvh::simd::{Mask, Vector};
 
 /// Slack of t for its own rounding and that of products with it.

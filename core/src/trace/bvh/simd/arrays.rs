@@ -1,8 +1,7 @@
 //! Vectors as plain arrays, for processors of which nothing else is known here. Whatever is done to them, their lanes are numbers one by one: they are what other
 //! vectors are compared with.
 
-use super::{Array, Doubles, Group, Mask, TURNED, Three, Turned, Vector};
-use crate::trace::bvh::bundle::{PerRay, RAYS};
+use super::{Array, Doubles, Group, Mask, PerRay, RAYS, TURNED, Three, Turned, Vector};
 
 #[inline(always)]
 fn zip<T: Copy, const N: usize>(a: [T; N], b: [T; N], f: impl Fn(T, T) -> T) -> [T; N] {

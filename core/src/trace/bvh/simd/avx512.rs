@@ -8,10 +8,9 @@ use std::arch::x86_64::*;
 use super::avx2::Avx2;
 use super::isa::{self, Kernel};
 use super::x86::{D4, V4, V8, lanewise, opaque};
-use super::{Group, Mask, Simd, Vector};
+use super::{Group, Mask, PerRay, RAYS, Simd, Vector};
 use crate::math::Vec3;
 use crate::trace::bvh::block::Block;
-use crate::trace::bvh::bundle::{PerRay, RAYS};
 use crate::trace::bvh::node::{Child, Node};
 
 /// AVX-512 F, VL, DQ and BW.

@@ -10,6 +10,7 @@ mod arrays;
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+pub(super) mod boxes;
 pub(super) mod doubles;
 pub(super) mod isa;
 mod portable;
@@ -29,12 +30,29 @@ pub(super) use portable::Portable;
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::V8;
 
+use self::boxes::Boxes;
 use self::isa::Kernel;
 use super::block::Block;
-use super::build::lanes::Boxes;
-use super::bundle::{PerRay, RAYS, axes};
 use super::node::{Child, Node};
 use crate::math::Vec3;
+
+/// Rays in a bundle: a bit of a word for each.
+pub(super) const RAYS: usize = 64;
+
+/// One number for each ray of a bundle.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct PerRay(pub [f32; RAYS]);
+
+impl PerRay {
+    pub const ZERO: Self = Self([0.0; RAYS]);
+}
+
+/// The two axes beside `axis`, and itself.
+#[inline(always)]
+pub(super) const fn axes(axis: usize) -> [usize; 3] {
+    [(axis + 1) % 3, (axis + 2) % 3, axis]
+}
 
 /// An instruction set, as a family of vector types.
 pub(super) trait Simd {

@@ -7,10 +7,9 @@ use std::arch::x86_64::*;
 
 use bytemuck::cast;
 
+use super::boxes::{Boxes, RANKED};
 use super::x86::lanewise;
-use super::{Array, Doubles, Group, Mask, Three, Turned, Vector, quad};
-use crate::trace::bvh::build::lanes::{Boxes, RANKED};
-use crate::trace::bvh::bundle::{PerRay, RAYS};
+use super::{Array, Doubles, Group, Mask, PerRay, RAYS, Three, Turned, Vector, quad};
 
 /// Four f32.
 #[derive(Clone, Copy)]

@@ -6,8 +6,7 @@
 
 use std::arch::{asm, x86_64::*};
 
-use super::{Array, Doubles, Group, Mask, TURNED, Three, Turned, Vector, quad};
-use crate::trace::bvh::bundle::{PerRay, RAYS};
+use super::{Array, Doubles, Group, Mask, PerRay, RAYS, TURNED, Three, Turned, Vector, quad};
 
 /// A function of two vectors by its intrinsic, as a method.
 macro_rules! lanewise {

@@ -6,10 +6,11 @@
 pub(super) mod stack;
 
 use self::stack::{Entry, Room, Stack};
-use super::node::{Child, Node, Tree, WIDTH};
+use super::node::{Child, Node, WIDTH};
 use super::query::Query;
 use super::reject::slab::SlabRay;
 use super::simd::{Array, Mask, Simd, Vector};
+use super::tree::Tree;
 use crate::trace::nearest::Nearest;
 
 /// What a leaf says to the walk.

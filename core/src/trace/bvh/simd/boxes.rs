@@ -1,9 +1,8 @@
-//! What the builder asks of a vector beyond arithmetic. All implementations give the same bits, so the tree is
+//! Boxes in vectors, as the builder has them: what it asks of a vector beyond arithmetic. All implementations give the same bits, so the tree is
 //! the same for every instruction set: nothing is fused.
-#![allow(unsafe_code)] // Intrinsics; see `simd::x86`.
+#![allow(unsafe_code)] // Intrinsics; see `x86`.
 
-use super::record;
-use crate::trace::bvh::simd::Vector;
+use super::Vector;
 
 /// Most items that [`Boxes::ranks`] sorts.
 pub(in crate::trace::bvh) const RANKED: usize = 32;
@@ -20,6 +19,14 @@ pub(in crate::trace::bvh) trait Boxes: Copy {
     fn half_areas(boxes: [Self; 3]) -> [f32; 4];
     /// For each of the first `n` keys, none of them NaN, how many of these are less. The rest is anything.
     fn ranks(keys: &[f32; RANKED], n: usize) -> [u32; RANKED];
+}
+
+/// Half the surface of a box; without order for an empty one.
+#[inline(always)]
+pub(in crate::trace::bvh) fn half_area(bounds: &[f32; 8]) -> f32 {
+    let &[a, b, c, _, d, e, f, _] = bounds;
+    let (x, y, z) = (a + d, b + e, c + f);
+    y * (x + z) + z * x
 }
 
 impl Boxes for [f32; 8] {
@@ -45,7 +52,7 @@ impl Boxes for [f32; 8] {
 
     #[inline(always)]
     fn half_areas([a, b, c]: [Self; 3]) -> [f32; 4] {
-        [record::half_area(&a), record::half_area(&b), record::half_area(&c), 0.0]
+        [half_area(&a), half_area(&b), half_area(&c), 0.0]
     }
 
     #[inline(always)]
