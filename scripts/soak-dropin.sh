@@ -3,7 +3,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-g++ -O2 -std=c++17 ffi/rtc/tests/soak.cpp -o target/dropin/soak -lembree3
+version=3
+define=()
+if [[ -e /usr/include/embree4/rtcore.h ]]; then
+    version=4
+    define=(-DEMBREE4)
+fi
+g++ -O2 -std=c++17 "${define[@]}" ffi/rtc/tests/soak.cpp -o target/dropin/soak "-lembree$version"
 export LD_LIBRARY_PATH=$PWD/target/dropin
 target/dropin/soak "${CYCLES:-1000000}"
-valgrind --quiet --child-silent-after-fork=yes --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite --error-exitcode=9 target/dropin/conformance3
+valgrind --quiet --child-silent-after-fork=yes --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite --error-exitcode=9 target/dropin/conformance$version

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # Compiles the tests of the C interface (ffi/rtc/tests/conformance) and runs them on Embree and on our library: they must pass on both.
 #
-#   scripts/test-dropin.sh [3|4] [FOLDER]     which version (default 3), and where our library is (default target/dropin)
+#   scripts/test-dropin.sh [3|4] [FOLDER]     which version (default: the one that is installed, 4 where both are), and where our library is (default target/dropin)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-version=${1:-3}
+installed=3
+[[ ! -e /usr/include/embree4/rtcore.h ]] || installed=4
+version=${1:-$installed}
 folder=$(realpath "${2:-target/dropin}")
 program=target/dropin/conformance$version
 define=()

@@ -3,7 +3,7 @@
 //! Triangles go to the accelerators as meshes; every other shape is a variant of [`Shape`], which answers
 //! [`bounds`](Shape::bounds) and [`intersect`](Shape::intersect) for the native leaves and for Embree's user geometry
 //! alike. A closed family is an enum and not a trait object, so that the compiler lists what a new shape must reach. It does not list how it
-//! is read from a file (`DShape` in `src/io/dshape.rs`, `SHAPES` in `src/io/toml/primitives.rs`), and which kinds tests go through: `KINDS` in `src/lab/shape_tests.rs`, `shapes` in
+//! is read from a file (`DShape` in `src/io/dshape.rs`, `SINGLES` and `shape` in `src/io/toml/primitives.rs`), and which kinds tests go through: `KINDS` in `src/lab/shape_tests.rs`, `shapes` in
 //! `tests/shapes.rs` and `Kind` in `tests/accelerators/subjects.rs`.
 
 mod axis;

@@ -13,7 +13,7 @@
 //! tracer, `Accelerated`, does the rest with any of them: an index over what is fixed, one over each object, one over the
 //! places where objects stand. Primitives are tested by the very code of brute force, so hits are the same to the bit as long
 //! as no index loses an item; `ray` has the bounds on rounding by which none does. A tracer for each accelerator, the
-//! alternative, would have its own leaves, levels and proofs, seven times.
+//! alternative, would have its own leaves, levels and proofs, six times.
 //!
 //! The native [`Bvh`](super::bvh) is no `Index`: what makes it fast (eight boxes, bundles, blocks of triangles) is what the
 //! trait hides.
