@@ -33,7 +33,7 @@ test: packages ## run the tests of library and program
 # The longest tests of the native tracer alone and of how samples are spread, which are the same on every system: `make test` has run them.
 NATIVE = brute_force:: stress::native render::adaptive::
 # Those that no feature changes, either, but for what Embree itself does.
-FEATURELESS = $(NATIVE) stress::the_matrix render::determinism:: render::transport:: accelerators::matrix:: references::scenes_look
+FEATURELESS = $(NATIVE) stress::the_matrix render::determinism:: render::transport:: accelerators::matrix::
 # With the Python package, so that one library serves both: who depends on a crate decides on its features.
 WITHOUT_FEATURES = --no-default-features -p twincast -p twincast-python
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A million scenes, one after the other, on our library: memory must stay flat. And the tests of the C interface under valgrind.
+# A million scenes, one after the other, on our library, in the version of Debian's Embree that is installed (4 where both are): memory must stay flat. And the tests
+# of the C interface, which scripts/test-dropin.sh has compiled, under valgrind.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

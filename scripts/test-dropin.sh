@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Compiles the tests of the C interface (ffi/rtc/tests/conformance) and runs them on Embree and on our library: they must pass on both.
 #
-#   scripts/test-dropin.sh [3|4] [FOLDER]     which version (default: the one that is installed, 4 where both are), and where our library is (default target/dropin)
+#   scripts/test-dropin.sh [3|4] [FOLDER]     which version (default: that of Debian's Embree that is installed, 4 where both are), and where our library is (default target/dropin)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

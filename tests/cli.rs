@@ -182,6 +182,21 @@ fn what_a_scene_is_read_from_is_not_replaced() {
     assert_eq!(render("a.toml", &["-o", &path("c.png")]), (0, String::new()));
 }
 
+#[test]
+fn a_picture_that_the_scene_names_is_the_scenes_to_name_well() {
+    let ball = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
+    let scene = format!("[render]\noutput = \"picture.xyz\"\nsize = [8, 8]\n\n{ball}");
+    let files = crate::io::Files::one("a.toml", &scene);
+    let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
+    let (code, message) = fails(&["render", &path("a.toml"), "-q", "--backend", "native"]);
+    let words = "a.toml: names the picture picture.xyz: unknown suffix .xyz; this build writes ";
+    assert!(code == 3 && message.contains(words) && message.contains("; -o FILE chooses another"), "{code} {message}");
+    let chosen = fails(&["render", &path("a.toml"), "-q", "--backend", "native", "-o", &path("b.png")]);
+    assert_eq!(chosen, (0, String::new()));
+    let (code, message) = fails(&["render", &path("a.toml"), "-q", "--backend", "native", "-o", &path("b.xyz")]);
+    assert!(code == 4 && message.contains("b.xyz: unknown suffix .xyz"), "{code} {message}");
+}
+
 #[cfg(not(feature = "embree"))]
 #[test]
 fn a_backend_that_is_not_built_ends_with_5() {

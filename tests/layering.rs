@@ -1,6 +1,6 @@
 //! Holds the source to the layers of the architecture: imports only ever point down, and `unsafe` stays where it may be.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -113,10 +113,10 @@ fn heads(rest: &str) -> Vec<&str> {
     names
 }
 
-/// Every name directly below a crate's root that `text`, in the module `path`, refers to.
-fn uses<'t>(text: &'t str, path: &[&str]) -> Vec<&'t str> {
+/// Every name directly below a module that `text` refers to, which stands in the module `path` from there on. `roots` are the module's own paths.
+fn uses<'t>(text: &'t str, path: &[&str], roots: &[&str]) -> Vec<&'t str> {
     let mut found = Vec::new();
-    for root in ["crate::", CORE] {
+    for root in roots {
         for (i, _) in text.match_indices(root) {
             // Not `$crate::` and not another crate's name.
             if !text[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
@@ -161,7 +161,7 @@ fn violations(file: &str, text: &str, exports: &BTreeMap<&str, &str>) -> Vec<Str
     let Some(&module) = path.first() else { return Vec::new() };
     let Some(own) = layer(module) else { return vec![format!("{file}: module {module} is in no layer")] };
     let mut wrong = Vec::new();
-    for name in uses(without_tests(text), &path) {
+    for name in uses(without_tests(text), &path, &["crate::", CORE]) {
         let target = exports.get(name).copied().unwrap_or(name);
         match layer(target) {
             Some(other) if target == module || other < own => {}
@@ -183,6 +183,40 @@ fn imports_point_down() {
     let wrong: Vec<_> = judged.flat_map(|(file, text)| violations(file, text, &exports)).collect();
     assert!(wrong.is_empty(), "imports only ever point down:\n{}", wrong.join("\n"));
     assert_eq!((exports.get("Ray"), exports.get("Renderer")), (Some(&"ray"), Some(&"render")));
+}
+
+/// The modules among `parts` that are in a circle of imports, or import one that is.
+fn circular<'a>(parts: &BTreeMap<&'a str, BTreeSet<&str>>) -> Vec<&'a str> {
+    let mut left: Vec<&str> = parts.keys().copied().collect();
+    loop {
+        let before = left.len();
+        let still = left.clone();
+        left.retain(|part| parts[part].iter().any(|import| import != part && still.contains(import)));
+        if left.len() == before {
+            return left;
+        }
+    }
+}
+
+#[test]
+fn parts_of_the_native_tracer_import_one_way() {
+    const ROOT: &str = "crate::trace::bvh::";
+    // A query says what is done with a hit, and `hits` does it.
+    const EXCEPTION: (&str, &str) = ("query", "hits");
+    let files = files();
+    let mut parts: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (file, text) in files.iter().filter(|(file, _)| !file.ends_with("tests.rs")) {
+        if let ["trace", "bvh", path @ ..] = &module_path(file)[..]
+            && let Some(part) = path.first()
+        {
+            parts.entry(part).or_default().extend(uses(without_tests(text), path, &[ROOT]));
+        }
+    }
+    assert!(parts["walk"].contains("simd") && parts.len() > 20, "{parts:?}");
+    let (from, to) = EXCEPTION;
+    assert!(parts.get_mut(from).is_some_and(|imports| imports.remove(to)), "the exception is one");
+    let circle = circular(&parts);
+    assert!(circle.is_empty(), "among these, imports run in a circle: {circle:?}");
 }
 
 #[test]
@@ -219,6 +253,11 @@ fn the_scan_itself_finds_what_it_should() {
         ),
         1
     );
+    let circle = |of_c| {
+        let imports = [("a", vec!["b", "a", "Bvh"]), ("b", vec!["c"]), ("c", of_c)];
+        circular(&imports.map(|(part, imports)| (part, imports.into_iter().collect())).into())
+    };
+    assert_eq!((circle(vec![]), circle(vec!["b"])), (vec![], vec!["a", "b", "c"]));
     assert_eq!(wrong("src/novel.rs", ""), 1);
     assert_eq!(wrong("src/ray.rs", "use crate::novel::x;"), 1);
 }

@@ -347,6 +347,13 @@ impl RenderArgs {
         let Some(picture) = named.map(PathBuf::from) else {
             return Err(no_picture());
         };
+        image::check_suffix(&picture).map_err(|error| match error {
+            Error::Output { path, message } => {
+                let message = format!("names the picture {}: {message}; -o FILE chooses another", path.display());
+                Error::input(&self.scene.scene, "", message)
+            }
+            other => other,
+        })?;
         let pictures = vec![picture];
         outputs::check(&pictures, &self.stats, &self.inputs())?;
         Ok(pictures)

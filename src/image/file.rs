@@ -283,6 +283,14 @@ fn suffix(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
+/// Whether this build writes pictures of such a name.
+///
+/// # Errors
+/// [`Error::Output`] where it does not, and as [`prepare`].
+pub(crate) fn check_suffix(path: &Path) -> Result<()> {
+    writable_suffix(path).map(drop)
+}
+
 /// The suffix in lower case, if this build writes it.
 fn writable_suffix(path: &Path) -> Result<String> {
     let suffix = suffix(path);

@@ -11,8 +11,8 @@
 //!
 //! | of rays and what they meet | |
 //! | --- | --- |
-//! | `simd/` | the same code compiled for AVX-512, for AVX2 and for any processor, and which of them runs (`isa`) |
-//! | `reject/` | what a ray cannot hit: boxes, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*), and triangles |
+//! | `simd/` | the same code compiled for AVX-512, for AVX2 and for any processor, and which of them runs (`isa`); a number for each ray of a bundle (`PerRay`), and a box as the builder has it (`boxes`) |
+//! | `reject/` | what a ray cannot hit: boxes, padded so that rounding never loses a hit (Ize 2013, *Robust BVH ray traversal*), and triangles; by how much a ray may be off (`Blur`) |
 //! | `hits/` | what it has hit: noted, listed, decided, computed |
 //! | `query` | what is asked: the closest hit, or whether there is one; and all that a query of another kind has to say |
 //!

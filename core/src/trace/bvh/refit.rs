@@ -5,6 +5,8 @@
 //! while refitting (Kopta, Ize, Spjut, Brunvand, Davis, Kensler 2012, *Fast, effective BVH updates for animated
 //! scenes*), the alternative, would change the tree's layout under a cached file.
 
+use std::fmt;
+
 use super::Bvh;
 use super::build::preset::Options;
 use super::levels::Level;
@@ -25,7 +27,7 @@ impl Bvh {
     /// be, one that can be hit; then the trees may be partly fitted, and are to be built anew.
     pub fn refit(&mut self, world: &World) -> Result<()> {
         if self.objects.len() != world.objects.len() {
-            return Err(changed(&format!("{} objects, not {}", world.objects.len(), self.objects.len())));
+            return Err(changed(format!("{} objects, not {}", world.objects.len(), self.objects.len())));
         }
         let options = Options { preset: self.preset, isa: self.isa(), progress: None };
         self.fixed.refit(&world.parts[world.fixed.clone()], &options)?;
@@ -41,14 +43,14 @@ impl Bvh {
 
 impl Level {
     fn refit(&mut self, parts: &[Part], options: &Options<'_>) -> Result<()> {
-        self.triangles.refit(parts)?;
+        self.triangles.refit(parts).map_err(changed)?;
         self.shapes = ShapeTree::build(parts, options);
         Ok(())
     }
 }
 
 /// The error for a world that is not the one a tree was built for.
-pub(super) fn changed(what: &str) -> Error {
+fn changed(what: impl fmt::Display) -> Error {
     Error::Backend {
         backend: "native",
         message: format!("cannot refit: the world now has {what}; build the tree anew"),

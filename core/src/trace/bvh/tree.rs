@@ -44,7 +44,7 @@ impl Tree {
         self.nodes.is_empty()
     }
 
-    /// The box around everything, [`widened`].
+    /// The box around everything, [`widened`](super::node::widened).
     #[inline]
     pub fn bounds(&self) -> Aabb {
         self.bounds
@@ -81,13 +81,13 @@ impl Tree {
         })
     }
 
-    /// This tree with nodes `below` in place of its leaves, of one item each: that of an item is told by `node`.
-    pub fn over(self, below: Vec<Node>, node: impl Fn(u32) -> u32) -> Self {
+    /// This tree, whose leaves name one item each, with the nodes `below` in their place; `index_of(item)` is where in `below` an item's node is.
+    pub fn over(self, below: Vec<Node>, index_of: impl Fn(u32) -> u32) -> Self {
         let mut above = self.nodes.into_vec();
         let base = above.len() as u32;
         for child in above.iter_mut().flat_map(|above| &mut above.child) {
             if child.is_leaf() && *child != Child::NONE {
-                *child = Child::inner(base + node(child.first()));
+                *child = Child::inner(base + index_of(child.first()));
             }
         }
         const CHUNK: usize = 1 << 12;

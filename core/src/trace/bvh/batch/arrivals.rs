@@ -3,12 +3,12 @@
 use std::hint::select_unpredictable;
 
 use crate::ray::{Hit, Ray};
+use crate::trace::bvh::Bvh;
 use crate::trace::bvh::hits::found::{Found, NONE};
 use crate::trace::bvh::hits::noted::Rays;
 use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::{Query, SOMETHING};
-use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::{Bvh, bundle};
+use crate::trace::bvh::simd::{RAYS, Simd};
 
 /// Rays that have arrived, whose hits are computed four at a time.
 pub(super) struct Arrivals<'a, Q: Query> {
@@ -25,7 +25,7 @@ impl<'a, Q: Query> Arrivals<'a, Q> {
         rays: &'a [Ray],
         answers: &'a mut [Q::Answer],
         first: usize,
-        t: &'a mut [f64; bundle::RAYS],
+        t: &'a mut [f64; RAYS],
     ) -> Self {
         let answers = Answers { bvh, rays, answers, first, t };
         Self { answers, fixed: Pending::NONE, placed: Pending::NONE }
@@ -69,13 +69,13 @@ struct Answers<'a, Q: Query> {
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     first: usize,
-    t: &'a mut [f64; bundle::RAYS],
+    t: &'a mut [f64; RAYS],
 }
 
 impl<Q: Query> Answers<'_, Q> {
     #[inline(always)]
     fn take(&mut self, ray: usize, t: f64, hit: Option<Hit>) {
-        (self.answers[ray], self.t[(self.first + ray) % bundle::RAYS]) = (Q::answer(hit), t);
+        (self.answers[ray], self.t[(self.first + ray) % RAYS]) = (Q::answer(hit), t);
     }
 
     /// Answers for four rays, of which all hits are fixed, or all are placed.

@@ -10,9 +10,8 @@ use super::alone::Doubted;
 use super::flight::{self, Flight, Objects};
 use super::levels::placements::walk_over;
 use super::query::{Closest, Query};
-use super::simd::Simd;
-use super::simd::isa;
-use super::simd::isa::Kernel;
+use super::simd::isa::{self, Kernel};
+use super::simd::{RAYS, Simd};
 use super::walk::Visit;
 use super::{Bvh, bundle};
 use crate::ray::Ray;
@@ -144,7 +143,7 @@ impl Bvh {
         let mut start = 0;
         while start < rays.len() {
             let left = rays.len() - start;
-            let chunk = start..start + if in_bundles || !is_all { bundle::RAYS.min(left) } else { left };
+            let chunk = start..start + if in_bundles || !is_all { RAYS.min(left) } else { left };
             start = chunk.end;
             let (first, count) = (chunk.start, chunk.len());
             let traced = if in_bundles {
@@ -153,7 +152,7 @@ impl Bvh {
                 0
             };
             // The others, in runs: all of them, where there are no bundles.
-            let mut open = if in_bundles { !traced & u64::MAX >> (bundle::RAYS - count) } else { 1 };
+            let mut open = if in_bundles { !traced & u64::MAX >> (RAYS - count) } else { 1 };
             while open != 0 {
                 let from = open.trailing_zeros() as usize;
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
@@ -206,7 +205,7 @@ struct Unbundled<'a, Q: Query> {
     first: usize,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    t: &'a mut [f64; bundle::RAYS],
+    t: &'a mut [f64; RAYS],
 }
 
 impl<Q: Query> Unbundled<'_, Q> {
@@ -270,7 +269,7 @@ struct Others<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    t: &'a [f64; bundle::RAYS],
+    t: &'a [f64; RAYS],
 }
 
 impl<Q: Query> Kernel for Others<'_, Q> {

@@ -4,7 +4,7 @@
 //!
 //! | file | idea |
 //! | --- | --- |
-//! | `record`, `lanes` | a box in one register, as [-min, max] |
+//! | `record` | a box in one register, as [-min, max]; arithmetic with it, `simd/boxes` |
 //! | `split` | a range of items, and how it is divided in two |
 //! | `bins` | the best plane between bins, for large ranges |
 //! | `sweep` | the best of all divisions, for small ones |

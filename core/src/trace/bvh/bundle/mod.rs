@@ -40,7 +40,7 @@ use super::flight::Visitors;
 use super::levels::placements::FIXED;
 use super::node::WIDTH;
 use super::query::{Query, SOMETHING};
-use super::simd::Simd;
+use super::simd::{RAYS, Simd};
 use crate::ray::Ray;
 use found::{BundleFound, Finish};
 use octants::{Octants, Part};
@@ -49,8 +49,6 @@ use range::Range;
 use rays::{Bundle, Fill, Fit};
 use walk::{Walk, few};
 use way::{Entry, Way};
-
-pub(super) use super::simd::RAYS;
 
 /// Working memory, made once a batch.
 pub(super) struct Scratch {

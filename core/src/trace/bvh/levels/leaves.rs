@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::numbers::{NONE, Numbers, numbered};
+use super::numbers::{Blocks, NONE, Numbers, numbered};
 use crate::math::{Aabb, is_traceable};
 use crate::memory::Array;
 use crate::memory::room;
@@ -20,33 +20,6 @@ pub(in crate::trace::bvh) enum Leaves {
     Blocks(Array<Block>),
     /// 4 bytes a triangle, but to reach a corner takes two steps through memory.
     Numbers(Numbers),
-}
-
-/// Blocks by their numbers.
-pub(in crate::trace::bvh) trait Blocks {
-    /// Whether corners are fetched from the mesh when a block is asked for.
-    const IS_PUT_TOGETHER: bool;
-    /// Block `index`; `scratch` is where it may be put together.
-    fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
-    /// Where in memory it is.
-    fn address<S: Simd>(&self, index: u32) -> *const u8;
-    /// The numbers, where corners are fetched from so far that it helps to have them loaded before: first the triangles of a block, then their vertices.
-    #[inline(always)]
-    fn far(&self) -> Option<&Numbers> {
-        None
-    }
-}
-
-impl Blocks for [Block] {
-    const IS_PUT_TOGETHER: bool = false;
-    #[inline(always)]
-    fn block<'a, S: Simd>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
-        &self[index as usize]
-    }
-    #[inline(always)]
-    fn address<S: Simd>(&self, index: u32) -> *const u8 {
-        S::address(self, index)
-    }
 }
 
 /// Nodes that are gone through by one thread.
@@ -103,7 +76,7 @@ impl Leaves {
     pub fn len(&self) -> usize {
         match self {
             Self::Blocks(blocks) => blocks.len(),
-            Self::Numbers(numbers) => numbers.blocks.len(),
+            Self::Numbers(numbers) => numbers.blocks().len(),
         }
     }
 
@@ -111,7 +84,7 @@ impl Leaves {
     pub fn as_bytes(&self) -> &[u8] {
         match self {
             Self::Blocks(blocks) => bytemuck::cast_slice(blocks),
-            Self::Numbers(numbers) => bytemuck::cast_slice(&numbers.blocks),
+            Self::Numbers(numbers) => bytemuck::cast_slice(numbers.blocks()),
         }
     }
 
@@ -129,7 +102,7 @@ impl Leaves {
                 (numbers, bytemuck::bytes_of(&again) == bytemuck::bytes_of(block))
             }
             Self::Numbers(own) => {
-                let (numbers, most) = (*own.blocks.get(index as usize)?, meshes.triangle_count());
+                let (numbers, most) = (*own.blocks().get(index as usize)?, meshes.triangle_count());
                 (numbers, numbers.iter().all(|&number| number == NONE || (number as usize) < most))
             }
         };
@@ -156,8 +129,8 @@ impl Leaves {
                 })
                 .reduce(|| true, |a, b| a && b),
             Self::Numbers(numbers) => {
-                numbers.meshes = meshes.clone();
-                let count = numbers.blocks.len() as u32;
+                numbers.set_meshes(meshes.clone());
+                let count = numbers.blocks().len() as u32;
                 (0..count).into_par_iter().all(|index| is_sound(numbers.put_together::<Portable>(index, &mut None)))
             }
         }
@@ -186,7 +159,7 @@ impl Leaves {
     pub fn bytes(&self) -> usize {
         match self {
             Self::Blocks(blocks) => size_of_val(&blocks[..]),
-            Self::Numbers(numbers) => size_of_val(&numbers.blocks[..]),
+            Self::Numbers(numbers) => size_of_val(numbers.blocks()),
         }
     }
 }

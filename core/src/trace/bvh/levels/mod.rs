@@ -18,6 +18,7 @@ use self::shapes::ShapeTree;
 use self::triangles::TriangleTree;
 use super::build::preset::Options;
 use super::query::Query;
+use super::reject::Blur;
 use super::reject::filter::Filter;
 use super::reject::slab::SlabRay;
 use super::simd::Simd;
@@ -26,7 +27,6 @@ use super::walk::{self, Visit};
 use crate::math::{Aabb, Affine3, Vec3};
 use crate::ray::Ray;
 use crate::trace::Part;
-use crate::trace::bvh::reject::Blur;
 use crate::trace::nearest::Nearest;
 
 /// Everything in one coordinate system.

@@ -1,6 +1,5 @@
-//! Blocks of triangle numbers, whose corners are fetched from the mesh when a block is asked for.
+//! Blocks that are there, or are put together from numbers of triangles, whose corners are fetched from the mesh, when one is asked for.
 
-use super::leaves::Blocks;
 use crate::math::{Aabb, Vec3};
 use crate::memory::Array;
 use crate::trace::bvh::block::{Block, LANES, Lane, rounded_up};
@@ -8,10 +7,37 @@ use crate::trace::bvh::meshes::{Mesh, Meshes};
 use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::bvh::simd::{Array as _, Simd, Vector};
 
+/// Blocks by their numbers.
+pub(in crate::trace::bvh) trait Blocks {
+    /// Whether corners are fetched from the mesh when a block is asked for.
+    const IS_PUT_TOGETHER: bool;
+    /// Block `index`; `scratch` is where it may be put together.
+    fn block<'a, S: Simd>(&'a self, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    /// Where in memory it is.
+    fn address<S: Simd>(&self, index: u32) -> *const u8;
+    /// The numbers, where corners are fetched from so far that it helps to have them loaded before: first the triangles of a block, then their vertices.
+    #[inline(always)]
+    fn far(&self) -> Option<&Numbers> {
+        None
+    }
+}
+
+impl Blocks for [Block] {
+    const IS_PUT_TOGETHER: bool = false;
+    #[inline(always)]
+    fn block<'a, S: Simd>(&'a self, index: u32, _: &'a mut Option<Block>) -> &'a Block {
+        &self[index as usize]
+    }
+    #[inline(always)]
+    fn address<S: Simd>(&self, index: u32) -> *const u8 {
+        S::address(self, index)
+    }
+}
+
 /// Blocks of triangle numbers.
 pub(in crate::trace::bvh) struct Numbers {
-    pub(super) blocks: Array<[u32; LANES]>,
-    pub(super) meshes: Meshes,
+    blocks: Array<[u32; LANES]>,
+    meshes: Meshes,
     /// Whether the meshes are of [`FAR`] bytes or more.
     are_far: bool,
 }
@@ -64,18 +90,17 @@ impl Kernel for PutTogether<'_> {
     fn run<S: Simd>(self) {
         const NOWHERE: &Vec3 = &Vec3::ZERO;
         let Self { numbers, index, block } = self;
-        let (mut triangles, mut lane) = ([[NOWHERE; 3]; LANES], 0);
+        let mut triangles = [[NOWHERE; 3]; LANES];
         numbers.for_each(
             index,
             #[inline(always)]
-            |mesh, primitive| {
+            |lane, mesh, primitive| {
                 let [a, b, c] = mesh.triangles[primitive as usize];
                 let positions = &mesh.positions[..];
                 triangles[lane] = [&positions[a as usize], &positions[b as usize], &positions[c as usize]];
                 block.primitive[lane] = primitive;
                 block.part[lane] = mesh.part;
                 block.lanes |= 1 << lane;
-                lane += 1;
             },
         );
         let corners = S::by_component(&triangles);
@@ -97,6 +122,17 @@ impl Numbers {
     pub(super) fn new(blocks: impl Into<Array<[u32; LANES]>>, meshes: Meshes) -> Self {
         let are_far = meshes.bytes() >= FAR;
         Self { blocks: blocks.into(), meshes, are_far }
+    }
+
+    /// The numbers, block by block.
+    #[inline(always)]
+    pub(super) fn blocks(&self) -> &[[u32; LANES]] {
+        &self.blocks
+    }
+
+    /// Takes the corners of `meshes`, whose triangles are the same.
+    pub(super) fn set_meshes(&mut self, meshes: Meshes) {
+        self.meshes = meshes;
     }
 
     /// Block `index`, by a function of its own: it is long, and kernels ask for blocks in many places.
@@ -121,7 +157,7 @@ impl Numbers {
         self.for_each(
             index,
             #[inline(always)]
-            |mesh, primitive| S::prefetch_line(&mesh.triangles[primitive as usize]),
+            |_, mesh, primitive| S::prefetch_line(&mesh.triangles[primitive as usize]),
         );
     }
 
@@ -131,7 +167,7 @@ impl Numbers {
         self.for_each(
             index,
             #[inline(always)]
-            |mesh, primitive| {
+            |_, mesh, primitive| {
                 let [a, b, c] = mesh.triangles[primitive as usize];
                 S::prefetch_line(&mesh.positions[a as usize]);
                 S::prefetch_line(&mesh.positions[b as usize]);
@@ -140,15 +176,15 @@ impl Numbers {
         );
     }
 
-    /// Each triangle of a block.
+    /// Each triangle of a block, with its lane.
     #[inline(always)]
-    fn for_each<'a>(&'a self, index: u32, mut visit: impl FnMut(&'a Mesh, u32)) {
+    fn for_each<'a>(&'a self, index: u32, mut visit: impl FnMut(usize, &'a Mesh, u32)) {
         let numbers = &self.blocks[index as usize];
         let (mut last, _) = self.meshes.find(numbers[0]);
         // The used lanes come first.
-        for &number in numbers.iter().take_while(|number| **number != NONE) {
+        for (lane, &number) in numbers.iter().enumerate().take_while(|(_, number)| **number != NONE) {
             let (mesh, primitive) = self.meshes.find_near(number, &mut last);
-            visit(mesh, primitive);
+            visit(lane, mesh, primitive);
         }
     }
 

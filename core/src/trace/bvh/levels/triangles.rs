@@ -6,10 +6,11 @@ use super::Through;
 use super::clusters;
 use super::farthest::Waiting;
 use super::leaves::Leaves;
-use crate::error::Result;
+
 use crate::math::{Aabb, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::Placed;
+use crate::trace::bvh::PartId;
 use crate::trace::bvh::block::{Block, LANES, Lane};
 use crate::trace::bvh::build::preset::{Options, Preset};
 use crate::trace::bvh::build::{self, presplit};
@@ -18,7 +19,6 @@ use crate::trace::bvh::node::Child;
 use crate::trace::bvh::reject::filter::Filter;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::tree::Tree;
-use crate::trace::bvh::{PartId, refit};
 use crate::trace::leaf::{Id, offer_triangle};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
@@ -80,18 +80,18 @@ impl TriangleTree {
     /// Moves all triangles to where they are in `parts`.
     ///
     /// # Errors
-    /// Where there are others than those it was built for.
-    pub fn refit(&mut self, parts: &[Part]) -> Result<()> {
+    /// Where there are others than those it was built for, in words.
+    pub fn refit(&mut self, parts: &[Part]) -> Result<(), &'static str> {
         let is_same = |(part, old): (&Part, &Option<Triangles>)| match (triangles(part), old) {
             (Some(new), Some(old)) => Arc::ptr_eq(&new, old) || new == *old,
             (new, old) => new.is_none() && old.is_none(),
         };
         if parts.len() != self.topology.len() || !parts.iter().zip(&self.topology).all(is_same) {
-            return Err(refit::changed("other triangles"));
+            return Err("other triangles");
         }
         let meshes = Meshes::new(parts);
         if !self.leaves.refit(&meshes) || meshes.traceable_count() != self.count {
-            return Err(refit::changed("other triangles that can be hit"));
+            return Err("other triangles that can be hit");
         }
         let leaves = &self.leaves;
         self.tree.refit(|blocks| blocks.map(|index| leaves.bounds(index)).fold(Aabb::EMPTY, Aabb::union));

@@ -4,6 +4,8 @@
 //! and [`Avx512`]. They may differ in the last bit of an f32 where a product and a sum are fused, so what is fused serves only tests
 //! that reject conservatively; where bits of f32 are kept, as by [`super::levels::farthest`], products and sums are rounded one by one. f64 is never fused: its operations round as the scalar ones of
 //! [`crate::shape::triangle`] do, so that the numbers of a hit are the same whoever computes them.
+//!
+//! Beside these, what vectors are made of: a number for each ray of a bundle ([`PerRay`]), and a box as the builder has it ([`boxes`]).
 
 mod arrays;
 #[cfg(target_arch = "x86_64")]
