@@ -156,6 +156,16 @@ impl Rational {
         }
     }
 
+    /// As `cmp`, of roots that are rounded to 256 bits, where those of two quadratics may be one: equal where they differ by 2^-200 of themselves.
+    pub fn cmp_root(&self, other: &Self) -> Ordering {
+        let (here, there) = (self.numerator.mul(&other.denominator), other.numerator.mul(&self.denominator));
+        let difference = here.sub(&there);
+        let magnitude = |x: Dyadic| if x.signum() < 0 { x.neg() } else { x };
+        let sign = difference.signum();
+        let excess = magnitude(difference).mul(&Dyadic::from_f64(2f64.powi(200))).sub(&magnitude(there));
+        if excess.signum() <= 0 { Ordering::Equal } else { sign.cmp(&0) }
+    }
+
     /// The sign of `constant + slope * self`.
     pub fn sign_of(&self, constant: &Dyadic, slope: &Dyadic) -> i32 {
         constant.mul(&self.denominator).add(&slope.mul(&self.numerator)).signum()

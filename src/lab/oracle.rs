@@ -12,6 +12,8 @@
 //! The determinants are formed from the corners and not from points along the ray, because o + d need not be an f64.
 //! Nothing here is tuned for speed but the f64 filter in front of the integers of triangles ([`Approx`]).
 
+use std::cmp::Ordering;
+
 use super::exact::{Approx, Dyadic, Rational, Ring, Vector, det, vector, zip};
 use super::exact_shapes::crossings;
 use crate::math::{Affine3, Vec3, is_traceable};
@@ -107,10 +109,10 @@ pub fn closest(world: &World, ray: &Ray) -> Vec<(Id, Meeting)> {
     let mut nearest: Vec<(Id, Meeting)> = Vec::new();
     for (id, primitive) in primitives(world, ray.moment()) {
         let Some(meeting) = meet(ray, &primitive).filter(|m| m.in_range) else { continue };
-        match nearest.first().map(|(_, first)| meeting.t.cmp(&first.t)) {
-            Some(std::cmp::Ordering::Greater) => continue,
-            Some(std::cmp::Ordering::Less) => nearest.clear(),
-            Some(std::cmp::Ordering::Equal) | None => {}
+        match nearest.first().map(|(_, first)| meeting.t.cmp_root(&first.t)) {
+            Some(Ordering::Greater) => continue,
+            Some(Ordering::Less) => nearest.clear(),
+            Some(Ordering::Equal) | None => {}
         }
         nearest.push((id, meeting));
     }
@@ -316,5 +318,19 @@ mod tests {
         let ids: Vec<Id> = closest(&world, &down(0.25, 0.25)).into_iter().map(|(id, _)| id).collect();
         assert_eq!(ids, [(0, 0, 0), (0, 0, 1)]);
         assert!(closest(&world, &down(2.0, 0.25)).is_empty());
+    }
+
+    #[test]
+    fn spheres_tie_where_their_roots_are_one_though_not_rational() {
+        let ball = |x: f32, z: f32| Shape::Sphere(Sphere { centre: Vec3::new(x, -0.75, z), radius: 0.625 });
+        let shapes = vec![ball(1.0, 0.75), ball(0.875, 0.375), ball(0.875, 0.375f32.next_up())];
+        let scene = crate::Scene::from_geometries(
+            vec![crate::scene::Geometry::Shapes { shapes, material: 0 }],
+            vec![Default::default()],
+        );
+        let world = World::new(&scene).unwrap();
+        // Both axes pass it at sqrt(5 / 64), so that it meets both at (63.375 - sqrt(5 / 16)) / 4.
+        let found = closest(&world, &Ray::new(Vec3::new(0.75, -64.125, 0.625), Vec3::Y * 4.0));
+        assert_eq!(found.iter().map(|(id, _)| id.2).collect::<Vec<_>>(), [0, 1]);
     }
 }

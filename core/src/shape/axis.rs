@@ -3,10 +3,12 @@
 //! Capped, they are convex: the line is inside where it is inside the lateral surface and between the end planes, and
 //! hits where it enters and leaves. One comparison of t decides for the side and the cap at once, so no ray slips
 //! through the rim between them; testing the side and two disks by themselves, the simpler way, loses rays there. Open,
-//! they are hit at the lateral surface's roots, where those are between the end planes.
+//! they are hit at the lateral surface's roots, where those are between the end planes, which is decided exactly.
+
+use std::cmp::Ordering;
 
 use super::line::{Interval, Line, NO_ROOTS, PRECISION, Roots};
-use super::quadric::Inside;
+use super::quadric::{Inside, Quadric};
 use super::round::{disk_reach, outwards, turn};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Bounded, Formula, Number, dot, minus, vector};
@@ -51,9 +53,10 @@ impl Frustum {
         self.ends[1].as_dvec3() - self.ends[0].as_dvec3()
     }
 
-    /// The crossings of a line of which `inside` is within the lateral surface. `widens`: whether the line goes towards
+    /// The crossings of a line; `surface` is the lateral one. `widens`: whether the line goes towards
     /// larger radii, on the side of the apex where the surface is.
-    pub fn roots(&self, line: &Line, inside: Inside, widens: bool) -> Roots {
+    pub fn roots(&self, line: &Line, surface: &impl Quadric, widens: bool) -> Roots {
+        let inside = surface.solve();
         let within = match inside {
             Inside::Nothing => return NO_ROOTS,
             Inside::All if !self.capped => return NO_ROOTS,
@@ -63,12 +66,14 @@ impl Frustum {
             Inside::Beyond(roots) if widens => Interval { enter: roots.exit, ..Interval::ALL },
             Inside::Beyond(roots) => Interval { exit: roots.enter, ..Interval::ALL },
         };
-        let between = Ends { line, ends: self.ends.map(|end| line.place(end)) }.between();
+        let ends = Ends { line, ends: self.ends.map(|end| line.place(end)) };
+        let between = ends.between();
         let roots = if self.capped {
             within.and(between).ends()
         } else {
-            let side = |t: f64| (t.is_finite() && between.contains(t)).then_some(t);
-            let [first, second] = [side(within.enter), side(within.exit)];
+            let rims = Rims { surface, ends, between, is_beyond: matches!(inside, Inside::Beyond(_)) };
+            let side = |t: f64, crossing| (t.is_finite() && rims.hold(t, crossing)).then_some(t);
+            let [first, second] = [side(within.enter, Crossing::Enter), side(within.exit, Crossing::Exit)];
             if first.is_some() { [first, second] } else { [second, None] }
         };
         roots.map(|t| t.map(|t| line.t(t)))
@@ -118,6 +123,76 @@ impl Ends<'_> {
         } else {
             Interval::EMPTY
         }
+    }
+}
+
+/// A crossing of a line and the lateral surface.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Crossing {
+    Enter,
+    Exit,
+}
+
+/// An open lateral surface between its end planes. On a rim two t meet, each of them rounded: there their order is that of exact arithmetic, by the signs that the
+/// surface's polynomial and its slope have where the line meets the end plane.
+struct Rims<'a, Q> {
+    surface: &'a Q,
+    ends: Ends<'a>,
+    between: Interval,
+    /// Whether the line is inside before the first crossing and after the second, and not between them.
+    is_beyond: bool,
+}
+
+impl<Q: Quadric> Rims<'_, Q> {
+    /// What two t that are one may differ by, relative to the larger, each being off by 2^-26 of itself; and as much again.
+    const DOUBT: f64 = 1.0 / (1 << 24) as f64;
+
+    /// Whether a crossing, which is at about t, is between the planes, or on one of them.
+    fn hold(&self, t: f64, crossing: Crossing) -> bool {
+        let Interval { enter, exit } = self.between;
+        let in_doubt =
+            [enter, exit].iter().any(|end| end.is_finite() && (t - end).abs() <= Self::DOUBT * t.abs().max(end.abs()));
+        if !in_doubt {
+            return self.between.contains(t);
+        }
+        let [_, _, speed] = self.ends.signs();
+        let [first, last] = if speed > 0 { [0, 1] } else { [1, 0] };
+        self.compare(first, crossing) != Ordering::Greater && self.compare(last, crossing) != Ordering::Less
+    }
+
+    /// Where the line meets an end plane, beside a crossing.
+    fn compare(&self, end: usize, crossing: Crossing) -> Ordering {
+        let is_first = (crossing == Crossing::Enter) != self.is_beyond;
+        let signs = AtEnd { rims: self, end }.signs();
+        match if self.is_beyond { signs.map(|sign| -sign) } else { signs } {
+            [-1, _] if is_first => Ordering::Greater,
+            [-1, _] => Ordering::Less,
+            // On the surface: at the crossing that has this slope, or where both are one.
+            [0, 1] if is_first => Ordering::Greater,
+            [0, -1] if !is_first => Ordering::Less,
+            [0, _] => Ordering::Equal,
+            // Before both, or after both.
+            [_, slope] => slope.cmp(&0),
+        }
+    }
+}
+
+/// The surface's polynomial and half its slope where the line meets an end plane, at t = n / s, times s^2: a n^2 + 2 b n s + c s^2, and s (a n + b s). Where the line is inside
+/// beyond the crossings, a is below 0, or 0, when one of them is at infinity; then the signs are turned round, for the first to be below 0 between the crossings.
+struct AtEnd<'a, Q> {
+    rims: &'a Rims<'a, Q>,
+    end: usize,
+}
+
+impl<Q: Quadric> Formula<2> for AtEnd<'_, Q> {
+    #[inline(always)]
+    fn evaluate<N: Number>(&self) -> [N; 2] {
+        let Rims { surface, ends, .. } = self.rims;
+        let [a, b, c, ..] = surface.evaluate::<N>();
+        let [base, apex, s] = ends.evaluate::<N>();
+        let n = if self.end == 0 { base } else { apex };
+        let (slope, rest) = (a.mul(&n).add(&b.mul(&s)), b.mul(&n).add(&c.mul(&s)));
+        [slope.mul(&n).add(&rest.mul(&s)), slope.mul(&s)]
     }
 }
 

@@ -8,7 +8,6 @@
 use super::InvalidShape;
 use super::axis::Frustum;
 use super::line::{Line, Roots};
-use super::quadric::Quadric;
 use crate::math::number::{Formula, Number, cross, dot, minus, plus, times, vector};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
@@ -66,7 +65,7 @@ impl Cone {
             radii: [line.length(self.base_radius), line.length(self.apex_radius)],
             line,
         };
-        frustum.roots(&line, seen.solve(), Widening(&seen).signs()[0] > 0)
+        frustum.roots(&line, &seen, Widening(&seen).signs()[0] > 0)
     }
 }
 

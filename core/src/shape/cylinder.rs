@@ -7,7 +7,6 @@
 use super::InvalidShape;
 use super::axis::Frustum;
 use super::line::{Line, Roots};
-use super::quadric::Quadric;
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
@@ -56,7 +55,7 @@ impl Cylinder {
         let line = Line::new(ray, frustum.size());
         let seen =
             Seen { base: line.place(self.base), apex: line.place(self.apex), radius: line.length(self.radius), line };
-        frustum.roots(&line, seen.solve(), false)
+        frustum.roots(&line, &seen, false)
     }
 }
 
