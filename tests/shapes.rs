@@ -134,7 +134,7 @@ fn brute_force_is_the_oracle() {
     let world = World::new(&scene).expect("sound");
     let brute = Brute::new(&world);
     let (mut hits, mut ties) = (0, 0);
-    for ray in rays(600, 10) {
+    for ray in rays(800, 10) {
         let exact = oracle::closest(&world, &ray);
         let found = brute.closest(&ray);
         hits += usize::from(found.is_some());
