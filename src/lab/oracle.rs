@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn spheres_tie_where_their_roots_are_one_though_not_rational() {
         let ball = |x: f32, z: f32| Shape::Sphere(Sphere { centre: Vec3::new(x, -0.75, z), radius: 0.625 });
-        let shapes = vec![ball(1.0, 0.75), ball(0.875, 0.375), ball(0.875, 0.375f32.next_up())];
+        let shapes = vec![ball(1.0, 0.75), ball(0.875, 0.375), ball(0.875, 0.375f32.next_down())];
         let scene = crate::Scene::from_geometries(
             vec![crate::scene::Geometry::Shapes { shapes, material: 0 }],
             vec![Default::default()],
