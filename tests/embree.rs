@@ -8,18 +8,42 @@ use twincast::trace::Primitives;
 use twincast::trace::embree::{self, Embree, Options, Quality};
 use twincast::{Batch, Error, Hit, Ray, Scene, Shape, Sphere, Tracer, Width, World};
 
-use crate::scenes::{self, Random};
-
 /// Barycentric weights and sines of less than this are too close to call in f32.
 const MARGIN: f64 = 1e-3;
 
-/// From outside the unit cube to somewhere near its middle; not unit directions.
-fn rays(random: &mut Random, count: usize) -> Vec<Ray> {
-    let ray = |_| {
-        let origin = random.vec3().normalize_or(Vec3::X) * 4.0;
-        Ray::new(origin, random.vec3() - origin)
-    };
-    (0..count).map(ray).collect()
+struct Random(u32);
+
+impl Random {
+    /// Over [-1, 1).
+    fn signed(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        (self.0 >> 8) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// From outside the unit cube to somewhere near its middle; not a unit direction.
+    fn ray(&mut self) -> Ray {
+        let origin = self.point().normalize_or(Vec3::X) * 4.0;
+        Ray::new(origin, self.point() - origin)
+    }
+
+    fn rays(&mut self, count: usize) -> Vec<Ray> {
+        (0..count).map(|_| self.ray()).collect()
+    }
+
+    /// Triangles of any direction in the unit cube.
+    fn soup(&mut self, count: u32, size: f32) -> Mesh {
+        let corners = (0..count).flat_map(|_| {
+            let middle = self.point();
+            [(); 3].map(|()| middle + self.point() * size)
+        });
+        Mesh::new(corners.collect(), (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+    }
 }
 
 /// A triangle as placed, in f64.
@@ -203,7 +227,7 @@ fn empty_worlds_and_meshes_are_missed() {
         vec![Geometry::Shapes { shapes: vec![], material: 0 }],
         vec![Geometry::Shapes { shapes, material: 0 }],
     ];
-    let rays = rays(&mut Random::new(5), 50);
+    let rays = Random(5).rays(50);
     for geometries in geometries {
         // Once as it is, and twice as an instance.
         let mut scene = Scene::from_geometries(geometries, Vec::new());
@@ -223,12 +247,12 @@ fn empty_worlds_and_meshes_are_missed() {
 
 #[test]
 fn every_width_agrees_with_the_f64_loop_and_with_width_one() {
-    let mut random = Random::new(3);
-    let world = world(vec![Geometry::Mesh(scenes::soup(300, 0.3, 1)), Geometry::Mesh(scenes::soup(100, 0.5, 2))]);
+    let mut random = Random(1);
+    let world = world(vec![Geometry::Mesh(random.soup(300, 0.3)), Geometry::Mesh(random.soup(100, 0.5))]);
     let truth = triangles(&world);
     let tracer = build(&world);
     // No multiple of a width, and with rays that end early or start late.
-    let mut rays = rays(&mut random, 1003);
+    let mut rays = random.rays(1003);
     for (i, ray) in rays.iter_mut().enumerate() {
         match i % 4 {
             0 => ray.tmax = 0.9,
@@ -252,11 +276,11 @@ fn every_width_agrees_with_the_f64_loop_and_with_width_one() {
 #[test]
 fn invalid_rays_miss_and_leave_their_neighbours_alone() {
     let world = world(vec![
-        Geometry::Mesh(scenes::soup(200, 0.4, 9)),
+        Geometry::Mesh(Random(9).soup(200, 0.4)),
         Geometry::Shapes { shapes: vec![Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: 0.3 })], material: 0 },
     ]);
     let tracer = build(&world);
-    let mut rays = rays(&mut Random::new(2), 61);
+    let mut rays = Random(2).rays(61);
     for (i, ray) in rays.iter_mut().enumerate() {
         match i % 11 {
             1 => ray.origin.y = f32::NAN,
@@ -286,8 +310,8 @@ fn invalid_rays_miss_and_leave_their_neighbours_alone() {
 /// Debian's package ends the process when it is given a coordinate above 1.844e18.
 #[test]
 fn rays_beyond_embrees_numbers_miss_and_leave_their_neighbours_alone() {
-    let tracer = build(&world(vec![Geometry::Mesh(scenes::soup(200, 0.4, 9))]));
-    let mut rays = rays(&mut Random::new(2), 48);
+    let tracer = build(&world(vec![Geometry::Mesh(Random(9).soup(200, 0.4))]));
+    let mut rays = Random(2).rays(48);
     for (i, ray) in rays.iter_mut().enumerate() {
         match i % 7 {
             1 => ray.origin.y = 1.9e18,
@@ -359,7 +383,7 @@ fn places() -> [DAffine3; 2] {
 
 #[test]
 fn an_instanced_mesh_is_hit_like_a_baked_one() {
-    let mesh = scenes::soup(200, 0.3, 3);
+    let mesh = Random(3).soup(200, 0.3);
     let scene = |groups: &[u32]| {
         let count = groups.iter().max().unwrap() + 1;
         let instance = |(&group, transform)| Instance { name: String::new(), group, transform, transform_end: None };
@@ -374,7 +398,7 @@ fn an_instanced_mesh_is_hit_like_a_baked_one() {
     let baked = World::new(&scene(&[0, 1])).unwrap();
     let instanced = World::new(&scene(&[0, 0])).unwrap();
     assert_eq!((baked.placements.len(), instanced.placements.len()), (0, 2));
-    let rays = rays(&mut Random::new(4), 2000);
+    let rays = Random(4).rays(2000);
     let (truth, baked, instanced) = (triangles(&instanced), build(&baked), build(&instanced));
     let expected = closest(&baked, &rays, Batch::default());
     assert!(expected.iter().flatten().count() > 500);
@@ -403,17 +427,17 @@ fn sphere_root(ray: &Ray, centre: DVec3, radius: f64, to_object: &DAffine3) -> O
 
 #[test]
 fn spheres_are_hit_where_the_closed_form_says() {
-    let mut random = Random::new(6);
+    let mut random = Random(6);
     let mut spheres: Vec<_> =
-        (0..40).map(|_| Sphere { centre: random.vec3(), radius: 0.1 + 0.2 * random.unit() }).collect();
+        (0..40).map(|_| Sphere { centre: random.point(), radius: 0.2 + 0.1 * random.signed() }).collect();
     spheres[7].radius = 0.0;
     spheres[8].radius = f32::NAN;
     spheres[9].centre.x = f32::INFINITY;
     let shapes = spheres.iter().map(|&sphere| Shape::Sphere(sphere)).collect();
     let mut scene = Scene::from_geometries(vec![Geometry::Shapes { shapes, material: 0 }], Vec::new());
-    let mut rays = rays(&mut random, 501);
+    let mut rays = random.rays(501);
     // From inside the spheres too.
-    rays.extend((0..500).map(|_| Ray::new(random.vec3(), random.vec3())));
+    rays.extend((0..500).map(|_| Ray::new(random.point(), random.point())));
     rays.iter_mut().step_by(3).for_each(|ray| ray.tmax = 0.8);
     for placed in [false, true] {
         if placed {
@@ -469,9 +493,9 @@ fn shapes_and_triangles_hide_each_other() {
 
 #[test]
 fn every_option_traces_the_same_scene_and_compact_takes_less_memory() {
-    let world = world(vec![Geometry::Mesh(scenes::soup(20_000, 0.02, 7))]);
+    let world = world(vec![Geometry::Mesh(Random(7).soup(20_000, 0.02))]);
     let truth = triangles(&world);
-    let rays = rays(&mut Random::new(8), 150);
+    let rays = Random(8).rays(150);
     let bytes = |options: Options| {
         let tracer = Embree::new(&world, &options).unwrap();
         let hits = closest(&tracer, &rays, Batch { width: Width::Eight, coherent: false });
@@ -496,7 +520,7 @@ fn every_option_traces_the_same_scene_and_compact_takes_less_memory() {
 #[test]
 fn placements_take_memory() {
     const PLACEMENTS: u32 = 100_000;
-    let mut scene = Scene::from_geometries(vec![Geometry::Mesh(scenes::soup(1, 0.2, 9))], Vec::new());
+    let mut scene = Scene::from_geometries(vec![Geometry::Mesh(Random(9).soup(1, 0.2))], Vec::new());
     let place = |i: u32| DAffine3::from_translation(DVec3::new(f64::from(i % 300), f64::from(i / 300), 0.0));
     scene.instances = (0..PLACEMENTS).map(|i| Instance { transform: place(i), ..scene.instances[0].clone() }).collect();
     let world = World::placed(&scene).unwrap();
@@ -508,8 +532,8 @@ fn placements_take_memory() {
 
 #[test]
 fn thread_counts_give_equal_hits() {
-    let world = world(vec![Geometry::Mesh(scenes::soup(50_000, 0.05, 10))]);
-    let rays = rays(&mut Random::new(11), 5000);
+    let world = world(vec![Geometry::Mesh(Random(10).soup(50_000, 0.05))]);
+    let rays = Random(11).rays(5000);
     let hits = [Some(1), Some(2), None].map(|threads| {
         let tracer = Embree::new(&world, &Options { threads, ..Options::default() }).unwrap();
         // Queries from two threads of ours, too.

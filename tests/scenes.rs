@@ -1,34 +1,36 @@
 //! Scenes and rays for tests, from a seed.
 
-use twincast::math::{self, DAffine3, DQuat, DVec3, Vec3};
+use twincast::math::{DAffine3, DQuat, DVec3, Vec3};
 use twincast::scene::{Geometry, Group, Instance, Material, Mesh, Scene};
 use twincast::{Ray, Shape, Sphere};
 
-/// [`math::Random`] of a seed alone.
-pub struct Random(math::Random);
+/// A generator that is the same everywhere (Marsaglia 2003, *Xorshift RNGs*).
+pub struct Random(u64);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
-        Self(math::Random::new(seed, 0))
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
     }
 
     pub fn bits(&mut self) -> u64 {
-        self.0.bits()
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
     }
 
     /// In [0, 1).
     pub fn unit(&mut self) -> f32 {
-        self.0.unit()
+        (self.bits() >> 40) as f32 / (1u32 << 24) as f32
     }
 
     /// In [-1, 1) on each axis.
     pub fn vec3(&mut self) -> Vec3 {
-        self.0.vector()
+        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 
-    /// Below `n`, which is above 0.
     pub fn below(&mut self, n: usize) -> usize {
-        self.0.below(n as u64) as usize
+        (self.bits() % n as u64) as usize
     }
 }
 

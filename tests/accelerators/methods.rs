@@ -121,8 +121,8 @@ fn where_the_textbooks_methods_of_triangles_fail() {
         &[
             row(TriangleMethod::SidePlanes, ".x-xx--xx"),
             row(TriangleMethod::SameSide, ".x-xx--xx"),
-            row(TriangleMethod::Areas, ".x-xx--xx"),
-            row(TriangleMethod::MoellerTrumbore, ".x.xx..xx"),
+            row(TriangleMethod::Areas, ".x.xx.-xx"),
+            row(TriangleMethod::MoellerTrumbore, ".x.xx.-xx"),
             row(TriangleMethod::Woop, ".xxxx.-xx"),
             row(TriangleMethod::Exact, "........."),
         ],
@@ -135,9 +135,9 @@ fn where_the_textbooks_methods_of_spheres_fail() {
     hold(
         Kind::Sphere,
         &[
-            row(SphereMethod::Algebraic, "..x...-xx"),
-            row(SphereMethod::Geometric, ".-x...-xx"),
-            row(SphereMethod::Accurate, "..-....xx"),
+            row(SphereMethod::Algebraic, "..x....xx"),
+            row(SphereMethod::Geometric, "..x...-xx"),
+            row(SphereMethod::Accurate, "..x....xx"),
             row(SphereMethod::Exact, "........."),
         ],
     );
