@@ -6,7 +6,6 @@ use super::Through;
 use super::clusters;
 use super::farthest::Waiting;
 use super::leaves::Leaves;
-
 use crate::math::{Aabb, Vec3};
 use crate::ray::{Hit, Ray};
 use crate::shape::triangle::Placed;
