@@ -34,14 +34,10 @@ pub struct Primitive<'a> {
 }
 
 impl Primitive<'_> {
-    /// Whether the native engine's verdict on it is that of exact arithmetic. It is not of shapes that are placed, to which rays are brought in f64,
-    /// nor of capped ones, at whose rims two t are compared; see [`Shape`].
+    /// Whether the native engine's verdict on it is that of exact arithmetic. It is not of shapes that are placed, to which rays are brought in f64.
     pub fn is_decided_exactly(&self) -> bool {
         match self.body {
             Body::Triangle(_) => true,
-            Body::Shape(Shape::Cylinder(Cylinder { capped: true, .. }) | Shape::Cone(Cone { capped: true, .. })) => {
-                false
-            }
             Body::Shape(_) => self.to_world.is_none(),
         }
     }

@@ -113,9 +113,6 @@ fn nasty(targets: &[Vec3], random: &mut Random) -> Ray {
     Ray::new(origin, direction)
 }
 
-/// What a capped rim may leave undecided, and t be off by, twice.
-const SLACK: f64 = 1.0 / (1 << 25) as f64;
-
 #[track_caller]
 fn assert_exact(shape: &Shape, ray: &Ray) -> usize {
     let whole = |ray: &Ray| shape.intersect_all(ray).map(|hit| hit.t).collect::<Vec<f64>>();
@@ -133,15 +130,6 @@ fn assert_exact(shape: &Shape, ray: &Ray) -> usize {
     let is_solid = matches!(shape, Shape::Cuboid(_))
         || matches!(shape, Shape::Cylinder(Cylinder { capped: true, .. }) | Shape::Cone(Cone { capped: true, .. }));
     let t: Vec<f64> = if is_solid { [t.first(), t.last()].into_iter().flatten().copied().collect() } else { t };
-    let is_capped = is_solid && !matches!(shape, Shape::Cuboid(_));
-    if is_capped && found.len() != t.len() {
-        // Within rounding of a rim: the side's t and the end plane's cannot be told apart.
-        let both = [&found, &t].into_iter().find(|t| !t.is_empty()).unwrap();
-        let close = (both[both.len() - 1] - both[0]).abs() <= SLACK * both[0].abs().max(1.0);
-        let touches = exact.iter().any(|(_, touches)| *touches);
-        assert!(close || touches, "{shape:?} {ray:?}: {found:?}, exactly {t:?}");
-        return 0;
-    }
     // At its tip a whole cone is crossed once, or each half of the double one is: twice at the same t.
     let is_whole = matches!(shape, Shape::Cone(cone) if cone.base_radius.min(cone.apex_radius) == 0.0);
     let mut t = t;

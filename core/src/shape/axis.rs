@@ -1,9 +1,9 @@
 //! What a cylinder and a cone share: an axis, an end plane at each end of it, and what lies between.
 //!
 //! Capped, they are convex: the line is inside where it is inside the lateral surface and between the end planes, and
-//! hits where it enters and leaves. One comparison of t decides for the side and the cap at once, so no ray slips
-//! through the rim between them; testing the side and two disks by themselves, the simpler way, loses rays there. Open,
-//! they are hit at the lateral surface's roots, where those are between the end planes, which is decided exactly.
+//! hits where it enters and leaves, if it enters one before it leaves the other. Open, they are hit at the lateral
+//! surface's roots, where those are between the end planes. Both are decided exactly. Testing the side and two disks by
+//! themselves, the simpler way, loses rays between them.
 
 use std::cmp::Ordering;
 
@@ -59,8 +59,9 @@ impl Frustum {
         let inside = surface.solve();
         let within = match inside {
             Inside::Nothing => return NO_ROOTS,
-            Inside::All if !self.capped => return NO_ROOTS,
-            Inside::All => Interval::ALL,
+            // What lies in the side of a solid enters and leaves it by the ends.
+            Inside::All | Inside::Along if self.capped => Interval::ALL,
+            Inside::All | Inside::Along => return NO_ROOTS,
             Inside::Between(roots) => roots,
             // A double cone: the half on this side.
             Inside::Beyond(roots) if widens => Interval { enter: roots.exit, ..Interval::ALL },
@@ -68,13 +69,17 @@ impl Frustum {
         };
         let ends = Ends { line, ends: self.ends.map(|end| line.place(end)) };
         let between = ends.between();
-        let roots = if self.capped {
-            within.and(between).ends()
-        } else {
-            let rims = Rims { surface, ends, between, is_beyond: matches!(inside, Inside::Beyond(_)) };
+        let rims = Rims { surface, ends, between, is_beyond: matches!(inside, Inside::Beyond(_)) };
+        let roots = if !self.capped {
             let side = |t: f64, crossing| (t.is_finite() && rims.hold(t, crossing)).then_some(t);
             let [first, second] = [side(within.enter, Crossing::Enter), side(within.exit, Crossing::Exit)];
             if first.is_some() { [first, second] } else { [second, None] }
+        } else if rims.meet(within) {
+            let Interval { enter, exit } = within.and(between);
+            // Where they are equal but for rounding, they may be rounded to the wrong order.
+            [Some(enter), Some(exit.max(enter))]
+        } else {
+            NO_ROOTS
         };
         roots.map(|t| t.map(|t| line.t(t)))
     }
@@ -126,14 +131,14 @@ impl Ends<'_> {
     }
 }
 
-/// A crossing of a line and the lateral surface.
+/// Where a line crosses a boundary.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Crossing {
     Enter,
     Exit,
 }
 
-/// An open lateral surface between its end planes. On a rim two t meet, each of them rounded: there their order is that of exact arithmetic, by the signs that the
+/// A lateral surface and its end planes. On a rim two t meet, each of them rounded: there their order is that of exact arithmetic, by the signs that the
 /// surface's polynomial and its slope have where the line meets the end plane.
 struct Rims<'a, Q> {
     surface: &'a Q,
@@ -149,15 +154,27 @@ impl<Q: Quadric> Rims<'_, Q> {
 
     /// Whether a crossing, which is at about t, is between the planes, or on one of them.
     fn hold(&self, t: f64, crossing: Crossing) -> bool {
-        let Interval { enter, exit } = self.between;
-        let in_doubt =
-            [enter, exit].iter().any(|end| end.is_finite() && (t - end).abs() <= Self::DOUBT * t.abs().max(end.abs()));
+        self.order(Crossing::Enter, t, crossing).is_le() && self.order(Crossing::Exit, t, crossing).is_ge()
+    }
+
+    /// Whether some of the line is inside the surface, which is `within`, and between the planes, or on them.
+    fn meet(&self, within: Interval) -> bool {
+        self.order(Crossing::Exit, within.enter, Crossing::Enter).is_ge()
+            && self.order(Crossing::Enter, within.exit, Crossing::Exit).is_le()
+    }
+
+    /// Where the line comes between the planes, or leaves, beside a crossing of the surface that is at about t.
+    fn order(&self, end: Crossing, t: f64, crossing: Crossing) -> Ordering {
+        let at = match end {
+            Crossing::Enter => self.between.enter,
+            Crossing::Exit => self.between.exit,
+        };
+        let in_doubt = at.is_finite() && t.is_finite() && (t - at).abs() <= Self::DOUBT * t.abs().max(at.abs());
         if !in_doubt {
-            return self.between.contains(t);
+            return at.total_cmp(&t);
         }
         let [_, _, speed] = self.ends.signs();
-        let [first, last] = if speed > 0 { [0, 1] } else { [1, 0] };
-        self.compare(first, crossing) != Ordering::Greater && self.compare(last, crossing) != Ordering::Less
+        self.compare(usize::from((speed > 0) == (end == Crossing::Exit)), crossing)
     }
 
     /// Where the line meets an end plane, beside a crossing.

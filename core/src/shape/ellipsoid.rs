@@ -62,7 +62,7 @@ impl Ellipsoid {
         let seen = Seen { line, centre: line.place(self.centre), axes: [x, y, z].map(|axis| line.place(axis)) };
         match seen.solve() {
             Inside::Between(roots) => roots.ends().map(|t| t.map(|t| line.t(t))),
-            Inside::Nothing | Inside::All | Inside::Beyond(_) => NO_ROOTS,
+            Inside::Nothing | Inside::Along | Inside::All | Inside::Beyond(_) => NO_ROOTS,
         }
     }
 

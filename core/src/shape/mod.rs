@@ -50,9 +50,7 @@ use line::{NO_ROOTS, Roots};
 /// A primitive that is not a triangle.
 ///
 /// Whether a line hits is decided exactly, for the shape and the ray that stand there in f32: where f64 leaves a doubt,
-/// in exact arithmetic. The rims of capped cylinders and cones are the exception: there two t are compared that are
-/// each off by at most 2^-26 of themselves, the bound for all shapes; but no ray slips through between the side and the
-/// cap. What touches hits; a line within a plane, a disk, a polygon or an open side does not.
+/// in exact arithmetic. What touches hits; a line within a plane, a disk, a polygon or an open side does not.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.

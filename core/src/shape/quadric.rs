@@ -28,7 +28,11 @@ pub(super) trait Quadric: Formula<5> {
             // Both are 0.
             [0.0; 2]
         } else {
-            return if c < 0.0 { Inside::All } else { Inside::Nothing };
+            return match c {
+                0.0 => Inside::Along,
+                c if c < 0.0 => Inside::All,
+                _ => Inside::Nothing,
+            };
         };
         let roots = Interval::between(roots[0], roots[1]);
         if a > 0.0 { Inside::Between(roots) } else { Inside::Beyond(roots) }
@@ -40,8 +44,10 @@ impl<T: Formula<5>> Quadric for T {}
 /// What of a line is inside a quadric.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Inside {
-    /// Nothing; the line may lie in the surface.
+    /// Nothing.
     Nothing,
+    /// Nothing, but the line lies in the surface.
+    Along,
     /// The line does not cross the surface.
     All,
     /// What is between the roots.

@@ -37,7 +37,7 @@ impl Sphere {
         let seen = Seen { line, centre: line.place(self.centre), radius: line.length(self.radius) };
         match seen.solve() {
             Inside::Between(roots) => roots.ends().map(|t| t.map(|t| line.t(t))),
-            Inside::Nothing | Inside::All | Inside::Beyond(_) => NO_ROOTS,
+            Inside::Nothing | Inside::Along | Inside::All | Inside::Beyond(_) => NO_ROOTS,
         }
     }
 

@@ -6,9 +6,8 @@
 //! inner point: with a ball of radius rho around it inside the solid, scaling by 1 + blur / rho covers every point
 //! within blur of it, and by 1 - blur / rho leaves as much room inside. The ray is scaled in place of the solid.
 //!
-//! A ray that was not moved is exact, and so is the verdict, but for the rims of capped cylinders and cones. Of disks,
-//! polygons and open sides that were placed by a transform, only a clear miss of the box around them is told from the
-//! rest.
+//! A ray that was not moved is exact, and so is the verdict. Of disks, polygons and open sides that were placed by a
+//! transform, only a clear miss of the box around them is told from the rest.
 
 use super::super::exact_shapes::{Crossing, crossings_of};
 use super::*;
@@ -29,19 +28,19 @@ pub(super) fn outcome(shape: &Shape, ray: &LocalRay) -> Outcome {
         Shape::Plane(_) => Outcome::MISS,
         Shape::Cuboid(cuboid) => {
             let half = (cuboid.max.as_dvec3() - cuboid.min.as_dvec3()) * 0.5;
-            solid(shape, ray, (cuboid.min.as_dvec3() + half, half.min_element()), 0.0)
+            solid(shape, ray, (cuboid.min.as_dvec3() + half, half.min_element()))
         }
         Shape::Ellipsoid(ellipsoid) => {
             let inverse = ellipsoid.axes.as_dmat3().inverse();
             // Not above the smallest half axis: the matrix norm is not above Frobenius's.
             let norm = inverse.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-            solid(shape, ray, (ellipsoid.centre.as_dvec3(), norm.recip()), 0.0)
+            solid(shape, ray, (ellipsoid.centre.as_dvec3(), norm.recip()))
         }
         Shape::Cylinder(c @ Cylinder { capped: true, .. }) => {
             let cone = Cone { base: c.base, base_radius: c.radius, apex: c.apex, apex_radius: c.radius, capped: true };
-            solid(shape, ray, inside_cone(&cone), T_ERROR)
+            solid(shape, ray, inside_cone(&cone))
         }
-        Shape::Cone(cone @ Cone { capped: true, .. }) => solid(shape, ray, inside_cone(cone), T_ERROR),
+        Shape::Cone(cone @ Cone { capped: true, .. }) => solid(shape, ray, inside_cone(cone)),
         Shape::Disk(_) | Shape::Polygon(_) | Shape::Cylinder(_) | Shape::Cone(_) if exact => {
             let found = crossings_of(ray.origin, ray.direction, shape);
             let roots = between(&found, &found);
@@ -89,15 +88,14 @@ fn inside_cone(cone: &Cone) -> (DVec3, f64) {
     (base + (apex - base) * share, side.min(length * 0.25))
 }
 
-/// A convex solid, with an inner point and its distance from the surface. `unsure` of the distance from the ray's
-/// origin may be lost to the engines' own rounding.
-fn solid(shape: &Shape, ray: &LocalRay, (centre, depth): (DVec3, f64), unsure: f64) -> Outcome {
+/// A convex solid, with an inner point and its distance from the surface.
+fn solid(shape: &Shape, ray: &LocalRay, (centre, depth): (DVec3, f64)) -> Outcome {
     let bounds = shape.bounds();
     if bounds.is_empty() {
         return Outcome::MISS;
     }
     let size = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
-    let blur = blur(ray, centre, size) + 2.0 * unsure * ((ray.origin - centre).length() + size);
+    let blur = blur(ray, centre, size);
     // The centre itself is rounded.
     let share = if blur == 0.0 { 0.0 } else { 1.01 * blur / depth + gamma64(64) };
     if !(share < 0.5) {
