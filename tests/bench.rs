@@ -110,11 +110,11 @@ fn contender(
         let bvh = Bvh::build_with(world, Options { isa: Isa::Portable, ..Options::default() });
         Ok(Built { seconds: 0.5, bytes: 8000, sah_cost: None, tracer: Box::new(Bent(bvh, bend)) })
     };
-    Contender { backend, mode, build: Box::new(build) }
+    Contender { backend, mode, is_exact: backend == "native", build: Box::new(build) }
 }
 
 fn setup<'a>(subject: &'a Subject, contenders: &'a [Contender], kinds: &'a [Kind]) -> Setup<'a> {
-    Setup { subject, contenders, kinds, side: 32, threads: 1, repeat: 2, cancel: None, on_step: None }
+    Setup { subject, contenders, kinds, side: 32, threads: 1, isa: "any", repeat: 2, cancel: None, on_step: None }
 }
 
 /// Two engines of which each says that its builds take so many seconds.
@@ -129,7 +129,7 @@ fn builds_that_take_no_time_are_repeated() {
                 builds.fetch_add(1, Ordering::Relaxed);
                 Ok(Built { seconds, bytes: 0, sah_cost: None, tracer: Box::new(Bvh::build(world)) })
             };
-            Contender { backend, mode, build: Box::new(build) }
+            Contender { backend, mode, is_exact: backend == "native", build: Box::new(build) }
         };
         let contenders = [engine("native", "default"), engine("embree", "robust")];
         setup(&subject, &contenders, &[Kind::Primary]).run().unwrap();
@@ -163,7 +163,7 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
         for row in traversal {
             let mut keys: Vec<_> = row.as_object().unwrap().keys().map(String::as_str).collect();
             keys.sort_unstable();
-            assert_eq!(keys, ["backend", "hits", "kind", "mode", "mrays_per_s", "width"]);
+            assert_eq!(keys, ["backend", "hits", "kind", "mode", "mrays_per_s", "rays", "width"]);
             let rate = |which: &str| row["mrays_per_s"][which].as_f64().unwrap();
             assert!(0.0 < rate("min") && rate("min") <= rate("median") && rate("median") <= rate("max"), "{row}");
             let same = traversal.iter().filter(|other| other["kind"] == row["kind"]);
@@ -175,8 +175,13 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
             ["primary", "diffuse", "shadow", "pixel"]
         );
         assert!(ratios.iter().all(|r| r["over_embree_robust"].is_number() && r["over_embree_fast"].is_number()));
-        assert_eq!(json.as_object().unwrap().len(), 6, "and nothing else: {json}");
-        assert_eq!(report.verdicts.len(), 4);
+        assert_eq!((&json["isa"], &json["size"], &json["repeat"]), (&"any".into(), &32.into(), &2.into()));
+        assert!(json["processor"].is_string() && json.as_object().unwrap().len() == 11, "and nothing else: {json}");
+        let answers = json["answers"].as_array().unwrap();
+        assert_eq!(answers.len(), 4);
+        for (answers, row) in answers.iter().zip(traversal.iter().step_by(9)) {
+            assert_eq!((&answers["kind"], &answers["agree"]), (&row["kind"], &row["rays"]));
+        }
     }
 }
 
@@ -200,5 +205,13 @@ fn wrong_answers_end_a_benchmark() {
     let contenders = [contender("native", "default", |_, hit, _| hit), contender("embree", "robust", |_, _, _| None)];
     let report = setup(&subject, &contenders, &[Kind::Primary]).run().unwrap();
     assert_eq!(report.traversal[3].hits, 0);
-    assert!(report.verdicts[0].1.count(twincast::lab::Class::EmbreeWrong) > 100);
+    assert!(report.answers[0].embree_wrong > 100);
+    // Nor need a textbook's method be right, which says nothing of the others.
+    let textbook =
+        Contender { is_exact: false, ..contender("native", "grid", |_, hit, _| hit.filter(|hit| hit.u > 0.5)) };
+    let exact = contender("native", "default", |_, hit, _| hit);
+    let contenders = [textbook, exact, honest()];
+    let report = setup(&subject, &contenders, &[Kind::Primary]).run().unwrap();
+    let [of_textbook, of_exact] = [0, 3].map(|row: usize| report.traversal[row].hits);
+    assert!(of_textbook < of_exact && report.answers[0].agree == report.traversal[0].rays);
 }

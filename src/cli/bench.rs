@@ -85,7 +85,7 @@ pub(super) struct BenchArgs {
 
     /// Measure time against the number of triangles instead, for every accelerator: builds on all threads, rays on one. One that takes
     /// over 10 seconds for a step is not asked for more
-    #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid"])]
+    #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid", "triangle_method", "sphere_method"])]
     scaling: bool,
 
     /// Most triangles of --scaling (default: 1000000)
@@ -200,7 +200,7 @@ mod with_embree {
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::scene::Search;
     use crate::trace::World;
-    use crate::trace::accel::{self, Accel};
+    use crate::trace::accel::{self, Accel, Methods};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Instructions, Options, Quality};
 
@@ -239,12 +239,15 @@ mod with_embree {
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
-        let mut reports = Vec::new();
+        let mut subjects = Vec::new();
         for name in &args.scenes {
-            let subject = interrupt::while_reading(|| Subject::new(name, args.up_axis.axis()));
-            let (subject, warnings) = subject?;
+            let (subject, warnings) = interrupt::while_reading(|| Subject::new(name, args.up_axis.axis()))?;
             warn(&warnings);
             interrupt::check()?;
+            subjects.push(subject);
+        }
+        let mut reports = Vec::new();
+        for (name, subject) in args.scenes.iter().zip(subjects) {
             let costs = Arc::default();
             let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
             let modes = modes.map(|mode| contender(mode, threads, (isa, instructions), &costs));
@@ -256,6 +259,7 @@ mod with_embree {
                 kinds: &kinds,
                 side: args.size as usize,
                 threads,
+                isa: isa.name(),
                 repeat: args.repeat as usize,
                 cancel: Some(cancel),
                 on_step: None,
@@ -304,11 +308,12 @@ mod with_embree {
         let embree = |mode, options: Options| {
             let costs = Arc::clone(costs);
             let build = Box::new(move |world: &World| build_embree(world, &options, &costs));
-            Contender { backend: "embree", mode, build }
+            Contender { backend: "embree", mode, is_exact: false, build }
         };
         let native = |preset: Preset| Contender {
             backend: "native",
             mode: preset.name(),
+            is_exact: true,
             build: Box::new(move |world| Ok(build_native(world, preset, isa))),
         };
         match mode {
@@ -324,16 +329,17 @@ mod with_embree {
         }
     }
 
-    /// Another accelerator, which answers as native.
+    /// Another accelerator, which answers as native unless it is told to use a textbook's methods.
     fn other(accel: Accel, options: &accel::Options) -> Contender {
         let options = options.clone();
+        let is_exact = !accel.has_methods() || options.methods == Methods::default();
         let build = move |world: &World| {
             let start = Instant::now();
             let built = accel.build(world, &options);
             let seconds = start.elapsed().as_secs_f64();
             Ok(Built { seconds, bytes: built.bytes, sah_cost: None, tracer: Box::new(built) })
         };
-        Contender { backend: "native", mode: accel.name(), build: Box::new(build) }
+        Contender { backend: "native", mode: accel.name(), is_exact, build: Box::new(build) }
     }
 
     fn build_native(world: &World, preset: Preset, isa: Isa) -> Built {

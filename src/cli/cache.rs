@@ -7,9 +7,10 @@ use clap::Args;
 use serde::Serialize;
 
 use super::engine::BackendArg;
-use super::report::{size, time};
+use super::report::time;
 use super::warn;
 use crate::error::{Error, Result};
+use crate::memory::size;
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 

@@ -132,7 +132,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::lab::compare::BRUTE_LIMIT;
     use crate::render::{Control, Renderer};
     use crate::trace::Tracer;
-    use crate::trace::accel::{Accel, Built};
+    use crate::trace::accel::{Accel, Built, Methods};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
@@ -162,6 +162,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
         scene: &name,
         renderer: &renderer,
         native: &native,
+        is_exact: !accel.has_methods() || options.methods == Methods::default(),
         embree: &embree,
         brute: brute.as_ref().map(|brute| brute as &dyn Tracer),
         random: args.random,

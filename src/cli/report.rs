@@ -117,16 +117,6 @@ pub(super) fn counted(n: u64, singular: &str, plural: &str) -> String {
     format!("{} {}", grouped(n), if n == 1 { singular } else { plural })
 }
 
-/// Bytes in a unit that suits them.
-pub(super) fn size(bytes: u64) -> String {
-    match bytes as f64 {
-        b if b < 1e4 => format!("{b} B"),
-        b if b < 1e7 => format!("{:.0} kB", b / 1e3),
-        b if b < 1e10 => format!("{:.0} MB", b / 1e6),
-        b => format!("{:.1} GB", b / 1e9),
-    }
-}
-
 /// Seconds in a unit that suits them.
 pub(super) fn time(seconds: f64) -> String {
     match seconds {
@@ -144,7 +134,6 @@ mod tests {
     fn numbers_read_well() {
         assert_eq!([0, 999, 1000, 1234567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
         assert_eq!(counted(1, "mesh", "meshes"), "1 mesh");
-        assert_eq!([9_999, 123_456, 12_345_678, 12_345_678_901].map(size), ["9999 B", "123 kB", "12 MB", "12.3 GB"]);
         assert_eq!([0.0123, 5.678, 125.0].map(time), ["12.3 ms", "5.68 s", "2 min 05 s"]);
     }
 

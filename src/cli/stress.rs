@@ -54,7 +54,7 @@ pub(super) struct StressArgs {
     in_turns: bool,
 
     /// Look for new cases for so long: change rays and triangles towards where f32 fails, and ask the methods there (default: native)
-    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["cases", "list"], value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["cases", "rays", "in_turns"], value_parser = clap::value_parser!(u64).range(1..))]
     search: Option<u64>,
 
     /// Print one JSON document, and nothing else
@@ -66,7 +66,7 @@ pub(super) struct StressArgs {
     output: Option<PathBuf>,
 
     /// Name every case, and where it is from
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["cases", "backend", "methods", "rays", "in_turns", "search", "json", "output"])]
     list: bool,
 }
 

@@ -6,48 +6,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::Normals;
-use super::compact::{compact, with_vertices};
 use super::weld::weld;
 use crate::error::Warning;
-use crate::math::{Vec2, Vec3};
+use crate::math::Vec2;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 
 /// Vertices or corners that are worth a task of their own.
 const TASK: usize = 1 << 14;
-
-/// Leaves out the vertices that no triangle names, if the outermost are among them: a stray one far away would frame the scene for the camera, and leave f32
-/// little of what is seen.
-pub(super) fn drop_strays(mesh: &mut Mesh) {
-    if mesh.triangles.is_empty() || outermost_are_used(&mesh.positions, mesh.triangles.as_flattened()) {
-        return;
-    }
-    let mut triangles = Arc::unwrap_or_clone(std::mem::take(&mut mesh.triangles));
-    *mesh = match compact(triangles.as_flattened_mut(), mesh.positions.len()) {
-        Some(used) => with_vertices(mesh, &used, triangles),
-        None => Mesh { triangles: Arc::new(triangles), ..std::mem::take(mesh) },
-    };
-}
-
-/// Whether, of those that are farthest along each axis, one each way is a triangle's corner. Most often all vertices are: to look for six of them among the
-/// corners takes a tenth of the time that it takes to mark all.
-fn outermost_are_used(positions: &[Vec3], corners: &[u32]) -> bool {
-    // Six times an index: of the least coordinates, and of the largest.
-    let farther = |a: [u32; 6], b: [u32; 6]| -> [u32; 6] {
-        std::array::from_fn(|k| {
-            let along = |i: u32| positions[i as usize][k % 3] * if k < 3 { -1.0 } else { 1.0 };
-            // Written so that a NaN gives way.
-            if along(b[k]) > along(a[k]) || along(a[k]).is_nan() { b[k] } else { a[k] }
-        })
-    };
-    let all = (0..positions.len() as u32).into_par_iter().with_min_len(TASK);
-    let Some(outermost) = all.map(|i| [i; 6]).reduce_with(farther) else { return true };
-    let seen = corners.par_chunks(TASK).map(|corners| {
-        let has = |wanted: u32| corners.iter().fold(false, |found, &corner| found | (corner == wanted));
-        outermost.map(has)
-    });
-    let either = |a: [bool; 6], b: [bool; 6]| std::array::from_fn(|k| a[k] || b[k]);
-    seen.reduce(|| [false; 6], either) == [true; 6]
-}
 
 /// Has components of colours and of texture coordinates that are not finite be 0, and 1 where they are alpha; and tells of how many colours and coordinates.
 pub(super) fn make_finite(geometry: &mut Geometry) -> usize {

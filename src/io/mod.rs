@@ -5,7 +5,6 @@
 //! compared with what they point into before they reach a [`Scene`]. What all formats share is done once, afterwards:
 //! normals on request, axes and units, and a last check of the whole scene.
 
-mod compact;
 mod course;
 mod dshape;
 mod finish;
@@ -35,7 +34,7 @@ pub use self::format::SUFFIXES;
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
-use self::finish::{bare, brightest_color, doubt_bare, drop_strays, make_finite, meshes};
+use self::finish::{bare, brightest_color, doubt_bare, make_finite, meshes};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
@@ -186,7 +185,7 @@ pub fn load_watched(
     scene.bake_turns();
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
-            drop_strays(mesh);
+            mesh.drop_strays();
             options.normals.apply(mesh);
         }
     }

@@ -4,8 +4,8 @@
 //! them from the start is a fair sample of all. Brute force goes first and answers as many as it can within a time; the others
 //! are asked the same. To hold them against each other on all rays instead would compare trees that are built of the same parts.
 //!
-//! A native accelerator must give the hits of brute force to the bit, so whatever differs is wrong. Embree is judged as
-//! [`compare`](super::compare) judges it.
+//! A native accelerator must give the hits of brute force to the bit, so whatever differs is wrong; with a textbook's methods, whose t are f32's, it must name the
+//! same primitives. Embree is judged as [`compare`](super::compare) judges it.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -18,9 +18,10 @@ use super::entrants::Entrant;
 use super::rays::{Aim, Query};
 use crate::error::{Error, Result};
 use crate::math::Random;
+use crate::memory::{self, process};
 use crate::ray::{Hit, Ray};
 use crate::render::{Control, Renderer};
-use crate::trace::accel::Options;
+use crate::trace::accel::{Methods, Options};
 use crate::trace::{Tracer, World};
 
 /// Rays that are asked together.
@@ -70,7 +71,7 @@ pub struct Row {
     pub bytes: usize,
     /// Millions of the compared rays a second, on all threads.
     pub mrays_per_s: f64,
-    /// Rays on which the answer is not that of brute force: for native accelerators to the bit, for Embree the
+    /// Rays on which the answer is not that of brute force: for native accelerators to the bit, for Embree and textbooks' methods the
     /// primitive.
     pub differing: u64,
     /// Of those, [`Class::Tie`].
@@ -119,16 +120,17 @@ impl Setup<'_> {
     /// Builds and asks one after the other.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] once `control.cancel` is set, and those of Embree.
+    /// [`Error::Interrupted`] once `control.cancel` is set, [`Error::Memory`] for more rays than there is room for, and those of Embree.
     pub fn run(&self, control: Control<'_>) -> Result<Report> {
         let world = self.renderer.world();
-        let queries = self.queries();
+        let queries = self.queries()?;
         let mut expected: Vec<Answer> = Vec::new();
         let mut rows = Vec::new();
         for entrant in Entrant::all() {
             if control.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed)) {
                 return Err(Error::Interrupted);
             }
+            let is_exact = entrant.is_native() && self.options.methods == Methods::default();
             let start = Instant::now();
             let built = entrant.build(world, self.options)?;
             let build_seconds = start.elapsed().as_secs_f64();
@@ -156,7 +158,7 @@ impl Setup<'_> {
                 example: None,
             };
             for ((query, expected), found) in queries.iter().zip(&expected).zip(&answers) {
-                row.judge(world, entrant, &*built.tracer, query, *expected, *found);
+                row.judge(world, (entrant, is_exact), &*built.tracer, query, *expected, *found);
             }
             rows.push(row);
             if let Some(on_tile) = control.on_tile {
@@ -173,8 +175,17 @@ impl Setup<'_> {
     }
 
     /// All rays, in random order.
-    fn queries(&self) -> Vec<Query> {
+    fn queries(&self) -> Result<Vec<Query>> {
         let (width, height) = self.size;
+        let rays = u64::from(width) * u64::from(height) + self.random.min(u64::MAX / 2);
+        // Each has an answer of each of two tracers beside it.
+        let bytes = rays.saturating_mul((size_of::<Query>() + 2 * size_of::<Answer>()) as u64);
+        if let Some(free) = process::available().filter(|&free| bytes > free) {
+            let [bytes, free] = [bytes, free].map(memory::size);
+            return Err(Error::Memory(format!(
+                "{rays} rays take {bytes}, and {free} are free; give a smaller --random or --size"
+            )));
+        }
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let mut queries: Vec<Query> = pixels.map(|(x, y)| Query::Closest(self.renderer.camera_ray(x, y, 0))).collect();
         if let Some(aim) = Aim::new(self.renderer.world()) {
@@ -184,7 +195,7 @@ impl Setup<'_> {
         for i in (1..queries.len()).rev() {
             queries.swap(i, random.below(i as u64 + 1) as usize);
         }
-        queries
+        Ok(queries)
     }
 }
 
@@ -192,7 +203,7 @@ impl Row {
     fn judge(
         &mut self,
         world: &World,
-        entrant: Entrant,
+        (entrant, is_exact): (Entrant, bool),
         tracer: &dyn Tracer,
         query: &Query,
         expected: Answer,
@@ -202,6 +213,7 @@ impl Row {
             return;
         }
         let class = match (query, expected, found) {
+            (_, Answer::Closest(Some(a)), Answer::Closest(Some(b))) if !is_exact && a.id() == b.id() => Class::Agree,
             _ if entrant.is_native() => Class::NativeWrong,
             (Query::Closest(ray), Answer::Closest(native), Answer::Closest(embree)) => {
                 classify_closest(world, ray, &Answers { native, embree, brute: None })

@@ -78,16 +78,25 @@ pub fn ulps(a: f32, b: f32) -> u32 {
 
 /// Judges the answers to a closest-hit query.
 pub fn classify_closest(world: &World, ray: &Ray, answers: &Answers) -> Class {
+    classify(world, ray, answers, true)
+}
+
+/// The same where native's t may be any, as that of a textbook's method is: what it names alone is judged.
+pub fn classify_named(world: &World, ray: &Ray, answers: &Answers) -> Class {
+    classify(world, ray, answers, false)
+}
+
+fn classify(world: &World, ray: &Ray, answers: &Answers, with_t: bool) -> Class {
     let Answers { native, embree, brute } = answers;
     let id = |hit: &Option<Hit>| hit.map(|h| h.id());
     let same = id(native) == id(embree);
     if same && brute.is_none_or(|b| id(&b) == id(native)) {
         // The primitive stands; native's t is held to its bound as well.
-        let stands = native.zip(*embree).is_none_or(|(a, b)| a.t == b.t || t_fits(world, ray, &a));
+        let stands = !with_t || native.zip(*embree).is_none_or(|(a, b)| a.t == b.t || t_fits(world, ray, &a));
         return if stands { Class::Agree } else { Class::NativeWrong };
     }
     let involved = Involved::new(world, ray, answers.named());
-    if !involved.explain_closest(ray, *native, |c| &c.exact, true) {
+    if !involved.explain_closest(ray, *native, |c| &c.exact, with_t) {
         return Class::NativeWrong;
     }
     if same {
@@ -284,6 +293,11 @@ mod tests {
         let off = 1.0 + 3.0 * f32::EPSILON;
         assert_eq!(closest(clear, hit(0, off), hit(0, 1.0)), Class::NativeWrong);
         assert_eq!(closest(clear, hit(0, 1.0), hit(0, off)), Class::Agree);
+        // Of a textbook's method what it names is judged.
+        let named = |native, embree| classify_named(&world(), &clear, &Answers { native, embree, brute: None });
+        assert_eq!(named(hit(0, off), hit(0, 1.0)), Class::Agree);
+        assert_eq!(named(hit(2, 2.0), hit(0, 1.0)), Class::NativeWrong);
+        assert_eq!(named(None, hit(0, 1.0)), Class::NativeWrong);
     }
 
     #[test]

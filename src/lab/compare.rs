@@ -25,6 +25,8 @@ pub struct Setup<'a, A, B> {
     pub renderer: &'a Renderer<'a>,
     /// The native engine.
     pub native: &'a A,
+    /// Whether its t are exact but for rounding, as those of all but textbooks' methods are.
+    pub is_exact: bool,
     /// Embree.
     pub embree: &'a B,
     /// Brute force, for scenes below [`BRUTE_LIMIT`].
@@ -100,6 +102,7 @@ impl<A: Tracer, B: Tracer> Setup<'_, A, B> {
         let native_image = self.renderer.render(self.native, control)?;
         let embree_image = self.renderer.render(self.embree, control)?;
         let paired = Paired::new(world, self.native, self.embree, self.brute);
+        let paired = if self.is_exact { paired } else { paired.by_name() };
         self.renderer.render(&paired, control)?;
         shoot(&paired, world, self.random, self.seed, control)?;
         let pixels = explain_pixels(self.renderer, self.native, self.embree, &native_image, &embree_image);

@@ -29,7 +29,7 @@ pub mod stress;
 pub mod suspicious;
 pub mod tree;
 
-pub use classify::{Answers, Class, classify_closest, classify_occluded, is_boundary, ulps};
+pub use classify::{Answers, Class, classify_closest, classify_named, classify_occluded, is_boundary, ulps};
 pub use compare::{Comparison, Report, Setup};
 pub use entrants::Entrant;
 pub use paired::{Asked, Difference, Paired, Tally};

@@ -18,7 +18,7 @@ use super::exact::{Approx, Dyadic, Rational, Ring, Vector, det, vector, zip};
 use super::exact_shapes::crossings;
 use crate::math::{Affine3, Vec3, is_traceable};
 use crate::ray::{Hit, Ray};
-use crate::shape::{Cone, Cylinder, Shape};
+use crate::shape::Shape;
 use crate::trace::{Part, Primitives, World};
 
 /// The order of [`Hit::id`]: instance, geometry, primitive.

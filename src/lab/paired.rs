@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-use super::classify::{Answers, Class, classify_closest, classify_occluded, starts_on, ulps};
+use super::classify::{Answers, Class, classify_closest, classify_named, classify_occluded, starts_on, ulps};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Tracer, World};
@@ -22,13 +22,20 @@ pub struct Paired<'a, A: ?Sized, B: ?Sized> {
     native: &'a A,
     embree: &'a B,
     brute: Option<&'a dyn Tracer>,
+    judge: fn(&World, &Ray, &Answers) -> Class,
     tally: Tally,
 }
 
 impl<'a, A: Tracer + ?Sized, B: Tracer + ?Sized> Paired<'a, A, B> {
     /// Engines that were built from `world`.
     pub fn new(world: &'a World, native: &'a A, embree: &'a B, brute: Option<&'a dyn Tracer>) -> Self {
-        Self { world, native, embree, brute, tally: Tally::default() }
+        Self { world, native, embree, brute, judge: classify_closest, tally: Tally::default() }
+    }
+
+    /// The same, of a native tracer whose t are not exact: it is judged by what it names.
+    #[must_use]
+    pub fn by_name(self) -> Self {
+        Self { judge: classify_named, ..self }
     }
 
     /// What was found so far.
@@ -38,7 +45,7 @@ impl<'a, A: Tracer + ?Sized, B: Tracer + ?Sized> Paired<'a, A, B> {
 
     fn judge_closest(&self, ray: &Ray, native: Option<Hit>, embree: Option<Hit>) {
         let answers = Answers { native, embree, brute: self.brute.map(|b| b.closest(ray)) };
-        let class = classify_closest(self.world, ray, &answers);
+        let class = (self.judge)(self.world, ray, &answers);
         if let Some((a, b)) = native.zip(embree).filter(|(a, b)| a.id() == b.id()) {
             let steps = ulps(a.t, b.t);
             if steps > self.tally.max_t_ulp() && !starts_on(self.world, ray, &a) {

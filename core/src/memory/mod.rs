@@ -21,6 +21,16 @@ use bytemuck::Zeroable;
 /// Arrays below this many bytes are left as they are: a few huge pages.
 const LEAST: usize = 1 << 23;
 
+/// Bytes in a unit that suits them, for messages.
+pub fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        b if b < 1e4 => format!("{b} B"),
+        b if b < 1e7 => format!("{:.0} kB", b / 1e3),
+        b if b < 1e10 => format!("{:.0} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
+}
+
 /// So many zeros. The system hands them out as they are first touched, so they cost nothing until then.
 pub fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
     let mut items = bytemuck::zeroed_vec(count);
@@ -61,6 +71,11 @@ fn huge_pages(_: usize, _: usize) {}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_read_well() {
+        assert_eq!([9_999, 123_456, 12_345_678, 12_345_678_901].map(size), ["9999 B", "123 kB", "12 MB", "12.3 GB"]);
+    }
 
     #[test]
     fn holds_what_was_asked_for() {

@@ -15,7 +15,10 @@ const PIECE: usize = 256;
 const TASK: usize = 64;
 
 impl Scene {
-    /// Bounds of everything that can be hit, in scene coordinates, at all times.
+    /// Bounds of everything that has bounds, in scene coordinates, at all times: of all shapes but planes, and of what [`Mesh::bounds`] counts.
+    ///
+    /// # Panics
+    /// For an instance of a group that there is not.
     pub fn bounds(&self) -> DAabb {
         let mut uses = vec![0usize; self.geometries.len()];
         let geometries = |group| self.group_geometries(group).map(|(i, geometry)| (i as usize, geometry));

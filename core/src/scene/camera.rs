@@ -128,7 +128,7 @@ impl fmt::Display for Fov {
 impl Camera {
     /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi. Where `up` is along the view, up in the
     /// picture is what it becomes for a camera that is tilted until it looks up or down: -z for one that looks along -z
-    /// and is tilted down. None where `eye` and `target` coincide, where `up` is zero, and for what is not finite.
+    /// and is tilted down. None where `eye` and `target` coincide, where `up` is zero, and where these are not finite; the angle is looked at by who renders.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov: f64) -> Option<Self> {
         let back = (eye - target).try_normalize()?;
         let up = up.try_normalize()?;
@@ -153,14 +153,19 @@ impl Camera {
         })
     }
 
-    /// A view of the whole of `bounds`, from the front, a little from the right and above.
+    /// A view of the whole of `bounds`, from the front, a little from the right and above; of something about a point, where there is no more to see.
+    ///
+    /// # Panics
+    /// For bounds that are not finite, and an aspect that is not above 0.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
         let fov = 40f64.to_radians();
         let half = (fov / 2.0).min(libm::atan(libm::tan(fov / 2.0) * aspect));
-        let radius = if bounds.radius() > 0.0 { bounds.radius() } else { 1.0 };
+        // What f64 still keeps apart from the middle, so that there is a direction from there.
+        let least = bounds.centre().abs().max_element() * 0.5f64.powi(40);
+        let radius = if bounds.radius() > 0.0 { bounds.radius() } else { 1.0 }.max(least);
         let direction = DVec3::new(0.45, 0.35, 1.0).normalize();
         let eye = bounds.centre() + direction * (radius / libm::sin(half));
-        Self::look_at(eye, bounds.centre(), DVec3::Y, fov).expect("the direction is neither zero nor vertical")
+        Self::look_at(eye, bounds.centre(), DVec3::Y, fov).expect("bounds are finite, and the aspect is above 0")
     }
 
     /// Where it is at a time from 0 to 1.
@@ -180,6 +185,25 @@ impl Camera {
         if let Some(lens) = &mut self.lens {
             lens.radius *= scale;
             lens.focus *= scale;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However far away and small, what is framed is in the middle of the picture.
+    #[test]
+    fn framing_looks_at_the_middle_from_a_distance() {
+        for (away, size) in [(0.0, 1.0), (0.0, 0.0), (0.0, 1e30), (1e17, 0.0), (1e17, 1.0), (-1e30, 1e10), (1e6, 1e-3)]
+        {
+            let middle = DVec3::new(away, -away, away);
+            let bounds = DAabb::EMPTY.include(middle).include(middle + DVec3::splat(size));
+            let camera = Camera::framing(&bounds, 1.5);
+            let way = bounds.centre() - camera.eye;
+            assert!(way.length() >= bounds.radius() && camera.eye.is_finite(), "{away} {size}");
+            assert!(way.normalize().dot(-camera.frame.z_axis) > 1.0 - 1e-6, "{away} {size}");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4, cofactor, is_traceable};
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, LARGEST_COORDINATE, Vec2, Vec3, Vec4, cofactor, is_traceable};
 
 /// Vertices or triangles that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -39,14 +39,13 @@ impl Mesh {
         Self { positions: Arc::new(positions), triangles: Arc::new(triangles), ..Self::default() }
     }
 
-    /// Stores f64 positions as f32 offsets from an origin in the middle of those that the mesh's triangles name, where these are far from zero; in the
-    /// middle of all of them where it has no triangles yet.
+    /// Stores f64 positions as f32 offsets from an origin in the middle of those that triangles name which rays can hit, where these are far from zero; in
+    /// the middle of all of them where the mesh has no triangles yet.
     pub fn set_positions(&mut self, positions: &[DVec3]) {
-        let corners = self.triangles.as_flattened();
-        let bounds = if corners.is_empty() {
+        let bounds = if self.triangles.is_empty() {
             bounds_of(positions, |p| Some(*p))
         } else {
-            bounds_of(corners, |&i| positions.get(i as usize).copied())
+            bounds_of_triangles(&self.triangles, positions)
         };
         self.origin = choose_origin(&bounds);
         let offset = |p: &DVec3| (p - self.origin).as_vec3();
@@ -59,7 +58,7 @@ impl Mesh {
         self.origin + offset.as_dvec3()
     }
 
-    /// The bounds of the traceable vertices under `transform`.
+    /// The bounds of the traceable vertices under `transform`, those that no triangle names among them: reading a file leaves these out.
     pub fn bounds(&self, transform: &DAffine3) -> DAabb {
         let place = |p: Vec3| transform.transform_point3(self.point(p));
         let tasks = self.positions.par_chunks(TASK);
@@ -126,15 +125,18 @@ impl Mesh {
 
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
     /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
-    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat.
+    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat. A triangle with a corner that is NaN or infinite has none.
+    ///
+    /// # Panics
+    /// For a triangle that names a vertex that there is not.
     pub fn smooth_normals(&mut self) {
         let mut sums = vec![DVec3::ZERO; self.positions.len()];
         for corners in self.triangles.iter() {
             let p = corners.map(|i| self.positions[i as usize].as_dvec3());
-            let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
-            if !normal.is_finite() {
+            if !p.iter().all(|p| p.is_finite()) {
                 continue;
             }
+            let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
             for k in 0..3 {
                 let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
                 // The angle by its tangent: accurate for slivers too.
@@ -143,6 +145,19 @@ impl Mesh {
         }
         self.normals = sums.into_par_iter().with_min_len(TASK).map(|n| n.normalize_or_zero().as_vec3()).collect();
     }
+}
+
+/// Around the triangles whose corners are there, finite and small enough to be traced.
+fn bounds_of_triangles(triangles: &[[u32; 3]], positions: &[DVec3]) -> DAabb {
+    // Written so that NaN gives false.
+    let is_traceable = |p: &DVec3| p.abs().cmple(DVec3::splat(LARGEST_COORDINATE.into())).all();
+    let corner = |i: u32| positions.get(i as usize).copied().filter(is_traceable);
+    let around = |bounds: DAabb, &[a, b, c]: &[u32; 3]| match (corner(a), corner(b), corner(c)) {
+        (Some(a), Some(b), Some(c)) => bounds.include(a).include(b).include(c),
+        _ => bounds,
+    };
+    let tasks = triangles.par_chunks(TASK).map(|part| part.iter().fold(DAabb::EMPTY, around));
+    tasks.reduce(|| DAabb::EMPTY, DAabb::union)
 }
 
 /// Around the finite ones of the points of these items.
@@ -157,4 +172,44 @@ pub fn bounds_of<T: Sync>(items: &[T], point: impl Fn(&T) -> Option<DVec3> + Syn
 pub fn choose_origin(bounds: &DAabb) -> DVec3 {
     let centre = bounds.centre();
     if centre.abs().max_element() <= 8.0 * bounds.radius() { DVec3::ZERO } else { centre }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bump of 8 x 8 squares.
+    fn bump(place: impl Fn(DVec3) -> DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let at = |i: u32| f64::from(i) * 0.25 - 1.0;
+        let height = |x: f64, y: f64| (-(x * x + y * y)).exp();
+        let positions = (0..81).map(|i| (at(i % 9), at(i / 9))).map(|(x, y)| place(DVec3::new(x, y, height(x, y))));
+        let corners = (0..64u32).map(|i| i % 8 + i / 8 * 9);
+        (positions.collect(), corners.flat_map(|i| [[i, i + 1, i + 10], [i, i + 10, i + 9]]).collect())
+    }
+
+    /// A triangle that no ray can hit neither bends normals nor takes from others' precision.
+    #[test]
+    fn what_cannot_be_hit_changes_nothing() {
+        let (positions, triangles) = bump(|p| p + DVec3::new(5e6, 0.0, -5e6));
+        let make = |positions: &[DVec3], triangles: Vec<[u32; 3]>| {
+            let mut mesh = Mesh { triangles: Arc::new(triangles), ..Mesh::default() };
+            mesh.set_positions(positions);
+            mesh.drop_strays();
+            mesh.smooth_normals();
+            mesh
+        };
+        let alone = make(&positions, triangles.clone());
+        assert!(alone.normals.iter().all(|normal| normal.is_normalized()));
+        for bad in [f64::NAN, f64::INFINITY, 1e300] {
+            let more = [&positions[..], &[DVec3::ZERO, DVec3::new(bad, 0.0, 0.0)]].concat();
+            let mesh = make(&more, [&triangles[..], &[[40, 81, 82]]].concat());
+            assert_eq!((mesh.untraceable_triangles(), mesh.triangles.len()), (1, 129));
+            assert_eq!(
+                (mesh.origin, &mesh.positions[..81], &mesh.normals[..81]),
+                (alone.origin, &alone.positions[..], &alone.normals[..])
+            );
+            let [found, expected] = [&mesh, &alone].map(|mesh| mesh.bounds(&DAffine3::IDENTITY));
+            assert_eq!((found.min, found.max), (expected.min, expected.max), "{bad}");
+        }
+    }
 }

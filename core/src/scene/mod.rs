@@ -6,6 +6,8 @@
 mod bounds;
 mod camera;
 mod check;
+#[doc(hidden)]
+pub mod compact;
 mod environment;
 mod fog;
 mod instance;

@@ -105,11 +105,6 @@ impl Interval {
         Self { enter: self.enter.max(other.enter), exit: self.exit.min(other.exit) }
     }
 
-    /// Whether t lies in it.
-    pub fn contains(&self, t: f64) -> bool {
-        self.enter <= t && t <= self.exit
-    }
-
     /// Its ends, where it is not empty.
     pub fn ends(&self) -> Roots {
         let is_some = self.enter <= self.exit;

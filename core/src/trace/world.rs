@@ -342,7 +342,7 @@ fn group_origin(scene: &Scene, group: u32) -> DVec3 {
 
 fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     let Instance { name, transform, transform_end, .. } = instance;
-    if can_place(transform) && transform_end.is_none_or(|end| end.is_finite()) {
+    if can_place(transform) && transform_end.is_none_or(|end| end.as_affine3().is_finite()) {
         return Ok(());
     }
     let remedy = "give it a scale that is neither zero nor beyond what f32 holds";
@@ -356,6 +356,20 @@ mod tests {
     use crate::scene::Material;
     use crate::trace::Tracer;
     use crate::trace::bvh::Bvh;
+
+    /// Not even at the start would it be seen.
+    #[test]
+    fn what_moves_beyond_f32_is_refused() {
+        let scene = |x: f64| {
+            let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+            let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+            scene.instances[0].transform_end = Some(DAffine3::from_translation(DVec3::X * x));
+            scene
+        };
+        assert!(World::new(&scene(1e6)).is_ok());
+        let told = World::new(&scene(1e39)).expect_err("refused").to_string();
+        assert!(told.contains("beyond what f32 holds"), "{told}");
+    }
 
     /// Wherever the scene lies, and so wherever zero is for tracers.
     #[test]

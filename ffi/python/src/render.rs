@@ -162,6 +162,7 @@ pub fn render_meshes<'py>(
         let mut mesh = Mesh { material: number as u32, ..Mesh::new(Vec::new(), triangles) };
         pool::run(py, wishes.threads, || {
             mesh.set_positions(&positions);
+            mesh.drop_strays();
             if is_smooth {
                 mesh.smooth_normals();
             }

@@ -10,7 +10,7 @@ use super::document::Document;
 use super::draco;
 use super::schema::Primitive;
 use crate::error::Result;
-use crate::io::compact::pick;
+use crate::scene::compact::pick;
 
 /// The attributes of a primitive.
 pub(super) struct Attributes<'v> {

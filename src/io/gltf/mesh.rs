@@ -15,8 +15,8 @@ use super::pose::Pose;
 use super::schema::Primitive;
 use super::{draco, skin, triangles, variants};
 use crate::error::{Result, Warning};
-use crate::io::compact::compact;
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use crate::scene::compact::compact;
 use crate::scene::{Geometry, Group, Mesh, Scene};
 
 /// A mesh in one of its shapes.

@@ -16,10 +16,10 @@ use super::mtl::Library;
 use super::statement::{Faces, Polygon};
 use super::{NONE, Obj, Piece, Section};
 use crate::error::{Error, Result, Warning};
-use crate::io::compact::{compact, pick};
 use crate::io::polygon;
 use crate::math::{DAabb, DVec3, Vec2, Vec3, Vec4};
 use crate::memory;
+use crate::scene::compact::{compact, pick};
 use crate::scene::{Geometry, Mesh, Scene, bounds_of, choose_origin};
 
 /// Positions that are worth a task of their own.

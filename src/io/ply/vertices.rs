@@ -7,9 +7,9 @@ use super::header::{Element, Scalar};
 use super::item::Item;
 use super::{Items, TELL};
 use crate::io::Placeless;
-use crate::io::compact::{choose, pick};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::Mesh;
+use crate::scene::compact::{choose, pick};
 
 /// Which of an element's properties is what.
 pub(super) struct Layout {

@@ -12,10 +12,10 @@ use super::header::{Element, Header};
 use super::item::Item;
 use super::vertices::{Layout, Vertices};
 use crate::io::Placeless;
-use crate::io::compact::{compact, with_vertices};
 use crate::io::weld::Weld;
 use crate::math::{Vec2, Vec4};
 use crate::scene::Mesh;
+use crate::scene::compact::{compact, with_vertices};
 
 /// The property that says which of the textures a face has.
 pub(super) const NUMBER: &str = "texnumber";

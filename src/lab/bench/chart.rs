@@ -21,6 +21,8 @@ const PANEL: f64 = (WIDTH - 2.0 * MARGIN - GAP) / 2.0;
 const NAMES: f64 = 102.0;
 const RATES: f64 = 68.0;
 const PLOT: f64 = PANEL - NAMES - RATES;
+/// Letters that fit on the left.
+const MOST_LETTERS: usize = 17;
 /// Height of a bar's row, and of the bar.
 const ROW: f64 = 17.0;
 const BAR: f64 = 9.0;
@@ -140,8 +142,10 @@ fn panel(svg: &mut Drawing, (x, y): (f64, f64), report: &Report, ratio: &Ratio) 
 fn bar(svg: &mut Drawing, x: f64, middle: f64, rows: &[&TraversalRow], at: impl Fn(f64) -> f64) {
     let Some(best) = rows.iter().max_by(|a, b| a.mrays_per_s.median.total_cmp(&b.mrays_per_s.median)) else { return };
     let baseline = middle + 4.0;
+    // Where there is no room for both, colours tell the engines apart.
     let name = format!("{} {}", best.backend, best.mode);
-    svg.text((x + NAMES - 7.0, baseline), Anchor::End, BODY, &shortened(&name, 17));
+    let name = if name.len() > MOST_LETTERS { best.mode } else { &name };
+    svg.text((x + NAMES - 7.0, baseline), Anchor::End, BODY, &shortened(name, MOST_LETTERS));
     let rate = best.mrays_per_s;
     let length = at(rate.median) - at(0.0);
     svg.rectangle((at(0.0), middle - BAR / 2.0), (length, BAR), color(best));
@@ -187,15 +191,9 @@ fn scale(most: f64) -> (f64, u32) {
     (step, (most / step).ceil() as u32)
 }
 
-/// With three digits that count.
+/// With three digits that count, and no more than six behind the point.
 fn number(x: f64) -> String {
-    let digits = if x == 0.0 || x >= 100.0 {
-        0
-    } else if x >= 10.0 {
-        1
-    } else {
-        2
-    };
+    let digits = if x > 0.0 { (2.0 - x.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 };
     format!("{x:.digits$}")
 }
 
@@ -233,13 +231,16 @@ mod tests {
             width,
             kind: Kind::Primary,
             mrays_per_s: Spread { min: 0.5 * rate, median: rate, max: 1.5 * rate },
+            rays: 1,
             hits: 1,
             turns: vec![rate],
         };
         let traversal: Vec<TraversalRow> = rates.iter().map(row).collect();
         let ratios = vec![Ratio::new(Kind::Primary, &traversal), Ratio::new(Kind::Diffuse, &traversal)];
-        let (scene, builds, verdicts) = (scene.to_owned(), Vec::new(), Vec::new());
-        Report { scene, triangles: 1_234_567, threads: 2, builds, traversal, ratios, verdicts }
+        let (processor, isa, size, repeat) = ("a processor".to_owned(), "avx2", 8, 1);
+        let (scene, builds, answers) = (scene.to_owned(), Vec::new(), Vec::new());
+        let (triangles, threads) = (1_234_567, 2);
+        Report { scene, triangles, threads, processor, isa, size, repeat, builds, traversal, ratios, answers }
     }
 
     /// The values of an attribute in the elements of a name, in order.

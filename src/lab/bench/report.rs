@@ -16,6 +16,14 @@ pub struct Report {
     pub triangles: u64,
     /// Threads that built and traced.
     pub threads: usize,
+    /// The processor, in its own words.
+    pub processor: String,
+    /// Instructions that the engines may use at most.
+    pub isa: &'static str,
+    /// Camera rays to a side, before they are made whole tiles.
+    pub size: usize,
+    /// How often everything was measured.
+    pub repeat: usize,
     /// One for each engine and mode.
     pub builds: Vec<BuildRow>,
     /// One for each engine, mode, width and kind of ray.
@@ -23,8 +31,7 @@ pub struct Report {
     /// One for each kind of ray.
     pub ratios: Vec<Ratio>,
     /// What became of comparing the answers, where there was something to compare.
-    #[serde(skip)]
-    pub verdicts: Vec<(Kind, Verdict)>,
+    pub answers: Vec<Verdict>,
 }
 
 /// Smallest, middle and largest of what was measured again and again.
@@ -66,6 +73,8 @@ pub struct TraversalRow {
     pub kind: Kind,
     /// Millions of rays a second.
     pub mrays_per_s: Spread,
+    /// Rays that were traced in each turn.
+    pub rays: u64,
     /// Rays that hit something.
     pub hits: u64,
     /// The rate of each turn, in order.
@@ -85,19 +94,28 @@ pub struct Ratio {
     pub over_embree_fast: Option<f64>,
 }
 
-/// How native's answers stand to Embree's.
-#[derive(Clone, Copy, Debug)]
-pub struct Verdict([u64; Class::ALL.len()]);
+/// How native's answers stand to Embree's, on the rays of one kind.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Verdict {
+    /// What the rays are for.
+    pub kind: Kind,
+    /// [`Class::Agree`].
+    pub agree: u64,
+    /// [`Class::Tie`].
+    pub tie: u64,
+    /// [`Class::Boundary`].
+    pub boundary: u64,
+    /// [`Class::NativeWrong`].
+    pub native_wrong: u64,
+    /// [`Class::EmbreeWrong`].
+    pub embree_wrong: u64,
+}
 
 impl Verdict {
     /// The counts of `tally`.
-    pub(super) fn new(tally: &Tally) -> Self {
-        Self(Class::ALL.map(|class| tally.count(class)))
-    }
-
-    /// Rays of one class.
-    pub fn count(&self, class: Class) -> u64 {
-        self.0[class as usize]
+    pub(super) fn new(kind: Kind, tally: &Tally) -> Self {
+        let [agree, tie, boundary, native_wrong, embree_wrong] = Class::ALL.map(|class| tally.count(class));
+        Self { kind, agree, tie, boundary, native_wrong, embree_wrong }
     }
 }
 
@@ -160,12 +178,13 @@ impl fmt::Display for Report {
                     writeln!(f, "  {:<22}{ratio:9.2}", format!("over embree {name}"))?;
                 }
             }
-            for (_, verdict) in self.verdicts.iter().filter(|(of, _)| of == kind) {
-                write!(f, "  answers:")?;
-                for (class, comma) in Class::ALL.iter().zip(["", ",", ",", ",", ","]) {
-                    write!(f, "{comma} {} {}", verdict.count(*class), class.name())?;
-                }
-                writeln!(f)?;
+            for Verdict { agree, tie, boundary, native_wrong, embree_wrong, .. } in
+                self.answers.iter().filter(|answers| answers.kind == *kind)
+            {
+                writeln!(
+                    f,
+                    "  answers: {agree} agree, {tie} tie, {boundary} boundary, {native_wrong} native_wrong, {embree_wrong} embree_wrong"
+                )?;
             }
         }
         Ok(())
@@ -178,7 +197,7 @@ mod tests {
 
     fn row(backend: &'static str, mode: &'static str, width: usize, turns: &[f64]) -> TraversalRow {
         let mrays_per_s = Spread::of(turns);
-        TraversalRow { backend, mode, width, kind: Kind::Primary, mrays_per_s, hits: 0, turns: turns.to_vec() }
+        TraversalRow { backend, mode, width, kind: Kind::Primary, mrays_per_s, rays: 9, hits: 0, turns: turns.to_vec() }
     }
 
     #[test]

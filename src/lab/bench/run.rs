@@ -6,6 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::answers::{Answers, CHUNK, Room};
+use super::machine::processor;
 use super::pixel_loop::PixelLoop;
 use super::rays::{Kind, RaySet};
 use super::report::{BuildRow, Ratio, Report, Spread, TraversalRow, Verdict};
@@ -29,6 +30,8 @@ pub struct Contender {
     pub backend: &'static str,
     /// As it is set up: `default`, `fast`, `robust` ...
     pub mode: &'static str,
+    /// Whether its answers must be right, and those of all others of which that is said, to the bit: of the native ones, but for textbooks' methods.
+    pub is_exact: bool,
     /// Builds it, on rayon's current pool or as many threads.
     pub build: Box<Build>,
 }
@@ -64,6 +67,8 @@ pub struct Setup<'a> {
     pub side: usize,
     /// Threads that build and trace, at least 1.
     pub threads: usize,
+    /// Instructions that engines may use at most, as in reports.
+    pub isa: &'static str,
     /// How often everything is measured, at least 1; builds that take no time more often.
     pub repeat: usize,
     /// Stops the measurement once set.
@@ -89,29 +94,34 @@ impl Setup<'_> {
         let pool = pool.map_err(|error| Error::Usage(format!("{} threads: {error}", self.threads)))?;
         pool.install(|| {
             let (tracers, builds) = self.build()?;
-            let Some(first) = self.position("native", None).or(self.contenders.first().map(|_| 0)) else {
+            let exact = self.contenders.iter().position(|contender| contender.is_exact);
+            let Some(first) = exact.or(self.contenders.first().map(|_| 0)) else {
                 return Err(Error::Usage("no engine to measure".to_owned()));
             };
             let pixels = PixelLoop::new(self.subject, self.side)?;
             let prepared = self.subject.view.rays(&self.subject.world, &*tracers[first], self.kinds, self.side);
             let mut prepared = prepared.into_iter();
-            let (mut traversal, mut verdicts) = (Vec::new(), Vec::new());
+            let (mut traversal, mut answers) = (Vec::new(), Vec::new());
             for &kind in self.kinds {
                 let of_pixels = || RaySet { kind, rays: pixels.rays() };
                 let set = if kind == Kind::Pixel { Some(of_pixels()) } else { prepared.next() };
                 let Some(set) = set else { continue };
                 let (hits, verdict) = self.compare(&set, &tracers, first)?;
-                verdicts.extend(verdict.map(|verdict| (set.kind, verdict)));
+                answers.extend(verdict);
                 traversal.extend(self.trace(&set, &pixels, &tracers, &hits)?);
             }
             Ok(Report {
                 scene: self.subject.name.clone(),
                 triangles: self.subject.world.primitive_count(),
                 threads: self.threads,
+                processor: processor(),
+                isa: self.isa,
+                size: self.side,
+                repeat: self.repeat,
                 builds,
                 ratios: self.kinds.iter().map(|&kind| Ratio::new(kind, &traversal)).collect(),
                 traversal,
-                verdicts,
+                answers,
             })
         })
     }
@@ -149,7 +159,7 @@ impl Setup<'_> {
         Ok((built.into_iter().flatten().map(|b| b.tracer).collect(), rows))
     }
 
-    /// Has every engine answer once at every width. Native's answers must all be the same to the bit, and right
+    /// Has every engine answer once at every width. Exact answers must all be the same to the bit, and right
     /// wherever Embree's differ. Gives the hits by contender and width.
     fn compare(
         &self,
@@ -164,7 +174,7 @@ impl Setup<'_> {
             for (width, count) in WIDTHS.into_iter().zip(counts) {
                 let answers = Answers::of(set, &**tracer, set.kind.batch(width));
                 *count = answers.hits();
-                if contender.backend == "native" && answers != reference {
+                if contender.is_exact && answers != reference {
                     let (mode, kind, width) = (contender.mode, set.kind.name(), width.rays());
                     return Err(Error::Check(format!(
                         "{name}: native {mode} answers differently at width {width} on {kind} rays"
@@ -173,7 +183,7 @@ impl Setup<'_> {
                 self.step()?;
             }
         }
-        if self.contenders[first].backend != "native" {
+        if !self.contenders[first].is_exact {
             return Ok((counts, None));
         }
         let Some(embree) = self.position("embree", Some("robust")).or(self.position("embree", None)) else {
@@ -190,7 +200,7 @@ impl Setup<'_> {
                 "{name}: the native engine is wrong on {wrong} of {rays} {kind} rays; for example\n{example}"
             )));
         }
-        Ok((counts, Some(Verdict::new(tally))))
+        Ok((counts, Some(Verdict::new(set.kind, tally))))
     }
 
     /// Times every engine at every width, in turn, `repeat` times.
@@ -231,6 +241,7 @@ impl Setup<'_> {
                 width: width.rays(),
                 kind: set.kind,
                 mrays_per_s: Spread::of(&turns),
+                rays: set.rays.len() as u64,
                 hits,
                 turns,
             })

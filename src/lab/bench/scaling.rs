@@ -2,7 +2,7 @@
 //!
 //! Two families of triangles: *scattered* ones of no order, with edges of about the distance to the next, which is what grids are
 //! good at; and a *terrain*, a mesh in which most of space is empty. The same rays for all accelerators, from a sphere around the scene to points in its
-//! bounds; the best of a few passes counts, since whatever else the machine does makes passes slower and never faster. An accelerator
+//! bounds; the best of a few passes, and of a few builds that are short, counts, since whatever else the machine does makes them slower and never faster. An accelerator
 //! that takes longer than a limit for a step is not asked for more primitives, nor is one that would take more memory than there may be, by
 //! what it took for each primitive while it was built before.
 //!
@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::lab::Entrant;
 use crate::math::{Random, Vec3};
-use crate::memory::process;
+use crate::memory::{self, process};
 use crate::ray::Ray;
 use crate::scene::{self, Geometry, Material, Mesh, Scene};
 use crate::trace::accel::{Accel, Options, Resolution};
@@ -206,12 +206,24 @@ impl Scaling<'_> {
         let (family, grid) = (Family::Scattered, Entrant::Accel(Accel::Grid));
         let world = world(family.mesh(SWEPT.min(self.max)))?;
         let rays = rays(&world);
-        for cells in RESOLUTIONS.into_iter().map(Some).chain([None]) {
-            self.step(&format!("grid of {}", cells.map_or("its own choice".to_owned(), |n| n.to_string())))?;
+        let mut bytes = MESH_BYTES;
+        for cells in [None].into_iter().chain(RESOLUTIONS.into_iter().map(Some)) {
+            let name = cells.map_or("its own choice".to_owned(), |n| n.to_string());
+            if let Some(why) = self.too_much(bytes, world.primitive_count()) {
+                report.stopped.push(format!("grids end before {name}: building {why}"));
+                break;
+            }
+            self.step(&format!("grid of {name}"))?;
             let options = Options { grid: cells.map(Resolution::Longest), ..Options::default() };
             let point = measure(&world, &rays, family, grid, &options)?;
+            if cells.is_some() {
+                // The next has eight times as many cells.
+                bytes = 8.0 * point.bytes_a_primitive_building.unwrap_or(0.0).max(point.bytes_a_primitive);
+            }
             report.grids.push(Swept { cells, point });
         }
+        let first = usize::from(!report.grids.is_empty());
+        report.grids.rotate_left(first);
         Ok(())
     }
 
@@ -219,9 +231,8 @@ impl Scaling<'_> {
     fn too_much(&self, bytes: f64, count: u64) -> Option<String> {
         let limit = self.max_memory? as f64;
         let wanted = process::held().unwrap_or(0) as f64 + SPARE * bytes * count as f64;
-        let gigabytes = |bytes: f64| bytes / 1e9;
-        (wanted > limit)
-            .then(|| format!("may take {:.1} GB in all, of {:.1} allowed", gigabytes(wanted), gigabytes(limit)))
+        let size = |bytes: f64| memory::size(bytes as u64);
+        (wanted > limit).then(|| format!("may take {} in all, of {} allowed", size(wanted), size(limit)))
     }
 
     fn step(&self, what: &str) -> Result<()> {
@@ -238,9 +249,22 @@ fn world(mesh: Mesh) -> Result<World> {
 }
 
 fn measure(world: &World, rays: &[Ray], family: Family, entrant: Entrant, options: &Options) -> Result<Point> {
-    let start = Instant::now();
-    let (built, growth) = process::growth(|| entrant.build(world, options));
-    let (built, build_seconds) = (built?, start.elapsed().as_secs_f64());
+    let build = || {
+        let start = Instant::now();
+        entrant.build(world, options).map(|built| (built, start.elapsed()))
+    };
+    let (built, growth) = process::growth(build);
+    let (built, mut fastest) = built?;
+    let mut spent = fastest;
+    for _ in 1..PASSES {
+        if spent > PASS {
+            break;
+        }
+        let (_, again) = build()?;
+        spent += again;
+        fastest = fastest.min(again);
+    }
+    let build_seconds = fastest.as_secs_f64();
     let best = (0..PASSES).map(|_| pass(&built, rays)).fold(f64::INFINITY, f64::min);
     let primitives = world.primitive_count();
     Ok(Point {

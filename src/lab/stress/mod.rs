@@ -75,9 +75,17 @@ pub fn catalogue() -> impl Iterator<Item = Case> {
 }
 
 impl Case {
-    /// Its worlds, with about so many rays in all; `seed` chooses among rays, and never changes a world.
+    /// Its worlds, with about so many rays in all, and one at least; `seed` chooses among rays, and never changes a world.
     pub fn probes(&self, rays: usize, seed: u64) -> Vec<Probe> {
-        (self.make)(rays.max(1), &mut Random::new(seed, 0))
+        let make = |rays| (self.make)(rays, &mut Random::new(seed, 0));
+        let mut rays = rays.max(1);
+        let mut probes = make(rays);
+        // Of few rays, the share of each world may be none.
+        while probes.iter().all(|probe| probe.rays.is_empty()) {
+            rays *= 2;
+            probes = make(rays);
+        }
+        probes
     }
 }
 

@@ -95,7 +95,7 @@ pub struct Tally {
 /// Errors that are kept, of which the median and the like are taken: a million rays would take as many.
 const SAMPLES: usize = 1 << 16;
 
-/// A [`Tally`], in figures. The errors are those of rays on which the right primitive was hit.
+/// A [`Tally`], in figures. The errors are those of rays on which the right primitive was hit, at a t that is a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Rays that were asked.
@@ -147,7 +147,7 @@ impl Tally {
                 }
             }
             failing.extend(fails.map(|fault| (i, fault)));
-            if let Some(hit) = found[i].filter(|hit| exact.nearest.contains(&hit.id())) {
+            if let Some(hit) = found[i].filter(|hit| exact.nearest.contains(&hit.id()) && !hit.t.is_nan()) {
                 let nearest = exact.t as f32;
                 let step = f64::from(nearest.next_up()) - f64::from(nearest);
                 let error = (f64::from(hit.t) - exact.t).abs();
@@ -228,6 +228,11 @@ mod tests {
         let verdict = tally.verdict();
         assert_eq!((verdict.false_misses, verdict.wrong_primitives, verdict.inconsistent), (1, 1, 1));
         assert_eq!((verdict.failing, verdict.t_ulp_max), (1, 1.0));
+        // An error that is no number is no error of t, but a fault.
+        let mut tally = Tally::default();
+        tally.add(Gate::Hits, &rays, &exact, &[hit(3, f32::NAN), hit(3, 2.0f32.next_up()), hit(3, 2.0)], &[true; 3]);
+        let verdict = tally.verdict();
+        assert_eq!((verdict.not_numbers, verdict.t_ulp_p99, verdict.t_ulp_max), (1, 1.0, 1.0));
         assert_eq!(Tally::default().add(Gate::Exact, &rays, &exact, &found, &[true, true, false]).len(), 2);
     }
 }
