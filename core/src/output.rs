@@ -22,12 +22,41 @@ use crate::error::{Error, Result};
 /// What `write` returns, and [`Error::Output`] where the file cannot be put in place. The old file is then whole, and
 /// nothing is left beside it.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let part = match Part::beside(path)? {
-        Target::Special => return write(path),
-        Target::File(part) => part,
-    };
-    write(&part.name)?;
-    part.put_in_place().map_err(|e| Error::output(path, reason("cannot put the finished file in place", &e)))
+    let mut files = Together::default();
+    files.write(path, write)?;
+    files.put_in_place()
+}
+
+/// Files that are put in place together, once all of them are whole: where one fails, all old ones stay.
+#[derive(Default)]
+pub struct Together(Vec<Part>);
+
+impl Together {
+    /// Has `write` make a file, as for [`write_atomically`], which is put in place with the others.
+    ///
+    /// # Errors
+    /// What `write` returns, and [`Error::Output`] where there is no place for the file.
+    pub fn write(&mut self, path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+        match Part::beside(path)? {
+            Target::Special => write(path),
+            Target::File(part) => {
+                write(&part.name)?;
+                self.0.push(part);
+                Ok(())
+            }
+        }
+    }
+
+    /// Puts all of them in place.
+    ///
+    /// # Errors
+    /// [`Error::Output`] where one cannot be; those after it are removed.
+    pub fn put_in_place(self) -> Result<()> {
+        self.0.iter().try_for_each(|part| {
+            part.put_in_place()
+                .map_err(|e| Error::output(&part.place, reason("cannot put the finished file in place", &e)))
+        })
+    }
 }
 
 /// Checks, before long work whose result goes to `path`, that a file can be created there.
@@ -89,7 +118,7 @@ impl Part {
                 Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
                 Err(e) => return Err(cannot_create(path, &e)),
             },
-            Err(e) if e.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => (through_links(path), None),
             Err(e) => return Err(cannot_create(path, &e)),
         };
         let folder = match place.parent() {
@@ -116,6 +145,18 @@ impl Drop for Part {
         // Gone after a successful rename, and never there if `write` failed early: neither is an error.
         let _ = fs::remove_file(&self.name);
     }
+}
+
+/// Where a link leads at whose end there is nothing yet.
+fn through_links(path: &Path) -> PathBuf {
+    // As many as Linux follows.
+    const MOST: usize = 40;
+    let mut place = path.to_owned();
+    for _ in 0..MOST {
+        let Ok(target) = fs::read_link(&place) else { break };
+        place = place.parent().map_or(target.clone(), |folder| folder.join(&target));
+    }
+    place
 }
 
 /// `.STEM.PROCESS-NUMBER.part.SUFFIX`.
@@ -217,6 +258,19 @@ mod tests {
         assert_eq!(fs::read_to_string(&target).unwrap(), "new");
         assert_eq!(fs::metadata(&target).unwrap().permissions().mode() & 0o777, 0o640);
 
+        // A link to what is not there yet makes that; one into a folder that is not there says so.
+        symlink("there/b.txt", folder.path().join("b.txt")).unwrap();
+        symlink("nowhere/c.txt", folder.path().join("c.txt")).unwrap();
+        let write = |name: &str| {
+            let link = folder.path().join(name);
+            let written = write_atomically(&link, |part| fs::write(part, "new").map_err(|e| cannot_create(part, &e)));
+            assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+            written
+        };
+        write("b.txt").unwrap();
+        assert_eq!(fs::read_to_string(folder.path().join("there/b.txt")).unwrap(), "new");
+        assert!(write("c.txt").unwrap_err().to_string().contains("nowhere does not exist"));
+
         let null = Path::new("/dev/null");
         check_writable(null).unwrap();
         write_atomically(null, |name| {
@@ -225,6 +279,28 @@ mod tests {
         })
         .unwrap();
         assert!(!fs::metadata(null).unwrap().is_file());
+    }
+
+    #[test]
+    fn of_several_none_is_put_in_place_where_one_fails() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.txt", "b.txt"].map(|name| folder.path().join(name));
+        fs::write(&a, "old").unwrap();
+        let make = |fails: bool| {
+            let mut files = Together::default();
+            let new = |part: &Path| fs::write(part, "new").map_err(|e| cannot_create(part, &e));
+            files.write(&a, new)?;
+            files.write(&b, |part| if fails { Err(Error::output(part, "full")) } else { new(part) })?;
+            files.put_in_place()
+        };
+        assert!(make(true).is_err());
+        assert_eq!(
+            (fs::read_to_string(&a).unwrap(), names(folder.path())),
+            ("old".to_owned(), vec!["a.txt".to_owned()])
+        );
+        make(false).unwrap();
+        assert_eq!([&a, &b].map(|path| fs::read_to_string(path).unwrap()), ["new", "new"]);
+        assert_eq!(names(folder.path()), ["a.txt", "b.txt"]);
     }
 
     #[test]

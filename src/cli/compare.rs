@@ -130,6 +130,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::image::{Metadata, WriteOptions};
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
+    use crate::output::Together;
     use crate::render::{Control, Renderer};
     use crate::trace::Tracer;
     use crate::trace::accel::{Accel, Built, Methods};
@@ -176,7 +177,9 @@ fn compare(args: &CompareArgs) -> Result<()> {
 
     let (a, b) = (&comparison.native_image, &comparison.embree_image);
     if !diff.is_empty() {
-        outputs::write_pictures(diff, &a.difference_image(b)?, &[], &Metadata::default(), &WriteOptions::default())?;
+        let (picture, mut files) = (a.difference_image(b)?, Together::default());
+        outputs::write_pictures(&mut files, diff, &picture, &[], &Metadata::default(), &WriteOptions::default())?;
+        files.put_in_place()?;
     }
     let report = &comparison.report;
     args.print(report)?;

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::image::{self, Channel, Image, Metadata, WriteOptions};
-use crate::output;
+use crate::output::{self, Together};
 
 /// Whether every picture and the other files can be written, before anything is done for them; and whether none of them
 /// would replace another, nor one of the `inputs`.
@@ -71,8 +71,9 @@ pub(super) fn try_out(pictures: &[PathBuf]) -> Result<()> {
     common.try_for_each(|path| image::check_writable(path))
 }
 
-/// Writes one picture to each path, in the format its suffix says, with the channels where that holds any.
+/// Writes one picture to each path, in the format its suffix says, with the channels where that holds any; to be put in place with `files`.
 pub(super) fn write_pictures(
+    files: &mut Together,
     paths: &[PathBuf],
     picture: &Image,
     channels: &[Channel],
@@ -81,21 +82,24 @@ pub(super) fn write_pictures(
 ) -> Result<()> {
     paths.iter().try_for_each(|path| {
         let channels = if image::holds_channels(path) { channels } else { &[] };
-        image::write_channels(path, picture, channels, metadata, options)
+        image::write_beside(files, path, picture, channels, metadata, options)
     })
 }
 
-/// Writes a JSON document.
-pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
+/// Writes a JSON document, to be put in place with `files`.
+pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(document).map_err(|error| Error::output(path, error.to_string()))?;
     text.push('\n');
-    write_text(path, &text)
+    files.write(path, |part| fill(path, part, &text))
 }
 
 /// Writes a text.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
-    let write = |part: &Path| std::fs::write(part, text).map_err(|error| Error::output(path, error.to_string()));
-    output::write_atomically(path, write)
+    output::write_atomically(path, |part| fill(path, part, text))
+}
+
+fn fill(path: &Path, part: &Path, text: &str) -> Result<()> {
+    std::fs::write(part, text).map_err(|error| Error::output(path, error.to_string()))
 }
 
 #[cfg(test)]

@@ -33,6 +33,7 @@ use crate::error::{Error, Result, Warning};
 use crate::image::{self, Metadata, Reference, Response, WriteOptions};
 use crate::io::Format;
 use crate::memory::process;
+use crate::output::Together;
 use crate::plan;
 use crate::render::{Crop, Renderer, Settings};
 use crate::scene::{Camera, Geometry, Request, Scene};
@@ -226,7 +227,8 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             kept.tell()?;
         }
         let (outcome, denoise) = outcome?;
-        let write_seconds = args.write(&asked, &outcome.passes[0])?;
+        let mut files = Together::default();
+        let write_seconds = args.write(&mut files, &asked, &outcome.passes[0])?;
 
         let pass = &outcome.passes[0];
         let [width, height] = asked.size();
@@ -246,8 +248,10 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
         };
         if let Some(path) = &args.stats {
-            outputs::write_json(path, &stats)?;
+            outputs::write_json(&mut files, path, &stats)?;
         }
+        files.put_in_place()?;
+        asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         if !args.quiet {
             let camera = &asked.camera_source;
             let mut summary = Rendered { scene, renderer: &renderer, camera, build: build.as_ref(), stats: &stats }
@@ -315,8 +319,8 @@ impl RenderArgs {
         Ok(asked)
     }
 
-    /// Writes the pictures, after which nothing need be kept of the render; in how many seconds.
-    fn write(&self, asked: &Asked, pass: &Pass) -> Result<f64> {
+    /// Writes the pictures, to be put in place with `files`; in how many seconds.
+    fn write(&self, files: &mut Together, asked: &Asked, pass: &Pass) -> Result<f64> {
         let start = Instant::now();
         let picture = &pass.picture;
         let mean_spp = picture.samples as f64 / asked.pixels() as f64;
@@ -327,13 +331,12 @@ impl RenderArgs {
         };
         let response = self.response.choose(&asked.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };
-        outputs::write_pictures(&asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
+        outputs::write_pictures(files, &asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
         let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
         let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, &asked.settings.window()));
         let bright = |path| Some((path, too_bright(&picture.image, &options.response)?));
         let told = beyond.or_else(|| of_codes.and_then(bright));
         warn(told.map(|(path, message)| Warning::new(path, "", message)).as_slice());
-        asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         Ok(start.elapsed().as_secs_f64())
     }
 

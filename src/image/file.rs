@@ -13,7 +13,7 @@ use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Curve, Image, Metadata, Response, channels};
 use crate::error::{Error, Result, one_line};
 use crate::memory::Mapped;
-use crate::output;
+use crate::output::{self, Together};
 
 /// How an image is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,6 +107,20 @@ pub fn write_channels(
     metadata: &Metadata,
     options: &WriteOptions,
 ) -> Result<()> {
+    let mut files = Together::default();
+    write_beside(&mut files, path, image, channels, metadata, options)?;
+    files.put_in_place()
+}
+
+/// The same, as one of several files that are put in place together.
+pub(crate) fn write_beside(
+    files: &mut Together,
+    path: &Path,
+    image: &Image,
+    channels: &[Channel],
+    metadata: &Metadata,
+    options: &WriteOptions,
+) -> Result<()> {
     let suffix = writable_suffix(path)?;
     let (width, height) = (image.width, image.height);
     if width == 0 || height == 0 || image.pixels.len() as u64 != u64::from(width) * u64::from(height) {
@@ -126,7 +140,7 @@ pub fn write_channels(
     channels::check(channels, image.pixels.len())?;
     let encoding = encoding(&suffix, options, image);
     let coding = (encoding, &options.response);
-    output::write_atomically(path, |part| write_part(path, part, image, channels, coding, metadata))
+    files.write(path, |part| write_part(path, part, image, channels, coding, metadata))
 }
 
 /// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.

@@ -138,6 +138,7 @@ mod tests {
     use crate::math::{DAffine3, DVec3, Vec2, Vec3};
     use crate::plan::{Census, Plan};
     use crate::scene::{Alpha, AreaShape, Attenuation, Geometry, Instance, Integrator, Light, Material, Mesh};
+    use crate::shape::{Cuboid, Shape};
     use crate::trace::World;
 
     /// A floor, and above it a tilted square of another material, before a blue sky, lit by the sun and a lamp; without anything but flat, matte surfaces.
@@ -286,6 +287,17 @@ mod tests {
         assert_eq!(plan.faint, 0.0);
         let difference = lean.difference(&full).expect("of one size").max_abs;
         let step = 1.0 / 255.0 / 12.92;
+        assert!(difference > 0.0 && difference < 0.5 * step, "{difference:e}");
+        // However many there are: three panes in a row split rays again and again.
+        let pane = |z: f32| Cuboid::new(Vec3::new(-30.0, -30.0, z), Vec3::new(30.0, 30.0, z + 1.0)).expect("a box");
+        let shapes = [0.0, -2.0, -4.0].map(|z| Shape::Cuboid(pane(z))).to_vec();
+        let mut panes =
+            Scene::from_geometries(vec![Geometry::Shapes { shapes, material: 0 }], vec![Material::glass(1.5)]);
+        panes.background = Some(Vec3::ONE);
+        let deep = |complete| Settings { complete, max_depth: Some(16), width: 8, height: 6, spp: 1, ..settings() };
+        let lean = picture(&panes, &deep(Complete::NOTHING)).0;
+        let full = picture(&panes, &deep(Complete::NOTHING.with(Reduction::Faint))).0;
+        let difference = lean.difference(&full).expect("of one size").max_abs;
         assert!(difference > 0.0 && difference < 0.5 * step, "{difference:e}");
         // Where something is a hundred times as bright as white, a hundredth of that share is seen.
         let mut bright = needing(Reduction::Faint);

@@ -90,12 +90,21 @@ pub(super) struct Path {
     pub(super) density: f32,
     /// By how much radiance grew where it was refracted, all in all.
     pub(super) scale: f32,
+    /// How large a share of the pixel may be left out of what the ray and those that follow from it see.
+    pub(super) allowance: f32,
 }
 
 impl Path {
     /// A camera ray's.
-    const CAMERA: Self =
-        Self { pixel: 0, weight: Vec3::ONE, branch: 0, media: Media::OUTSIDE, density: 0.0, scale: 1.0 };
+    const CAMERA: Self = Self {
+        pixel: 0,
+        weight: Vec3::ONE,
+        branch: 0,
+        media: Media::OUTSIDE,
+        density: 0.0,
+        scale: 1.0,
+        allowance: 0.0,
+    };
 }
 
 impl Renderer<'_> {
@@ -185,7 +194,7 @@ impl Renderer<'_> {
         hits.resize(patterns.len(), None);
         // Camera paths differ in their pixel alone, and nobody changes them: those of the last sample stay.
         let known = paths.len();
-        paths.resize(patterns.len(), Path::CAMERA);
+        paths.resize(patterns.len(), Path { allowance: self.plan.faint, ..Path::CAMERA });
         paths.iter_mut().zip(0..).skip(known).for_each(|(path, pixel)| path.pixel = pixel);
         let (groups, rest) = match &self.view {
             View::Pinhole(pinhole) => {

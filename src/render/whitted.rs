@@ -129,12 +129,13 @@ impl Renderer<'_> {
         for Lit { path, route, direction, point, shading } in lit {
             let material = &*self.appearance(point);
             let ways = Ways::new(material, point, direction.as_dvec3().normalize());
-            for (which, way, event) in [(1, ways.mirrored, Event::Specular), (2, ways.refracted, Event::Transmitted)] {
-                let Some(way) = way else { continue };
-                let weight = path.weight * way.share * way.scale;
-                if weight.max_element() <= self.plan.faint {
-                    continue;
-                }
+            let weights = [&ways.mirrored, &ways.refracted]
+                .map(|way| way.as_ref().map_or(Vec3::ZERO, |way| path.weight * way.share * way.scale));
+            let (is_followed, allowance) = followed(weights.map(Vec3::max_element), path.allowance);
+            let ways = [(1, ways.mirrored, Event::Specular), (2, ways.refracted, Event::Transmitted)];
+            for (k, (which, way, event)) in ways.into_iter().enumerate() {
+                let Some(way) = way.filter(|_| is_followed[k]) else { continue };
+                let weight = weights[k];
                 let branch = path.branch.wrapping_mul(2).wrapping_add(which);
                 let direction = match material.gloss {
                     None => Some(way.direction),
@@ -146,7 +147,7 @@ impl Renderer<'_> {
                 let Some(direction) = direction else { continue };
                 wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
                 let media = if which == 2 { self.media_behind(path, point) } else { path.media };
-                wave.paths.push(Path { weight, branch, media, ..*path });
+                wave.paths.push(Path { weight, branch, media, allowance, ..*path });
                 if let Some(tally) = tally {
                     wave.routes.push(tally.after(*route, event));
                 }
@@ -246,4 +247,18 @@ impl Wave {
         }
         (length > 0).then(|| begin..begin + length)
     }
+}
+
+/// Which of two ways are followed, and what each of these may leave out: the smaller ones are not as long as they fit into what may be left out, and the rest of that is
+/// shared. So all that is left out of a tree of rays, however large, stays below what its first ray may leave out.
+fn followed(shares: [f32; 2], allowance: f32) -> ([bool; 2], f32) {
+    let (mut is_followed, mut left) = ([true; 2], allowance);
+    let smaller = usize::from(shares[1] < shares[0]);
+    for k in [smaller, 1 - smaller] {
+        if shares[k] <= left {
+            left -= shares[k];
+            is_followed[k] = false;
+        }
+    }
+    (is_followed, if is_followed == [true; 2] { left / 2.0 } else { left })
 }

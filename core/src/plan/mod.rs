@@ -64,8 +64,8 @@ pub const USUAL_DEPTH: u32 = 5;
 /// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
 pub const USUAL_PATH_DEPTH: u32 = 64;
 
-/// A share of the picture, in each channel, that is not worth a mirrored or refracted ray to what is white and less: below half the smallest step of 8 bits,
-/// which in sRGB is 1 / 255 / 12.92. Where something may be brighter, the share is as much smaller ([`Census::brightest`]).
+/// A share of the picture, in each channel, that is not worth the mirrored and refracted rays to what is white and less which would add it: below half the smallest
+/// step of 8 bits, which in sRGB is 1 / 255 / 12.92. Where something may be brighter, the share is as much smaller ([`Census::brightest`]).
 pub const FAINT: f32 = 1e-4;
 
 /// What is wanted of a render. What is none is chosen.
@@ -100,7 +100,7 @@ pub struct Plan {
     pub why: &'static str,
     /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
-    /// Mirrored and refracted rays of no larger share are not followed: [`FAINT`] by what is brightest, or 0.
+    /// Mirrored and refracted rays are not followed whose shares come to no more than this for a sample, all together: [`FAINT`] by what is brightest, or 0.
     pub faint: f32,
     /// Whether textures bend normals.
     pub normal_maps: bool,

@@ -179,10 +179,15 @@ impl Material {
         !self.unlit && (self.diffuse != Vec3::ZERO || self.specular != Vec3::ZERO)
     }
 
+    /// The exponent of the highlight, but no more than 10^10: such a highlight is narrower than rays of any picture are apart, and sharper ones f64 cannot tell.
+    pub(crate) fn exponent(&self) -> f32 {
+        self.shininess.min(1e10)
+    }
+
     /// What an energy-conserving highlight is scaled by: pi times the factor of its f, so that met head-on it sends on just `specular`. None for the classic one, which has
     /// no such factor.
     pub(crate) fn highlight_scale(&self) -> Option<f32> {
-        let n = self.shininess;
+        let n = self.exponent();
         self.energy_conserving.then(|| match self.model {
             Specular::Phong => (n + 2.0) / 2.0,
             Specular::BlinnPhong => (n + 2.0) / 8.0 * ((n + 4.0) / (libm::exp2f(-n / 2.0) + n)),

@@ -10,6 +10,9 @@ use super::warp;
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{Material, Specular};
 
+/// The highest exponent for which f32 gives a power to a thousandth.
+const MOST_IN_F32: f32 = 1e4;
+
 /// The highlight of a material.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Highlight {
@@ -22,8 +25,8 @@ pub(super) struct Highlight {
 
 impl Highlight {
     pub(super) fn new(material: &Material) -> Self {
-        let Material { specular: color, shininess, model, .. } = *material;
-        Self { color, shininess, model, scale: material.highlight_scale() }
+        let Material { specular: color, model, .. } = *material;
+        Self { color, shininess: material.exponent(), model, scale: material.highlight_scale() }
     }
 
     /// pi f cos, for light at `cosine` to the normal.
@@ -32,7 +35,13 @@ impl Highlight {
             Specular::Phong => (normal * (2.0 * cosine) - l).dot(to_viewer),
             Specular::BlinnPhong => (l + to_viewer).normalize_or_zero().dot(normal),
         };
-        let height = libm::powf(base.clamp(0.0, 1.0) as f32, self.shininess);
+        let base = base.clamp(0.0, 1.0);
+        // In f32 the base's rounding would count: it is raised with it.
+        let height = if self.shininess <= MOST_IN_F32 {
+            libm::powf(base as f32, self.shininess)
+        } else {
+            libm::pow(base, self.shininess.into()) as f32
+        };
         self.color * self.scale.map_or(height, |scale| scale * height * cosine as f32)
     }
 
@@ -78,6 +87,42 @@ impl Highlight {
                 let half = (l + to_viewer).normalize_or_zero();
                 let cosine = half.dot(to_viewer);
                 if cosine > 0.0 { warp::power_density(half.dot(normal), n) / (4.0 * cosine) } else { 0.0 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However sharp, an energy-conserving highlight sends on its colour where the viewer looks straight at it, and nowhere more: the mean of what samples are
+    /// worth, in a white surround.
+    #[test]
+    fn sharp_highlights_make_no_energy() {
+        const SIDE: i32 = 64;
+        let normal = DVec3::new(0.3, 0.9, -0.2).normalize();
+        let aslant = (normal + DVec3::new(0.5, 0.0, 0.3)).normalize();
+        for model in [Specular::Phong, Specular::BlinnPhong] {
+            for shininess in [1e2, 1e4, 1.1e4, 1e6, 1e8, 1e10, 3e38] {
+                let material =
+                    Material { specular: Vec3::ONE, shininess, model, energy_conserving: true, ..Material::default() };
+                let highlight = Highlight::new(&material);
+                let sent_on = |to_viewer: DVec3| {
+                    let xi = (0..SIDE * SIDE)
+                        .map(|k| (DVec2::new((k % SIDE).into(), (k / SIDE).into()) + 0.5) / f64::from(SIDE));
+                    let worth = xi.map(|xi| {
+                        let l = highlight.sample(normal, to_viewer, xi);
+                        let density = highlight.density(normal, to_viewer, l);
+                        let value = f64::from(highlight.value(normal, to_viewer, l, l.dot(normal)).x);
+                        if density > 0.0 { value / (density * std::f64::consts::PI) } else { 0.0 }
+                    });
+                    worth.sum::<f64>() / f64::from(SIDE * SIDE)
+                };
+                let straight = sent_on(normal);
+                assert!((straight - 1.0).abs() < 5e-3, "{model:?} {shininess}: {straight}");
+                let aslant = sent_on(aslant);
+                assert!(aslant < 1.0 + 5e-3 && aslant > 0.5, "{model:?} {shininess}: {aslant}");
             }
         }
     }
