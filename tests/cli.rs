@@ -152,6 +152,53 @@ fn outputs_are_checked_before_the_scene_is_read() {
     }
 }
 
+/// Of several outputs none is put in place where one cannot be written.
+#[cfg(target_os = "linux")]
+#[test]
+fn where_one_output_fails_all_stay_as_they_were() {
+    use crate::io::Files;
+    let files = Files::one("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").and("a.png", "old");
+    let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
+    let render = |stats: &str| {
+        let picture = path("a.png");
+        fails(&[
+            "render",
+            &path("a.obj"),
+            "-o",
+            &picture,
+            "--stats",
+            stats,
+            "--size",
+            "8x8",
+            "--backend",
+            "native",
+            "-q",
+        ])
+    };
+    let (code, message) = render("/dev/full");
+    assert!(code == 4 && message.contains("/dev/full"), "{code} {message}");
+    assert_eq!(std::fs::read(files.path("a.png")).expect("still there"), b"old");
+    assert_eq!(render(&path("a.json")), (0, String::new()));
+    assert!(std::fs::read(files.path("a.png")).expect("replaced").starts_with(b"\x89PNG"));
+}
+
+/// A camera that cannot be is the file's fault or the command line's.
+#[test]
+fn what_is_wrong_with_a_camera_is_told_of_where_it_is_from() {
+    use crate::io::Files;
+    let camera = "[[camera]]\nname = \"near\"\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nfov = 1e-9\n";
+    let files = Files::one("a.toml", format!("{camera}[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n"));
+    let scene = files.path("a.toml");
+    let render = |more: &[&str]| {
+        let scene = scene.to_str().expect("UTF-8");
+        fails(&[&["render", scene, "--pixel", "0,0", "--size", "8x8", "--backend", "native", "-q"], more].concat())
+    };
+    let (code, message) = render(&[]);
+    assert!(code == 3 && message.contains("a.toml: camera \"near\": an angle of view so small"), "{code} {message}");
+    let (code, message) = render(&["--eye", "0,0,5", "--fov", "1e-9"]);
+    assert!(code == 2 && message.starts_with("error: an angle of view so small"), "{code} {message}");
+}
+
 /// Names in a scene are not on the command line, where a slip of the finger is to be expected.
 #[test]
 fn what_a_scene_is_read_from_is_not_replaced() {

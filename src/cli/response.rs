@@ -37,6 +37,9 @@ impl ResponseArgs {
     }
 }
 
+/// Where light begins to be cut off: above white, but for the rounding of what is to be just white.
+const WHITE: f32 = 1.001;
+
 /// Where most of what is seen is cut off as white: how much, and the exposure that would show it.
 pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     // Filmic curves have no white that light would be cut off at.
@@ -46,7 +49,7 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     let gain = response.exposure.exp2();
     let covered = || image.pixels.iter().filter(|pixel| pixel.w > 0.0);
     let light = || covered().map(|pixel| pixel.truncate().min_element() * gain);
-    let (count, white) = (covered().count(), light().filter(|&light| light >= 1.0).count());
+    let (count, white) = (covered().count(), light().filter(|&light| light > WHITE).count());
     if 2 * white <= count {
         return None;
     }
@@ -104,6 +107,7 @@ mod tests {
         assert!(message.starts_with("67 % of what is seen") && message.contains("--exposure -8 would"), "{message}");
         assert_eq!(told([0.0, 100.0, 200.0, 0.5], -8.0), None, "the advice holds");
         assert_eq!(told([2.0, 0.2, 0.3, 2.0], 0.0), None, "half of it is light that is meant to be bright");
+        assert_eq!(told([1.0, 1.0, 1.000_000_1, 1.0], 0.0), None, "white is not brighter than white");
         let filmic = Response { curve: Curve::Filmic, ..Response::default() };
         assert_eq!(too_bright(&image([100.0; 4]), &filmic), None);
     }

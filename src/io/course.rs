@@ -151,7 +151,7 @@ impl Reader {
         let (from, at, up) = (statement.vector()?, statement.vector()?, statement.vector()?);
         let fov_y = statement.angle_of_view()?.to_radians();
         let camera = Camera::look_at(from, at, up, fov_y);
-        let camera = camera.ok_or("from and at are one point, or up is 0 0 0; the camera must look somewhere")?;
+        let camera = camera.ok_or_else(|| Camera::no_look(["from", "at", "up"], [from, at, up]))?;
         self.scene.cameras.push(camera);
         Ok(())
     }

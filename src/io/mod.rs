@@ -197,6 +197,14 @@ pub fn load_watched(
         let message = format!("{bad} triangles have corners that are NaN, infinite or too far away; no ray hits them");
         warnings.push(Warning::new(path, "", message));
     }
+    let is_there = |geometry: &Geometry| match geometry {
+        Geometry::Mesh(mesh) => mesh.has_area(),
+        Geometry::Shapes { shapes, .. } => !shapes.is_empty(),
+    };
+    if !may_be_empty && !scene.geometries.iter().any(is_there) {
+        let message = "no ray hits anything: none of its triangles has an area, and corners that can be traced";
+        warnings.push(Warning::new(path, "", message));
+    }
     Ok((scene, warnings))
 }
 

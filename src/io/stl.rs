@@ -52,14 +52,24 @@ pub(super) fn promised_mesh(bytes: &[u8]) -> Option<Promised> {
     is_there.then(|| Promised { triangles, bytes: triangles * size_of::<[u32; 3]>() as u64 })
 }
 
+/// Whether it begins as a text does.
+fn is_readable(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(512)];
+    head.iter().all(|byte| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~'))
+}
+
 fn binary(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result<Mesh> {
     let bytes: &[u8] = file;
+    let there = (bytes.len().saturating_sub(HEADER) / FACET) as u64;
+    if promised(bytes).is_none_or(|count| count > there) && is_readable(bytes) {
+        let message = "is text, but no STL: that begins with \"solid\" and has \"facet\" or \"endsolid\" next";
+        return Err(Error::input(path, "line 1", message));
+    }
     let Some(count) = promised(bytes) else {
         let message = format!("is no STL file: neither text that begins with \"solid\" nor {HEADER} bytes long");
         return Err(Error::input(path, "byte 0", message));
     };
-    let there = (bytes.len() - HEADER) / FACET;
-    if count > there as u64 {
+    if count > there {
         let message = format!("promises {count} triangles of {FACET} bytes, but the file has room for {there}");
         return Err(Error::input(path, "byte 80", message));
     }

@@ -108,20 +108,32 @@ impl fmt::Debug for Renderer<'_> {
     }
 }
 
+/// What is wrong with a camera, with the file where it is one of that.
+fn told_of(error: Error, camera: &Camera, scene: &Scene) -> Error {
+    match (error, scene.files.first()) {
+        (Error::Usage(message), Some(file)) if scene.cameras.contains(camera) => {
+            let place =
+                if camera.name.is_empty() { "its camera".to_owned() } else { format!("camera {:?}", camera.name) };
+            Error::input(file, place, message)
+        }
+        (other, _) => other,
+    }
+}
+
 impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
     /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`](crate::scene::LARGEST_SIDE), a camera that cannot be, and settings that do not go
     /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
-    /// what is not there.
+    /// what is not there. [`Error::Input`] where the camera is one of the scene's file.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         settings.check()?;
         let request = Request::new(&settings.aovs, scene)?;
         // Of what samples are spread over.
         let most = settings.adaptive.map_or(spp, |adaptive| adaptive.max_spp);
-        let view = View::new(&camera, world.centre, width, height)?;
+        let view = View::new(&camera, world.centre, width, height).map_err(|error| told_of(error, &camera, scene))?;
         let [open, close] = camera.shutter;
         if !(0.0 <= open && open <= close && close <= 1.0) {
             let message = format!("a shutter from {open} to {close}: things move from time 0 to 1, and it closes last");

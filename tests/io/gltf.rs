@@ -380,6 +380,13 @@ fn what_is_not_rendered_is_a_warning() {
         "/nodes/1",
         "\"flat\" is scaled by zero",
     );
+    let two = json!([{"attributes": {"POSITION": 0}}]);
+    let nodes = json!([{"mesh": 0}, {"mesh": 0, "translation": [1e100, 0, 0], "name": "far"}, {}, {}]);
+    say(
+        &[("/nodes", nodes), ("/scenes/1/nodes", json!([0, 1])), ("/meshes/0/primitives", two)],
+        "/nodes/1",
+        "\"far\" is placed farther away",
+    );
 }
 
 #[test]

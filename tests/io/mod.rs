@@ -133,6 +133,25 @@ fn strays_change_nothing() {
     }
 }
 
+/// Where no ray hits anything, that is told, and nothing is framed that no ray hits.
+#[test]
+fn meshes_without_an_area_are_told() {
+    let ply = |corners: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{corners}3 0 1 2\n"
+        )
+    };
+    for (corners, is_bounded) in [("0 0 0\n1 0 0\n2 0 0\n", true), ("0 0 0\nnan 0 0\n0 1 0\n", false)] {
+        let files = Files::one("a.ply", ply(corners));
+        let (scene, warnings) = files.load("a.ply");
+        assert!(warnings.iter().any(|warning| warning.message.starts_with("no ray hits anything")), "{warnings:?}");
+        assert_eq!(!scene.bounds().is_empty(), is_bounded, "{corners}");
+    }
+    let (_, warnings) = Files::one("a.ply", ply("0 0 0\n1 0 0\n0 1 0\n")).load("a.ply");
+    assert_eq!(warnings, []);
+}
+
 #[test]
 fn files_that_are_no_scenes() {
     let files = Files::one("empty.obj", "").and("scene.xyz", "x").and("none", "x");

@@ -70,7 +70,12 @@ fn faults_are_told_with_their_place() {
     refused_bytes("a.stl", &bytes, "byte 80", "promises 2 triangles of 50 bytes, but the file has room for 1");
     bytes[80..84].fill(0xff);
     refused_bytes("a.stl", &bytes, "byte 80", "promises 4294967295 triangles");
-    refused_bytes("a.stl", "short", "byte 0", "no STL file");
+    refused_bytes("a.stl", "short\x01", "byte 0", "no STL file");
+    // Texts of other kinds, short and long, and one that says nothing.
+    let wavefront = "v 0.5 0.25 0.125\n".repeat(50);
+    for text in ["short", "solid", "# exported\nsolid a\n", &wavefront] {
+        refused_bytes("a.stl", text, "line 1", "is text, but no STL");
+    }
     refused_bytes(
         "a.stl",
         text().replacen("vertex 0 0e0 0", "vertex 0 0 zero", 1),

@@ -341,6 +341,16 @@ fn faults_are_told_with_line_and_remedy() {
             "a length above 0",
         ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 1, 0]\n", 1, "are one point"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nup = [0, 0, 0]\n", 1, "\"up\" is zero"),
+        (
+            "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nup = [0, 1e-300, 0]\n",
+            1,
+            "\"up\" is too long or too short",
+        ),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 1e300]\n", 1, "are too far apart"),
+        ("[[camera]]\neye = [0, 1e30, 0]\nlook_at = [0, 0, 0]\n", 2, "coordinates of at most 1.8446744e18"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\neye_end = [0, 1e30, 0]\n", 4, "coordinates of at most"),
+        ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 1e300, focus = 5 }\n", 4, "of at most"),
         (
             "[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nheight = 3\n",
             4,

@@ -153,6 +153,21 @@ impl Camera {
         })
     }
 
+    /// Why [`Camera::look_at`] gives none, where it does, in words for which the three have these names.
+    #[doc(hidden)]
+    pub fn no_look(names: [&str; 3], [eye, target, up]: [DVec3; 3]) -> String {
+        let [eye_name, target_name, up_name] = names;
+        if eye == target {
+            format!("{eye_name} and {target_name} are one point")
+        } else if up == DVec3::ZERO {
+            format!("{up_name} is zero, which is no direction")
+        } else if up.try_normalize().is_none() {
+            format!("{up_name} is too long or too short; give it about the length 1")
+        } else {
+            format!("{eye_name} and {target_name} are too far apart, or too near each other")
+        }
+    }
+
     /// A view of the whole of `bounds`, from the front, a little from the right and above; of something about a point, where there is no more to see.
     ///
     /// # Panics

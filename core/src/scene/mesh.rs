@@ -93,13 +93,13 @@ impl Mesh {
         placed
     }
 
-    /// Whether any of its triangles has an area.
+    /// Whether any of its triangles has an area, and corners that can be traced.
     #[doc(hidden)]
     pub fn has_area(&self) -> bool {
-        let corner = |i: u32| self.positions[i as usize].as_dvec3();
-        self.triangles.par_iter().with_min_len(TASK).any(|&[a, b, c]| {
-            let a = corner(a);
-            (corner(b) - a).cross(corner(c) - a) != DVec3::ZERO
+        self.triangles.par_iter().with_min_len(TASK).any(|corners| {
+            let corners = corners.map(|i| self.positions[i as usize]);
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
+            corners.into_iter().all(is_traceable) && (b - a).cross(c - a) != DVec3::ZERO
         })
     }
 

@@ -61,7 +61,7 @@ impl Motion {
 
 /// Says of an instance that [`Motion::new`] gave a time.
 pub(super) fn singular_on_the_way(index: usize, name: &str, time: f64) -> Error {
-    let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way";
+    let why = "matrices are interpolated, so it may neither be mirrored nor turn by half a circle on the way, with all that it stands in";
     Error::Scene(format!("instance {index} ({name:?}) moves through a singular transform near time {time:.3}; {why}"))
 }
 

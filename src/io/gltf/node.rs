@@ -100,9 +100,13 @@ impl Stage<'_, '_> {
         }
         let places = instancing::placements(self.document, node, pointer)?;
         let places = places.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
-        let (mut flat, mut stopped) = (0, 0);
+        let (mut flat, mut far, mut stopped) = (0, 0, 0);
         for place in &places {
             let (start, end) = (transform * *place, end.map(|end| end * *place));
+            if !start.as_affine3().is_finite() {
+                far += 1;
+                continue;
+            }
             if !is_invertible(&start) {
                 match self.pressed(group, &start, pointer)? {
                     Some(group) => {
@@ -118,6 +122,9 @@ impl Stage<'_, '_> {
             self.scene.instances.push(instance(start, moves_to));
         }
         let mut warn = |message| self.warnings.push(self.document.warning(pointer, message));
+        if far > 0 {
+            warn(format!("node {:?} is placed farther away, or larger, than f32 holds, and left out", node.name));
+        }
         if flat > 0 && flat == places.len() {
             warn(format!("node {:?} is scaled by zero, and left out", node.name));
         } else if flat > 0 {

@@ -47,7 +47,7 @@ impl View {
         let share = if rows > 1.0 { rows / (rows - 1.0) } else { 1.0 };
         let fov_y = 2.0 * libm::atan(libm::tan(angle.to_radians() / 2.0) * share);
         let camera = Camera::look_at(from, at, up, fov_y);
-        let camera = camera.ok_or("from and at are one point, or up is 0 0 0; the view must go somewhere")?;
+        let camera = camera.ok_or_else(|| Camera::no_look(["from", "at", "up"], [from, at, up]))?;
         Ok((camera, size))
     }
 }

@@ -86,7 +86,10 @@ impl Library {
                     let message = format!("material library {:?} is missing; its materials are grey", file.display());
                     warnings.push(Warning::new(obj, format!("line {line}"), message));
                 }
-                Err(e) => return Err(Error::input(file, "", system_message(&e))),
+                Err(e) => {
+                    let error = Error::input(file, "", system_message(&e));
+                    return Err(error.named_in(obj, &format!("line {line}")));
+                }
             }
         }
         Ok(())

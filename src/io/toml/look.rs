@@ -12,6 +12,8 @@ use crate::scene::{
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
+/// What says where a camera is, and where it looks.
+const NAMES: [&str; 3] = ["\"eye\"", "\"look_at\"", "\"up\""];
 /// Vertical angle of view where none is given, degrees.
 const USUAL_FOV: f64 = 40.0;
 
@@ -242,10 +244,10 @@ fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
 
 /// `[[camera]]`.
 pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
-    let (eye, target) = (table.need("eye")?.vector()?, table.need("look_at")?.vector()?);
+    let (eye, target) = (place_of(table.need("eye")?)?, table.need("look_at")?.vector()?);
     let up = table.optional("up", |value| value.vector())?.unwrap_or(DVec3::Y);
-    let mut camera = Camera::look_at(eye, target, up, 1.0)
-        .ok_or_else(|| table.fault("\"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+    let mut camera =
+        Camera::look_at(eye, target, up, 1.0).ok_or_else(|| table.fault(Camera::no_look(NAMES, [eye, target, up])))?;
     camera.end = end(&mut table, [eye, target, up])?;
     camera.projection = projection(&mut table)?;
     camera.lens = table.optional("lens", lens)?;
@@ -279,18 +281,29 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     Ok(camera)
 }
 
+/// A place that rays can start from.
+fn place_of(value: Value<'_>) -> Read<DVec3> {
+    let place = value.vector()?;
+    let is_held = place.abs().max_element() <= LARGEST_COORDINATE.into();
+    if is_held {
+        Ok(place)
+    } else {
+        Err(value.unlike(&format!("a place: coordinates of at most {LARGEST_COORDINATE:e}")))
+    }
+}
+
 /// Where a camera goes; what is not said stays as it is.
 fn end(table: &mut Table<'_>, start: [DVec3; 3]) -> Read<Option<Pose>> {
     let (mut first, mut said) = (None, start);
     for (key, vector) in ["eye_end", "look_at_end", "up_end"].into_iter().zip(&mut said) {
         if let Some(value) = table.get(key) {
-            *vector = value.vector()?;
+            *vector = if key == "eye_end" { place_of(value)? } else { value.vector()? };
             first = first.or(Some(value));
         }
     }
     let (Some(value), [eye, target, up]) = (first, said) else { return Ok(None) };
     let camera = Camera::look_at(eye, target, up, 1.0)
-        .ok_or_else(|| value.fault("at time 1 \"eye\" and \"look_at\" are one point, or \"up\" is zero"))?;
+        .ok_or_else(|| value.fault(format!("at time 1 {}", Camera::no_look(NAMES, [eye, target, up]))))?;
     Ok(Some(camera.pose(0.0)))
 }
 
@@ -326,7 +339,7 @@ fn projection(table: &mut Table<'_>) -> Read<Projection> {
 /// `lens = { radius, focus, blades }`.
 fn lens(value: Value<'_>) -> Read<ThinLens> {
     let mut table = value.table("\"lens\"".to_owned())?;
-    let (radius, focus) = (length(table.need("radius")?)?, length(table.need("focus")?)?);
+    let (radius, focus) = (radius(table.need("radius")?)?, radius(table.need("focus")?)?);
     let blades = table.optional("blades", |value| match value.whole(0..=100)? {
         blades @ (1 | 2) => {
             Err(value.fault(format!("{blades} blades shut out all light; 3 or more, or 0 for a round opening")))
@@ -343,7 +356,7 @@ fn length(value: Value<'_>) -> Read<f64> {
     if length > 0.0 { Ok(length) } else { Err(value.unlike("a length above 0")) }
 }
 
-/// The radius of a light, as that of a shape.
+/// A length that is no larger than coordinates may be, as the radius of a light.
 fn radius(value: Value<'_>) -> Read<f64> {
     let radius = length(value)?;
     let is_held = radius <= LARGEST_COORDINATE.into();

@@ -12,6 +12,7 @@ use super::{Probe, hex};
 use crate::error::{Error, Result};
 use crate::lab::oracle::{self, Body};
 use crate::math::{DVec3, Vec3};
+use crate::memory::Mapped;
 use crate::ray::Ray;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 use crate::shape::{Shape, Sphere};
@@ -66,8 +67,8 @@ pub fn to_text(note: &str, world: &World, rays: &[Ray]) -> Option<String> {
 /// # Errors
 /// [`Error::Input`] for a file that is no case, naming the place.
 pub fn read(path: &Path) -> Result<(String, Probe)> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::input(path, "", error.to_string()))?;
-    let document: Document = serde_json::from_str(&text).map_err(|error| {
+    let file = Mapped::open(path).map_err(|error| Error::input(path, "", error.to_string()))?;
+    let document: Document = serde_json::from_slice(&file).map_err(|error| {
         let place = format!("line {}", error.line());
         Error::input(path, place, format!("is no stress case: {error}; one has note, triangles, spheres and rays"))
     })?;

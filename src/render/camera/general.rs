@@ -3,7 +3,7 @@
 
 use super::no_ray;
 use crate::error::{Error, Result};
-use crate::math::{DVec2, DVec3};
+use crate::math::{DVec2, DVec3, LARGEST_COORDINATE};
 use crate::ray::Ray;
 use crate::scene::{Camera, Distortion, Journey, Pose, Projection, ThinLens};
 
@@ -30,8 +30,9 @@ impl General {
         let journey = end.map(|end| Journey::new(pose, Pose { eye: end.eye - centre, ..end }));
         if let Some(ThinLens { radius, focus, .. }) = lens {
             for (name, length) in [("opening of radius", radius), ("focus at", focus)] {
-                if !(length > 0.0 && length.is_finite()) {
-                    return Err(Error::Usage(format!("a lens with an {name} {length} m: must be above 0")));
+                if !(length > 0.0 && length <= LARGEST_COORDINATE.into()) {
+                    let range = format!("must be above 0, and at most {LARGEST_COORDINATE:e}");
+                    return Err(Error::Usage(format!("a lens with an {name} {length} m: {range}")));
                 }
             }
             if projection == Projection::Equirectangular {

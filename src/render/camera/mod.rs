@@ -6,7 +6,7 @@ mod general;
 mod pinhole;
 
 use crate::error::{Error, Result};
-use crate::math::{DMat3, DVec2, DVec3, Vec3};
+use crate::math::{DMat3, DVec2, DVec3, LARGEST_COORDINATE, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Camera, Distortion, Projection};
 
@@ -81,12 +81,19 @@ impl View {
     }
 }
 
+/// Lens shifts, in sides of the picture, up to which f32 tells rays of neighbouring pixels apart.
+const MOST_SHIFT: f64 = 1000.0;
+
 /// Whether the camera stands somewhere and looks somewhere; what else it has is checked where it is used.
 fn check_numbers(camera: &Camera) -> Result<()> {
     let Camera { eye, frame, ref end, shift, distortion, .. } = *camera;
     for (eye, frame) in [(eye, frame)].into_iter().chain(end.as_ref().map(|end| (end.eye, end.frame))) {
         if !eye.is_finite() {
             return Err(Error::Usage(format!("a camera at {eye}: its place must be finite")));
+        }
+        if eye.abs().max_element() > LARGEST_COORDINATE.into() {
+            let message = format!("a camera at {eye}: its coordinates must be at most {LARGEST_COORDINATE:e}");
+            return Err(Error::Usage(message));
         }
         // Not so of NaN.
         let is_frame = (frame.transpose() * frame).abs_diff_eq(DMat3::IDENTITY, 1e-6);
@@ -100,6 +107,15 @@ fn check_numbers(camera: &Camera) -> Result<()> {
     let Distortion { k1, k2, k3, p1, p2 } = distortion.unwrap_or_default();
     if !shift.is_finite() || ![k1, k2, k3, p1, p2].into_iter().all(f64::is_finite) {
         return Err(Error::Usage("a camera whose lens shift or distortion is not finite".to_owned()));
+    }
+    if let Projection::Orthographic(height) = camera.projection
+        && height > LARGEST_COORDINATE.into()
+    {
+        return Err(Error::Usage(format!("a view of height {height:e} m: must be at most {LARGEST_COORDINATE:e}")));
+    }
+    if shift.abs().max_element() > MOST_SHIFT {
+        let message = format!("a lens shift of {shift}: at most {MOST_SHIFT} pictures to a side are possible");
+        return Err(Error::Usage(message));
     }
     Ok(())
 }

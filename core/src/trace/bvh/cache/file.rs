@@ -106,6 +106,10 @@ pub(super) fn write(path: &Path, key: &Digest, arrays: &[&[u8]]) -> Result<u64> 
     let header = Header::new(key, arrays.len(), length);
     let header = Header { digest: header.digest(table), ..header };
     output::write_atomically(path, |part| {
+        // A pipe in the file's place would have to be written to directly, and wait for a reader.
+        if part == path {
+            return Err(Error::output(path, "is a device or a pipe; remove it"));
+        }
         let mut file = File::create(part).map_err(failed)?;
         let mut written = size_of::<Header>() + table.len();
         file.write_all(&[bytemuck::bytes_of(&header), table].concat()).map_err(failed)?;
