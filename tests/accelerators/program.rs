@@ -188,9 +188,10 @@ fn scaling_ends_where_memory_would() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
     assert_eq!(document["points"].as_array().map(Vec::len), Some(0), "{document}");
+    assert_eq!(document["grids"].as_array().map(Vec::len), Some(0), "{document}");
     let stopped = document["stopped"].to_string();
     assert!(
-        stopped.contains("terrain ends at 0: 10 triangles may take") && stopped.contains("0.0 allowed"),
+        stopped.contains("terrain ends at 0: 10 triangles may take") && stopped.contains("of 1049 kB allowed"),
         "{stopped}"
     );
 }

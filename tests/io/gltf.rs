@@ -126,7 +126,10 @@ fn changed(changes: &[(&str, Value)]) -> Files {
 #[test]
 fn everything_is_where_it_belongs() {
     let text = Files::one("a.gltf", rich()).scene("a.gltf");
-    let binary = Files::one("a.glb", glb(rich_with_binary(), &triangle_bytes())).scene("a.glb");
+    let bytes = glb(rich_with_binary(), &triangle_bytes());
+    let (_, warnings) = Files::one("a.glb", [&bytes[..], b"more"].concat()).load("a.glb");
+    assert!(warnings.iter().any(|warning| warning.to_string().contains("4 bytes after the end")), "{warnings:?}");
+    let binary = Files::one("a.glb", bytes).scene("a.glb");
     for scene in [text, binary] {
         let triangle = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
         let shapes = meshes(&scene);

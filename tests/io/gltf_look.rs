@@ -219,6 +219,10 @@ fn variants_of_materials() {
     );
     let error = with(&Maker::triangle().files(), Some("day")).unwrap_err();
     assert!(error.to_string().contains("the file has none"), "{error}");
+    let mapped = "/meshes/0/primitives/0/extensions/KHR_materials_variants/mappings/0/material";
+    *maker.json.pointer_mut(mapped).expect("a mapping") = json!(7);
+    let error = with(&maker.files(), Some("day")).unwrap_err().to_string();
+    assert!(error.contains(&format!("{mapped}: there is no material 7")), "{error}");
 }
 
 /// Images that are the same bytes, in one view or in several, or the same file, are decoded once.

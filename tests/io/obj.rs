@@ -459,7 +459,7 @@ fn a_folder_as_a_library_is_refused() {
     let files = Files::one("a.obj", format!("mtllib b.mtl\n{VERTICES}f 1 2 3\n"));
     std::fs::create_dir(files.path("b.mtl")).unwrap();
     let error = twincast::io::load(&files.path("a.obj"), &Default::default()).map(|_| ()).unwrap_err();
-    assert!(error.to_string().contains("directory"), "{error}");
+    assert!(error.to_string().contains("directory") && error.to_string().contains("a.obj, line 1"), "{error}");
     let files = Files::one("a.obj", "f 1 2 3\n");
     refused(&files, "a.obj", "line 1", "past the last vertex, 0");
 }

@@ -348,7 +348,7 @@ fn faults_are_told_with_line_and_remedy() {
             "\"up\" is too long or too short",
         ),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 1e300]\n", 1, "are too far apart"),
-        ("[[camera]]\neye = [0, 1e30, 0]\nlook_at = [0, 0, 0]\n", 2, "coordinates of at most 1.8446744e18"),
+        ("[[camera]]\neye = [0, 1e30, 0]\nlook_at = [0, 0, 0]\n", 2, "coordinates of at most 1.844e18"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\neye_end = [0, 1e30, 0]\n", 4, "coordinates of at most"),
         ("[[camera]]\neye = [0, 1, 0]\nlook_at = [0, 0, 0]\nlens = { radius = 1e300, focus = 5 }\n", 4, "of at most"),
         (

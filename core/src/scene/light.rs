@@ -1,6 +1,6 @@
 //! Light sources.
 
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3, cofactor};
 
 /// How light weakens over a distance d in metres: 1 / (constant + linear d + quadratic d^2).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,7 +176,9 @@ impl AreaShape {
             }
             Self::Disk { centre, normal, radius } => {
                 *centre = transform.transform_point3(*centre);
-                *normal = transform.transform_vector3(*normal).normalize();
+                // That of the plane that its own becomes, on the side to which its front goes.
+                let turned = cofactor(&transform.matrix3) * *normal;
+                *normal = (turned * transform.matrix3.determinant().signum()).normalize();
                 *radius *= scale;
             }
             Self::Sphere { centre, radius } => {
@@ -190,6 +192,23 @@ impl AreaShape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::tangents;
+
+    /// A disk faces what a flat surface in its place faces, stretched and mirrored.
+    #[test]
+    fn a_disk_stays_across_its_normal() {
+        for stretch in [DVec3::new(3.0, 1.0, 1.0), DVec3::new(-1.0, 0.5, 2.0)] {
+            let normal = DVec3::new(1.0, 1.0, 0.5).normalize();
+            let mut disk = AreaShape::Disk { centre: DVec3::ONE, normal, radius: 1.0 };
+            let transform = DAffine3::from_scale(stretch);
+            disk.transform(&transform, 1.0);
+            let AreaShape::Disk { normal: turned, .. } = disk else { panic!("{disk:?}") };
+            for along in tangents(normal) {
+                assert!(turned.dot(transform.transform_vector3(along)).abs() < 1e-12, "{stretch}");
+            }
+            assert!(turned.dot(transform.transform_vector3(normal)) > 0.0 && turned.is_normalized(), "{stretch}");
+        }
+    }
 
     /// In whatever unit a scene is written, it looks the same.
     #[test]

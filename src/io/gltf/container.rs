@@ -6,6 +6,8 @@ use crate::io::Placeless;
 pub(super) struct Parts<'a> {
     pub(super) json: &'a [u8],
     pub(super) binary: Option<&'a [u8]>,
+    /// Bytes after the end that the header gives.
+    pub(super) rest: usize,
 }
 
 /// Splits a file. A file that does not begin with GLB's magic number is JSON as a whole, whatever its suffix.
@@ -14,7 +16,7 @@ pub(super) struct Parts<'a> {
 /// The place and what is wrong.
 pub(super) fn split(bytes: &[u8]) -> Result<Parts<'_>, (String, String)> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(Parts { json: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), binary: None });
+        return Ok(Parts { json: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), binary: None, rest: 0 });
     }
     let fail = |at: usize| move |message: String| (format!("byte {at}"), message);
     let version = word(bytes, 4).map_err(fail(4))?;
@@ -26,16 +28,17 @@ pub(super) fn split(bytes: &[u8]) -> Result<Parts<'_>, (String, String)> {
     let bytes = bytes
         .get(..length)
         .ok_or_else(|| fail(8)(format!("truncated GLB: the header promises {length} bytes, the file has {there}")))?;
+    let rest = there - length;
     let (json, kind, next) = chunk(bytes, 12).map_err(fail(12))?;
     if kind != *b"JSON" {
         return Err(fail(16)("the first chunk of a GLB has to be JSON".into()));
     }
     if next + 8 > bytes.len() {
-        return Ok(Parts { json, binary: None });
+        return Ok(Parts { json, binary: None, rest });
     }
     // Chunks of other kinds are extensions, to be ignored.
     let (binary, kind, _) = chunk(bytes, next).map_err(fail(next))?;
-    Ok(Parts { json, binary: (kind == *b"BIN\0").then_some(binary) })
+    Ok(Parts { json, binary: (kind == *b"BIN\0").then_some(binary), rest })
 }
 
 /// The chunk at `at`: contents, kind, and where the next one begins.

@@ -88,6 +88,10 @@ pub(super) fn load(
 /// The same, with messages of any length.
 fn read(path: &Path, file: &Mapped<'_>, options: &LoadOptions, warnings: &mut Vec<Warning>) -> Result<Scene> {
     let parts = container::split(file).map_err(|(place, message)| Error::input(path, place, message))?;
+    if parts.rest > 0 {
+        let message = format!("{} bytes after the end that the header gives are ignored", parts.rest);
+        warnings.push(Warning::new(path, format!("byte {}", file.len() - parts.rest), message));
+    }
     let root: schema::Root = serde_json::from_slice(parts.json).map_err(|e| {
         let place = format!("line {}, column {}", e.line(), e.column());
         // The place is in the library's own message too.

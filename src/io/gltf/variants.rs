@@ -63,8 +63,13 @@ pub(super) fn material(
 ) -> Result<Option<usize>> {
     let Some(variant) = variant else { return Ok(primitive.material) };
     let Some(mappings) = read(document, &primitive.extensions, pointer)? else { return Ok(primitive.material) };
-    let mapping = mappings.mappings.iter().find(|mapping| mapping.variants.contains(&variant));
-    Ok(mapping.map(|mapping| mapping.material).or(primitive.material))
+    let Some(i) = mappings.mappings.iter().position(|mapping| mapping.variants.contains(&variant)) else {
+        return Ok(primitive.material);
+    };
+    let material = mappings.mappings[i].material;
+    let pointer = format!("{pointer}/extensions/{NAME}/mappings/{i}/material");
+    document.check_index(&pointer, material, document.root.materials.len(), "material")?;
+    Ok(Some(material))
 }
 
 fn read(document: &Document<'_>, extensions: &Extensions, pointer: &str) -> Result<Option<Mappings>> {

@@ -90,12 +90,12 @@ impl Scatter<'_> {
 
     fn draw_legend(&self, drawing: &mut Drawing, mut y: f64) -> f64 {
         let mut x = MARGIN;
-        for (name, color) in self.legend.iter().zip(COLORS.iter().cycle()) {
+        for (group, name) in self.legend.iter().enumerate() {
             let length = 34.0 + 6.6 * name.len() as f64;
             if x + length > WIDTH - MARGIN {
                 (x, y) = (MARGIN, y + 18.0);
             }
-            drawing.dot((x + 5.0, y - 4.0), 5.0, color);
+            mark(drawing, (x + 5.0, y - 4.0), group);
             drawing.text((x + 15.0, y), Anchor::Start, BODY, name);
             x += length;
         }
@@ -133,13 +133,19 @@ impl Scatter<'_> {
             drawing.line(from, to, GREY);
         }
         for point in &panel.points {
-            drawing.dot(at(point), 5.0, color(point.group));
+            mark(drawing, at(point), point.group);
         }
         for label in placed {
             let point = &panel.points[label.index];
             drawing.text(label.at, Anchor::Start, Font { color: color(point.group), ..NOTE }, &point.label);
         }
     }
+}
+
+/// Of more groups than there are colours, the second of a colour is hollow.
+fn mark(drawing: &mut Drawing, at: (f64, f64), group: usize) {
+    let is_hollow = group / COLORS.len() % 2 == 1;
+    if is_hollow { drawing.ring(at, 4.0, color(group)) } else { drawing.dot(at, 5.0, color(group)) }
 }
 
 fn color(group: usize) -> &'static str {
