@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 use clap::CommandFactory;
 use twincast::cli::Cli;
 
-use crate::program::{text, twincast};
+use crate::program::{command, text, twincast};
 
 /// Exit code and stderr.
 fn fails(args: &[&str]) -> (i32, String) {
@@ -180,6 +180,18 @@ fn where_one_output_fails_all_stay_as_they_were() {
     assert_eq!(std::fs::read(files.path("a.png")).expect("still there"), b"old");
     assert_eq!(render(&path("a.json")), (0, String::new()));
     assert!(std::fs::read(files.path("a.png")).expect("replaced").starts_with(b"\x89PNG"));
+}
+
+/// Help that nobody gets is no success.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_printed_ends_with_4() {
+    for args in [&["--version"][..], &["help", "render"], &["render", "--help"], &["make", "--list"]] {
+        let full = std::fs::File::create("/dev/full").expect("a device");
+        let output = command().args(args).stdout(full).output().expect("it runs");
+        let message = text(&output.stderr);
+        assert!(output.status.code() == Some(4) && message.contains("<stdout>"), "{args:?}: {message}");
+    }
 }
 
 /// A camera that cannot be is the file's fault or the command line's.

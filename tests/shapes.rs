@@ -142,7 +142,7 @@ fn brute_force_is_the_oracle() {
             Some(hit) => exact.iter().any(|(id, _)| *id == hit.id()),
             None => exact.is_empty(),
         };
-        // Two t within their bounds, or a rim.
+        // Two t within their bounds.
         let hit = found.and_then(|hit| Some((hit, oracle::primitive(&world, &hit, ray.time)?)));
         let t = hit.and_then(|(hit, p): (_, Primitive)| Some((hit.t, oracle::meet(&ray, &p)?.t.to_f64())));
         if !is_one_of_them {

@@ -27,7 +27,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) ->
     files.put_in_place()
 }
 
-/// Files that are put in place together, once all of them are whole: where one fails, all old ones stay.
+/// Files that are put in place together, once all of them are whole: where one cannot be written, all old ones stay. Devices and pipes are written to at once.
 #[derive(Default)]
 pub struct Together(Vec<Part>);
 
@@ -50,7 +50,7 @@ impl Together {
     /// Puts all of them in place.
     ///
     /// # Errors
-    /// [`Error::Output`] where one cannot be; those after it are removed.
+    /// [`Error::Output`] where one cannot be, though it could be written: those before it are in place, and those after it are removed.
     pub fn put_in_place(self) -> Result<()> {
         self.0.iter().try_for_each(|part| {
             part.put_in_place()
@@ -148,7 +148,8 @@ impl Drop for Part {
 }
 
 /// Where a link leads at whose end there is nothing yet.
-fn through_links(path: &Path) -> PathBuf {
+#[doc(hidden)]
+pub fn through_links(path: &Path) -> PathBuf {
     // As many as Linux follows.
     const MOST: usize = 40;
     let mut place = path.to_owned();

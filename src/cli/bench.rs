@@ -19,7 +19,7 @@ use crate::lab::bench::SIDE;
 /// second) of every engine and mode, ray by ray and in packets of 8 and 16, and for each kind of ray native's rate over
 /// Embree's, each at its best width: the median of the ratios within a turn. Rates move with whatever else the machine
 /// does; only these ratios can be compared between runs. The answers are compared as well: exit code 1 if native is
-/// wrong on a ray.
+/// wrong on a ray, textbooks' methods apart.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -200,7 +200,7 @@ mod with_embree {
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::scene::Search;
     use crate::trace::World;
-    use crate::trace::accel::{self, Accel, Methods};
+    use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Instructions, Options, Quality};
 
@@ -239,15 +239,13 @@ mod with_embree {
         let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
-        let mut subjects = Vec::new();
+        // Before hours are spent on others.
+        args.scenes.iter().try_for_each(|name| Subject::check(name))?;
+        let mut reports = Vec::new();
         for name in &args.scenes {
             let (subject, warnings) = interrupt::while_reading(|| Subject::new(name, args.up_axis.axis()))?;
             warn(&warnings);
             interrupt::check()?;
-            subjects.push(subject);
-        }
-        let mut reports = Vec::new();
-        for (name, subject) in args.scenes.iter().zip(subjects) {
             let costs = Arc::default();
             let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
             let modes = modes.map(|mode| contender(mode, threads, (isa, instructions), &costs));
@@ -332,7 +330,7 @@ mod with_embree {
     /// Another accelerator, which answers as native unless it is told to use a textbook's methods.
     fn other(accel: Accel, options: &accel::Options) -> Contender {
         let options = options.clone();
-        let is_exact = !accel.has_methods() || options.methods == Methods::default();
+        let is_exact = options.are_exact_for(accel);
         let build = move |world: &World| {
             let start = Instant::now();
             let built = accel.build(world, &options);

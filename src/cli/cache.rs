@@ -10,7 +10,7 @@ use super::engine::BackendArg;
 use super::report::time;
 use super::warn;
 use crate::error::{Error, Result};
-use crate::memory::size;
+use crate::memory::in_words as size;
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 

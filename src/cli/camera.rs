@@ -213,15 +213,10 @@ impl CameraArgs {
 
 /// A camera at a point that looks at another; `flags` are where the three are from.
 fn looking([eye, target, up]: [DVec3; 3], flags: [&str; 3]) -> Result<Camera> {
-    let [eye_flag, target_flag, up_flag] = flags;
     Camera::look_at(eye, target, up, 1.0).ok_or_else(|| {
-        Error::Usage(if eye == target {
-            format!("{eye_flag} {} and {target_flag} {} are one point", list(eye), list(target))
-        } else if up == DVec3::ZERO {
-            format!("{up_flag} 0,0,0 is no direction")
-        } else {
-            format!("{eye_flag} {} and {target_flag} {} are too far apart", list(eye), list(target))
-        })
+        let [eye_flag, target_flag, up_flag] =
+            [0, 1, 2].map(|i| format!("{} {}", flags[i], list([eye, target, up][i])));
+        Error::Usage(Camera::no_look([&eye_flag, &target_flag, &up_flag], [eye, target, up]))
     })
 }
 

@@ -61,7 +61,7 @@ pub(super) struct CompareArgs {
     accel: AccelArgs,
 
     /// Hold every accelerator, and Embree where it is built, against brute force, on as many of the rays as that has time for; exit
-    /// code 1 if any of this program's own differs on one
+    /// code 1 if any of this program's own differs on one, with textbooks' methods in what it names
     #[arg(long, conflicts_with_all = ["accel", "diff", "folder", "spp"])]
     all: bool,
 
@@ -133,7 +133,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::output::Together;
     use crate::render::{Control, Renderer};
     use crate::trace::Tracer;
-    use crate::trace::accel::{Accel, Built, Methods};
+    use crate::trace::accel::{Accel, Built};
     use crate::trace::brute::Brute;
     use crate::trace::bvh;
     use crate::trace::embree::{Embree, Options};
@@ -163,7 +163,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
         scene: &name,
         renderer: &renderer,
         native: &native,
-        is_exact: !accel.has_methods() || options.methods == Methods::default(),
+        is_exact: options.are_exact_for(accel),
         embree: &embree,
         brute: brute.as_ref().map(|brute| brute as &dyn Tracer),
         random: args.random,

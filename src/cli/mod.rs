@@ -121,9 +121,16 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match parsed {
         Ok(cli) => cli.command.run(),
         Err(error) => {
-            // Nobody is left to be told that stderr is closed.
-            let _ = error.print();
-            return error.exit_code() as u8;
+            let printed = error.print().and_then(|()| std::io::stdout().flush());
+            return match printed {
+                // What was asked for, help or a version, and could not be told. Where stderr is closed, nobody is left to be told of that.
+                Err(failed) if !error.use_stderr() && failed.kind() != ErrorKind::BrokenPipe => {
+                    let failed = Error::output("<stdout>", failed.to_string());
+                    complain("error", &failed);
+                    failed.exit_code()
+                }
+                _ => error.exit_code() as u8,
+            };
         }
     };
     match outcome {

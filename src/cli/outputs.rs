@@ -60,6 +60,7 @@ pub(super) fn spare<'a>(outputs: impl IntoIterator<Item = &'a PathBuf>, files: &
 
 /// Where a file really is; one that does not exist yet has the place of its folder.
 fn place(path: &Path) -> PathBuf {
+    let path = &output::through_links(path);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let in_folder = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
     path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
@@ -113,6 +114,12 @@ mod tests {
         std::fs::write(&scene, "v 0 0 0").expect("written");
         let pictures = std::slice::from_ref(&picture);
         assert!(check(pictures, [&stats], [&scene]).is_ok());
+        #[cfg(unix)]
+        {
+            let link = folder.path().join("link.json");
+            std::os::unix::fs::symlink("picture.png", &link).expect("a link");
+            assert!(check(pictures, [&link], [&scene]).is_err(), "to what is not there yet");
+        }
         let same = folder.path().join(".").join("scene.obj");
         for (others, inputs) in [([&same], [&scene]), ([&picture], [&scene]), ([&stats], [&picture])] {
             let refused = check(pictures, others, inputs).expect_err("one file has two parts");

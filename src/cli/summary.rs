@@ -1,7 +1,7 @@
 //! What a render says of itself when it is done.
 
 use super::report::{Rays, Stats, Summary, counted, grouped, time};
-use crate::memory::size;
+use crate::memory::in_words as size;
 use crate::plan::BuildChoice;
 use crate::render::Renderer;
 use crate::scene::Scene;

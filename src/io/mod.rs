@@ -38,7 +38,7 @@ use self::finish::{bare, brightest_color, doubt_bare, make_finite, meshes};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Mesh, Scene, fault};
+use crate::scene::{Geometry, Scene, fault};
 
 /// How a file is understood.
 #[derive(Clone, Debug, Default)]
@@ -125,7 +125,7 @@ fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
 /// What is odd but can be rendered comes back as warnings: a missing texture, triangles with corners that are not
-/// finite (they stay in their mesh and are never hit), features that the renderer does not have.
+/// finite (they keep their numbers, are never hit, and have no other corner left), features that the renderer does not have.
 ///
 /// # Errors
 /// [`Error::Input`] for anything that is wrong with the file or with what it refers to.
@@ -183,16 +183,16 @@ pub fn load_watched(
         return Err(nothing_to_render(path, &warnings));
     }
     scene.bake_turns();
+    let mut bad = 0;
     for geometry in &mut scene.geometries {
         if let Geometry::Mesh(mesh) = geometry {
-            mesh.drop_strays();
+            bad += mesh.drop_strays();
             options.normals.apply(mesh);
         }
     }
     if !format.tells_of_bare_meshes() {
         warnings.extend(doubt_bare(path, bare(&scene.geometries, &scene.materials)));
     }
-    let bad: usize = meshes(&scene).map(Mesh::untraceable_triangles).sum();
     if bad > 0 {
         let message = format!("{bad} triangles have corners that are NaN, infinite or too far away; no ray hits them");
         warnings.push(Warning::new(path, "", message));

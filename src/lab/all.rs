@@ -21,7 +21,7 @@ use crate::math::Random;
 use crate::memory::{self, process};
 use crate::ray::{Hit, Ray};
 use crate::render::{Control, Renderer};
-use crate::trace::accel::{Methods, Options};
+use crate::trace::accel::Options;
 use crate::trace::{Tracer, World};
 
 /// Rays that are asked together.
@@ -130,7 +130,7 @@ impl Setup<'_> {
             if control.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed)) {
                 return Err(Error::Interrupted);
             }
-            let is_exact = entrant.is_native() && self.options.methods == Methods::default();
+            let is_exact = entrant.is_exact(self.options);
             let start = Instant::now();
             let built = entrant.build(world, self.options)?;
             let build_seconds = start.elapsed().as_secs_f64();
@@ -181,13 +181,14 @@ impl Setup<'_> {
         // Each has an answer of each of two tracers beside it.
         let bytes = rays.saturating_mul((size_of::<Query>() + 2 * size_of::<Answer>()) as u64);
         if let Some(free) = process::available().filter(|&free| bytes > free) {
-            let [bytes, free] = [bytes, free].map(memory::size);
+            let [bytes, free] = [bytes, free].map(memory::in_words);
             return Err(Error::Memory(format!(
-                "{rays} rays take {bytes}, and {free} are free; give a smaller --random or --size"
+                "{rays} rays take {bytes}, and {free} are free; take fewer random ones, or a smaller picture"
             )));
         }
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let mut queries: Vec<Query> = pixels.map(|(x, y)| Query::Closest(self.renderer.camera_ray(x, y, 0))).collect();
+        let mut queries = Vec::with_capacity(rays as usize);
+        queries.extend(pixels.map(|(x, y)| Query::Closest(self.renderer.camera_ray(x, y, 0))));
         if let Some(aim) = Aim::new(self.renderer.world()) {
             queries.extend((0..self.random).map(|index| aim.ray(self.seed, index)));
         }

@@ -33,9 +33,18 @@ impl Entrant {
         }
     }
 
-    /// Whether its hits are those of brute force to the bit.
+    /// Whether it is this program's own.
     pub const fn is_native(self) -> bool {
         matches!(self, Self::Accel(_))
+    }
+
+    /// Whether its hits are those of brute force to the bit.
+    pub fn is_exact(self, options: &Options) -> bool {
+        match self {
+            Self::Accel(accel) => options.are_exact_for(accel),
+            #[cfg(feature = "embree")]
+            Self::Embree => false,
+        }
     }
 
     /// Builds it.

@@ -133,6 +133,46 @@ fn strays_change_nothing() {
     }
 }
 
+/// Nor does a triangle that no ray can hit.
+#[test]
+fn what_cannot_be_hit_changes_nothing_either() {
+    let far = 5e6;
+    let vertices = [[far, 0.0, -far], [far + 0.25, 0.0, -far], [far, 0.25, 0.125 - far], [far + 0.25, 0.25, -far]];
+    for (bad, smoothing) in ["1e30", "1e300"].into_iter().zip(["s 1\n", ""]) {
+        let text = |more: bool, vertex: &dyn Fn(&str) -> String| {
+            let own = vertices.map(|[x, y, z]| vertex(&format!("{x} {y} {z}"))).concat();
+            if more { own + &vertex("0 0 0") + &vertex(&format!("{bad} 0 0")) } else { own }
+        };
+        let files = |more: bool| {
+            let faces = ["f 1 2 3\nf 2 4 3\n", "f 1 2 3\nf 2 4 3\nf 1 5 6\n"][usize::from(more)];
+            let obj = text(more, &|vertex| format!("v {vertex}\n")) + smoothing + faces;
+            let rows = text(more, &|vertex| format!("{vertex}\n"));
+            let triangles = ["3 0 1 2\n3 1 3 2\n", "3 0 1 2\n3 1 3 2\n3 0 4 5\n"][usize::from(more)];
+            let ply = format!(
+                "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+                 element face {}\nproperty list uchar int vertex_indices\nend_header\n{rows}{triangles}",
+                4 + 2 * usize::from(more),
+                2 + usize::from(more)
+            );
+            Files::one("a.obj", obj).and("a.ply", ply)
+        };
+        let (clean, spoilt) = (files(false), files(true));
+        for name in ["a.obj", "a.ply"] {
+            let ((spoilt, warnings), clean) = (spoilt.load(name), clean.scene(name));
+            assert!(warnings.iter().any(|w| w.message.starts_with("1 triangles have corners")), "{name}: {warnings:?}");
+            let [found, expected] = [&spoilt, &clean].map(|scene| meshes(scene)[0]);
+            assert_eq!(
+                (found.origin, &found.positions[..4]),
+                (expected.origin, &expected.positions[..4]),
+                "{name} {bad}"
+            );
+            assert_eq!(found.normals.get(..4), expected.normals.get(..4), "{name} {bad}");
+            let [found, expected] = [spoilt.bounds(), clean.bounds()];
+            assert_eq!((found.min, found.max), (expected.min, expected.max), "{name} {bad}");
+        }
+    }
+}
+
 /// Where no ray hits anything, that is told, and nothing is framed that no ray hits.
 #[test]
 fn meshes_without_an_area_are_told() {

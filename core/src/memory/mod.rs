@@ -22,7 +22,7 @@ use bytemuck::Zeroable;
 const LEAST: usize = 1 << 23;
 
 /// Bytes in a unit that suits them, for messages.
-pub fn size(bytes: u64) -> String {
+pub fn in_words(bytes: u64) -> String {
     match bytes as f64 {
         b if b < 1e4 => format!("{b} B"),
         b if b < 1e7 => format!("{:.0} kB", b / 1e3),
@@ -74,7 +74,10 @@ mod tests {
 
     #[test]
     fn sizes_read_well() {
-        assert_eq!([9_999, 123_456, 12_345_678, 12_345_678_901].map(size), ["9999 B", "123 kB", "12 MB", "12.3 GB"]);
+        assert_eq!(
+            [9_999, 123_456, 12_345_678, 12_345_678_901].map(in_words),
+            ["9999 B", "123 kB", "12 MB", "12.3 GB"]
+        );
     }
 
     #[test]

@@ -126,6 +126,9 @@ impl fmt::Display for Fov {
 }
 
 impl Camera {
+    /// The largest [`shift`](Self::shift) that a picture is made with.
+    pub const MOST_SHIFT: f64 = 1000.0;
+
     /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi. Where `up` is along the view, up in the
     /// picture is what it becomes for a camera that is tilted until it looks up or down: -z for one that looks along -z
     /// and is tilted down. None where `eye` and `target` coincide, where `up` is zero, and where these are not finite; the angle is looked at by who renders.

@@ -13,12 +13,14 @@ const TASK: usize = 1 << 14;
 
 impl Mesh {
     /// Leaves out the vertices that no triangle names, if the outermost are among them: a stray one far away would frame the scene for the camera, and leave f32
-    /// little of what is seen. Of a triangle that no ray can hit, since a corner is NaN, infinite or too far away, that corner alone is kept, three times.
+    /// little of what is seen. Of a triangle that no ray can hit, since a corner is NaN, infinite or too far away, that corner alone is kept, three times. How many
+    /// of these there are.
     ///
     /// # Panics
     /// For a triangle that names a vertex that there is not.
-    pub fn drop_strays(&mut self) {
-        if self.untraceable_triangles() > 0 {
+    pub fn drop_strays(&mut self) -> usize {
+        let untraceable = self.untraceable_triangles();
+        if untraceable > 0 {
             let Self { positions, triangles, .. } = self;
             let bad = |i: u32| !is_traceable(positions[i as usize]);
             Arc::make_mut(triangles).par_iter_mut().with_min_len(TASK).for_each(|corners| {
@@ -28,13 +30,14 @@ impl Mesh {
             });
         }
         if self.triangles.is_empty() || outermost_are_used(&self.positions, self.triangles.as_flattened()) {
-            return;
+            return untraceable;
         }
         let mut triangles = Arc::unwrap_or_clone(std::mem::take(&mut self.triangles));
         *self = match compact(triangles.as_flattened_mut(), self.positions.len()) {
             Some(used) => with_vertices(self, &used, triangles),
             None => Self { triangles: Arc::new(triangles), ..std::mem::take(self) },
         };
+        untraceable
     }
 }
 
@@ -44,8 +47,11 @@ fn outermost_are_used(positions: &[Vec3], corners: &[u32]) -> bool {
     // Six times an index: of the least coordinates, and of the largest.
     let farther = |a: [u32; 6], b: [u32; 6]| -> [u32; 6] {
         std::array::from_fn(|k| {
-            let along = |i: u32| positions[i as usize][k % 3] * if k < 3 { -1.0 } else { 1.0 };
-            // Written so that a NaN gives way.
+            // What cannot be traced counts as NaN, which gives way.
+            let along = |i: u32| {
+                let p = positions[i as usize];
+                if is_traceable(p) { p[k % 3] * if k < 3 { -1.0 } else { 1.0 } } else { f32::NAN }
+            };
             if along(b[k]) > along(a[k]) || along(a[k]).is_nan() { b[k] } else { a[k] }
         })
     };
@@ -114,9 +120,25 @@ pub fn with_vertices(mesh: &Mesh, used: &[u32], triangles: Vec<[u32; 3]>) -> Mes
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
+    /// Strays do not hide behind what no ray can hit, which is farther out than they are.
+    #[test]
+    fn strays_are_left_out_beside_what_cannot_be_hit() {
+        for bad in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30] {
+            for stray in [Vec3::X * 1e6, Vec3::NEG_ONE * 1e6] {
+                let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, stray, Vec3::new(bad, 0.0, bad), stray * 2.0];
+                let mut mesh = Mesh::new(positions, vec![[0, 1, 2], [0, 3, 4], [2, 0, 1]]);
+                assert_eq!(mesh.drop_strays(), 1);
+                assert_eq!(mesh.positions[..3], [Vec3::ZERO, Vec3::X, Vec3::Y]);
+                assert_eq!((mesh.positions.len(), &mesh.triangles[..]), (4, &[[0, 1, 2], [3; 3], [2, 0, 1]][..]));
+            }
+        }
+    }
+
     #[test]
     fn unused_vertices_are_left_out() {
-        let compact = |mut corners: Vec<u32>, count| (super::compact(&mut corners, count), corners);
+        let compact = |mut corners: Vec<u32>, count| (compact(&mut corners, count), corners);
         assert_eq!(compact(vec![7, 3, 7, 9], 10), (Some(vec![3, 7, 9]), vec![1, 0, 1, 2]));
         assert_eq!(compact(vec![4, 1, 4, 2, 1], 5), (Some(vec![1, 2, 4]), vec![2, 0, 2, 1, 0]));
         assert_eq!(compact(vec![1, 0, 2], 3), (None, vec![1, 0, 2]));

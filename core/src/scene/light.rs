@@ -177,8 +177,7 @@ impl AreaShape {
             Self::Disk { centre, normal, radius } => {
                 *centre = transform.transform_point3(*centre);
                 // That of the plane that its own becomes, on the side to which its front goes.
-                let turned = cofactor(&transform.matrix3) * *normal;
-                *normal = (turned * transform.matrix3.determinant().signum()).normalize();
+                *normal = (cofactor(&transform.matrix3) * *normal).normalize();
                 *radius *= scale;
             }
             Self::Sphere { centre, radius } => {

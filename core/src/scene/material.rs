@@ -70,7 +70,7 @@ pub struct Material {
     pub diffuse: Vec3,
     /// Specular reflectance.
     pub specular: Vec3,
-    /// Exponent of the highlight, at least 0.
+    /// Exponent of the highlight, at least 0; no more than 10^10 of it counts.
     pub shininess: f32,
     /// Share of what the mirrored ray sees; no ray is traced where it is zero.
     pub reflection: Vec3,

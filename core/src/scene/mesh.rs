@@ -147,10 +147,15 @@ impl Mesh {
     }
 }
 
+/// Whether a vertex that is not rounded yet may take part in tracing.
+pub fn is_traceable_f64(p: &DVec3) -> bool {
+    // Written so that NaN gives false.
+    p.abs().cmple(DVec3::splat(LARGEST_COORDINATE.into())).all()
+}
+
 /// Around the triangles whose corners are there, finite and small enough to be traced.
 fn bounds_of_triangles(triangles: &[[u32; 3]], positions: &[DVec3]) -> DAabb {
-    // Written so that NaN gives false.
-    let is_traceable = |p: &DVec3| p.abs().cmple(DVec3::splat(LARGEST_COORDINATE.into())).all();
+    let is_traceable = is_traceable_f64;
     let corner = |i: u32| positions.get(i as usize).copied().filter(is_traceable);
     let around = |bounds: DAabb, &[a, b, c]: &[u32; 3]| match (corner(a), corner(b), corner(c)) {
         (Some(a), Some(b), Some(c)) => bounds.include(a).include(b).include(c),

@@ -33,7 +33,7 @@ pub use light::{AreaShape, Attenuation, Light, Unlit};
 pub use material::{Absorption, Alpha, Interface, Material, Specular};
 pub use mesh::Mesh;
 #[doc(hidden)]
-pub use mesh::{bounds_of, choose_origin};
+pub use mesh::{bounds_of, choose_origin, is_traceable_f64};
 pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossiness, Texels, Workflow};
 pub use pose::{Journey, Pose};
 pub use procedural::{architecture, terrain};

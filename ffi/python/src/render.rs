@@ -73,8 +73,8 @@ impl Wishes {
         if let Some((eye, target, up, fov)) = self.view {
             let [eye, target, up] = [eye, target, up].map(DVec3::from);
             let camera = Camera::look_at(eye, target, up, fov.to_radians());
-            let message = "eye, look_at and up: they must be finite, eye and look_at two points, and up not zero";
-            return camera.map(Some).ok_or_else(|| PyValueError::new_err(message));
+            let message = || Camera::no_look(["eye", "look_at", "up"], [eye, target, up]);
+            return camera.map(Some).ok_or_else(|| PyValueError::new_err(message()));
         }
         if let Some(name) = &self.camera {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);

@@ -100,13 +100,16 @@ impl Stage<'_, '_> {
         }
         let places = instancing::placements(self.document, node, pointer)?;
         let places = places.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
-        let (mut flat, mut far, mut stopped) = (0, 0, 0);
+        let (mut flat, mut far, mut gone, mut stopped) = (0, 0, 0, 0);
         for place in &places {
             let (start, end) = (transform * *place, end.map(|end| end * *place));
-            if !start.as_affine3().is_finite() {
+            if !is_held(&start) {
                 far += 1;
                 continue;
             }
+            let goes_far = end.is_some_and(|end| !is_held(&end));
+            let end = end.filter(is_held);
+            gone += usize::from(goes_far);
             if !is_invertible(&start) {
                 match self.pressed(group, &start, pointer)? {
                     Some(group) => {
@@ -122,8 +125,14 @@ impl Stage<'_, '_> {
             self.scene.instances.push(instance(start, moves_to));
         }
         let mut warn = |message| self.warnings.push(self.document.warning(pointer, message));
-        if far > 0 {
-            warn(format!("node {:?} is placed farther away, or larger, than f32 holds, and left out", node.name));
+        let beyond = "placed farther away, or larger, than f32 holds";
+        if far > 0 && far == places.len() {
+            warn(format!("node {:?} is {beyond}, and left out", node.name));
+        } else if far > 0 {
+            warn(format!("{far} instances of node {:?} are {beyond}, and left out", node.name));
+        }
+        if gone > 0 {
+            warn(format!("node {:?} is {beyond} while the shutter is open; it stands still", node.name));
         }
         if flat > 0 && flat == places.len() {
             warn(format!("node {:?} is scaled by zero, and left out", node.name));
@@ -158,6 +167,11 @@ impl Stage<'_, '_> {
         groups.push(Group { name, geometries: begin..end });
         Ok(Some(groups.len() as u32 - 1))
     }
+}
+
+/// Whether f32 holds it, in whatever unit.
+fn is_held(transform: &DAffine3) -> bool {
+    transform.as_affine3().is_finite()
 }
 
 /// What can be traced: see [`World`](crate::World). With room for a change of units.

@@ -20,7 +20,7 @@ use crate::io::polygon;
 use crate::math::{DAabb, DVec3, Vec2, Vec3, Vec4};
 use crate::memory;
 use crate::scene::compact::{compact, pick};
-use crate::scene::{Geometry, Mesh, Scene, bounds_of, choose_origin};
+use crate::scene::{Geometry, Mesh, Scene, bounds_of, choose_origin, is_traceable_f64};
 
 /// Positions that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -49,9 +49,8 @@ type Smooth = HashMap<(u32, u32), DVec3>;
 pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut Vec<Warning>) -> Result<Scene> {
     let sections = std::mem::take(&mut obj.sections);
     let triangles: Vec<Triangles> = sections.iter().map(|section| split(path, &obj, section)).collect::<Result<_>>()?;
-    // One origin for all, so that vertices that meshes share stay equal; what no face uses has no say.
-    let used = |faces: &Faces| bounds_of(&faces.positions, |&i| obj.positions.get(i as usize).copied());
-    let origin = choose_origin(&obj.faces.iter().map(used).fold(DAabb::EMPTY, DAabb::union));
+    // One origin for all, so that vertices that meshes share stay equal.
+    let origin = choose_origin(&bounds(&obj, &triangles));
     obj.faces = Vec::new();
     let smooth = smooth_normals(&obj, &triangles);
     let is_plain = triangles.iter().all(|triangles| matches!(triangles, Triangles::Plain(_)));
@@ -72,6 +71,25 @@ pub(super) fn scene(path: &Path, mut obj: Obj, library: Library, warnings: &mut 
     let mut scene = Scene::from_geometries(geometries, Vec::new());
     library.resolve(path, used, !obj.colors.is_empty(), &mut scene, warnings)?;
     Ok(scene)
+}
+
+/// Around what rays can hit: neither vertices that no face uses have a say, nor faces with a corner that cannot be traced.
+fn bounds(obj: &Obj, triangles: &[Triangles]) -> DAabb {
+    let place = |i: u32| obj.positions.get(i as usize).copied();
+    if obj.positions.par_iter().with_min_len(TASK).all(is_traceable_f64) {
+        let used = |faces: &Faces| bounds_of(&faces.positions, |&i| place(i));
+        return obj.faces.iter().map(used).fold(DAabb::EMPTY, DAabb::union);
+    }
+    let around = |bounds: DAabb, corners: [u32; 3]| {
+        let corners = corners.map(|i| place(i).filter(is_traceable_f64));
+        if corners.contains(&None) { bounds } else { corners.into_iter().flatten().fold(bounds, DAabb::include) }
+    };
+    triangles.iter().fold(DAabb::EMPTY, |bounds, triangles| match triangles {
+        Triangles::Plain(triangles) => triangles.iter().copied().fold(bounds, around),
+        Triangles::Detailed(pieces) => {
+            pieces.iter().flatten().map(|triangle| triangle.corners.map(|c| c.0[0])).fold(bounds, around)
+        }
+    })
 }
 
 impl Piece {
@@ -158,6 +176,9 @@ fn smooth_normals(obj: &Obj, triangles: &[Triangles]) -> Smooth {
     });
     for Triangle { corners, smoothing } in detailed.flatten().flatten().filter(|t| t.smoothing != 0) {
         let p = corners.map(|c| obj.positions[c.0[0] as usize]);
+        if !p.iter().all(is_traceable_f64) {
+            continue;
+        }
         let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
         for k in 0..3 {
             if corners[k].0[2] == NONE {

@@ -203,11 +203,11 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
         }
         Kind::Disk => {
             let (centre, normal) = (table.need("position")?.vector()?, table.need("direction")?.direction()?);
-            area(AreaShape::Disk { centre, normal, radius: radius(table.need("radius")?)? }, &mut table)?
+            area(AreaShape::Disk { centre, normal, radius: extent(table.need("radius")?)? }, &mut table)?
         }
         Kind::Sphere => {
             let centre = table.need("position")?.vector()?;
-            area(AreaShape::Sphere { centre, radius: radius(table.need("radius")?)? }, &mut table)?
+            area(AreaShape::Sphere { centre, radius: extent(table.need("radius")?)? }, &mut table)?
         }
     };
     table.finish()?;
@@ -276,9 +276,15 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
     if camera.projection == Projection::Equirectangular {
         table.refuse("shift", "is not for equirectangular cameras, which see the whole sphere; turn the camera")?;
     }
-    camera.shift = table.optional("shift", |value| value.numbers())?.map(DVec2::from_array).unwrap_or_default();
+    camera.shift = table.optional("shift", shift)?.unwrap_or_default();
     table.finish()?;
     Ok(camera)
+}
+
+fn shift(value: Value<'_>) -> Read<DVec2> {
+    let shift = DVec2::from_array(value.numbers()?);
+    let inside = shift.abs().max_element() <= Camera::MOST_SHIFT;
+    if inside { Ok(shift) } else { Err(value.unlike(&format!("shares of at most {}", Camera::MOST_SHIFT))) }
 }
 
 /// A place that rays can start from.
@@ -322,7 +328,7 @@ fn projection(table: &mut Table<'_>) -> Read<Projection> {
         }
     }
     match kind {
-        "orthographic" => Ok(Projection::Orthographic(length(table.need("height")?)?)),
+        "orthographic" => Ok(Projection::Orthographic(extent(table.need("height")?)?)),
         "equirectangular" => Ok(Projection::Equirectangular),
         _ => {
             let vertical = table.optional("fov", angle)?;
@@ -339,7 +345,7 @@ fn projection(table: &mut Table<'_>) -> Read<Projection> {
 /// `lens = { radius, focus, blades }`.
 fn lens(value: Value<'_>) -> Read<ThinLens> {
     let mut table = value.table("\"lens\"".to_owned())?;
-    let (radius, focus) = (radius(table.need("radius")?)?, radius(table.need("focus")?)?);
+    let (radius, focus) = (extent(table.need("radius")?)?, extent(table.need("focus")?)?);
     let blades = table.optional("blades", |value| match value.whole(0..=100)? {
         blades @ (1 | 2) => {
             Err(value.fault(format!("{blades} blades shut out all light; 3 or more, or 0 for a round opening")))
@@ -356,8 +362,8 @@ fn length(value: Value<'_>) -> Read<f64> {
     if length > 0.0 { Ok(length) } else { Err(value.unlike("a length above 0")) }
 }
 
-/// A length that is no larger than coordinates may be, as the radius of a light.
-fn radius(value: Value<'_>) -> Read<f64> {
+/// A length that is no larger than coordinates may be.
+fn extent(value: Value<'_>) -> Read<f64> {
     let radius = length(value)?;
     let is_held = radius <= LARGEST_COORDINATE.into();
     if is_held { Ok(radius) } else { Err(value.unlike(&format!("a length of at most {LARGEST_COORDINATE:e}"))) }

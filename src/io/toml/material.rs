@@ -140,7 +140,9 @@ fn absorption(table: &mut Table<'_>, transmission: Vec3, interface: Interface) -
 
 fn above_zero(table: &mut Table<'_>, key: &'static str) -> Read<Option<f32>> {
     table.optional(key, |value| {
-        let number = value.share()?;
-        if number > 0.0 { Ok(number) } else { Err(value.unlike("a number above 0")) }
+        let number = value.number()? as f32;
+        // What is less cannot be divided by.
+        let inside = number.is_finite() && number >= f32::MIN_POSITIVE;
+        if inside { Ok(number) } else { Err(value.unlike("a number above 0, from 1.2e-38 up")) }
     })
 }

@@ -114,8 +114,15 @@ pub struct Verdict {
 impl Verdict {
     /// The counts of `tally`.
     pub(super) fn new(kind: Kind, tally: &Tally) -> Self {
-        let [agree, tie, boundary, native_wrong, embree_wrong] = Class::ALL.map(|class| tally.count(class));
-        Self { kind, agree, tie, boundary, native_wrong, embree_wrong }
+        let count = |class| tally.count(class);
+        Self {
+            kind,
+            agree: count(Class::Agree),
+            tie: count(Class::Tie),
+            boundary: count(Class::Boundary),
+            native_wrong: count(Class::NativeWrong),
+            embree_wrong: count(Class::EmbreeWrong),
+        }
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Contender {
     pub backend: &'static str,
     /// As it is set up: `default`, `fast`, `robust` ...
     pub mode: &'static str,
-    /// Whether its answers must be right, and those of all others of which that is said, to the bit: of the native ones, but for textbooks' methods.
+    /// Whether its answers must be right, and equal to the bit to those of every other exact one. So it is for native engines, unless they use a textbook's method.
     pub is_exact: bool,
     /// Builds it, on rayon's current pool or as many threads.
     pub build: Box<Build>,
@@ -59,7 +59,7 @@ pub struct Built {
 pub struct Setup<'a> {
     /// The scene.
     pub subject: &'a Subject,
-    /// The engines; the first native one answers for the rays that start on surfaces.
+    /// The engines; the first exact one answers for the rays that start on surfaces.
     pub contenders: &'a [Contender],
     /// Kinds of rays, each once.
     pub kinds: &'a [Kind],

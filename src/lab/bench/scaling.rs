@@ -231,7 +231,7 @@ impl Scaling<'_> {
     fn too_much(&self, bytes: f64, count: u64) -> Option<String> {
         let limit = self.max_memory? as f64;
         let wanted = process::held().unwrap_or(0) as f64 + SPARE * bytes * count as f64;
-        let size = |bytes: f64| memory::size(bytes as u64);
+        let size = |bytes: f64| memory::in_words(bytes as u64);
         (wanted > limit).then(|| format!("may take {} in all, of {} allowed", size(wanted), size(limit)))
     }
 
@@ -254,13 +254,16 @@ fn measure(world: &World, rays: &[Ray], family: Family, entrant: Entrant, option
         entrant.build(world, options).map(|built| (built, start.elapsed()))
     };
     let (built, growth) = process::growth(build);
-    let (built, mut fastest) = built?;
+    let (mut built, mut fastest) = built?;
     let mut spent = fastest;
     for _ in 1..PASSES {
         if spent > PASS {
             break;
         }
-        let (_, again) = build()?;
+        // Its memory goes before the next one takes its own.
+        drop(built);
+        let again;
+        (built, again) = build()?;
         spent += again;
         fastest = fastest.min(again);
     }

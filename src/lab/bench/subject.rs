@@ -72,6 +72,18 @@ impl Procedural {
 }
 
 impl Subject {
+    /// Whether there may be a scene of this name: one that is made by rule, or a file that is there.
+    ///
+    /// # Errors
+    /// [`Error::Input`].
+    pub fn check(name: &str) -> Result<()> {
+        if Procedural::parse(name)?.is_none() {
+            let metadata = std::fs::metadata(name);
+            metadata.map_err(|error| Error::input(name, "", format!("cannot be read: {error}")))?;
+        }
+        Ok(())
+    }
+
     /// The scene called `name`: `terrainN` (2 N^2 triangles), `architecture` or `architectureN` (N storeys), `instances`
     /// or `instancesN` (N placements of one mesh), or a file.
     /// All but terrains stand on a floor, two triangles at the bottom of their bounds.

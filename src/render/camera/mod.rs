@@ -81,9 +81,6 @@ impl View {
     }
 }
 
-/// Lens shifts, in sides of the picture, up to which f32 tells rays of neighbouring pixels apart.
-const MOST_SHIFT: f64 = 1000.0;
-
 /// Whether the camera stands somewhere and looks somewhere; what else it has is checked where it is used.
 fn check_numbers(camera: &Camera) -> Result<()> {
     let Camera { eye, frame, ref end, shift, distortion, .. } = *camera;
@@ -113,8 +110,9 @@ fn check_numbers(camera: &Camera) -> Result<()> {
     {
         return Err(Error::Usage(format!("a view of height {height:e} m: must be at most {LARGEST_COORDINATE:e}")));
     }
-    if shift.abs().max_element() > MOST_SHIFT {
-        let message = format!("a lens shift of {shift}: at most {MOST_SHIFT} pictures to a side are possible");
+    if shift.abs().max_element() > Camera::MOST_SHIFT {
+        let most = Camera::MOST_SHIFT;
+        let message = format!("a lens shift of {shift}: at most {most} pictures to a side are possible");
         return Err(Error::Usage(message));
     }
     Ok(())

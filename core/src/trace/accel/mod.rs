@@ -58,6 +58,13 @@ pub struct Options {
     pub methods: Methods,
 }
 
+impl Options {
+    /// Whether an accelerator of these gives the hits of brute force to the bit.
+    pub fn are_exact_for(&self, accel: Accel) -> bool {
+        !accel.has_methods() || self.methods == Methods::default()
+    }
+}
+
 /// Which of many boxes a ray may pass.
 trait Index: Sized + Send + Sync {
     /// Whether a ray may meet an item more than once.
