@@ -24,6 +24,12 @@ type Nearest<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
+/// The distance of a point whose square is told, which is infinite from 1e154 on: from there all that can be met is as near as zero.
+fn root(squared: f64, point: DVec3) -> f64 {
+    let most = point.abs().max_element();
+    if squared == f64::INFINITY && most.is_finite() { (point / most).length() * most } else { squared.sqrt() }
+}
+
 /// What `ask` answers of the points, in their order; it gets some that are near each other at a time, and answers that say `none`, as all do once it
 /// is called off.
 fn along<T: Copy + Send + Sync>(
@@ -94,7 +100,7 @@ impl Scene {
                         let (u, v) = (found.u, found.v);
                         let weights = if is_f32 { weights_f32(u, v).map(f64::from) } else { [u, v] };
                         uv[2 * i..2 * i + 2].copy_from_slice(&weights);
-                        distance[i] = found.distance_squared.sqrt();
+                        distance[i] = root(found.distance_squared, rows.at(number));
                     }
                 }
                 self.normals_of(primitive, geometry, true, normal, |x| x);
@@ -127,8 +133,9 @@ impl Scene {
                 } else if samples > 0 {
                     are_inside(counted, points, samples, false, &mut inside);
                 }
-                for (distance, inside) in distances.iter_mut().zip(inside) {
-                    *distance = if inside { -distance.sqrt() } else { distance.sqrt() };
+                for ((distance, inside), &point) in distances.iter_mut().zip(inside).zip(points) {
+                    let length = root(*distance, point);
+                    *distance = if inside { -length } else { length };
                 }
             })
         })?;

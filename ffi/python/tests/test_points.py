@@ -46,6 +46,36 @@ def test_nearest_points(rng, dtype):
         assert (u >= 0).all() and (v >= 0).all() and (u + v <= 1 + eps).all()
 
 
+@pytest.mark.parametrize("away", [1e3, 1e6, 1e9, 1e12, 1e15])
+def test_the_nearest_point_is_on_the_mesh_however_far_the_point(away):
+    """On a unit cube's face at x = 0.5, across from the point."""
+    import trimesh
+
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(trimesh.creation.box())
+    found = scene.compute_closest_points([[away, 0.125, 0.25]])
+    assert np.abs(found["points"] - [[0.5, 0.125, 0.25]]).max() < 1e-15 * max(away, 1e3)
+    assert found["points"][0, 0] == 0.5
+
+
+def test_distances_that_are_large():
+    """Squares of distances leave f64, and distances float32, before points do."""
+    import warnings
+
+    import trimesh
+
+    scene = twincast.RaycastingScene()
+    scene.add_triangles(trimesh.creation.box())
+    points = np.array([[1e200, 0, 0], [3e300, -4e300, 0], [2, 0, 0]])
+    assert np.allclose(scene.compute_distance(points), [1e200, 5e300, 1.5], rtol=1e-15)
+    assert np.allclose(scene.compute_signed_distance(points), [1e200, 5e300, 1.5], rtol=1e-15)
+    most = np.finfo(np.float32).max
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        single = np.float32([[-3.4e38, 3.4e38, 3.4e38], [3, 0, 0], [np.nan, 0, 0]])
+        assert np.array_equal(scene.compute_distance(single), np.float32([most, 2.5, np.nan]), equal_nan=True)
+
+
 def test_slivers_and_points(rng):
     """Triangles of which f32 cannot tell the normal, and some without an area."""
     a = rng.uniform(-1, 1, (400, 3))

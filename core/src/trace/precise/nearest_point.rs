@@ -37,10 +37,14 @@ impl NearestPoint {
             || self.distance_squared == other.distance_squared && self.id() < other.id()
     }
 
-    fn new(point: DVec3, on: TrianglePoint, geometry: u32, primitive: u32) -> Self {
+    fn new(point: DVec3, on: TrianglePoint, [a, b, c]: [DVec3; 3], geometry: u32, primitive: u32) -> Self {
         let TrianglePoint { offset, distance_squared, u, v } = on;
         let [u, v] = weights_within(u, v);
-        Self { point: point + offset, distance_squared, u, v, primitive, geometry }
+        // From farther away than the triangle is from zero, the way to it is rounded more than the triangle is.
+        let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
+        let is_far = offset.abs().max_element() > reach;
+        let point = if is_far { a + (b - a) * u + (c - a) * v } else { point + offset };
+        Self { point, distance_squared, u, v, primitive, geometry }
     }
 }
 
@@ -104,7 +108,7 @@ impl Precise {
             for primitive in 0..mesh.triangles.len() as u32 {
                 let corners = self.corners(geometry, primitive);
                 if corners.iter().all(|&corner| is_traceable(corner)) {
-                    let answer = NearestPoint::new(point, closest_point(point, corners), geometry, primitive);
+                    let answer = NearestPoint::new(point, closest_point(point, corners), corners, geometry, primitive);
                     if best.as_ref().is_none_or(|best| answer.is_before(best)) {
                         best = Some(answer);
                     }
@@ -120,7 +124,7 @@ trait Answer: Clone {
     /// Whether the nearest point is part of it.
     const HAS_POINT: bool;
     /// Of a triangle that the tree has found.
-    fn of(point: DVec3, nearest: &NearestTriangle) -> Self;
+    fn of(precise: &Precise, point: DVec3, nearest: &NearestTriangle) -> Self;
     /// Of a look at every triangle.
     fn of_all(nearest: Option<NearestPoint>) -> Self;
 }
@@ -128,8 +132,9 @@ trait Answer: Clone {
 impl Answer for Option<NearestPoint> {
     const HAS_POINT: bool = true;
 
-    fn of(point: DVec3, nearest: &NearestTriangle) -> Self {
-        nearest.on.map(|on| NearestPoint::new(point, on, nearest.geometry, nearest.primitive))
+    fn of(precise: &Precise, point: DVec3, nearest: &NearestTriangle) -> Self {
+        let NearestTriangle { on, geometry, primitive, .. } = *nearest;
+        on.map(|on| NearestPoint::new(point, on, precise.corners(geometry, primitive), geometry, primitive))
     }
 
     fn of_all(nearest: Option<NearestPoint>) -> Self {
@@ -141,7 +146,7 @@ impl Answer for Option<NearestPoint> {
 impl Answer for f64 {
     const HAS_POINT: bool = false;
 
-    fn of(_: DVec3, nearest: &NearestTriangle) -> Self {
+    fn of(_: &Precise, _: DVec3, nearest: &NearestTriangle) -> Self {
         nearest.distance_squared
     }
 
@@ -169,7 +174,7 @@ impl<A: Answer> Surveyor for Survey<'_, A> {
         let run = &mut self.runs[traveller];
         if let Some(nearest) = last {
             let asked = run.asked - 1;
-            run.answers[asked] = A::of(run.points[asked], &nearest);
+            run.answers[asked] = A::of(self.precise, run.points[asked], &nearest);
         }
         loop {
             let point = *run.points.get(run.asked)?;

@@ -47,8 +47,13 @@ def rays_from_matrices(
     # Through the pixels' middles.
     x, y = np.meshgrid(np.arange(width_px) + 0.5, np.arange(height_px) + 0.5)
     to_world = extrinsic[:3, :3].T @ to_camera
+    if not np.linalg.det(extrinsic[:3, :3]):
+        raise ValueError(f"extrinsic_matrix must have an inverse; it is {extrinsic.tolist()}")
+    centre = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
+    if not np.abs(centre).max() <= np.finfo(np.float32).max:
+        raise ValueError(f"the camera is at {centre.tolist()}, which is more than float32 holds")
     rays = np.empty((height_px, width_px, 6), dtype=np.float32)
-    rays[..., :3] = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
+    rays[..., :3] = centre
     rays[..., 3:] = np.stack([x, y, np.ones_like(x)], axis=-1) @ to_world.T
     return rays
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 from . import _arguments, _arrays, _native
 
@@ -28,14 +31,14 @@ def render(
     *,
     size: tuple[int, int] | None = None,
     spp: int | None = None,
-    eye: Sequence[float] | None = None,
-    look_at: Sequence[float] | None = None,
-    up: Sequence[float] = (0.0, 1.0, 0.0),
-    fov: float = 40.0,
+    eye: ArrayLike | None = None,
+    look_at: ArrayLike | None = None,
+    up: ArrayLike | None = None,
+    fov: float | None = None,
     camera: str | None = None,
     integrator: str | None = None,
     max_depth: int | None = None,
-    background: Sequence[float] | None = None,
+    background: ArrayLike | None = None,
     seed: int | None = None,
     up_axis: str = "y",
     unit: str = "m",
@@ -54,11 +57,11 @@ def render(
     spp : int, optional
         Samples a pixel; the file's, else 4.
     eye, look_at, up : (3,) float, optional
-        Where the camera is, what it looks at and what is up, in the coordinates of the scene. Without ``eye`` the file's camera, or one that
-        shows everything. Where ``up`` is along the view, up in the picture is what it becomes for a camera that is tilted until it looks up or
+        Where the camera is, what it looks at and what is up (0, 1, 0 where not given), in the coordinates of the scene. Without ``eye``, with
+        which the others go, the file's camera, or one that shows everything. Where ``up`` is along the view, up in the picture is what it becomes for a camera that is tilted until it looks up or
         down.
-    fov : float
-        Vertical field of view in degrees, with ``eye``.
+    fov : float, optional
+        Vertical field of view in degrees, with ``eye``; 40 where not given.
     camera : str, optional
         The name of one of the file's cameras; not with ``eye``.
     integrator : str, optional
@@ -125,13 +128,15 @@ def render(
 
 def _view(meshes: list[_Mesh] | None, eye: Any, look_at: Any, up: Any, fov: Any) -> tuple[Any, ...] | None:
     """Eye, target, up and field of view; None where the camera is the scene's. ``meshes`` are None for a file."""
-    fov = _arguments.real("fov", fov)
+    if eye is None:
+        alone = [name for name, value in [("look_at", look_at), ("up", up), ("fov", fov)] if value is not None]
+        if alone:
+            raise ValueError(f"eye must be given with {' and '.join(alone)}")
+        return None
+    up = (0.0, 1.0, 0.0) if up is None else up
+    fov = 40.0 if fov is None else _arguments.real("fov", fov)
     if not 0 < fov < 180:
         raise ValueError(f"fov must be between 0 and 180, not {fov}")
-    if eye is None:
-        if look_at is not None:
-            raise ValueError("eye must be given with look_at")
-        return None
     target = _centre(meshes) if look_at is None and meshes is not None else look_at
     if target is None:
         raise ValueError("look_at must be given with eye, for a file")

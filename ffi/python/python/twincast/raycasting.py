@@ -222,6 +222,10 @@ class RaycastingScene(Meshes):
     def _distance(self, query_points: Any, nthreads: int, samples: int) -> Result:
         points, shape = _points(query_points)
         distance = self._scene.distance(points, samples, threads=_threads(nthreads))
+        if points.dtype == np.float32:
+            # Farther than float32 holds counts as far as it does.
+            most = np.finfo(np.float32).max
+            np.clip(distance, -most, most, out=distance)
         return _result(distance.astype(points.dtype, copy=False), *shape)
 
     def compute_occupancy(self, query_points: Any, nthreads: int = 0, nsamples: int = 1) -> Result:
@@ -291,8 +295,12 @@ def _threads(nthreads: Any) -> int:
     return _arguments.whole("nthreads", nthreads)
 
 
+# A majority is settled long before, and nothing is looked at in between.
+_MOST_SAMPLES = 9_999
+
+
 def _samples(nsamples: Any) -> int:
-    samples = _arguments.whole("nsamples", nsamples, least=1)
+    samples = _arguments.whole("nsamples", nsamples, least=1, most=_MOST_SAMPLES)
     if samples % 2 == 0:
         raise ValueError(f"nsamples must be an odd number, not {samples}")
     return samples
