@@ -54,8 +54,10 @@ def test_the_nearest_point_is_on_the_mesh_however_far_the_point(away):
     scene = twincast.RaycastingScene()
     scene.add_triangles(trimesh.creation.box())
     found = scene.compute_closest_points([[away, 0.125, 0.25]])
-    assert np.abs(found["points"] - [[0.5, 0.125, 0.25]]).max() < 1e-15 * max(away, 1e3)
-    assert found["points"][0, 0] == 0.5
+    assert found["points"][0, 0] == 0.5 and np.abs(found["points"]).max() <= 0.5
+    # Farther out, squares of distances no longer tell the face's points apart.
+    if away <= 1e6:
+        assert np.abs(found["points"] - [[0.5, 0.125, 0.25]]).max() < 1e-15 * away
 
 
 def test_distances_that_are_large():
