@@ -10,7 +10,7 @@ use super::engine::BackendArg;
 use super::report::time;
 use super::warn;
 use crate::error::{Error, Result};
-use crate::memory::in_words as size;
+use crate::memory::in_words;
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Cache, CacheReport, CacheUse, Options};
 
@@ -76,7 +76,7 @@ impl CacheStats {
 impl fmt::Display for CacheStats {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { file, used, bytes, seconds } = self;
-        let (bytes, seconds) = (size(*bytes), time(*seconds));
+        let (bytes, seconds) = (in_words(*bytes), time(*seconds));
         match *used {
             "failed" => write!(f, "{used} to write {file}"),
             _ => write!(f, "{used} {file}: {bytes}, {seconds} of the build"),

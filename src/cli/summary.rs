@@ -1,7 +1,7 @@
 //! What a render says of itself when it is done.
 
 use super::report::{Rays, Stats, Summary, counted, grouped, time};
-use crate::memory::in_words as size;
+use crate::memory::in_words;
 use crate::plan::BuildChoice;
 use crate::render::Renderer;
 use crate::scene::Scene;
@@ -74,14 +74,14 @@ impl Rendered<'_> {
                     counted(*exact, "decision that f64 could not take", "decisions that f64 could not take"),
                 );
                 let each = engine.bytes_per_triangle.map(|b| format!(", {b:.0} B a triangle")).unwrap_or_default();
-                summary.line("memory", format_args!("{}{each}", size(engine.bytes as u64)));
+                summary.line("memory", format_args!("{}{each}", in_words(engine.bytes as u64)));
             }
         }
         if let Some(denoise) = &self.stats.denoise {
             summary.line("denoised", format_args!("{}: {}", denoise.library, time(denoise.seconds)));
         }
         if let (true, Some(peak)) = (verbose, self.stats.peak_memory) {
-            summary.line("peak", format_args!("{} of memory for everything", size(peak)));
+            summary.line("peak", format_args!("{} of memory for everything", in_words(peak)));
         }
         summary
     }

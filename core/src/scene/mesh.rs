@@ -155,8 +155,7 @@ pub fn is_traceable_f64(p: &DVec3) -> bool {
 
 /// Around the triangles whose corners are there, finite and small enough to be traced.
 fn bounds_of_triangles(triangles: &[[u32; 3]], positions: &[DVec3]) -> DAabb {
-    let is_traceable = is_traceable_f64;
-    let corner = |i: u32| positions.get(i as usize).copied().filter(is_traceable);
+    let corner = |i: u32| positions.get(i as usize).copied().filter(is_traceable_f64);
     let around = |bounds: DAabb, &[a, b, c]: &[u32; 3]| match (corner(a), corner(b), corner(c)) {
         (Some(a), Some(b), Some(c)) => bounds.include(a).include(b).include(c),
         _ => bounds,

@@ -125,22 +125,17 @@ impl Stage<'_, '_> {
             self.scene.instances.push(instance(start, moves_to));
         }
         let mut warn = |message| self.warnings.push(self.document.warning(pointer, message));
-        let beyond = "placed farther away, or larger, than f32 holds";
-        if far > 0 && far == places.len() {
-            warn(format!("node {:?} is {beyond}, and left out", node.name));
-        } else if far > 0 {
-            warn(format!("{far} instances of node {:?} are {beyond}, and left out", node.name));
-        }
-        if gone > 0 {
-            warn(format!("node {:?} is {beyond} while the shutter is open; it stands still", node.name));
-        }
-        if flat > 0 && flat == places.len() {
-            warn(format!("node {:?} is scaled by zero, and left out", node.name));
-        } else if flat > 0 {
-            warn(format!("{flat} instances of node {:?} are scaled by zero, and left out", node.name));
-        }
-        if stopped > 0 {
-            warn(format!("node {:?} is scaled by zero while the shutter is open; it stands still", node.name));
+        let reasons =
+            [("placed farther away, or larger, than f32 holds", far, gone), ("scaled by zero", flat, stopped)];
+        for (why, left_out, standing) in reasons {
+            if left_out > 0 && left_out == places.len() {
+                warn(format!("node {:?} is {why}, and left out", node.name));
+            } else if left_out > 0 {
+                warn(format!("{left_out} instances of node {:?} are {why}, and left out", node.name));
+            }
+            if standing > 0 {
+                warn(format!("node {:?} is {why} while the shutter is open; it stands still", node.name));
+            }
         }
         Ok(())
     }
