@@ -125,17 +125,18 @@ impl Mesh {
 
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
     /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
-    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat. A triangle with a corner that is NaN or infinite has none.
+    /// Vertices that no triangle with an area uses get the zero vector, which shades as flat. A triangle that no ray can hit has none.
     ///
     /// # Panics
     /// For a triangle that names a vertex that there is not.
     pub fn smooth_normals(&mut self) {
         let mut sums = vec![DVec3::ZERO; self.positions.len()];
         for corners in self.triangles.iter() {
-            let p = corners.map(|i| self.positions[i as usize].as_dvec3());
-            if !p.iter().all(|p| p.is_finite()) {
+            let p = corners.map(|i| self.positions[i as usize]);
+            if !p.iter().all(|&p| is_traceable(p)) {
                 continue;
             }
+            let p = p.map(|p| p.as_dvec3());
             let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
             for k in 0..3 {
                 let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
@@ -198,13 +199,16 @@ mod tests {
         let make = |positions: &[DVec3], triangles: Vec<[u32; 3]>| {
             let mut mesh = Mesh { triangles: Arc::new(triangles), ..Mesh::default() };
             mesh.set_positions(positions);
-            mesh.drop_strays();
             mesh.smooth_normals();
+            mesh.drop_strays();
+            let before = mesh.normals.clone();
+            mesh.smooth_normals();
+            assert_eq!(mesh.normals, before);
             mesh
         };
         let alone = make(&positions, triangles.clone());
         assert!(alone.normals.iter().all(|normal| normal.is_normalized()));
-        for bad in [f64::NAN, f64::INFINITY, 1e300] {
+        for bad in [f64::NAN, f64::INFINITY, 1e19, 1e300] {
             let more = [&positions[..], &[DVec3::ZERO, DVec3::new(bad, 0.0, 0.0)]].concat();
             let mesh = make(&more, [&triangles[..], &[[40, 81, 82]]].concat());
             assert_eq!((mesh.untraceable_triangles(), mesh.triangles.len()), (1, 129));

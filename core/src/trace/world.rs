@@ -87,6 +87,9 @@ struct Lookup {
 
 impl World {
     /// The part and the placement that a hit names.
+    ///
+    /// # Panics
+    /// For a hit of another world, or one that names nothing.
     pub fn locate(&self, hit: &Hit) -> (&Part, Option<&Placement>) {
         let lookup = self.lookup[hit.instance as usize];
         let part = &self.parts[lookup.first_part + (hit.geometry - lookup.first_geometry) as usize];
@@ -145,6 +148,9 @@ impl World {
     ///
     /// # Errors
     /// Those of [`World::new`].
+    ///
+    /// # Panics
+    /// As [`World::new`] does.
     pub fn placed(scene: &Scene) -> Result<Self> {
         Self::with(scene, false).map_err(|error| error.told_of(scene.files.first()))
     }

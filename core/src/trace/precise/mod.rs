@@ -189,6 +189,9 @@ impl Precise {
     }
 
     /// The corners of a triangle.
+    ///
+    /// # Panics
+    /// For a mesh or a triangle that there is not.
     #[inline]
     pub fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3] {
         let mesh = &self.meshes[geometry as usize];
