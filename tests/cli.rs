@@ -709,6 +709,8 @@ fn frames_of_an_animation() {
     }
     let other = ["--time", "0.5", "-o", &path("t.exr"), "--reference", &path("f.02.exr"), "--threshold", "0.001"];
     assert_eq!(render(&other).0, 1, "it moves");
+    // None of them was interrupted: all begin anew.
+    assert_eq!(render(&["--frames", "0-1", "--fps", "2", "--resume", "-o", &numbered]), (0, String::new()));
     // What is there stays, what is missing is made.
     std::fs::write(path("f.01.exr"), "kept").expect("written");
     std::fs::remove_file(path("f.02.exr")).expect("it was there");

@@ -1,8 +1,9 @@
-//! Ctrl-C while a scene is read.
+//! What ends the program while it reads, measures or renders.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::process::Stdio;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::program::{Running, command};
 
@@ -33,10 +34,55 @@ fn reading_ends_at_once() {
             assert!(!mapped.is_empty(), "{name} does not read");
             std::thread::sleep(Duration::from_millis(1));
         }
-        child.interrupt();
+        // As schedulers of batches do it, too.
+        child.signal(if *name == "plan" { "TERM" } else { "INT" });
         let (code, said) = child.end();
         assert_eq!(code, Some(130), "{name}: {said}");
         assert!(said.contains("interrupted") && !said.contains("missing.mtl"), "{name}: {said}");
         assert!(!folder.path().join("a.png").exists());
     }
+}
+
+/// Measuring for a chart takes long, and writes nothing meanwhile.
+#[test]
+fn charts_end_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = command();
+    command.current_dir(&folder).args(["chart", "--charts", "triangles", "-q", "-o", "out"]);
+    let child = Running::new(command.stderr(Stdio::piped()).spawn().expect("it runs"));
+    let begin = Instant::now();
+    while !folder.path().join("out").is_dir() {
+        assert!(begin.elapsed().as_secs() < 60, "it makes its folder");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // After the check of its outputs.
+    std::thread::sleep(Duration::from_millis(300));
+    child.interrupt();
+    let (code, said) = child.end();
+    assert!(code == Some(130) && said.contains("interrupted"), "{code:?}: {said}");
+    assert_eq!(std::fs::read_dir(folder.path().join("out")).expect("a folder").count(), 0);
+}
+
+/// A mapped file that becomes shorter while it is read. Whether it was read before that is chance.
+#[test]
+fn a_file_that_is_cut_short_is_told() {
+    const TRIANGLES: u32 = 2_000_000;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("large.stl");
+    let tell = || {
+        let file = std::fs::File::create(&path).expect("a file");
+        (&file).write_all(&[&[0; 80][..], &TRIANGLES.to_le_bytes()].concat()).expect("written");
+        // Zeros, which take no room.
+        file.set_len(84 + 50 * u64::from(TRIANGLES)).expect("room");
+        let child = command().args(["info"]).arg(&path).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+        let child = Running::new(child.expect("it runs"));
+        let maps = || std::fs::read_to_string(format!("/proc/{}/maps", child.id())).unwrap_or_default();
+        while !maps().contains("large.stl") && !maps().is_empty() {
+            std::thread::yield_now();
+        }
+        file.set_len(1000).expect("it is shorter");
+        child.end()
+    };
+    let told = (0..20).map(|_| tell()).find(|(_, said)| said.contains("became shorter"));
+    assert_eq!(told.map(|(code, _)| code), Some(Some(3)));
 }

@@ -41,8 +41,14 @@ impl Running {
     /// Ctrl-C.
     #[cfg(unix)]
     pub fn interrupt(&self) {
+        self.signal("INT");
+    }
+
+    /// By its name.
+    #[cfg(unix)]
+    pub fn signal(&self, name: &str) {
         // The shell's own: a system may have no other.
-        let kill = format!("kill -INT {}", self.id());
+        let kill = format!("kill -{name} {}", self.id());
         assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
     }
 

@@ -18,12 +18,12 @@ pub(super) struct AccelArgs {
     accel: Option<AccelArg>,
 
     #[command(flatten)]
-    pub(super) options: AccelOptions,
+    pub(super) options: AccelOptionArgs,
 }
 
 /// What an accelerator may be told.
 #[derive(Clone, Debug, Args)]
-pub(super) struct AccelOptions {
+pub(super) struct AccelOptionArgs {
     /// Cells of the grid: along its longest side, or along each axis (default: by the number of primitives)
     #[arg(long, value_name = "N|XxYxZ", value_parser = parse_grid)]
     grid: Option<Resolution>,
@@ -73,7 +73,7 @@ impl AccelArg {
     }
 }
 
-impl AccelOptions {
+impl AccelOptionArgs {
     /// What is said here.
     fn search(&self) -> Search {
         let Self { grid, triangle_method, sphere_method } = *self;

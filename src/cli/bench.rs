@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::accel::{AccelArg, AccelOptions};
+use super::accel::{AccelArg, AccelOptionArgs};
 use super::common::{UpAxis, needs, parse_bytes};
 use super::engine::BackendArg;
 use super::scaling;
@@ -81,9 +81,9 @@ pub(super) struct BenchArgs {
     accel: Vec<AccelArg>,
 
     #[command(flatten)]
-    options: AccelOptions,
+    options: AccelOptionArgs,
 
-    /// Measure time against the number of triangles instead, for every accelerator: builds on all threads, rays on one. One that takes
+    /// Measure time against the number of triangles instead, for every accelerator: builds on --threads, rays on one. One that takes
     /// over 10 seconds for a step is not asked for more
     #[arg(long, conflicts_with_all = ["scenes", "up_axis", "rays", "modes", "size", "isa", "repeat", "accel", "grid", "triangle_method", "sphere_method"])]
     scaling: bool,
@@ -243,7 +243,7 @@ mod with_embree {
         args.scenes.iter().try_for_each(|name| Subject::check(name))?;
         let mut reports = Vec::new();
         for name in &args.scenes {
-            let (subject, warnings) = interrupt::while_reading(|| Subject::new(name, args.up_axis.axis()))?;
+            let (subject, warnings) = interrupt::while_nothing_is_written(|| Subject::new(name, args.up_axis.axis()))?;
             warn(&warnings);
             interrupt::check()?;
             let costs = Arc::default();

@@ -86,7 +86,7 @@ pub(super) fn run(args: &ChartArgs) -> Result<()> {
     let figures = pool.install(|| {
         let setup = Setup { quick: args.quick, cancel: Some(cancel), on_step: Some(&on_step) };
         let figures = charts.iter().map(|chart| {
-            let figure = chart.make(&setup)?;
+            let figure = interrupt::while_nothing_is_written(|| chart.make(&setup))?;
             write(folder, &figure)?;
             Ok(figure)
         });

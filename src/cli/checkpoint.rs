@@ -1,7 +1,7 @@
 //! Long renders: how often they are kept, and going on from what was kept.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
@@ -19,7 +19,8 @@ pub(super) struct CheckpointArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     checkpoint: Option<Duration>,
 
-    /// Go on from that file, to the same bits; an error where it is missing, or of another scene, settings or program
+    /// Go on from that file, to the same bits; an error where it is missing, or of another scene, settings or program. With --frames
+    /// the frames that have none begin anew
     #[arg(long)]
     resume: bool,
 }
@@ -31,7 +32,17 @@ pub(super) struct Kept {
     resume: bool,
 }
 
+/// Beside the first picture.
+fn place(picture: &Path) -> PathBuf {
+    picture.with_extension("checkpoint.exr")
+}
+
 impl CheckpointArgs {
+    /// Goes on only if these pictures' render was kept: of many frames, one at most was interrupted.
+    pub(super) fn resume_if_kept(&mut self, pictures: &[PathBuf]) {
+        self.resume &= pictures.first().is_none_or(|first| place(first).exists());
+    }
+
     /// How the render of these pictures is kept; none where it is not. Checked before any work.
     ///
     /// # Errors
@@ -59,7 +70,7 @@ impl CheckpointArgs {
                 "--checkpoint and --resume need a picture: name one with --output FILE".to_owned(),
             ));
         };
-        let path = first.with_extension("checkpoint.exr");
+        let path = place(first);
         if self.resume && !path.exists() {
             let message = "there is no checkpoint to resume: leave out --resume to begin anew";
             return Err(Error::input(path, "", message));

@@ -95,7 +95,7 @@ pub(crate) fn needs((flag, is_given): (&str, bool), (other, is_there): (&str, bo
 impl SceneArgs {
     /// Reads the scene. If `has_shutter`, what an animation moves is to move.
     pub(crate) fn load(&self, has_shutter: bool) -> Result<(Scene, Vec<Warning>)> {
-        interrupt::while_reading(|| io::load(&self.scene, &self.options(has_shutter)))
+        interrupt::while_nothing_is_written(|| io::load(&self.scene, &self.options(has_shutter)))
     }
 
     /// Reads the scene with a bar over the bytes of the file.
@@ -104,7 +104,7 @@ impl SceneArgs {
         let length = std::fs::metadata(&self.scene).map_or(0, |file| file.len());
         let bar = progress::bar(length, "loading", quiet);
         let load = || io::load_watched(&self.scene, &self.options(has_shutter), Some(&|bytes| bar.inc(bytes)));
-        let scene = interrupt::while_reading(load);
+        let scene = interrupt::while_nothing_is_written(load);
         bar.finish_and_clear();
         scene
     }

@@ -1,12 +1,12 @@
 //! A picture in the making, in the viewer tev (T. Müller's, by its protocol: packets over TCP, as its `src/Ipc.cpp` has them).
 //!
-//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render; what waits to be sent is at most the picture. A
-//! viewer that goes away during the render is told of at the end, and costs the picture nothing.
+//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render. What waits to be sent is at most the picture: of a
+//! tile that is done again before it was sent, the newest packet. A viewer that goes away during the render is told of at the end, and costs the picture nothing.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::mpsc::{Sender, channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -28,10 +28,69 @@ pub(super) struct Display {
     address: String,
     /// What images are called, but for the engine.
     title: String,
-    /// The image that is shown.
-    name: Mutex<String>,
-    packets: Sender<Vec<u8>>,
-    thread: JoinHandle<std::io::Result<()>>,
+    queue: Arc<Queue>,
+    thread: Option<JoinHandle<std::io::Result<()>>>,
+}
+
+/// What is to be sent, and whoever waits for it.
+#[derive(Default)]
+struct Queue {
+    state: Mutex<Waiting>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct Waiting {
+    /// The image that is shown, and its number.
+    name: String,
+    image: u32,
+    /// In the order in which they are sent.
+    packets: BTreeMap<Place, Vec<u8>>,
+    /// Whether nothing more comes, or nothing more can be sent.
+    is_over: bool,
+}
+
+/// What a packet is about: of the image with this number the tile at (y, x), or the whole.
+type Place = (u32, Option<[u32; 2]>);
+
+impl Queue {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// In place of what is still waiting about the same.
+    fn put(&self, mut waiting: MutexGuard<'_, Waiting>, tile: Option<[u32; 2]>, packet: Packet) {
+        if !waiting.is_over {
+            let place = (waiting.image, tile);
+            waiting.packets.insert(place, packet.finished());
+            self.changed.notify_one();
+        }
+    }
+
+    /// The next, once there is one; none after the last.
+    fn next(&self) -> Option<Vec<u8>> {
+        let mut waiting = self.lock();
+        loop {
+            match waiting.packets.pop_first() {
+                Some((_, packet)) => return Some(packet),
+                None if waiting.is_over => return None,
+                None => waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner),
+            }
+        }
+    }
+
+    fn end(&self) {
+        self.lock().is_over = true;
+        self.changed.notify_one();
+    }
+
+    fn send_all(&self, stream: &mut TcpStream) -> std::io::Result<()> {
+        let sent = std::iter::from_fn(|| self.next()).try_for_each(|packet| stream.write_all(&packet));
+        if sent.is_err() {
+            *self.lock() = Waiting { is_over: true, ..Waiting::default() };
+        }
+        sent
+    }
 }
 
 impl Display {
@@ -44,9 +103,10 @@ impl Display {
             backend: "display server",
             message: format!("{address} cannot be reached ({error}): start tev there, or leave out --display-server"),
         })?;
-        let (packets, waiting) = channel::<Vec<u8>>();
-        let thread = std::thread::spawn(move || waiting.into_iter().try_for_each(|packet| stream.write_all(&packet)));
-        Ok(Self { address: address.to_owned(), title, name: Mutex::default(), packets, thread })
+        let queue = Arc::<Queue>::default();
+        let sent = Arc::clone(&queue);
+        let thread = Some(std::thread::spawn(move || sent.send_all(&mut stream)));
+        Ok(Self { address: address.to_owned(), title, queue, thread })
     }
 
     /// Shows an empty picture, by the engine that is to fill it.
@@ -55,13 +115,15 @@ impl Display {
         let mut packet = Packet::new(CREATE_IMAGE, true, &name);
         packet.numbers([width, height, CHANNELS.len() as u32]);
         CHANNELS.iter().for_each(|channel| packet.text(channel));
-        self.send(packet);
-        *self.name.lock().unwrap_or_else(PoisonError::into_inner) = name;
+        let mut waiting = self.queue.lock();
+        waiting.name = name;
+        waiting.image += 1;
+        self.queue.put(waiting, None, packet);
     }
 
     /// Shows pixels that are done.
     pub(super) fn show(&self, finished: &Finished) {
-        let name = self.name.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let name = self.queue.lock().name.clone();
         let mut packet = Packet::new(UPDATE_IMAGE, false, &name);
         packet.numbers([CHANNELS.len() as u32]);
         CHANNELS.iter().for_each(|channel| packet.text(channel));
@@ -72,23 +134,25 @@ impl Display {
         for value in finished.pixels.iter().flat_map(|pixel| pixel.to_array()) {
             packet.0.extend(value.to_le_bytes());
         }
-        self.send(packet);
-    }
-
-    fn send(&self, packet: Packet) {
-        // Nobody takes it where the connection is lost, which is told at the end.
-        let _ = self.packets.send(packet.finished());
+        self.queue.put(self.queue.lock(), Some([finished.y, finished.x]), packet);
     }
 
     /// Waits until everything is shown; a warning where it was not.
-    pub(super) fn finish(self) -> Option<Warning> {
-        drop(self.packets);
-        let lost = match self.thread.join() {
+    pub(super) fn finish(mut self) -> Option<Warning> {
+        self.queue.end();
+        let lost = match self.thread.take()?.join() {
             Ok(Ok(())) => return None,
             Ok(Err(error)) => error.to_string(),
             Err(_) => "it failed".to_owned(),
         };
-        Some(Warning::new("--display-server", self.address, format!("did not show all of the picture: {lost}")))
+        let message = format!("did not show all of the picture: {lost}");
+        Some(Warning::new("--display-server", self.address.clone(), message))
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        self.queue.end();
     }
 }
 
@@ -158,6 +222,25 @@ mod tests {
         packet.text("R");
         let bytes = [&[23u8, 0, 0, 0, 4, 1, b'a', b'b', 0][..], &[3, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0], &[b'R', 0]];
         assert_eq!(packet.finished(), bytes.concat());
+    }
+
+    /// What comes again before it was sent takes the place of what came before; an image comes before its tiles, and before the next.
+    #[test]
+    fn the_newest_of_each_tile_waits() {
+        let queue = Queue::default();
+        let packet = |letter: &str| Packet::new(UPDATE_IMAGE, false, letter);
+        for (image, tile, letter) in
+            [(1, None, "a"), (1, Some([8, 0]), "b"), (1, Some([0, 8]), "c"), (1, Some([8, 0]), "d"), (2, None, "e")]
+        {
+            let mut waiting = queue.lock();
+            waiting.image = image;
+            queue.put(waiting, tile, packet(letter));
+        }
+        queue.end();
+        let sent: Vec<Vec<u8>> = std::iter::from_fn(|| queue.next()).collect();
+        assert_eq!(sent, ["a", "c", "d", "e"].map(|letter| packet(letter).finished()));
+        queue.put(queue.lock(), None, packet("f"));
+        assert!(queue.next().is_none(), "nothing waits for who is gone");
     }
 
     #[test]

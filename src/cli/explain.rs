@@ -31,9 +31,13 @@ pub(super) struct ExplainArgs {
 }
 
 impl ExplainArgs {
-    /// An error where it is not said which pixel.
-    pub(super) fn check(&self) -> Result<()> {
-        needs(("--explain", self.explain), ("--pixel", self.is_wanted()))
+    /// An error where it is not said which pixel, or of two engines by which.
+    pub(super) fn check(&self, backend: BackendArg) -> Result<()> {
+        needs(("--explain", self.explain), ("--pixel", self.is_wanted()))?;
+        if self.is_wanted() && backend == BackendArg::Both {
+            return Err(Error::Usage("--pixel takes one backend: native or embree".to_owned()));
+        }
+        Ok(())
     }
 
     /// Whether a pixel is wanted in place of a picture.
@@ -68,7 +72,7 @@ impl ExplainArgs {
             }
             #[cfg(not(feature = "embree"))]
             BackendArg::Embree => unreachable!("it is not in this build, which was checked"),
-            BackendArg::Both => return Err(Error::Usage("--pixel takes one backend: native or embree".to_owned())),
+            BackendArg::Both => unreachable!("there is one, which was checked"),
         };
         match (self.explain, self.json) {
             (false, _) => {

@@ -61,6 +61,7 @@ fn frame(args: &RenderArgs, number: u32) -> RenderArgs {
     for path in frame.output.iter_mut().chain(&mut frame.stats).chain(&mut frame.reference) {
         *path = numbered(path, number);
     }
+    frame.checkpoint.resume_if_kept(&frame.output);
     frame
 }
 

@@ -34,6 +34,8 @@ mod render;
 mod report;
 mod response;
 mod scaling;
+#[cfg(unix)]
+mod signals;
 mod stress;
 mod summary;
 mod trace;
@@ -108,6 +110,8 @@ Exit codes:
 
 /// Runs the program on the process's own arguments, and ends the process with its exit code.
 pub fn main() -> ! {
+    #[cfg(unix)]
+    signals::tell_of_missing_pages();
     leave::leave(main_with(std::env::args_os()))
 }
 

@@ -27,13 +27,18 @@ pub(super) fn check_places<'a>(
     inputs: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<()> {
     let others: Vec<&PathBuf> = others.into_iter().collect();
-    let mut taken: Vec<PathBuf> = inputs.into_iter().map(|path| place(path)).collect();
+    let inputs: Vec<PathBuf> = inputs.into_iter().map(|path| place(path)).collect();
+    let mut taken: Vec<PathBuf> = Vec::new();
     for path in pictures.iter().chain(others.iter().copied()) {
         let place = place(path);
-        if taken.contains(&place) && !place.starts_with("/dev") {
+        // What is no file, as /dev/null, holds nothing that could be lost.
+        let is_file = || path.metadata().map_or(true, |found| found.is_file());
+        let [is_read, is_written] = [&inputs, &taken].map(|places| places.contains(&place));
+        if (is_read || is_written) && is_file() {
+            let why = if is_read { "this file is read" } else { "this file is named twice" };
             let path = path.display();
             return Err(Error::Usage(format!(
-                "{path} is named twice; an output must not replace another file of the run"
+                "{path}: {why}; an output must not replace another file of the run, choose another name"
             )));
         }
         taken.push(place);
@@ -120,6 +125,13 @@ mod tests {
             std::os::unix::fs::symlink("picture.png", &link).expect("a link");
             assert!(check(pictures, [&link], [&scene]).is_err(), "to what is not there yet");
         }
+        // Of what is below /dev, files are files.
+        if let Ok(shared) = tempfile::NamedTempFile::new_in("/dev/shm") {
+            let shared = shared.path().to_owned();
+            assert!(check(std::slice::from_ref(&shared), [], [&shared]).is_err());
+        }
+        let nowhere = PathBuf::from("/dev/null");
+        assert!(check(&[], [&nowhere, &nowhere], [&scene]).is_ok());
         let same = folder.path().join(".").join("scene.obj");
         for (others, inputs) in [([&same], [&scene]), ([&picture], [&scene]), ([&stats], [&picture])] {
             let refused = check(pictures, others, inputs).expect_err("one file has two parts");

@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use super::common::{Size, by_name, parse_vector};
 use super::plan::PlanArgs;
 use crate::math::Vec3;
-use crate::render::{Adaptive, Crop, Filter, Sampling, Settings, TileOrder};
+use crate::render::{Adaptive, Crop, Filter, MOST_LIGHT_SAMPLES, Sampling, Settings, TileOrder};
 use crate::scene::{Integrator, MOST_DEPTH, MOST_SPP, Request};
 use crate::trace::{Batch, Width};
 
@@ -47,7 +47,7 @@ pub(super) struct PictureArgs {
     seed: Option<u64>,
 
     /// Shadow rays to each light with a surface, where a ray hits; paths ask one light
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_LIGHT_SAMPLES)))]
     light_samples: u32,
 
     /// How samples are spread: sobol, blue-noise, halton, stratified, grid or independent

@@ -119,13 +119,14 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
     args.light.apply(&mut scene)?;
     let accel = args.accel.choose(scene.request.search, args.backend, Some(&args.build), &cache)?.0;
     let settings = args.picture.settings(&scene.request, args.backend.best_width());
+    settings.check()?;
     let world = plan::world(&scene, settings.complete)?;
     let census = Census::new(&scene, &world);
     let wishes = settings.wishes();
     let plan = Plan::of_census(&scene, &world, &wishes, &census);
     let left_out = plan.left_out(&scene, &world, &wishes, &census);
     let rays = settings.expected_rays(&plan);
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    let pixels = settings.window().len() as u64;
     let build = match accel {
         Accel::Bvh => args.build.choose(args.backend, world.stored_triangles(), &rays, pixels, &[])?,
         _ => None,

@@ -80,7 +80,7 @@ pub(super) struct RenderArgs {
     denoise: DenoiseArgs,
 
     #[command(flatten)]
-    checkpoint: CheckpointArgs,
+    pub(super) checkpoint: CheckpointArgs,
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
@@ -147,7 +147,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 /// Renders one picture.
 fn render(args: &RenderArgs) -> Result<()> {
     args.backend.check_available()?;
-    args.explain.check()?;
+    args.explain.check(args.backend)?;
     args.accel.check(args.backend, Some(&args.build), &args.cache)?;
     args.build.check_file(args.backend, &args.scene.scene)?;
     let cancel = interrupt::install()?;

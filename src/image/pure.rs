@@ -140,7 +140,11 @@ pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
 
 /// Reads a file, unless `check` refuses its width and height. The format is told by the content.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    if openexr_magic(path)? { guarded(|| read_exr(path, check)) } else { picture::read(path, check) }
+    if openexr_magic(path)? { read_exr(path, check) } else { picture::read(path, check) }
+}
+
+fn read_headers(path: &Path) -> Result<exr::meta::MetaData> {
+    guarded(|| exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string()))
 }
 
 fn openexr_magic(path: &Path) -> Result<bool> {
@@ -153,7 +157,7 @@ pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
     if !openexr_magic(path)? {
         return Ok(None);
     }
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let meta = read_headers(path)?;
     let header = meta.headers.first().ok_or("no layers")?;
     let (at, display) = (header.own_attributes.layer_position, header.shared_attributes.display_window);
     let [x, y] =
@@ -169,24 +173,18 @@ pub(super) struct Planes {
     pub(super) list: Vec<openexr::AnyChannel<FlatSamples>>,
 }
 
-/// Reads them, unless `check` refuses width, height and number.
-pub(super) fn read_planes(path: &Path, check: impl FnOnce(u64, u64, u64) -> Result<()>) -> Result<Planes> {
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+/// Reads them, unless `check` refuses width and height. Every channel is decoded: many channels count as many pixels.
+pub(super) fn read_planes(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Planes> {
+    let meta = read_headers(path)?;
     let header = meta.headers.first().ok_or("no layers")?;
     if header.deep {
         return Err("a deep image; only flat ones are read".to_owned());
     }
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
-    check(width as u64, height as u64, header.channels.list.len() as u64)?;
-    let image = openexr::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_file(path)
-        .map_err(|e| e.to_string())?;
+    check(width as u64, (height as u64).saturating_mul(header.channels.list.len().div_ceil(4) as u64))?;
+    let reader = openexr::read().no_deep_data().largest_resolution_level().all_channels();
+    let reader = reader.first_valid_layer().all_attributes().non_parallel();
+    let image = guarded(|| reader.from_file(path).map_err(|e| e.to_string()))?;
     let list: Vec<_> = image.layer_data.channel_data.list.into_iter().collect();
     if list.iter().any(|channel| channel.sample_data.len() != width * height) {
         return Err("channels of a lower resolution are not read".to_owned());
@@ -195,9 +193,7 @@ pub(super) fn read_planes(path: &Path, check: impl FnOnce(u64, u64, u64) -> Resu
 }
 
 fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    // Every channel is decoded: many channels count as many pixels.
-    let by_pixels = |width, height: u64, count: u64| check(width, height.saturating_mul(count.div_ceil(4)));
-    let Planes { width, height, list: planes } = read_planes(path, by_pixels)?;
+    let Planes { width, height, list: planes } = read_planes(path, check)?;
     let plane = |name: &str| planes.iter().find(|c| c.name == *name).map(|c| &c.sample_data);
     let colours = match (plane("R"), plane("G"), plane("B"), plane("Y")) {
         (Some(r), Some(g), Some(b), _) => vec![r, g, b],
@@ -221,7 +217,7 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
 
 /// Reads the attributes that [`write`] writes.
 pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let meta = read_headers(path)?;
     let header = meta.headers.first().ok_or("no layers")?;
     let attributes = &header.own_attributes;
     let (at, display) = (attributes.layer_position, header.shared_attributes.display_window);

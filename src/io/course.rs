@@ -20,7 +20,7 @@ use super::statement::{Statement, statements};
 use super::suggest::suggestion;
 use super::text::{name, quoted};
 use crate::error::{Error, Result};
-use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3, can_place, is_invertible};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3, can_place, is_invertible, rotation, similarity};
 use crate::memory::Mapped;
 use crate::scene::{Attenuation, Camera, Geometry, Instance, Integrator, Light, Material, Scene, Specular, Unlit};
 use crate::shape::{Shape, Sphere};
@@ -174,7 +174,7 @@ impl Reader {
     fn multiply_transform(&mut self, keyword: &str, statement: &mut Statement<'_>) -> Placeless<()> {
         let step = match keyword {
             "translate" => DAffine3::from_translation(statement.vector()?),
-            "rotate" => rotation(statement.direction()?, statement.number()?),
+            "rotate" => DAffine3::from_quat(rotation(statement.direction()?, statement.number()?)),
             _ => DAffine3::from_scale(statement.vector()?),
         };
         let transform = self.transform * step;
@@ -202,7 +202,7 @@ impl Reader {
     fn sphere(&mut self, statement: &mut Statement<'_>) -> Placeless<()> {
         let (centre, radius) = (statement.vector()?, statement.number()?);
         let material = self.material();
-        if let Some(scale) = similarity(&self.transform.matrix3) {
+        if let Some(scale) = similarity(&self.transform.matrix3, 1e-12) {
             let centre = self.transform.transform_point3(centre);
             return self.parts.shape(material, DShape::Sphere { centre, radius: radius * scale });
         }
@@ -291,18 +291,4 @@ fn corners<T: Copy + Default>(statement: &mut Statement<'_>, what: &str, pile: &
         })?;
     }
     Ok(corners)
-}
-
-/// The turn by an angle in degrees about an axis of length 1.
-fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
-    let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
-    DAffine3::from_quat(DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize())
-}
-
-/// The factor by which a matrix scales, where it turns, mirrors and scales alike in every direction, up to rounding.
-fn similarity(matrix: &DMat3) -> Option<f64> {
-    let square = matrix.x_axis.length_squared();
-    let products = matrix.transpose() * *matrix;
-    let alike = products.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(square)), square * 1e-12);
-    alike.then_some(square.sqrt())
 }

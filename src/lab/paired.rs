@@ -108,7 +108,7 @@ pub struct Tally {
     kept: [Mutex<BTreeMap<Key, Difference>>; 5],
 }
 
-type Key = [u32; 9];
+type Key = [u32; 10];
 
 impl Tally {
     /// Rays of one class.
@@ -139,10 +139,10 @@ impl Tally {
             return;
         }
         let asked = asked();
-        let mut key: Key = [0; 9];
+        let mut key: Key = [0; 10];
         key[0] = u32::from(matches!(asked, Asked::Occluded { .. }));
         let [o, d] = [ray.origin, ray.direction].map(|v| v.to_array());
-        let floats = [o[0], o[1], o[2], d[0], d[1], d[2], ray.tmin, ray.tmax];
+        let floats = [o[0], o[1], o[2], d[0], d[1], d[2], ray.tmin, ray.tmax, ray.time];
         key[1..].copy_from_slice(&floats.map(f32::to_bits));
         let mut kept = self.lock(class);
         kept.insert(key, Difference { class, ray: *ray, asked });

@@ -42,7 +42,7 @@ pub struct Saving {
     pub saved: f64,
     /// Bytes of the tree that are saved, as a share.
     pub memory_saved: f64,
-    /// Whether both pictures are the same to the bit.
+    /// Whether no channel of any pixel differs.
     pub identical: bool,
     /// The largest difference of any channel.
     pub largest_difference: f64,

@@ -31,12 +31,14 @@ impl Renderer<'_> {
         if !self.plan.alpha {
             return;
         }
-        // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it was.
-        let mut pending: Vec<(usize, f32)> = (0..rays.len()).map(|i| (i, xi(i).x as f32)).collect();
+        // Once a ray has passed with the chance c of a number above c, the rest of the number is as even as all of it was. In f64, where it
+        // stays below 1: a number that is rounded to 1 would pass what covers all.
+        let mut pending: Vec<(usize, f64)> = (0..rays.len()).map(|i| (i, xi(i).x)).collect();
         loop {
             pending.retain_mut(|(i, chance)| {
                 let (ray, hit) = (&mut rays[*i], &hits[*i]);
                 let Some((hit, covered)) = hit.as_ref().zip(self.covered(ray, hit.as_ref())) else { return false };
+                let covered = f64::from(covered);
                 if *chance < covered {
                     return false;
                 }
@@ -81,5 +83,38 @@ impl Renderer<'_> {
         let material = self.scene.materials.get(material as usize).filter(|m| m.alpha != Alpha::Opaque)?;
         let point = SurfacePoint::new(self.scene, self.world, ray, hit, self.plan.attributes);
         Some(coverage(&point, material, &self.scene.textures))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Vec3};
+    use crate::render::Settings;
+    use crate::scene::{Camera, Geometry, Material, Mesh, Scene};
+    use crate::trace::World;
+    use crate::trace::bvh::Bvh;
+
+    /// No number that a sampler gives, the largest below 1 neither, lets a ray pass what covers all; and each passes what covers nothing.
+    #[test]
+    fn masks_are_exact() {
+        let sheet = |z: f32, material| {
+            let corners = [[-9.0, -9.0], [9.0, -9.0], [0.0, 9.0]].map(|[x, y]| Vec3::new(x, y, z));
+            Geometry::Mesh(Mesh { material, ..Mesh::new(corners.into(), vec![[0, 1, 2]]) })
+        };
+        let mask = |opacity| Material { alpha: Alpha::Mask { cutoff: 0.5 }, opacity, ..Material::default() };
+        let half = Material { alpha: Alpha::Blend, opacity: 0.5, ..Material::default() };
+        let geometries = vec![sheet(3.0, 1), sheet(2.0, 2), sheet(1.0, 2), sheet(0.0, 0), sheet(-1.0, 0)];
+        let scene = Scene::from_geometries(geometries, vec![mask(1.0), mask(0.0), half]);
+        let world = World::new(&scene).unwrap();
+        let camera = Camera::framing(&scene.bounds(), 1.0);
+        let renderer = Renderer::new(&scene, &world, camera, Settings::default()).unwrap();
+        let bvh = Bvh::build(&world);
+        for (xi, expected) in [(0.0, 1), (0.25, 1), (0.5, 2), (0.75, 3), (1.0 - 0.5f64.powi(32), 3)] {
+            let mut rays = [world.ray(DVec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z)];
+            let mut hits = [None];
+            renderer.closest(&bvh, &mut rays, &mut hits, Batch::default(), |_| DVec2::splat(xi));
+            assert_eq!(hits[0].map(|hit| hit.geometry), Some(expected), "{xi}");
+        }
     }
 }

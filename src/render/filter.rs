@@ -89,14 +89,31 @@ pub(super) struct FilterSampler {
     share: Vec<f64>,
     /// Whether the filter is negative at a step.
     negative: Vec<bool>,
-    has_negative: bool,
+    /// The share of the magnitude, over both axes, where the filter is negative.
+    negative_share: f64,
+}
+
+/// What each sample of a pixel counts where the filter is positive and where it is negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Balance {
+    positive: f32,
+    negative: f32,
+}
+
+impl Balance {
+    /// Of samples that follow the filter's magnitude, however few of them came to where it is negative.
+    pub(super) const SIGNS: Self = Self { positive: 1.0, negative: -1.0 };
+
+    pub(super) fn of(&self, is_negative: bool) -> f32 {
+        if is_negative { self.negative } else { self.positive }
+    }
 }
 
 impl FilterSampler {
     pub(super) fn new(filter: Filter) -> Self {
         let radius = filter.radius();
         if filter == Filter::Box {
-            return Self { radius, share: Vec::new(), negative: Vec::new(), has_negative: false };
+            return Self { radius, share: Vec::new(), negative: Vec::new(), negative_share: 0.0 };
         }
         let middle = |step: usize| ((step as f64 + 0.5) / STEPS as f64 * 2.0 - 1.0) * radius;
         let values: Vec<f64> = (0..STEPS).map(|step| filter.value(middle(step))).collect();
@@ -108,22 +125,38 @@ impl FilterSampler {
         });
         let share = share.collect();
         let negative: Vec<bool> = values.iter().map(|&value| value < 0.0).collect();
-        Self { radius, share, has_negative: negative.contains(&true), negative }
+        // Where one of both factors is.
+        let along: f64 = values.iter().map(|value| (-value).max(0.0)).sum::<f64>() / total;
+        Self { radius, share, negative_share: 2.0 * along * (1.0 - along), negative }
     }
 
-    /// Whether a weight can be negative.
+    /// Whether it is negative anywhere.
     pub(super) fn has_negative(&self) -> bool {
-        self.has_negative
+        self.negative_share > 0.0
     }
 
-    /// Where from the pixel's corner a sample lies, and its weight: 1, or -1 where the filter is negative.
+    /// Where from the pixel's corner a sample lies, and whether the filter is negative there.
     #[inline]
-    pub(super) fn place(&self, xi: DVec2) -> (DVec2, f32) {
+    pub(super) fn place(&self, xi: DVec2) -> (DVec2, bool) {
         if self.share.is_empty() {
-            return (xi, 1.0);
+            return (xi, false);
         }
         let ((x, a), (y, b)) = (self.along(xi.x), self.along(xi.y));
-        (DVec2::new(x, y) + 0.5, if a == b { 1.0 } else { -1.0 })
+        (DVec2::new(x, y) + 0.5, a != b)
+    }
+
+    /// What the samples of a pixel count of which so many lie where the filter is positive, and where it is negative. All together those of
+    /// either kind count as much as that part of the filter does, so that few samples cannot have the one outweigh the other; without any of
+    /// one kind all count alike. The weights add up to the number of samples.
+    pub(super) fn balance(&self, positive: u32, negative: u32) -> Balance {
+        if positive == 0 || negative == 0 {
+            return Balance { positive: 1.0, negative: 1.0 };
+        }
+        let count = f64::from(positive + negative) / (1.0 - 2.0 * self.negative_share);
+        Balance {
+            positive: (count * (1.0 - self.negative_share) / f64::from(positive)) as f32,
+            negative: (-count * self.negative_share / f64::from(negative)) as f32,
+        }
     }
 
     /// From the middle along one axis, and whether the filter is negative there.
@@ -153,6 +186,38 @@ mod tests {
         }
     }
 
+    /// However many samples there are of either kind, what they count adds up, and each kind counts as its part of the filter does.
+    #[test]
+    fn few_samples_are_balanced() {
+        let sampler = FilterSampler::new(Filter::Mitchell);
+        // By Simpson's rule, on lobes that the polynomials change at.
+        let integral = |from: f64, to: f64| {
+            let (n, mut sum) = (1000, 0.0);
+            for i in 0..n {
+                let [a, b] = [i, i + 1].map(|i| from + (to - from) * f64::from(i) / f64::from(n));
+                sum += (Filter::Mitchell.value(a)
+                    + 4.0 * Filter::Mitchell.value((a + b) / 2.0)
+                    + Filter::Mitchell.value(b))
+                    / 6.0;
+            }
+            sum * (to - from) / f64::from(n)
+        };
+        // Its zero between 1 and 2 is at 8 / 7.
+        let (above, below) = (integral(0.0, 1.0) + integral(1.0, 8.0 / 7.0), -integral(8.0 / 7.0, 2.0));
+        let share = 2.0 * above * below / (above + below).powi(2);
+        assert!((sampler.negative_share - share).abs() < 1e-4, "{} {share}", sampler.negative_share);
+        for (positive, negative) in [(1, 1), (1, 3), (3, 1), (14, 2), (60, 4)] {
+            let balance = sampler.balance(positive, negative);
+            let [p, n] = [positive as f32 * balance.positive, negative as f32 * balance.negative];
+            let count = (positive + negative) as f32;
+            assert!((p + n - count).abs() < 1e-5 * count, "{balance:?}");
+            assert!((f64::from(-n / p) - share / (1.0 - share)).abs() < 1e-4, "{balance:?}");
+        }
+        for (positive, negative) in [(5, 0), (0, 2)] {
+            assert_eq!(sampler.balance(positive, negative), Balance { positive: 1.0, negative: 1.0 });
+        }
+    }
+
     /// Weighted samples must have the filter's own mean and variance.
     #[test]
     fn samples_follow_the_filter() {
@@ -162,7 +227,8 @@ mod tests {
             let (mut mass, mut second, mut expected) = (0.0, 0.0, [0.0; 2]);
             for i in 0..n {
                 let xi = (f64::from(i) + 0.5) / f64::from(n);
-                let (at, weight) = sampler.place(DVec2::new(xi, 0.5));
+                let (at, is_negative) = sampler.place(DVec2::new(xi, 0.5));
+                let weight = Balance::SIGNS.of(is_negative);
                 let from_middle = at.x - 0.5;
                 assert!(from_middle.abs() <= filter.radius() && (at.y - 0.5).abs() < 2e-3, "{filter}: {at}");
                 mass += f64::from(weight);

@@ -18,7 +18,7 @@ impl Renderer<'_> {
     pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<Stretch> {
         let fog = self.plan.fog.as_ref()?;
         (self.surroundings(path, point, true) == Surroundings::Outside)
-            .then(|| stretch(fog, point.t as f32 * ray.direction.length()))
+            .then(|| stretch(fog, path.way(ray.direction, point)))
     }
 
     /// The same for a ray that hits nothing.

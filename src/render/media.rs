@@ -65,7 +65,7 @@ impl Renderer<'_> {
     pub(super) fn transmittance(&self, path: &Path, direction: Vec3, point: &SurfacePoint) -> Vec3 {
         match self.surroundings(path, point, true) {
             Surroundings::Inside(Some(medium)) if self.plan.depth > 0 => {
-                medium.transmittance(point.t as f32 * direction.length())
+                medium.transmittance(path.way(direction, point))
             }
             _ => Vec3::ONE,
         }
@@ -112,6 +112,13 @@ impl Renderer<'_> {
         }
         let material = self.scene.materials.get(media.innermost() as usize);
         Surroundings::Inside(material.and_then(|material| material.absorption))
+    }
+}
+
+impl Path {
+    /// How long the way of the path's ray is from the surface that it left to `point`.
+    pub(super) fn way(&self, direction: Vec3, point: &SurfacePoint) -> f32 {
+        (point.t as f32 * direction.length() + self.ahead).max(0.0)
     }
 }
 

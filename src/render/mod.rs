@@ -41,7 +41,7 @@ pub use filter::Filter;
 pub use finished::Finished;
 pub use rounds::Picture;
 pub use sampler::Sampling;
-pub use settings::{Crop, Settings};
+pub use settings::{Crop, MOST_LIGHT_SAMPLES, Settings};
 pub use tiles::{LARGEST_TILE, TileOrder};
 
 use crate::error::{Error, Result};
@@ -56,10 +56,13 @@ use crate::trace::{Tracer, World};
 use aov::Request;
 use camera::View;
 use film::Film;
-use filter::FilterSampler;
+use filter::{Balance, FilterSampler};
 use sampler::{Dimension, Pattern, Sampler};
 use tiles::{Tile, tiles};
 use wavefront::Buffers;
+
+/// The most samples that are balanced between where the filter is positive and where it is negative: of more, chance has them nearly so, and to count them takes longer.
+const MOST_BALANCED: u32 = 64;
 
 /// How a running render is watched and stopped.
 #[derive(Clone, Copy, Default)]
@@ -257,11 +260,22 @@ impl<'a> Renderer<'a> {
         self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut Buffers::default())[0]
     }
 
-    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and its weight.
+    /// A point on the film, in pixels from its top left corner: the place of one of a pixel's samples; and whether the filter is negative there.
     #[inline]
-    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, f32) {
-        let (within, weight) = self.filter.place(self.sampler.film(pixel, sample));
-        (pixel.corner() + within, weight)
+    fn place(&self, pixel: &Pattern, sample: u32) -> (DVec2, bool) {
+        let (within, is_negative) = self.filter.place(self.sampler.film(pixel, sample));
+        (pixel.corner() + within, is_negative)
+    }
+
+    /// What the samples of a pixel count, by a filter that is negative somewhere. Few are balanced; of many, and where it is not known how many there will be,
+    /// which then are [`adaptive`]'s sixteen at least, each counts 1 or -1.
+    fn balance(&self, pixel: &Pattern) -> Balance {
+        let Settings { spp, adaptive, .. } = self.settings;
+        if adaptive.is_some() || spp > MOST_BALANCED {
+            return Balance::SIGNS;
+        }
+        let negative = (0..spp).filter(|&sample| self.place(pixel, sample).1).count() as u32;
+        self.filter.balance(spp - negative, negative)
     }
 
     /// The camera ray of one sample of a pixel.

@@ -12,6 +12,7 @@
 use std::mem;
 
 use crate::math::{DVec2, DVec3, Vec3};
+use crate::plan::{HIGHEST_CHANCE, SAFE_DEPTH};
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
@@ -26,11 +27,6 @@ use super::explain::Answer;
 use super::sampler::{Bounces, Choice, Dimension, Pattern};
 use super::shadows::Sent;
 use super::wavefront::{Buffers, Path, Wave};
-
-/// How often a path is scattered before it may end by chance.
-const SAFE_DEPTH: u32 = 3;
-/// The highest chance to go on.
-const HIGHEST_CHANCE: f32 = 0.95;
 
 /// The surface that a path has come to.
 struct Vertex<'a> {
@@ -224,7 +220,7 @@ impl Renderer<'_> {
             return tally.after(route, if goes_through { Event::Transmitted } else { Event::Specular });
         }
         // The other number of the pair says whether the path ends.
-        let xi = self.choice(vertex, Choice::End).y as f32;
+        let xi = self.choice(vertex, Choice::End).y;
         tally.choose(route, vertex.lobes.parts(direction.normalize(), true), xi)
     }
 
@@ -246,7 +242,7 @@ impl Renderer<'_> {
         let media = if goes_through { self.media_behind(path, point) } else { path.media };
         let density = scattered.density.map_or(0.0, |density| density as f32);
         let ray = point.spawn(scattered.direction.as_vec3(), f32::INFINITY);
-        Some((ray, Path { weight, media, density, scale, ..*path }))
+        Some((ray, Path { weight, media, density, scale, ahead: point.ahead(&ray), ..*path }))
     }
 }
 

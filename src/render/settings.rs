@@ -5,8 +5,11 @@ use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::plan::{Complete, Plan, Rays, Wishes};
-use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH, Request};
+use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH, MOST_SPP, Request};
 use crate::trace::Batch;
+
+/// The most shadow rays to a light from one place.
+pub const MOST_LIGHT_SAMPLES: u32 = 4096;
 
 /// What picture to make of a scene.
 #[derive(Clone, Debug)]
@@ -15,7 +18,7 @@ pub struct Settings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples a pixel; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
+    /// Samples a pixel, 1 to [`MOST_SPP`]; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
@@ -31,7 +34,7 @@ pub struct Settings {
     pub tile: u32,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
-    /// Shadow rays to each extended light where a ray hits; paths ask one light, once.
+    /// Shadow rays to each extended light where a ray hits, 1 to [`MOST_LIGHT_SAMPLES`]; paths ask one light, once.
     pub light_samples: u32,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,
@@ -89,7 +92,7 @@ pub struct Crop {
 
 impl Crop {
     /// How many pixels.
-    pub(super) const fn len(&self) -> usize {
+    pub(crate) const fn len(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
@@ -137,7 +140,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         let Self { width, height, spp, sampling, .. } = *self;
         for side in [width, height] {
             if side == 0 || side > LARGEST_SIDE {
@@ -148,8 +151,8 @@ impl Settings {
         if self.background.is_some_and(|color| !color.is_finite()) {
             return Err(Error::Usage("a background that is not finite".to_owned()));
         }
-        if spp == 0 {
-            return Err(Error::Usage("0 samples a pixel: at least 1 is needed".to_owned()));
+        if !(1..=MOST_SPP).contains(&spp) {
+            return Err(Error::Usage(format!("{spp} samples a pixel: 1 to {MOST_SPP} are possible")));
         }
         if let Some(Crop { x, y, width: columns, height: rows }) = self.crop {
             let inside = |start: u32, length: u32, whole: u32| length > 0 && length <= whole.saturating_sub(start);
@@ -179,8 +182,11 @@ impl Settings {
         if let Some(depth) = self.max_depth.filter(|depth| *depth > MOST_DEPTH) {
             return Err(Error::Usage(format!("a depth of {depth}: a ray may be sent on {MOST_DEPTH} times at most")));
         }
-        if self.light_samples == 0 {
-            return Err(Error::Usage("0 shadow rays to a light: at least 1 is needed".to_owned()));
+        let count = self.light_samples;
+        if !(1..=MOST_LIGHT_SAMPLES).contains(&count) {
+            return Err(Error::Usage(format!(
+                "{count} shadow rays to a light: 1 to {MOST_LIGHT_SAMPLES} are possible"
+            )));
         }
         Ok(())
     }

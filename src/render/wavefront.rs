@@ -20,6 +20,7 @@ use crate::trace::{Batch, Tracer};
 use super::aov::{Request, Route, Tally};
 use super::camera::View;
 use super::explain::Trail;
+use super::filter::Balance;
 use super::media::Media;
 use super::sampler::{Bounces, Dimension, Pattern};
 use super::shadows::Shadows;
@@ -36,6 +37,8 @@ pub(super) struct Buffers {
     pub(super) patterns: Vec<Pattern>,
     /// As many where paths are traced; else empty.
     pub(super) bounces: Vec<Bounces>,
+    /// As many where the filter is negative somewhere; else empty.
+    pub(super) balances: Vec<Balance>,
     pub(super) sums: Vec<Vec4>,
     /// Of each pixel's samples so far, added up.
     pub(super) weights: Vec<f32>,
@@ -92,6 +95,8 @@ pub(super) struct Path {
     pub(super) scale: f32,
     /// How large a share of the pixel may be left out of what the ray and those that follow from it see.
     pub(super) allowance: f32,
+    /// How much of its way, from the surface that it leaves, lies before its origin.
+    pub(super) ahead: f32,
 }
 
 impl Path {
@@ -104,6 +109,7 @@ impl Path {
         density: 0.0,
         scale: 1.0,
         allowance: 0.0,
+        ahead: 0.0,
     };
 }
 
@@ -144,23 +150,24 @@ impl Renderer<'_> {
                 Integrator::RayCast | Integrator::Whitted => self.whitted(tracer, sample, buffers),
                 Integrator::Path => self.paths(tracer, sample, buffers),
             }
-            let Buffers { patterns, sums, weights, radiance, tally, trail, .. } = &mut *buffers;
+            let Buffers { patterns, balances, sums, weights, radiance, tally, trail, .. } = &mut *buffers;
             trail.end(radiance[0]);
-            for (((sum, total), radiance), pixel) in sums.iter_mut().zip(weights).zip(radiance).zip(&*patterns) {
-                let weight = self.weight(pixel, sample);
+            let weight = |i: usize| self.weight(balances, &patterns[i], i, sample);
+            for (i, ((sum, total), radiance)) in sums.iter_mut().zip(weights).zip(radiance).enumerate() {
+                let weight = weight(i);
                 *sum += *radiance * weight;
                 *total += weight;
             }
             if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
-                patterns.iter().enumerate().for_each(|(i, pixel)| tally.close(i, self.weight(pixel, sample)));
+                (0..patterns.len()).for_each(|i| tally.close(i, weight(i)));
             }
         }
     }
 
-    /// What a sample counts.
+    /// What a sample of the `i`th pixel counts.
     #[inline]
-    pub(super) fn weight(&self, pixel: &Pattern, sample: u32) -> f32 {
-        if self.filter.has_negative() { self.place(pixel, sample).1 } else { 1.0 }
+    pub(super) fn weight(&self, balances: &[Balance], pixel: &Pattern, i: usize, sample: u32) -> f32 {
+        balances.get(i).map_or(1.0, |balance| balance.of(self.place(pixel, sample).1))
     }
 
     /// How many camera rays of a tile hit something.
@@ -177,6 +184,10 @@ impl Renderer<'_> {
     pub(super) fn begin(&self, pixels: impl Iterator<Item = (u32, u32)>, buffers: &mut Buffers) {
         buffers.patterns.clear();
         buffers.patterns.extend(pixels.map(|(x, y)| self.sampler.pattern(x, y)));
+        buffers.balances.clear();
+        if self.filter.has_negative() {
+            buffers.balances.extend(buffers.patterns.iter().map(|pixel| self.balance(pixel)));
+        }
         buffers.bounces.clear();
         if self.plan.integrator == Integrator::Path {
             buffers.bounces.extend(buffers.patterns.iter().map(|pixel| self.sampler.bounces(pixel)));

@@ -145,9 +145,10 @@ impl Renderer<'_> {
                     }
                 };
                 let Some(direction) = direction else { continue };
-                wave.rays.push(point.spawn(direction.as_vec3(), f32::INFINITY));
+                let ray = point.spawn(direction.as_vec3(), f32::INFINITY);
                 let media = if which == 2 { self.media_behind(path, point) } else { path.media };
-                wave.paths.push(Path { weight, branch, media, allowance, ..*path });
+                wave.paths.push(Path { weight, branch, media, allowance, ahead: point.ahead(&ray), ..*path });
+                wave.rays.push(ray);
                 if let Some(tally) = tally {
                     wave.routes.push(tally.after(*route, event));
                 }

@@ -1,7 +1,7 @@
 //! Scenes that are written and read again.
 
 use twincast::io::save;
-use twincast::math::{DVec2, DVec3, Vec3};
+use twincast::math::{DAffine3, DVec2, DVec3, Vec3, Vec4};
 use twincast::scene::{
     Absorption, Camera, Fov, Geometry, Interface, Material, Mesh, Projection, RECIPES, Scene, Unlit,
 };
@@ -146,7 +146,52 @@ fn what_a_format_cannot_say_is_bad_usage() {
     refused(&Scene::from_geometries(vec![shapes], vec![Material::default()]), "a.nff", "NFF has no disks");
     let glowing = Material { emission: Vec3::ONE, ..Material::default() };
     let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
-    refused(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![glowing]), "a.nff", "emission");
+    refused(&Scene::from_geometries(vec![Geometry::Mesh(mesh.clone())], vec![glowing]), "a.nff", "emission");
+    let colored = Mesh { colors: vec![Vec4::ONE; 3], ..mesh.clone() };
+    let colored = Scene::from_geometries(vec![Geometry::Mesh(colored)], vec![Material::default()]);
+    ["a.nff", "a.ply", "a.toml"].iter().for_each(|name| refused(&colored, name, "colours of vertices"));
+    let mut moving = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+    moving.instances[0].transform_end = Some(DAffine3::from_translation(DVec3::X));
+    refused(&moving, "a.nff", "motion");
+    refused(&moving, "a.ply", "moves");
+    let negative =
+        Mesh { colors: vec![Vec4::NEG_ONE; 3], ..Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]) };
+    let negative = Scene::from_geometries(vec![Geometry::Mesh(negative)], vec![Material::default()]);
+    assert!(save(&negative, &files.path("a.ply")).unwrap_err().to_string().contains("negative"));
+}
+
+/// Where f32 does not hold them, coordinates are doubles in PLY, too.
+#[test]
+fn far_meshes_stay_where_they_are() {
+    let corners =
+        [[0.25, 0.0, 0.0], [1.0, 0.125, 0.0], [0.0, 1.0, 0.0625]].map(|p| DVec3::from(p) + DVec3::new(5e6, 0.0, -4e6));
+    let mut mesh = Mesh { triangles: vec![[0, 1, 2]].into(), ..Mesh::default() };
+    mesh.set_positions(&corners);
+    let scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+    let files = Files::one("none", "");
+    for name in ["a.ply", "a.toml", "a.nff"] {
+        save(&scene, &files.path(name)).unwrap();
+        let again = files.scene(name);
+        let Geometry::Mesh(mesh) = &again.geometries[0] else { panic!("a triangle is a mesh") };
+        let place = |i: u32| again.instances[0].transform.transform_point3(mesh.point(mesh.positions[i as usize]));
+        assert_eq!(mesh.triangles[0].map(place), corners, "{name}");
+    }
+}
+
+/// Materials keep their names where these tell them apart, and no name that is made up takes the place of one.
+#[test]
+fn materials_keep_their_names() {
+    let material = |name: &str| Material { name: name.to_owned(), ..Material::default() };
+    let names = ["red \"1\"", "", "m1", "red \"1\"", "a.b"];
+    let mesh =
+        |material| Geometry::Mesh(Mesh { material, ..Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]) });
+    let scene = Scene::from_geometries((0..5).map(mesh).collect(), names.map(material).into());
+    let files = Files::one("none", "");
+    save(&scene, &files.path("a.toml")).unwrap();
+    let again = files.scene("a.toml");
+    let mut found: Vec<_> = again.geometries.iter().map(|g| &*again.materials[g.material() as usize].name).collect();
+    found.sort_unstable();
+    assert_eq!(found, ["a.b", "m1", "m1_", "m3", "red \"1\""]);
 }
 
 /// What a scene file refuses is not written: of surfaces that show their colour as it is, of thin glass, of a view of the

@@ -1,13 +1,14 @@
 //! Pictures of scenes whose every pixel has a formula: how light weakens, how wide shadows and blurs are. Furnaces, form factors and caustics
 //! are in `transport`, Fresnel's equations in `glass`, the rays of lenses in `camera`.
 
-use twincast::math::{DVec3, Vec3};
+use twincast::math::{DVec3, Vec3, Vec4};
+use twincast::render::{Filter, Sampling};
 use twincast::scene::{
     AreaShape, Attenuation, Camera, Fov, Geometry, Integrator, Light, Material, Mesh, Projection, ThinLens, Unlit,
 };
 use twincast::{Image, Scene, Settings, Shape, Sphere, World};
 
-use super::{engines, floor, matte, render, settings};
+use super::{engines, floor, from_above, matte, render, settings};
 
 fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> Image {
     let world = World::new(scene).unwrap();
@@ -133,5 +134,41 @@ fn a_point_out_of_focus_becomes_a_disk() {
             (0..100).map(|k| seen.pixels[((45 + k / 10) * size + 45 + k % 10) as usize].x).sum::<f32>() / 100.0;
         let share = (point * focus / (lens * (focus - distance).abs())).powi(2);
         assert!((f64::from(middle) / share - 1.0).abs() < 0.05, "{distance}: {middle}, not {share}");
+    }
+}
+
+/// What is alike everywhere stays so by every filter, with however few samples; and what is black and white goes beyond either by no more than the filter's
+/// negative lobes weigh.
+#[test]
+fn few_samples_keep_what_is_even_and_stay_near_what_is_there() {
+    let white = Material { unlit: true, diffuse: Vec3::ONE, ..Material::default() };
+    let cards = (0..8).map(|k| {
+        let corners = [[0.0, -9.0], [0.04, -9.0], [0.04, 9.0], [0.0, 9.0]]
+            .map(|[x, z]| Vec3::new(x + 0.1 * k as f32 - 0.4, 0.0, z));
+        Geometry::Mesh(Mesh::new(corners.into(), vec![[0, 1, 2], [0, 2, 3]]))
+    });
+    let stripes = Scene::from_geometries(cards.collect(), vec![white]);
+    let grey =
+        Scene { background: Some(Vec3::splat(0.5)), ..Scene::from_geometries(vec![floor(1e-6, 0)], vec![matte(0.5)]) };
+    let aside = Camera::look_at(DVec3::Y, DVec3::Y * 2.0, DVec3::Z, 1.0).unwrap();
+    for filter in Filter::ALL {
+        for sampling in Sampling::ALL {
+            for spp in [1, 2, 3, 4, 5, 8, 16] {
+                let settings = Settings { filter, sampling, ..settings(24, 24, spp) };
+                let even = picture(&grey, &aside, &settings);
+                let is_even =
+                    even.pixels.iter().all(|p| (*p - Vec4::new(0.5, 0.5, 0.5, 1.0)).abs().max_element() < 1e-6);
+                assert!(is_even, "{filter}, {sampling}, {spp} samples");
+                // Mitchell's, over both axes: 0.0725 of its sum.
+                let beyond = if filter == Filter::Mitchell { 0.0735 } else { 1e-6 };
+                let image = picture(&stripes, &from_above(), &settings);
+                for pixel in &image.pixels {
+                    assert!(
+                        (-beyond..=1.0 + beyond).contains(&pixel.x),
+                        "{filter}, {sampling}, {spp} samples: {pixel}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -132,3 +132,22 @@ fn what_is_in_water_does_not_end_it() {
         }
     }
 }
+
+/// Of a thin sheet of something large, rays start a millionth of its size within: the way of the light is the whole one nevertheless. Against what Fresnel's equations
+/// leave at both faces, however often light goes to and fro between them.
+#[test]
+fn thin_sheets_of_large_bodies_absorb() {
+    for (half, thick) in [(1.0, 0.01f32), (10.0, 0.001), (100.0, 0.01)] {
+        let absorption = Some(Absorption { color: Vec3::splat(LEFT), distance: thick });
+        let sheet = Cuboid::new(Vec3::new(-half, -thick, -half), Vec3::new(half, 0.0, half)).unwrap();
+        let shapes = |shape: Shape, material| Geometry::Shapes { shapes: vec![shape], material };
+        let below = twincast::Plane::new(Vec3::NEG_Y, Vec3::Y).unwrap();
+        let geometries = vec![shapes(sheet.into(), 0), shapes(below.into(), 1)];
+        let scene = Scene::from_geometries(geometries, vec![Material { absorption, ..Material::glass(1.5) }, shown()]);
+        let scene = Scene { lights: dark(), ..scene };
+        let lost = 0.04f32;
+        let expected = (1.0 - lost).powi(2) * LEFT / (1.0 - (lost * LEFT).powi(2));
+        let found = seen(&scene, Integrator::Whitted, 1);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{thick} of {half}: {found}, not {expected}");
+    }
+}

@@ -45,6 +45,19 @@ pub fn cofactor(m: &DMat3) -> DMat3 {
     if m.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
+/// The turn by an angle in degrees, counter-clockwise, about an axis of length 1.
+pub fn rotation(axis: DVec3, degrees: f64) -> DQuat {
+    let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
+    DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize()
+}
+
+/// By what a map makes all lengths longer; none where it does not do so alike in all directions, by more than `tolerance` of the squares of lengths.
+pub fn similarity(m: &DMat3, tolerance: f64) -> Option<f64> {
+    let square = m.x_axis.length_squared();
+    let is_alike = (m.transpose() * *m).abs_diff_eq(DMat3::from_diagonal(DVec3::splat(square)), square * tolerance);
+    is_alike.then(|| square.sqrt())
+}
+
 /// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al. 2017, *Building an orthonormal
 /// basis, revisited*).
 pub fn tangents(n: DVec3) -> [DVec3; 2] {

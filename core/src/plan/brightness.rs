@@ -2,8 +2,8 @@
 
 use std::cell::LazyCell;
 
-use crate::math::{Aabb, DVec3};
-use crate::scene::{Light, Material, Scene};
+use crate::math::{Aabb, DVec3, Vec3};
+use crate::scene::{Geometry, Light, Material, Scene, Texels};
 use crate::trace::World;
 
 /// No ray sees more than this, linear and in any channel; at least 1, and infinite where nothing is known, as beside a light that grows without bound.
@@ -23,7 +23,9 @@ pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     });
     let behind = scene.background.map_or(0.0, |color| color.max_element());
     let fog = scene.fog.map_or(0.0, |fog| fog.color.max_element());
-    let of_material = |material: &Material| surface(material, scene.ambient.max_element(), arriving + environment);
+    let tint = brightest_color(scene);
+    let of_look = |look: Material| surface(&look, scene.ambient.max_element(), arriving + environment);
+    let of_material = |material: &Material| looks(material, tint).map(of_look).fold(0.0, f32::max);
     let surfaces = scene.materials.iter().map(of_material).fold(0.0, f32::max);
     let denser: f32 = scene.materials.iter().map(density).product();
     [environment, behind, fog, surfaces].into_iter().fold(1.0, f32::max) * denser
@@ -51,6 +53,40 @@ fn distance(point: DVec3, bounds: Aabb) -> f32 {
     (point - nearest).length() as f32
 }
 
+/// The largest component of vertices' colours, at least 1.
+fn brightest_color(scene: &Scene) -> f32 {
+    let colors = scene.geometries.iter().flat_map(|geometry| match geometry {
+        Geometry::Mesh(mesh) => &mesh.colors[..],
+        Geometry::Shapes { .. } => &[],
+    });
+    colors.map(|color| color.truncate().max_element()).fold(1.0, f32::max)
+}
+
+/// What a material may look like where vertices' colours go up to `tint`: no place of it is brighter than the brightest of these. Textures' colours go up to 1;
+/// of one that follows from textures of other things, what it shows is greatest where each of them is 0 or 1, since it is a sum of what rises or falls with each.
+fn looks(material: &Material, tint: f32) -> impl Iterator<Item = Material> {
+    let physical = material.physical;
+    let ends = if physical.is_some() { 1 << 5 } else { 1 };
+    (0..ends).map(move |end| {
+        let pick = |bit: u32| (end >> bit & 1) as f32;
+        let [ambient, diffuse] = match physical {
+            None => [material.ambient, material.diffuse].map(|color| color * tint),
+            Some(physical) => {
+                let here = physical.phong(&Texels {
+                    color: Vec3::splat(tint),
+                    metalness: pick(0),
+                    roughness: pick(1),
+                    transmission: pick(2),
+                    specular: pick(3),
+                    specular_color: Vec3::splat(pick(4)),
+                });
+                return Material { name: String::new(), emission: material.emission, ..here };
+            }
+        };
+        Material { name: String::new(), ambient, diffuse, ..*material }
+    })
+}
+
 /// What a surface shows at most of its own, of ambient light, and of what arrives from lights.
 fn surface(material: &Material, ambient: f32, arriving: f32) -> f32 {
     let peak = material.highlight_scale().unwrap_or(1.0).max(1.0);
@@ -68,8 +104,8 @@ fn density(material: &Material) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
-    use crate::scene::{Attenuation, Geometry, Mesh};
+    use crate::math::Vec4;
+    use crate::scene::{Attenuation, Mesh, MetallicRoughness, Physical, PhysicalTextures, Workflow};
 
     /// A triangle from zero to 1 along x and y, of a material, and a light.
     fn bound_of(material: Material, light: Light) -> f32 {
@@ -96,6 +132,32 @@ mod tests {
         assert_eq!(bound_of(matte(), lamp(within, Attenuation::NONE)), 0.5 * 40.0);
         let black = Material { diffuse: Vec3::ZERO, ..matte() };
         assert_eq!(bound_of(black, lamp(within, Attenuation::INVERSE_SQUARE)), 1.0);
+    }
+
+    /// A metal by its mean, whose texture may have a spot that is none; and colours of vertices that go beyond white.
+    #[test]
+    fn a_surface_is_as_bright_as_its_brightest_spot() {
+        let sun = Light::Directional { direction: DVec3::NEG_Z, color: Vec3::splat(10.0) };
+        let workflow =
+            Workflow::MetallicRoughness(MetallicRoughness { base: Vec3::ONE, ..MetallicRoughness::default() });
+        let textures = PhysicalTextures { metallic_roughness: Some(0), ..PhysicalTextures::default() };
+        let spotted = Material { physical: Some(Physical { workflow, textures }), ..matte() };
+        for texel in [0.0, 0.25, 1.0] {
+            let here = Texels { metalness: texel, roughness: texel, ..Texels::default() };
+            let here = workflow_look(&spotted, &here);
+            let shown = 10.0 * (here.diffuse.max_element() + here.specular.max_element());
+            let bound = bound_of(spotted.clone(), sun.clone());
+            assert!(bound >= shown && bound <= 25.0, "{texel}: {bound} {shown}");
+        }
+        let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        let mesh = Mesh { colors: vec![Vec4::ONE, Vec4::new(1.0, 6.0, 1.0, 1.0), Vec4::ONE], ..mesh };
+        let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![matte()]);
+        scene.lights = vec![sun];
+        assert_eq!(bound(&scene, &World::new(&scene).expect("sound")), 6.0 * 0.5 * 10.0);
+    }
+
+    fn workflow_look(material: &Material, texels: &Texels) -> Material {
+        material.physical.as_ref().expect("it follows from textures").phong(texels)
     }
 
     #[test]

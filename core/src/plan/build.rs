@@ -57,7 +57,7 @@ struct Cost {
     /// Nanoseconds to trace a ray from the camera or to a light, one thread.
     ray: f64,
     /// The same of a mirrored, refracted or scattered one, which shares its way with no other.
-    onward: f64,
+    sent_on: f64,
     /// Bytes a triangle of the finished tree.
     tree: u64,
     /// Bytes a triangle beside the tree while it is built.
@@ -70,12 +70,12 @@ struct Cost {
 /// `Compact` is for rays that would pay for `Default` where there is not the memory.
 const fn cost(preset: Preset) -> Cost {
     match preset {
-        Preset::Fast => Cost { build: 105.0, ray: 95.0, onward: 340.0, tree: 66, building: 33 },
-        Preset::Default => Cost { build: 290.0, ray: 75.0, onward: 250.0, tree: 58, building: 40 },
+        Preset::Fast => Cost { build: 105.0, ray: 95.0, sent_on: 340.0, tree: 66, building: 33 },
+        Preset::Default => Cost { build: 290.0, ray: 75.0, sent_on: 250.0, tree: 58, building: 40 },
         // Where triangles are long and thin; nothing is won where they are not.
-        Preset::High => Cost { build: 450.0, ray: 74.0, onward: 240.0, tree: 84, building: 60 },
-        Preset::Compact => Cost { build: 210.0, ray: 115.0, onward: 650.0, tree: 16, building: 40 },
-        Preset::FastCompact => Cost { build: 75.0, ray: 140.0, onward: 900.0, tree: 18, building: 20 },
+        Preset::High => Cost { build: 450.0, ray: 74.0, sent_on: 240.0, tree: 84, building: 60 },
+        Preset::Compact => Cost { build: 210.0, ray: 115.0, sent_on: 650.0, tree: 16, building: 40 },
+        Preset::FastCompact => Cost { build: 75.0, ray: 140.0, sent_on: 900.0, tree: 18, building: 20 },
     }
 }
 
@@ -87,9 +87,9 @@ impl BuildRequest {
     }
 
     fn nanoseconds(&self, preset: Preset) -> f64 {
-        let Cost { build, ray, onward, .. } = cost(preset);
-        let Rays { camera, onward: others, shadow } = self.rays;
-        build * self.triangles as f64 + ray * (camera as f64 + shadow as f64) + onward * others as f64
+        let Cost { build, ray, sent_on, .. } = cost(preset);
+        let Rays { camera, sent_on: others, shadow } = self.rays;
+        build * self.triangles as f64 + ray * (camera as f64 + shadow as f64) + sent_on * others as f64
     }
 
     /// Whether what is held anyway fits.
@@ -168,7 +168,7 @@ mod tests {
 
     const MESH: BuildRequest = BuildRequest {
         triangles: 1_000_000,
-        rays: Rays { camera: 0, onward: 0, shadow: 0 },
+        rays: Rays { camera: 0, sent_on: 0, shadow: 0 },
         held: 500 << 20,
         max_memory: None,
         wanted: None,
@@ -186,13 +186,13 @@ mod tests {
             [(0.0, FastCompact), (0.6, FastCompact), (0.7, Fast), (9.0, Fast), (9.5, Default), (159.0, Default)];
         for (rays, expected) in of_camera.into_iter().chain([(161.0, High), (10_000.0, High)]) {
             let half = (rays * 500_000.0) as u64;
-            assert_eq!(preset(Rays { camera: half, shadow: half, onward: 0 }, None), Some(expected), "{rays}");
+            assert_eq!(preset(Rays { camera: half, shadow: half, sent_on: 0 }, None), Some(expected), "{rays}");
         }
         // (105 - 75) / (900 - 340), (290 - 105) / (340 - 250) and (450 - 290) / (250 - 240).
         let others = [(0.05, FastCompact), (0.06, Fast), (2.0, Fast), (2.1, Default), (15.9, Default), (16.1, High)];
         for (rays, expected) in others {
-            let onward = (rays * 1e6) as u64;
-            assert_eq!(preset(Rays { onward, ..Rays::default() }, None), Some(expected), "{rays} onward");
+            let sent_on = (rays * 1e6) as u64;
+            assert_eq!(preset(Rays { sent_on, ..Rays::default() }, None), Some(expected), "{rays} sent_on");
         }
         assert!(BuildRequest { triangles: 0, ..MESH }.choose().is_ok());
         assert!(BuildRequest { triangles: u64::MAX, ..MESH }.choose().is_ok());

@@ -144,8 +144,8 @@ impl fmt::Display for PlanReport {
         writeln!(f, "{:<11} {}", "plan", self.words)?;
         let build = self.build.as_ref().map(|build| format!(", {} build: {}", build.preset, build.why));
         writeln!(f, "{:<11} {}{}", "accelerator", self.accelerator, build.unwrap_or_default())?;
-        let Rays { camera, onward, shadow } = self.rays;
-        writeln!(f, "{:<11} up to about {camera} camera + {onward} sent on + {shadow} shadow", "rays")?;
+        let Rays { camera, sent_on, shadow } = self.rays;
+        writeln!(f, "{:<11} up to about {camera} camera + {sent_on} sent on + {shadow} shadow", "rays")?;
         for LeftOut { name, what } in &self.left_out {
             writeln!(f, "{:<11} {name}: {what}", "left out")?;
         }

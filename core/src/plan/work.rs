@@ -11,7 +11,7 @@ use crate::scene::Integrator;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Work {
     /// Mirrored, refracted and scattered ones.
-    pub onward: f64,
+    pub sent_on: f64,
     /// Shadow rays to lights without a surface.
     pub shadow: f64,
     /// Questions to lights with a surface, each of which is as many shadow rays as are wished.
@@ -24,7 +24,7 @@ pub struct Rays {
     /// From the camera.
     pub camera: u64,
     /// Mirrored, refracted and scattered.
-    pub onward: u64,
+    pub sent_on: u64,
     /// To lights.
     pub shadow: u64,
 }
@@ -32,7 +32,7 @@ pub struct Rays {
 impl Rays {
     /// All of them.
     pub const fn total(&self) -> u64 {
-        self.camera.saturating_add(self.onward).saturating_add(self.shadow)
+        self.camera.saturating_add(self.sent_on).saturating_add(self.shadow)
     }
 }
 
@@ -48,24 +48,27 @@ pub(super) struct Means {
     pub(super) lights: [usize; 2],
 }
 
-/// How often paths are scattered before they may end by chance.
-const SAFE_DEPTH: f64 = 3.0;
+/// How often a path is scattered before it may end by chance.
+pub const SAFE_DEPTH: u32 = 3;
+
+/// The highest chance of a path to go on after that.
+pub const HIGHEST_CHANCE: f32 = 0.95;
 
 impl Work {
     pub(super) fn new(means: &Means) -> Self {
         let Means { integrator, depth, ways, albedo, lights: [bare, extended] } = *means;
         match integrator {
             Integrator::RayCast | Integrator::Whitted => {
-                let onward: f64 = (1..=depth.min(1000)).map(|k| ways.powi(k as i32)).sum();
-                let hits = 1.0 + onward;
-                Self { onward, shadow: hits * bare as f64, area_shadow: hits * extended as f64 }
+                let sent_on: f64 = (1..=depth.min(1000)).map(|k| ways.powi(k as i32)).sum();
+                let hits = 1.0 + sent_on;
+                Self { sent_on, shadow: hits * bare as f64, area_shadow: hits * extended as f64 }
             }
             Integrator::Path => {
-                let chance = albedo.clamp(0.0, 0.95);
-                let onward = (SAFE_DEPTH + chance / (1.0 - chance)).min(depth.into());
+                let chance = albedo.clamp(0.0, HIGHEST_CHANCE.into());
+                let sent_on = (f64::from(SAFE_DEPTH) + chance / (1.0 - chance)).min(depth.into());
                 // One light is asked at each surface, once.
-                let asks = if bare + extended > 0 { 1.0 + onward } else { 0.0 };
-                Self { onward, shadow: asks, area_shadow: 0.0 }
+                let asks = if bare + extended > 0 { 1.0 + sent_on } else { 0.0 };
+                Self { sent_on, shadow: asks, area_shadow: 0.0 }
             }
         }
     }
@@ -74,7 +77,7 @@ impl Work {
     pub fn rays(&self, samples: u64, light_samples: u32) -> Rays {
         let each = |count: f64| (count * samples as f64) as u64;
         let shadow = each(self.shadow + self.area_shadow * f64::from(light_samples));
-        Rays { camera: samples, onward: each(self.onward), shadow }
+        Rays { camera: samples, sent_on: each(self.sent_on), shadow }
     }
 }
 
@@ -87,20 +90,20 @@ mod tests {
     #[test]
     fn each_hit_asks_each_light() {
         let rays = Work::new(&CAST).rays(1000, 4);
-        assert_eq!(rays, Rays { camera: 1000, onward: 0, shadow: 6000 });
+        assert_eq!(rays, Rays { camera: 1000, sent_on: 0, shadow: 6000 });
         // Half of what is seen is glass: one way on, on average, at each of five depths.
         let glass = Means { integrator: Integrator::Whitted, depth: 5, ways: 1.0, ..CAST };
-        assert_eq!(Work::new(&glass).rays(1000, 4), Rays { camera: 1000, onward: 5000, shadow: 36_000 });
+        assert_eq!(Work::new(&glass).rays(1000, 4), Rays { camera: 1000, sent_on: 5000, shadow: 36_000 });
     }
 
     #[test]
     fn paths_go_on_by_what_surfaces_send_on_and_ask_one_light() {
         let path = Means { integrator: Integrator::Path, depth: 64, ..CAST };
-        assert_eq!(Work::new(&path).rays(1000, 4), Rays { camera: 1000, onward: 4000, shadow: 5000 });
+        assert_eq!(Work::new(&path).rays(1000, 4), Rays { camera: 1000, sent_on: 4000, shadow: 5000 });
         let short = Means { depth: 2, lights: [0, 0], ..path };
-        assert_eq!(Work::new(&short).rays(1000, 4), Rays { camera: 1000, onward: 2000, shadow: 0 });
+        assert_eq!(Work::new(&short).rays(1000, 4), Rays { camera: 1000, sent_on: 2000, shadow: 0 });
         let white = Means { albedo: f64::INFINITY, depth: 1000, ..CAST };
-        assert!(Work::new(&Means { integrator: Integrator::Path, ..white }).onward < 23.0);
-        assert_eq!(Rays { camera: u64::MAX, onward: 1, shadow: 1 }.total(), u64::MAX);
+        assert!(Work::new(&Means { integrator: Integrator::Path, ..white }).sent_on < 23.0);
+        assert_eq!(Rays { camera: u64::MAX, sent_on: 1, shadow: 1 }.total(), u64::MAX);
     }
 }

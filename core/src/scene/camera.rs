@@ -5,6 +5,9 @@ use std::fmt;
 use super::pose::{Journey, Pose};
 use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 
+/// The vertical angle of view where nothing else is asked for, in degrees.
+pub const USUAL_FOV: f64 = 40.0;
+
 /// A camera. It looks along its -z, +y is up, +x is right (glTF's convention).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -176,7 +179,7 @@ impl Camera {
     /// # Panics
     /// For bounds that are not finite, and an aspect that is not above 0.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
-        let fov = 40f64.to_radians();
+        let fov = USUAL_FOV.to_radians();
         let half = (fov / 2.0).min(libm::atan(libm::tan(fov / 2.0) * aspect));
         // What f64 still keeps apart from the middle, so that there is a direction from there.
         let least = bounds.centre().abs().max_element() * 0.5f64.powi(40);

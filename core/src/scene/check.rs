@@ -202,8 +202,8 @@ fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
     if !mesh.origin.is_finite() {
         return Err("its origin is not finite".into());
     }
-    if mesh.colors.iter().any(|color| !color.is_finite()) {
-        return Err("colors that are not finite".into());
+    if mesh.colors.iter().any(|color| !color.is_finite() || color.min_element() < 0.0) {
+        return Err("colors that are negative or not finite".into());
     }
     let highest = mesh.triangles.as_flattened().par_chunks(1 << 14).filter_map(|part| part.iter().max()).max();
     match highest.filter(|&&i| i as usize >= count) {

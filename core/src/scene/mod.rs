@@ -23,7 +23,7 @@ mod rocks;
 mod search;
 mod texture;
 
-pub use camera::{Camera, Distortion, Fov, Projection, ThinLens};
+pub use camera::{Camera, Distortion, Fov, Projection, ThinLens, USUAL_FOV};
 #[doc(hidden)]
 pub use check::fault;
 pub use environment::Environment;
@@ -164,7 +164,8 @@ impl Scene {
             .sum()
     }
 
-    /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities.
+    /// Moves the whole scene: instances, lights and cameras. Scales lengths, not intensities. The environment stays as it is: up in its picture is up, +y, whatever
+    /// was up in the file.
     pub fn transform(&mut self, transform: &DAffine3) {
         for instance in &mut self.instances {
             instance.transform = *transform * instance.transform;

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use super::area::short_of;
 use super::bodies;
 use super::light::{Illumination, LightSource};
-use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, tangents};
+use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, similarity, tangents};
 use crate::ray::Hit;
 use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
 use crate::shape::Shape;
@@ -222,7 +222,7 @@ impl Search<'_> {
 
     /// Makes a light of what the matrix `axes` makes of the unit sphere, if that is a ball and no body.
     fn round(&mut self, centre: DVec3, axes: &DMat3, emission: Option<Vec3>) -> Seat {
-        let Some(radius) = similarity(axes) else { return Seat::Alone };
+        let Some(radius) = similarity(axes, ALIKE) else { return Seat::Alone };
         self.ball(|light| bodies::has_sphere(light, centre, radius)).unwrap_or_else(|| {
             self.light(emission, |radiance, Self { lights, .. }| {
                 let light = Light::Area { shape: AreaShape::Sphere { centre, radius }, radiance };
@@ -245,7 +245,7 @@ impl Search<'_> {
                 self.round(at(ellipsoid.centre), &axes, emission)
             }
             Shape::Disk(disk) => {
-                if similarity(&to_world.matrix3).is_none() {
+                if similarity(&to_world.matrix3, ALIKE).is_none() {
                     return Seat::Alone;
                 }
                 let across = tangents(disk.normal.as_dvec3().normalize())
@@ -340,17 +340,12 @@ fn area(corners: &[DVec3]) -> f64 {
     sides.sum::<DVec3>().length() / 2.0
 }
 
+/// What a map may be off by that is said to scale alike in all directions, which is made of f32.
+const ALIKE: f64 = 1e-5;
+
 /// What patches are chosen by, beside their area.
 fn brightness(emission: Vec3) -> f64 {
     f64::from(emission.max_element())
-}
-
-/// How much longer a map makes lengths, where it does so alike in all directions.
-fn similarity(m: &DMat3) -> Option<f64> {
-    let product = m.transpose() * *m;
-    let squared = product.x_axis.x;
-    let off = (product - DMat3::from_diagonal(DVec3::splat(squared))).to_cols_array();
-    (off.iter().all(|x| x.abs() <= 1e-5 * squared)).then(|| squared.sqrt())
 }
 
 #[cfg(test)]
@@ -378,7 +373,7 @@ mod tests {
 
     #[test]
     fn similarities_are_told() {
-        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::splat(-3.0))), Some(3.0));
-        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 2.0))), None);
+        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::splat(-3.0)), ALIKE), Some(3.0));
+        assert_eq!(similarity(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 2.0)), ALIKE), None);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Directions are chosen by a density that is constant within each pixel: rows by how bright they are, then a pixel of
 //! the row (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 14.2.4). The picture is interpolated between pixels, so a
-//! pixel counts by the mean of the interpolation over it: then nothing bright has a density of 0.
+//! pixel counts by the mean of the interpolation over it: then nothing bright has a density of 0, but for what is below 2^-24 of its row.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -26,7 +26,10 @@ pub struct EnvironmentLight {
 }
 
 impl EnvironmentLight {
-    /// Counts the light of each pixel. None of a picture that is black or has no pixels.
+    /// Counts the light of each pixel.
+    ///
+    /// # Panics
+    /// When it is asked for anything, where the picture has no pixels.
     pub fn new(environment: &Environment) -> Self {
         let Environment { image, intensity, rotation } = environment;
         let (width, height) = (image.width as usize, image.height as usize);

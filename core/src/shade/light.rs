@@ -170,7 +170,11 @@ fn window(distance: f64, range: f64) -> f32 {
 /// 1 within the inner angle, 0 outside the outer one, by the cosine of the angle to the axis.
 fn cone(cosine: f64, inner_angle: f32, outer_angle: f32) -> f32 {
     let (inner, outer) = (libm::cos(f64::from(inner_angle)), libm::cos(f64::from(outer_angle)));
-    let ramp = ((cosine - outer) / (inner - outer).max(0.001)).clamp(0.0, 1.0);
+    if inner <= outer {
+        // No soft edge, or one that f64 does not tell from none.
+        return if cosine >= outer { 1.0 } else { 0.0 };
+    }
+    let ramp = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
     (ramp * ramp) as f32
 }
 
@@ -215,7 +219,18 @@ mod tests {
         // KHR_lights_punctual: ((cos 45 - cos 60) / (cos 30 - cos 60))^2.
         let ramp = (0.5f64.sqrt() - 0.5) / (0.75f64.sqrt() - 0.5);
         assert!((f64::from(at(45.0)) - ramp * ramp).abs() < 1e-6);
-        assert_eq!(cone(1.0, 0.5, 0.5), 1.0, "a cone without a soft edge is a number");
+        for outer in [0.5f32, 1e-3, 1e-5] {
+            assert_eq!([cone(1.0, outer, outer), cone(f64::from(2.0 * outer).cos(), outer, outer)], [1.0, 0.0]);
+            // Full light on the axis and at the inner angle, however narrow the cone and its edge are.
+            for inner in [0.0, outer * 0.5, outer * 0.999] {
+                assert_eq!(cone(f64::from(inner).cos(), inner, outer), 1.0, "{inner} {outer}");
+            }
+            assert_eq!(cone(f64::from(outer * 1.001).cos(), outer * 0.999, outer), 0.0);
+            // In between by the angles' squares, to which cosines of small angles come down.
+            let middle = cone(f64::from(outer * 0.75).cos(), outer * 0.5, outer);
+            let exact = ((f64::from(outer).powi(2) * (1.0 - 0.5625)) / (f64::from(outer).powi(2) * 0.75)).powi(2);
+            assert!(outer == 0.5 || (f64::from(middle) - exact).abs() < 1e-4, "{outer}: {middle} {exact}");
+        }
     }
 
     #[test]

@@ -205,6 +205,12 @@ impl SurfacePoint {
         Ray { origin: self.start(direction.as_dvec3()), direction, tmin: 0.0, tmax, time: self.time }
     }
 
+    /// How far beyond `position` a ray starts, along itself, that left the surface: by how much its way is longer than its t says.
+    pub fn ahead(&self, ray: &Ray) -> f32 {
+        let direction = ray.direction.as_dvec3();
+        ((ray.origin.as_dvec3() - self.position).dot(direction) / direction.length()) as f32
+    }
+
     /// A ray that leaves the surface and ends just short of `target` (world coordinates), at t = 1.
     pub fn spawn_to(&self, target: DVec3) -> Ray {
         let origin = self.start(target - self.position);

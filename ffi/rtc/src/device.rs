@@ -115,18 +115,27 @@ fn pool(count: usize) -> Result<ThreadPool> {
 impl Device {
     /// From a configuration such as `threads=4,verbose=1`. Names that are not known, or mean nothing here, are passed over, as Embree does
     /// with most.
+    ///
+    /// # Errors
+    /// For one of these two whose value is no whole number, which is told without a device.
     pub fn new(configuration: &str) -> Result<Self> {
         let mut device = Self::default();
         for part in configuration.split([',', ' ', '\t', '\n']) {
             let (name, value) = part.split_once('=').unwrap_or((part, ""));
+            let number = || {
+                value
+                    .trim()
+                    .parse::<usize>()
+                    .map_err(|_| Failure::unknown("a device's threads and verbose are whole numbers"))
+            };
             match name.trim() {
                 "threads" => {
-                    let threads: usize = value.trim().parse().unwrap_or(0);
+                    let threads = number()?;
                     if threads > 0 {
                         device.threads = Threads::new(threads)?;
                     }
                 }
-                "verbose" => device.verbose = value.trim().parse().is_ok_and(|level: u32| level > 0),
+                "verbose" => device.verbose = number()? > 0,
                 _ => {}
             }
         }

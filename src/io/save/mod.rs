@@ -28,6 +28,9 @@ type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
 
 /// Writes `scene` to `path`. The suffix, in any case, decides the format: one of [`SAVE_SUFFIXES`].
 ///
+/// PLY holds one mesh of everything, positions and triangles: materials, normals, texture coordinates, lights and cameras are left out, as are from NFF names, and what
+/// of [`Scene::request`] is not the size.
+///
 /// # Errors
 /// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, corners that are
 /// NaN in text); [`Error::Output`] where the file cannot be written, which leaves an old one whole.
@@ -53,6 +56,16 @@ pub fn save(scene: &Scene, path: &Path) -> Result<()> {
         };
         write_all().map_err(|error: io::Error| Error::output(path, format!("cannot be written: {error}")))
     })
+}
+
+/// Whether something moves.
+fn moves(scene: &Scene) -> bool {
+    scene.instances.iter().any(|instance| instance.transform_end.is_some())
+}
+
+/// Whether vertices have colours.
+fn is_colored(scene: &Scene) -> bool {
+    scene.geometries.iter().any(|geometry| matches!(geometry, Geometry::Mesh(mesh) if !mesh.colors.is_empty()))
 }
 
 /// Whether all numbers of the meshes are finite, as those of text formats have to be.

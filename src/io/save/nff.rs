@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Unsayable, check_finite, placed, spaced, spaced_f64};
+use super::{Unsayable, check_finite, is_colored, moves, placed, spaced, spaced_f64};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use crate::scene::{
     Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
@@ -28,8 +28,10 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
             }
         }
     }
-    let moves = scene.instances.iter().any(|instance| instance.transform_end.is_some());
-    if moves || scene.cameras.iter().any(|camera| camera.end.is_some()) {
+    if is_colored(scene) {
+        return Err("NFF has no colours of vertices; keep the file they are in".to_owned());
+    }
+    if moves(scene) || scene.cameras.iter().any(|camera| camera.end.is_some()) {
         return elsewhere("motion".to_owned());
     }
     if scene.fog.is_some() {
@@ -95,7 +97,9 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     for camera in &scene.cameras {
         view(camera, width, height, out)?;
     }
-    writeln!(out, "b {}", spaced(scene.background.unwrap_or_default()))?;
+    if let Some(background) = scene.background {
+        writeln!(out, "b {}", spaced(background))?;
+    }
     for light in &scene.lights {
         if let Light::Point { position, color, .. } = light {
             writeln!(out, "l {} {}", spaced_f64(*position), spaced(*color))?;

@@ -1,12 +1,12 @@
-//! Binary PLY, little-endian: one mesh of everything, in scene coordinates. Polygons are divided into triangles; materials,
-//! lights and cameras have no place in it.
+//! Binary PLY, little-endian: one mesh of everything, in scene coordinates, which are doubles where f32 does not hold them. Polygons are divided into triangles;
+//! materials, normals, texture coordinates, lights and cameras are left out.
 
 use std::io::{self, Write};
 
-use super::{Unsayable, placed};
+use super::{Unsayable, is_colored, moves, placed};
 use crate::io::polygon::triangulate;
 use crate::math::DVec3;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Scene, choose_origin};
 use crate::shape::{Polygon, Shape};
 
 /// Whether there is nothing but triangles and polygons, few enough for 32-bit indices.
@@ -17,6 +17,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     });
     if let Some(shape) = other {
         return Err(format!("PLY holds triangles, and this scene has a {}; write .nff or .toml", shape.name()));
+    }
+    if moves(scene) {
+        return Err("PLY holds what stands still, and this scene moves; write .toml".to_owned());
+    }
+    if is_colored(scene) {
+        return Err("colours of vertices are not written; keep the file they are in".to_owned());
     }
     let [vertices, triangles] = counts(scene);
     let most = vertices.max(triangles);
@@ -45,15 +51,21 @@ fn polygons(shapes: &[Shape]) -> impl Iterator<Item = &Polygon> {
 
 pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     let [vertices, triangles] = counts(scene);
+    // As loaders decide whether f32 holds it.
+    let is_far = choose_origin(&scene.bounds()) != DVec3::ZERO;
+    let real = if is_far { "double" } else { "float" };
     write!(
         out,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty {real} x\nproperty {real} y\n\
+         property {real} z\nelement face {triangles}\nproperty list uchar int vertex_indices\nend_header\n"
     )?;
     for (geometry, transform) in placed(scene) {
         let mut vertex = |p: DVec3| {
-            let p = transform.transform_point3(p).as_vec3();
-            out.write_all(bytemuck::bytes_of(&p.to_array().map(|x| x.to_bits().to_le())))
+            let p = transform.transform_point3(p);
+            if is_far {
+                return out.write_all(bytemuck::bytes_of(&p.to_array().map(|x| x.to_bits().to_le())));
+            }
+            out.write_all(bytemuck::bytes_of(&p.as_vec3().to_array().map(|x| x.to_bits().to_le())))
         };
         match geometry {
             Geometry::Mesh(mesh) => {

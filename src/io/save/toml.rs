@@ -1,9 +1,10 @@
 //! Twincast's own format, as docs/SCENES.md describes it. Groups that are placed more than once, or moved, are written as
 //! groups; the others at the top of the file.
 
+use std::collections::HashSet;
 use std::io::{self, Write};
 
-use super::{Unsayable, check_finite};
+use super::{Unsayable, check_finite, is_colored};
 use crate::image::Curve;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
@@ -15,11 +16,10 @@ use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 /// Whether the format has words for all of it: pictures are files of their own, and colours of vertices belong in meshes.
 pub(super) fn check(scene: &Scene) -> Result<(), Unsayable> {
     check_finite(scene)?;
-    let is_coloured = |geometry: &Geometry| matches!(geometry, Geometry::Mesh(mesh) if !mesh.colors.is_empty());
     if scene.environment.is_some() {
         return Err("environments are not written; name the picture's file in [environment]".to_owned());
     }
-    if !scene.textures.is_empty() || scene.geometries.iter().any(is_coloured) {
+    if !scene.textures.is_empty() || is_colored(scene) {
         return Err("textures and colours of vertices are not written; include the file they are in".to_owned());
     }
     Ok(())
@@ -42,8 +42,9 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         }
         writeln!(out)?;
     }
-    for (material, index) in scene.materials.iter().zip(0..) {
-        write_material(material, index, out)?;
+    let names = names(&scene.materials);
+    for (material, name) in scene.materials.iter().zip(&names) {
+        write_material(material, name, out)?;
     }
     // At the top of the file things are placed once, as they are.
     let mut uses = vec![0; scene.groups.len()];
@@ -57,11 +58,11 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         let prefix = if top { String::new() } else { format!("group.g{group}.") };
         for (_, geometry) in scene.group_geometries(group) {
             match geometry {
-                Geometry::Mesh(mesh) => write_mesh(mesh, &prefix, out)?,
+                Geometry::Mesh(mesh) => write_mesh(mesh, &prefix, &names[mesh.material as usize], out)?,
                 Geometry::Shapes { shapes, material } => {
                     for shape in shapes {
                         write_shape(shape, &prefix, out)?;
-                        writeln!(out, "material = \"m{material}\"\n")?;
+                        writeln!(out, "material = {}\n", names[*material as usize])?;
                     }
                 }
             }
@@ -76,6 +77,21 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out)?;
     }
     Ok(())
+}
+
+/// What materials are called, in quotes: by their own names where these tell them apart.
+fn names(materials: &[Material]) -> Vec<String> {
+    let mut taken: HashSet<&str> = HashSet::new();
+    let own: Vec<bool> = materials.iter().map(|m| !m.name.is_empty() && taken.insert(&m.name)).collect();
+    let numbered = |i: usize| {
+        let mut name = format!("m{i}");
+        while taken.contains(&*name) {
+            name.push('_');
+        }
+        name
+    };
+    let name = |(i, is_own): (usize, bool)| quoted(&if is_own { materials[i].name.clone() } else { numbered(i) });
+    own.into_iter().enumerate().map(name).collect()
 }
 
 /// A transform as one step, by rows.
@@ -235,8 +251,8 @@ fn write_light(light: &Light, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out)
 }
 
-fn write_material(material: &Material, index: u32, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[material.m{index}]")?;
+fn write_material(material: &Material, name: &str, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[material.{name}]")?;
     if material.unlit {
         let Material { diffuse, emission, .. } = material;
         writeln!(out, "type = \"unlit\"\ndiffuse = {}\nemission = {}", list(*diffuse), list(*emission))?;
@@ -282,8 +298,8 @@ fn write_lit(material: &Material, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-fn write_mesh(mesh: &Mesh, prefix: &str, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[[{prefix}mesh]]\nname = {}\nmaterial = \"m{}\"", quoted(&mesh.name), mesh.material)?;
+fn write_mesh(mesh: &Mesh, prefix: &str, material: &str, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "[[{prefix}mesh]]\nname = {}\nmaterial = {material}", quoted(&mesh.name))?;
     // One item a line: a mesh in one line is more than editors take.
     fn column<T>(out: &mut dyn Write, key: &str, items: &[T], line: impl Fn(&T) -> String) -> io::Result<()> {
         writeln!(out, "{key} = [")?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::include::Placed;
 use super::table::{Fault, Read, Table, Value};
 use crate::io::suggest::suggestion;
-use crate::math::{DAffine3, DMat3, DQuat, DVec3, can_place};
+use crate::math::{self, DAffine3, DMat3, DVec3, can_place};
 use crate::scene::{Instance, Scene};
 
 /// Groups within groups within groups.
@@ -238,6 +238,5 @@ fn rotation(value: Value<'_>) -> Read<DAffine3> {
     let [x, y, z, degrees] = value.numbers()?;
     let axis = DVec3::new(x, y, z).try_normalize();
     let axis = axis.ok_or_else(|| value.fault("\"rotate\" wants an axis, not all 0, and degrees"))?;
-    let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
-    Ok(DAffine3::from_quat(DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos).normalize()))
+    Ok(DAffine3::from_quat(math::rotation(axis, degrees)))
 }

@@ -8,14 +8,12 @@ use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
 use crate::math::{DVec2, DVec3, LARGEST_COORDINATE, Vec3};
 use crate::scene::{
     Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, LARGEST_SIDE, Light, MOST_DEPTH, MOST_SPP,
-    Pose, Projection, Request, Resolution, Search, ThinLens,
+    Pose, Projection, Request, Resolution, Search, ThinLens, USUAL_FOV,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
 /// What says where a camera is, and where it looks.
 const NAMES: [&str; 3] = ["\"eye\"", "\"look_at\"", "\"up\""];
-/// Vertical angle of view where none is given, degrees.
-const USUAL_FOV: f64 = 40.0;
 
 /// How lights and surfaces go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,6 +219,7 @@ fn color(table: &mut Table<'_>) -> Read<Vec3> {
 
 /// A light with a surface.
 fn area(shape: AreaShape, table: &mut Table<'_>) -> Read<Light> {
+    table.refuse("color", "is for lights without a surface; this one has \"radiance\"")?;
     Ok(Light::Area { shape, radiance: table.need("radiance")?.color()? })
 }
 

@@ -47,7 +47,7 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         reflection,
         transmission,
         ior: above_zero(table, "ior")?.unwrap_or(plain.ior),
-        gloss: table.optional("gloss", |value| value.share())?,
+        gloss: gloss(table, reflection, transmission)?,
         interface,
         absorption: absorption(table, transmission, interface)?,
         unlit: kind == Kind::Unlit,
@@ -57,6 +57,15 @@ pub(super) fn material(name: &str, table: &mut Table<'_>) -> Read<Material> {
         emission,
         ..plain
     })
+}
+
+/// `gloss`, of which nothing is seen where nothing is mirrored or let through.
+fn gloss(table: &mut Table<'_>, reflection: Vec3, transmission: Vec3) -> Read<Option<f32>> {
+    match (table.optional("gloss", |value| value.share())?, table.get("gloss")) {
+        (Some(_), Some(value)) if reflection == Vec3::ZERO && transmission == Vec3::ZERO => Err(value
+            .fault("\"gloss\" blurs what is mirrored or let through: give it a \"reflection\" or a \"transmission\"")),
+        (gloss, _) => Ok(gloss),
+    }
 }
 
 /// What only a surface has on which light falls.

@@ -74,7 +74,7 @@ pub struct Point {
     pub accel: &'static str,
     /// Triangles.
     pub primitives: u64,
-    /// Seconds to build it, on all threads.
+    /// Seconds to build it, on the threads of the pool that asks.
     pub build_seconds: f64,
     /// Microseconds for a ray, on one thread.
     pub microseconds_a_ray: f64,

@@ -63,7 +63,7 @@ impl Expression {
         let inner = text.strip_prefix('L').and_then(|rest| rest.strip_suffix('E'));
         let inner =
             inner.ok_or_else(|| format!("{text:?}: a path begins with L and ends with E, as in LDE or L.*SE"))?;
-        let mut reader = Reader { rest: inner, letters: Vec::new(), before: Vec::new() };
+        let mut reader = Reader { rest: inner, depth: 0, letters: Vec::new(), before: Vec::new() };
         let whole = reader.either().map_err(|what| format!("{text:?}: {what}"))?;
         if let Some(c) = reader.rest.chars().next() {
             return Err(format!("{text:?}: {c:?} closes nothing"));
@@ -104,6 +104,8 @@ struct Piece {
 
 struct Reader<'t> {
     rest: &'t str,
+    /// How many ( are open.
+    depth: usize,
     letters: Vec<u8>,
     before: Vec<u64>,
 }
@@ -154,7 +156,12 @@ impl Reader<'_> {
     fn single(&mut self, c: char) -> Result<Piece, String> {
         self.rest = &self.rest[c.len_utf8()..];
         if c == '(' {
+            if self.depth == MOST_LETTERS {
+                return Err(format!("more than {MOST_LETTERS} ( within each other"));
+            }
+            self.depth += 1;
             let piece = self.either()?;
+            self.depth -= 1;
             return if self.take(')') { Ok(piece) } else { Err("a ( that no ) closes".to_owned()) };
         }
         let events = match c {
@@ -311,6 +318,10 @@ mod tests {
             assert!(error.contains(words), "{text}: {error}");
         }
         assert!(Expression::new(&format!("L{}E", "D".repeat(61))).unwrap_err().contains("more than 60"));
+        for deep in ["(".repeat(100_000), format!("{}D{}", "(".repeat(61), ")".repeat(61))] {
+            assert!(Expression::new(&format!("L{deep}E")).unwrap_err().contains("within each other"));
+        }
+        assert!(Expression::new(&format!("L{}D{}{}E", "(".repeat(60), ")".repeat(60), "(D)".repeat(59))).is_ok());
         let long = Expression::new(&format!("L.*D{}E", ".".repeat(12))).unwrap();
         assert!(Automaton::new(&[&long]).is_ok(), "backwards it has few states");
         let long = Expression::new(&format!("L{}D.*E", ".".repeat(12))).unwrap();

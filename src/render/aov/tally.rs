@@ -104,11 +104,12 @@ impl Tally {
     }
 
     /// The route after one of the three events, which `xi` (from 0 to below 1) chooses by their shares for each colour.
-    pub(in crate::render) fn choose(&self, route: Route, shares: [Vec3; 3], xi: f32) -> Route {
+    pub(in crate::render) fn choose(&self, route: Route, shares: [Vec3; 3], xi: f64) -> Route {
         let after = Event::ALL.map(|event| self.after(route, event).0);
         let mut chosen = route.0;
         for (axis, state) in chosen.iter_mut().enumerate() {
-            let shares = shares.map(|share| share[axis]);
+            // In f64, where `xi` stays below 1 and what it chooses within the shares.
+            let shares = shares.map(|share| f64::from(share[axis]));
             let wanted = xi * (shares[0] + shares[1] + shares[2]);
             let event = if wanted < shares[0] {
                 0
@@ -141,11 +142,11 @@ impl Renderer<'_> {
         if !request.observes() {
             return;
         }
-        let Buffers { patterns, waves, hits, tally, .. } = buffers;
+        let Buffers { patterns, balances, waves, hits, tally, .. } = buffers;
         let Some(tally) = tally else { return };
         for (i, (ray, hit)) in waves[0].rays.iter().zip(hits).enumerate() {
             let Some(hit) = hit else { continue };
-            let weight = self.weight(&patterns[i], sample);
+            let weight = self.weight(balances, &patterns[i], i, sample);
             if let Some(mattes) = &request.mattes {
                 if mattes.has_objects {
                     cover(&mut tally.objects[i], mattes.object(hit), weight);

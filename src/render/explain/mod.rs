@@ -142,12 +142,11 @@ impl Renderer<'_> {
     ) -> Explanation {
         let mut buffers = Buffers { trail: Trail::laid(self.settings.spp), ..Buffers::default() };
         let value = self.tile(tracer, &Tile { x, y, width: 1, height: 1 }, &mut buffers)[0];
-        let mut samples = buffers.trail.into_samples();
+        let mut samples = std::mem::take(&mut buffers.trail).into_samples();
         let pattern = self.sampler.pattern(x, y);
         for (sample, number) in samples.iter_mut().zip(0..) {
-            let (film, weight) = self.place(&pattern, number);
-            sample.film = film.to_array();
-            sample.weight = if self.filter.has_negative() { weight } else { 1.0 };
+            sample.film = self.place(&pattern, number).0.to_array();
+            sample.weight = self.weight(&buffers.balances, &pattern, 0, number);
             for ray in &mut sample.rays {
                 ray.steps = steps.map(|steps| steps(&ray.ray));
             }

@@ -1,6 +1,6 @@
 //! What a camera makes of radiance, where it becomes codes: exposure, white balance and a response curve, in this order.
 //!
-//! Files of floating values (OpenEXR, Radiance, PFM) keep radiance: what was developed cannot be undone, and whoever reads
+//! Files of floating values (OpenEXR, Radiance) keep radiance: what was developed cannot be undone, and whoever reads
 //! them has a camera of their own. So none of this is done to an [`Image`](crate::Image), but on the way to 8 bits.
 //! Developing the image first, the simpler way, would need a second one in memory, and a rule of who must not develop it again.
 

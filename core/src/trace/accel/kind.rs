@@ -52,7 +52,7 @@ impl fmt::Debug for Built {
 }
 
 impl Accel {
-    /// Builds it.
+    /// Builds it. The BVH has but one method, and takes no options.
     pub fn build(self, world: &World, options: &Options) -> Built {
         match self {
             Self::Bvh => Bvh::build(world).into(),

@@ -74,7 +74,7 @@ trait Index: Sized + Send + Sync {
     fn build(input: &Input<'_>, options: &Options) -> Self;
 
     /// Calls `each` with every item whose box the ray enters before the limit, near ones first where that is known. `each`
-    /// gives the new limit, and infinity below zero to stop.
+    /// gives the new limit, and infinity below zero to stop; of the leaf that the ray is in, the rest may come yet.
     fn visit(&self, ray: &IndexRay, limit: f64, each: &mut impl FnMut(u32) -> f64);
 
     /// Memory it holds, in bytes.
@@ -183,6 +183,9 @@ impl<I: Index> Accelerated<I> {
         }
         let index_ray = IndexRay::of_world(ray, reach(&self.placed_bounds), self.spread.of(ray));
         self.placements.visit(&index_ray, limit(&nearest), &mut |placed| {
+            if is_done(&nearest) {
+                return f64::NEG_INFINITY;
+            }
             let found = |item| place = Some(Place { placed: Some(placed), item });
             let placed = self.placed[placed as usize].at(ray.moment());
             let object = &self.objects[placed.placement.object as usize];
@@ -246,13 +249,17 @@ impl<I: Index> Level<I> {
         nearest: &mut Nearest,
         mut found: impl FnMut(u32),
     ) {
-        let mut mailbox = Mailbox::new();
+        let (mut mailbox, mut is_done) = (Mailbox::new(), false);
         self.index.visit(index_ray, limit(nearest), &mut |item| {
+            if is_done {
+                return f64::NEG_INFINITY;
+            }
             if !(I::REPEATS && mailbox.has(item)) {
                 let before = nearest.t();
                 self.items.offer(item, ray, local, through, nearest);
                 if any && nearest.t() < before {
                     found(item);
+                    is_done = true;
                     return f64::NEG_INFINITY;
                 }
             }
@@ -261,7 +268,7 @@ impl<I: Index> Level<I> {
     }
 }
 
-/// The last few items that a ray was tested against, for indices that hold an item in many cells (Shevtsov, Soupikov,
+/// Some of the last items that a ray was tested against, of those with the same last four bits one, for indices that hold an item in many cells (Shevtsov, Soupikov,
 /// Kapustin 2007, *Ray-triangle intersection algorithm for modern CPU architectures*: the inverse mailbox). A number in each item, the older way,
 /// would be written by all threads. What is forgotten is tested again, which changes nothing.
 struct Mailbox([u32; 16]);

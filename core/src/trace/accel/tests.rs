@@ -11,8 +11,9 @@ use super::items::{Boxes, Input, reach};
 use super::kd::KdTree;
 use super::octree::Octree;
 use super::ray::IndexRay;
-use super::{Accel, Index, Options, Resolution};
+use super::{Accel, Index, Level, Nearest, Options, Resolution};
 use crate::math::{Aabb, DVec3, Random, UVec3, Vec3};
+use crate::ray::Ray;
 use crate::scene::{Geometry, Mesh, Scene};
 use crate::trace::World;
 
@@ -209,4 +210,34 @@ fn a_bsp_tree_says_where_it_stopped() {
         let ray = crate::Ray::new(random.vector() * 10.0, random.vector());
         assert_eq!(whole.tracer.closest(&ray), capped.tracer.closest(&ray));
     }
+}
+
+/// Who asks for any hit gets one, and what is left of the leaf is not tested for a nearer one.
+#[test]
+fn the_first_hit_is_enough() {
+    fn check<I: Index>(name: &str) {
+        // Slanted pieces that no plane tells apart, so that most are in one leaf; which is the nearest depends on the ray.
+        let mut random = Random::new(5, 0);
+        let triangle = |_| {
+            let [a, b, c] = [-1.0, 0.0, 1.0].map(|z| z + 0.5 * random.unit());
+            [Vec3::new(-9.0, -9.0, a), Vec3::new(9.0, -9.0, b), Vec3::new(0.0, 9.0, c)]
+        };
+        let positions: Vec<Vec3> = (0..12).flat_map(triangle).collect();
+        let mesh = Mesh::new(positions, (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
+        let scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![]);
+        let world = World::new(&scene).expect("sound");
+        let level = Level::<I>::build(&world.parts, &Options::default());
+        for _ in 0..20 {
+            let ray = Ray::new(Vec3::new(random.unit(), random.unit(), 9.0), Vec3::NEG_Z);
+            let mut found = 0;
+            level.trace(&ray, true, &mut Nearest::new(&ray), |_| found += 1);
+            assert_eq!(found, 1, "{name}");
+        }
+    }
+    check::<Groups>("groups");
+    check::<Binary>("binary");
+    check::<Grid>("grid");
+    check::<Octree>("octree");
+    check::<KdTree>("kd");
+    check::<Bsp>("bsp");
 }

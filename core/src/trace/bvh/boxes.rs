@@ -1,4 +1,7 @@
-//! A tree over boxes of which the caller knows what is in them.
+//! A tree over boxes of which the caller knows what is in them, and which may move.
+//!
+//! What moves has two trees of the same shape: with the boxes where they are at time 0, and at time 1. A ray finds a node's boxes between the two, at its own time
+//! (Glassner 1988, *Spacetime ray tracing for animation*): boxes around whole ways would all be entered where things move by more than their size.
 //!
 //! The builder and the walk know no primitive; here they are lent to callers whose primitives the library does not have
 //! (Embree's user geometry, instances of other scenes, curves). The caller names a box by its index, and is told which
@@ -9,20 +12,23 @@ use std::fmt;
 use super::alone::Search;
 use super::build::preset::Options;
 use super::build::{self, Record};
-use super::node::Child;
+use super::node::{Child, Node};
 use super::query::Closest;
 use super::reject::Blur;
 use super::reject::slab::SlabRay;
-use super::simd::Simd;
 use super::simd::isa::{self, Kernel, Present};
+use super::simd::{Simd, Vector};
 use super::tree::Tree;
-use super::walk::{self, Visit};
-use crate::math::{Aabb, DVec3, Vec3};
+use super::walk::{self, Enter, Visit};
+use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
 
 /// A tree over boxes.
 pub struct BoxTree {
+    /// Of what moves, at time 0.
     tree: Tree,
+    /// The same nodes at time 1, where something moves.
+    end: Option<Tree>,
     /// Which box each item of a leaf is.
     items: Vec<u32>,
     isa: Present,
@@ -46,18 +52,48 @@ impl BoxTree {
     /// # Panics
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> Self {
-        let isa = options.isa.demand();
-        let is_kept =
-            |bounds: &Aabb| bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite();
-        let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_kept(bounds));
-        let mut items: Vec<Record> = kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect();
-        let tree = build::build(&mut items, 1, Child::MOST, &options);
-        Self { tree, items: items.iter().map(Record::primitive).collect(), isa }
+        let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_sound(bounds));
+        Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), &options)
     }
 
-    /// The box around all of them, a millionth of its coordinates wider.
+    /// Over boxes that move, from where the first of each pair is at time 0 to where the second is at time 1, in straight lines. Rays before and after that
+    /// find them where they are then. Left out is what is empty or not finite at either time.
+    ///
+    /// # Panics
+    /// As [`BoxTree::build`] does.
+    pub fn moving(boxes: &[[Aabb; 2]], options: Options<'_>) -> Self {
+        if boxes.iter().all(|[start, end]| start == end) {
+            let still: Vec<Aabb> = boxes.iter().map(|[start, _]| *start).collect();
+            return Self::build(&still, options);
+        }
+        // What is near halfway is together.
+        let halfway =
+            |[start, end]: &[Aabb; 2]| Aabb { min: start.min.midpoint(end.min), max: start.max.midpoint(end.max) };
+        let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(is_sound));
+        let mut still = Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), &options);
+        let items = &still.items;
+        let at = |end: usize| {
+            let mut tree = Tree::new(still.tree.nodes().to_vec());
+            tree.refit(|leaf| {
+                let boxes = leaf.map(|item| wider(&boxes[items[item as usize] as usize])[end]);
+                boxes.fold(Aabb::EMPTY, Aabb::union)
+            });
+            tree
+        };
+        let [start, end] = [at(0), at(1)];
+        (still.tree, still.end) = (start, Some(end));
+        still
+    }
+
+    fn over(mut items: Vec<Record>, options: &Options<'_>) -> Self {
+        let isa = options.isa.demand();
+        let tree = build::build(&mut items, 1, Child::MOST, options);
+        Self { tree, end: None, items: items.iter().map(Record::primitive).collect(), isa }
+    }
+
+    /// The box around all of them, a millionth of its coordinates wider; at all times from 0 to 1.
     pub fn bounds(&self) -> Aabb {
-        self.tree.bounds()
+        self.end.iter().fold(self.tree.bounds(), |bounds, end| bounds.union(end.bounds()))
     }
 
     /// Whether there is none.
@@ -67,10 +103,11 @@ impl BoxTree {
 
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.bytes() + size_of_val(&self.items[..])
+        let trees = self.end.iter().chain([&self.tree]);
+        trees.map(Tree::bytes).sum::<usize>() + size_of_val(&self.items[..])
     }
 
-    /// Names boxes that `ray` enters, or nearly, up to the t that `visitor` returns last (at first the ray's tmax), near ones
+    /// Names boxes that `ray` enters at its time, or nearly, up to the t that `visitor` returns last (at first the ray's tmax), near ones
     /// mostly first, until it has seen enough. The search takes each box that the ray enters; it may take others.
     pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
         if !self.tree.is_empty() && ray.is_valid() {
@@ -80,7 +117,7 @@ impl BoxTree {
 
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
     /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a millionth of
-    /// coordinates.
+    /// coordinates. What moves is at time 0.
     pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> Search) {
         let mut radius = f64::from(radius);
         let mut open = vec![(0.0, Child::ROOT)];
@@ -115,6 +152,45 @@ impl BoxTree {
     }
 }
 
+/// Whether there is something in it that can be hit.
+fn is_sound(bounds: &Aabb) -> bool {
+    bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite()
+}
+
+/// Both wider by what it rounds to go from one to the other: a product of either, a difference and a sum.
+fn wider(ends: &[Aabb; 2]) -> [Aabb; 2] {
+    let reach = |bounds: &Aabb| bounds.min.abs().max(bounds.max.abs());
+    let slack = reach(&ends[0]).max(reach(&ends[1])) * (6.0 * UNIT_ROUNDOFF) + f32::MIN_POSITIVE;
+    ends.map(|bounds| Aabb { min: bounds.min - slack, max: bounds.max + slack })
+}
+
+/// A ray among boxes that move.
+struct MovingRay<'a> {
+    slab: SlabRay,
+    start: &'a [Node],
+    end: &'a [Node],
+    /// From 0 to 1.
+    time: f32,
+}
+
+impl Enter for MovingRay<'_> {
+    #[inline(always)]
+    fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        // Of nodes of the tree at the start, which alone are asked about.
+        let index = (std::ptr::from_ref(node).addr() - self.start.as_ptr().addr()) / size_of::<Node>();
+        let end = &self.end[index];
+        let (early, late) = (S::V8::splat(1.0 - self.time), S::V8::splat(self.time));
+        let row = |offset: u32| S::row(end, offset).mul_add(late, S::row(node, offset).mul(early));
+        self.slab.enter_rows::<S>(limit, row)
+    }
+
+    /// Of a slot without a child nothing is known between infinity and infinity.
+    #[inline(always)]
+    fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
+        node.children().fold(0, |there, (slot, _)| there | 1 << slot) & children
+    }
+}
+
 /// From a point to a box; 0 inside.
 fn distance(bounds: &Aabb, point: Vec3) -> f64 {
     let point = point.as_dvec3();
@@ -132,12 +208,28 @@ impl Kernel for VisitBoxes<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { boxes, ray, visitor } = self;
-        let slab = SlabRay::new::<S>(ray, boxes.tree.reach(), Blur::NONE);
-        let mut limit = ray.tmax.next_up();
+        let Self { boxes: BoxTree { tree, end, .. }, ray, .. } = self;
+        let reach = end.iter().fold(tree.reach(), |reach, end| reach.max(end.reach()));
+        let slab = SlabRay::new::<S>(ray, reach, Blur::NONE);
+        match end {
+            None => self.walk::<S>(&slab),
+            Some(end) => {
+                // Of NaN itself, which enters everything.
+                let time = ray.time.clamp(0.0, 1.0);
+                self.walk::<S>(&MovingRay { slab, start: tree.nodes(), end: end.nodes(), time });
+            }
+        }
+    }
+}
+
+impl VisitBoxes<'_, '_> {
+    #[inline(always)]
+    fn walk<S: Simd>(self, ray: &impl Enter) {
+        let Self { boxes, ray: Ray { tmax, .. }, visitor } = self;
+        let mut limit = tmax.next_up();
         walk::single::<S, Closest>(
             &boxes.tree,
-            &slab,
+            ray,
             limit,
             #[inline(always)]
             |leaf| {
@@ -150,5 +242,68 @@ impl Kernel for VisitBoxes<'_, '_> {
                 Visit::Until(limit)
             },
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+
+    /// Every box in which a ray is at its own time is named, and few of the others, however far they move.
+    #[test]
+    fn what_moves_is_found_where_it_is() {
+        let mut random = Random::new(62, 0);
+        for far in [0.0, 0.01, 1.0, 100.0, 1e6] {
+            let mut boxes: Vec<[Aabb; 2]> = Vec::new();
+            for i in 0..3000 {
+                let centre = random.vector() * 10.0;
+                // All one way, or each its own.
+                let way = if i % 2 == 0 { Vec3::new(1.0, 0.5, -0.25) } else { random.vector() };
+                let sizes = [0, 1].map(|_| Vec3::splat(random.unit()) * 0.1);
+                let centres = [centre, centre + way * far];
+                boxes.push([0, 1].map(|k| Aabb { min: centres[k] - sizes[k], max: centres[k] + sizes[k] }));
+            }
+            boxes[7][1] = Aabb::EMPTY;
+            let tree = BoxTree::moving(&boxes, Options::default());
+            assert_eq!(tree.end.is_some(), far > 0.0 || boxes.iter().any(|[start, end]| start != end));
+            let mut named = 0;
+            let rays = 2000;
+            for k in 0..rays {
+                let time = [random.unit(), 0.0, 1.0][k % 3];
+                // Through a point of one of them, or anywhere.
+                let [start, end] = boxes[random.below(3000) as usize];
+                let (a, b) = (start.min.midpoint(start.max), end.min.midpoint(end.max));
+                let target = if b.is_finite() { a.lerp(b, time) } else { a };
+                let direction = random.direction();
+                let ray = Ray { time, ..Ray::new(target - direction * (random.unit() * 20.0), direction) };
+                let mut seen = vec![false; boxes.len()];
+                tree.visit(&ray, &mut |i| {
+                    seen[i as usize] = true;
+                    Search::Continue(f32::INFINITY)
+                });
+                assert!(!seen[7], "it is nowhere at the end");
+                named += seen.iter().filter(|seen| **seen).count();
+                for (i, [start, end]) in boxes.iter().enumerate().filter(|(i, _)| *i != 7) {
+                    assert!(seen[i] || !is_entered(&ray, start, end), "far {far}, box {i}, ray {ray:?}");
+                }
+            }
+            assert!(named < 60 * rays, "far {far}: {named} of {rays} rays");
+        }
+    }
+
+    /// In f64, a millionth of the box narrower.
+    fn is_entered(ray: &Ray, start: &Aabb, end: &Aabb) -> bool {
+        let time = f64::from(ray.time);
+        let between = |a: Vec3, b: Vec3| a.as_dvec3() * (1.0 - time) + b.as_dvec3() * time;
+        let (min, max) = (between(start.min, end.min), between(start.max, end.max));
+        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let (mut near, mut far) = (0.0f64, f64::INFINITY);
+        for axis in 0..3 {
+            let (a, b) = ((min[axis] - o[axis]) / d[axis], (max[axis] - o[axis]) / d[axis]);
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
+        }
+        near < far
     }
 }

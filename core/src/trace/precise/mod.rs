@@ -203,7 +203,8 @@ impl Precise {
 ///
 /// Not made within `get_or_init`: there a thread of rayon's that waits for others may take up another query, which waits for this very cell; and
 /// a process that is forked meanwhile would wait for a thread that it does not have.
-fn made_outside<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+#[doc(hidden)]
+pub fn made_outside<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     cell.get().unwrap_or_else(|| {
         let made = make();
         cell.get_or_init(|| made)

@@ -80,19 +80,19 @@ pub unsafe extern "C-unwind" fn rtcGetDeviceError(device: *const Device) -> u32 
     }
 }
 
-/// The name of an error.
+/// An error in words, which are Embree's.
 #[cfg(feature = "v4")]
 #[unsafe(no_mangle)]
 pub extern "C-unwind" fn rtcGetErrorString(error: u32) -> *const c_char {
     let name = match error {
-        0 => c"RTC_ERROR_NONE",
-        1 => c"RTC_ERROR_UNKNOWN",
-        2 => c"RTC_ERROR_INVALID_ARGUMENT",
-        3 => c"RTC_ERROR_INVALID_OPERATION",
-        4 => c"RTC_ERROR_OUT_OF_MEMORY",
-        5 => c"RTC_ERROR_UNSUPPORTED_CPU",
-        6 => c"RTC_ERROR_CANCELLED",
-        7 => c"RTC_ERROR_LEVEL_ZERO_RAYTRACING_SUPPORT_MISSING",
+        0 => c"No Error",
+        1 => c"Unknown error",
+        2 => c"Invalid argument",
+        3 => c"Invalid operation",
+        4 => c"Out of Memory",
+        5 => c"Unsupported CPU",
+        6 => c"Build cancelled",
+        7 => c"Level Zero raytracing support missing",
         _ => c"Invalid error code",
     };
     name.as_ptr()

@@ -25,9 +25,10 @@ impl<T> TimeSteps<T> {
         self.len() == 1
     }
 
-    /// Whether it is there at a time at all.
+    /// Whether it is there at a time at all. At the end of its range what follows on it is, unless that is the end of all time, 1.
     pub fn is_at(&self, time: f32) -> bool {
-        self.is_still() || (self.range.0..=self.range.1).contains(&time)
+        let (begin, end) = self.range;
+        self.is_still() || (begin..end).contains(&time) || time == end && (end >= 1.0 || begin == end)
     }
 
     /// The steps around a time, as [`around`] has them.

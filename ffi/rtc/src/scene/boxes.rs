@@ -6,11 +6,11 @@ use twincast_core::trace::Part;
 use super::committed::{Body, Instance, Item, Record};
 use super::path;
 
-/// Boxes of the second tree, and what is in them; and those of everything at both ends of time.
+/// Boxes of the second tree, each between two places, and what is in them; and those of everything at both ends of time.
 #[derive(Default)]
 pub struct Boxes {
     pub items: Vec<Item>,
-    pub boxes: Vec<Aabb>,
+    pub boxes: Vec<[Aabb; 2]>,
     ends: Option<[Aabb; 2]>,
     /// Those of one primitive at each step.
     steps: Vec<Aabb>,
@@ -35,9 +35,21 @@ impl Boxes {
         if self.steps.iter().any(|bounds| !(bounds.min.cmple(bounds.max).all())) {
             return;
         }
-        self.surround(path::ends(&self.steps, range));
+        let ends = path::ends(&self.steps, range);
+        self.surround(ends);
+        let whole = self.steps.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+        self.put(item, whole, ends, range);
+    }
+
+    /// Adds what is within `whole` at all times of its range and, from time 0 to 1, between `ends`.
+    fn put(&mut self, item: Item, whole: Aabb, ends: [Aabb; 2], (begin, end): (f32, f32)) {
+        // What leads to and fro has ends that may be wider than the whole. Rounded they are as positions between two steps are, and as what is at a step is.
+        let reach = whole.min.abs().max(whole.max.abs()) * 1e-6;
+        let ends = ends.map(|bounds| Aabb { min: bounds.min - reach, max: bounds.max + reach });
+        let is_narrower = ends[0].half_area() + ends[1].half_area() < 1.9 * whole.half_area();
+        let is_within = begin >= 0.0 && end <= 1.0;
         self.items.push(item);
-        self.boxes.push(self.steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
+        self.boxes.push(if is_within && is_narrower { ends } else { [whole; 2] });
     }
 }
 
@@ -72,8 +84,7 @@ pub fn other_boxes(records: &[Option<Record>], parts: &[Part]) -> Boxes {
                     let (whole, ends) = instance_bounds(instance);
                     if whole.min.cmple(whole.max).all() {
                         boxes.surround(ends);
-                        boxes.items.push(item(i));
-                        boxes.boxes.push(whole);
+                        boxes.put(item(i), whole, ends, instance.motion.range());
                     }
                 }
             }

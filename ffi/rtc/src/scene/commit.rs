@@ -52,8 +52,9 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
             None => None,
         });
     }
-    let heeded = heeded(&records, plan.flags);
-    let has_filters = heeded.intersect_filter || heeded.occluded_filter || heeded.argument_filter;
+    let heeded = heeded(&records);
+    let of_queries = plan.flags & scene_flag::FILTER_IN_ARGUMENTS != 0;
+    let has_filters = heeded.intersect_filter || heeded.occluded_filter || of_queries;
     let (parts, is_plain) = solid_parts(&records);
     let boxes = scene.device.install(|| other_boxes(&records, &parts))?;
     let count: usize = parts.iter().map(|part| part.primitives.len()).sum();
@@ -67,7 +68,7 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
     let (solid, others) = scene.device.install(|| {
         let options = Options { preset, progress: Some(&progressed), ..Options::default() };
         let solid = (count > 0).then(|| Bvh::build_with(&world(parts), options));
-        let others = (!boxes.boxes.is_empty()).then(|| BoxTree::build(&boxes.boxes, options));
+        let others = (!boxes.boxes.is_empty()).then(|| BoxTree::moving(&boxes.boxes, options));
         (solid, others)
     })?;
     let bounds = boxes.ends();
@@ -149,18 +150,13 @@ fn instances(kind: Kind, state: &geometry::State) -> Result<Vec<Instance>> {
     (0..count).map(place).collect()
 }
 
-fn heeded(records: &[Option<Record>], flags: u32) -> Heeded {
+fn heeded(records: &[Option<Record>]) -> Heeded {
     let mut masks = records.iter().flatten().map(|record| record.mask);
     let first = masks.next();
     let functions = || records.iter().flatten().map(|record| &record.functions);
     let intersect_filter = functions().any(|functions| functions.intersect_filter.is_some());
     let occluded_filter = functions().any(|functions| functions.occluded_filter.is_some());
-    Heeded {
-        mask: first.filter(|&first| masks.all(|mask| mask == first)),
-        intersect_filter,
-        occluded_filter,
-        argument_filter: flags & scene_flag::FILTER_IN_ARGUMENTS != 0 || intersect_filter || occluded_filter,
-    }
+    Heeded { mask: first.filter(|&first| masks.all(|mask| mask == first)), intersect_filter, occluded_filter }
 }
 
 /// Surfaces that stand still, and whether each of their triangles is a primitive.

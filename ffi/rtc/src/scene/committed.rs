@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use twincast_core::math::{Aabb, DAffine3};
 use twincast_core::trace::bvh::{BoxTree, Bvh};
+use twincast_core::trace::precise::made_outside;
 
 use crate::abi::RTCBounds;
 use crate::device::Device;
@@ -64,8 +65,6 @@ pub struct Heeded {
     pub mask: Option<u32>,
     pub intersect_filter: bool,
     pub occluded_filter: bool,
-    /// Whether filters that come with a query are run, of all geometries or of some.
-    pub argument_filter: bool,
 }
 
 /// A committed scene.
@@ -102,7 +101,7 @@ impl Committed {
             is_plain: true,
             others: None,
             items: Vec::new(),
-            heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false, argument_filter: false },
+            heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false },
             bounds: [Aabb::EMPTY; 2],
             excludes_start: false,
             near: OnceLock::new(),
@@ -122,7 +121,7 @@ impl Committed {
     /// Where the system gives none to a process that was forked; it is told as an error.
     pub fn near(&self) -> &Near {
         let make = || self.device.install(|| Near::new(self)).unwrap_or_else(|failure| panic!("{}", failure.message));
-        self.near.get_or_init(make)
+        made_outside(&self.near, make)
     }
 }
 

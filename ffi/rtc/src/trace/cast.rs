@@ -47,7 +47,8 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
     let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
     match heeded.mask {
         Some(own) if own & mask == 0 => Sight::Nothing,
-        Some(_) if !(has_filter || heeded.argument_filter && query.filter.is_some()) => Sight::Everything,
+        // A filter that comes with the query is run whether the scene was told to expect one or not, as in Embree by single rays.
+        Some(_) if !(has_filter || query.filter.is_some()) => Sight::Everything,
         _ => Sight::Some,
     }
 }

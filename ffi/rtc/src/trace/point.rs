@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use twincast_core::math::{Affine3, DAffine3, Vec3};
+use twincast_core::math::{self, Affine3, DAffine3, Vec3};
 use twincast_core::trace::bvh::Search;
 
 use crate::abi::{
@@ -139,12 +139,7 @@ impl Search1 {
 
 /// By what all distances change under a transform; 0 where they change differently.
 fn similarity(transform: &DAffine3) -> f64 {
-    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis];
-    let square = x.length_squared();
-    let slack = 1e-5 * square;
-    let is_alike = (y.length_squared() - square).abs() <= slack && (z.length_squared() - square).abs() <= slack;
-    let is_square = x.dot(y).abs() <= slack && y.dot(z).abs() <= slack && z.dot(x).abs() <= slack;
-    if is_alike && is_square { square.sqrt() } else { 0.0 }
+    math::similarity(&transform.matrix3, 1e-5).unwrap_or(0.0)
 }
 
 /// By columns.

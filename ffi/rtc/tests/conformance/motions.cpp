@@ -212,9 +212,50 @@ static void ranges() {
   }
   rtcReleaseScene(early);
   rtcReleaseScene(within);
+  // Where one range ends the next begins: there is one of both; at the end of time the last is there.
+  RTCScene both = rtcNewScene(w.device);
+  for (int i = 0; i < 2; i++) {
+    g = w.mesh(RTC_GEOMETRY_TYPE_TRIANGLE, {at(0), at(0)}, {0, 1, 2});
+    rtcSetGeometryTimeRange(g, 0.5f * i, 0.5f + 0.5f * i);
+    w.add(g, both);
+  }
+  rtcCommitScene(both);
+  for (float time : {0.f, 0.25f, 0.5f, 0.75f, 1.f})
+    CHECK(shoot(both, {0.25f, 0.25f, 1}, {0, 0, -1}, INFINITY, time).hit.geomID == (time < 0.5f ? 0u : 1u));
+  rtcReleaseScene(both);
+}
+
+// Many small triangles that go far, each of which is where its time says, and nothing else is in the way; with steps on a bend, too.
+static void far_ways() {
+  for (int steps : {2, 5}) {
+    World w;
+    const int n = 40;
+    std::vector<std::vector<Vec>> positions(steps);
+    std::vector<unsigned> indices;
+    for (int k = 0; k < steps; k++) {
+      const float s = float(k) / float(steps - 1), bend = steps > 2 ? 20 * s * s : 0;
+      for (int i = 0; i < n * n; i++) {
+        const float x = float(i % n) + 100 * s, y = float(i / n) + bend, z = 0.01f * float(i);
+        for (Vec p : {Vec{x, y, z}, Vec{x + 0.5f, y, z}, Vec{x, y + 0.5f, z}}) positions[k].push_back(p);
+      }
+    }
+    for (unsigned i = 0; i < unsigned(3 * n * n); i++) indices.push_back(i);
+    w.add(w.mesh(RTC_GEOMETRY_TYPE_TRIANGLE, positions, indices));
+    rtcCommitScene(w.scene);
+    for (int i = 0; i < n * n; i += 7) {
+      const float time = float(i % 11) / 10, at = time * float(steps - 1);
+      const int k = std::min(int(at), steps - 2);
+      const float f = at - float(k);
+      const Vec a = positions[k][3 * i], b = positions[k + 1][3 * i];
+      const Vec p = {a.x + f * (b.x - a.x) + 0.125f, a.y + f * (b.y - a.y) + 0.125f, 100};
+      const RTCRayHit hit = shoot(w.scene, p, {0, 0, -1}, INFINITY, time);
+      CHECK(hit.hit.primID == unsigned(i) && near(hit.ray.tfar, 100 - 0.01f * float(i)));
+    }
+  }
 }
 
 void motions() {
   ranges();
+  far_ways();
   inside_moving();
 }

@@ -82,11 +82,21 @@ impl SlabRay {
     /// The children the ray may hit something in, up to `limit`; and where it enters each, not below 0.
     #[inline(always)]
     pub fn enter<S: Simd>(&self, node: &Node, limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        self.enter_rows::<S>(
+            limit,
+            #[inline(always)]
+            |offset| S::row(node, offset),
+        )
+    }
+
+    /// The same of the rows of bounds that are so many bytes after a node's first one.
+    #[inline(always)]
+    pub fn enter_rows<S: Simd>(&self, limit: f32, row: impl Fn(u32) -> S::V8) -> (<S::V8 as Vector>::Mask, S::V8) {
         let mut near = S::V8::splat(self.tmin);
         let mut far = S::V8::splat(limit);
         for axis in 0..3 {
-            let first = S::row(node, self.first[axis]);
-            let second = S::row(node, self.first[axis] ^ Node::ROW);
+            let first = row(self.first[axis]);
+            let second = row(self.first[axis] ^ Node::ROW);
             let reciprocal = S::V8::splat(self.reciprocal[axis]);
             // The accumulator second, so that a NaN (infinity less infinity) is passed over.
             near = first.mul_add(reciprocal, S::V8::splat(self.near_offset[axis])).max(near);
