@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The layers, from the bottom up. A module may use those in the layers below its own, and itself. `main` is the program.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["output", "memory"],
+    &["output", "memory", "once"],
     &["math"],
     &["ray"],
     &["shape", "image"],
@@ -27,6 +27,7 @@ const UNSAFE: &[&str] = &[
     "core/src/trace/bvh/simd/",
     "core/src/trace/bvh/walk/stack.rs",
     "src/cli/leave.rs",
+    "src/cli/signals.rs",
     "src/image/denoise/device.rs",
     "src/image/denoise/library.rs",
     "src/image/loading.rs",

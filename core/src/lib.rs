@@ -11,6 +11,8 @@ pub mod image;
 pub mod math;
 #[doc(hidden)]
 pub mod memory;
+#[doc(hidden)]
+pub mod once;
 pub mod output;
 pub mod plan;
 #[doc(hidden)]

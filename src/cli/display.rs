@@ -1,6 +1,6 @@
 //! A picture in the making, in the viewer tev (T. Müller's, by its protocol: packets over TCP, as its `src/Ipc.cpp` has them).
 //!
-//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render. What waits to be sent is at most the picture: of a
+//! Packets are sent by a thread of their own, so that a slow viewer does not hold up the render. What waits to be sent is at most the picture, one of each engine: of a
 //! tile that is done again before it was sent, the newest packet. A viewer that goes away during the render is told of at the end, and costs the picture nothing.
 
 use std::collections::BTreeMap;

@@ -173,15 +173,15 @@ pub(super) struct Planes {
     pub(super) list: Vec<openexr::AnyChannel<FlatSamples>>,
 }
 
-/// Reads them, unless `check` refuses width and height. Every channel is decoded: many channels count as many pixels.
-pub(super) fn read_planes(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Planes> {
+/// Reads them, unless `check` refuses width, height and number.
+pub(super) fn read_planes(path: &Path, check: impl FnOnce(u64, u64, u64) -> Result<()>) -> Result<Planes> {
     let meta = read_headers(path)?;
     let header = meta.headers.first().ok_or("no layers")?;
     if header.deep {
         return Err("a deep image; only flat ones are read".to_owned());
     }
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
-    check(width as u64, (height as u64).saturating_mul(header.channels.list.len().div_ceil(4) as u64))?;
+    check(width as u64, height as u64, header.channels.list.len() as u64)?;
     let reader = openexr::read().no_deep_data().largest_resolution_level().all_channels();
     let reader = reader.first_valid_layer().all_attributes().non_parallel();
     let image = guarded(|| reader.from_file(path).map_err(|e| e.to_string()))?;
@@ -193,7 +193,9 @@ pub(super) fn read_planes(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -
 }
 
 fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
-    let Planes { width, height, list: planes } = read_planes(path, check)?;
+    // Every channel is decoded: many channels count as many pixels.
+    let by_pixels = |width, height: u64, count: u64| check(width, height.saturating_mul(count.div_ceil(4)));
+    let Planes { width, height, list: planes } = read_planes(path, by_pixels)?;
     let plane = |name: &str| planes.iter().find(|c| c.name == *name).map(|c| &c.sample_data);
     let colours = match (plane("R"), plane("G"), plane("B"), plane("Y")) {
         (Some(r), Some(g), Some(b), _) => vec![r, g, b],

@@ -50,7 +50,7 @@ pub(super) fn write(
 
 /// Every channel of a file, unless `check` refuses its width and height.
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Channels> {
-    let Planes { width, height, list } = read_planes(path, check)?;
+    let Planes { width, height, list } = read_planes(path, |width, height, _| check(width, height))?;
     let channels = list.into_iter().map(|channel| {
         let plane = match channel.sample_data {
             FlatSamples::F16(values) => Plane::Float(values.into_iter().map(f16::to_f32).collect()),

@@ -153,8 +153,8 @@ fn few_samples_keep_what_is_even_and_stay_near_what_is_there() {
     let aside = Camera::look_at(DVec3::Y, DVec3::Y * 2.0, DVec3::Z, 1.0).unwrap();
     for filter in Filter::ALL {
         for sampling in Sampling::ALL {
-            for spp in [1, 2, 3, 4, 5, 8, 16] {
-                let settings = Settings { filter, sampling, ..settings(24, 24, spp) };
+            for spp in [1, 2, 4, 5, 16] {
+                let settings = Settings { filter, sampling, ..settings(16, 16, spp) };
                 let even = picture(&grey, &aside, &settings);
                 let is_even =
                     even.pixels.iter().all(|p| (*p - Vec4::new(0.5, 0.5, 0.5, 1.0)).abs().max_element() < 1e-6);

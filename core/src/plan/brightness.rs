@@ -23,9 +23,8 @@ pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     });
     let behind = scene.background.map_or(0.0, |color| color.max_element());
     let fog = scene.fog.map_or(0.0, |fog| fog.color.max_element());
-    let tint = brightest_color(scene);
-    let of_look = |look: Material| surface(&look, scene.ambient.max_element(), arriving + environment);
-    let of_material = |material: &Material| looks(material, tint).map(of_look).fold(0.0, f32::max);
+    let (tint, ambient) = (largest_tint(scene), scene.ambient.max_element());
+    let of_material = |material: &Material| surface(material, tint, ambient, arriving + environment);
     let surfaces = scene.materials.iter().map(of_material).fold(0.0, f32::max);
     let denser: f32 = scene.materials.iter().map(density).product();
     [environment, behind, fog, surfaces].into_iter().fold(1.0, f32::max) * denser
@@ -54,7 +53,7 @@ fn distance(point: DVec3, bounds: Aabb) -> f32 {
 }
 
 /// The largest component of vertices' colours, at least 1.
-fn brightest_color(scene: &Scene) -> f32 {
+fn largest_tint(scene: &Scene) -> f32 {
     let colors = scene.geometries.iter().flat_map(|geometry| match geometry {
         Geometry::Mesh(mesh) => &mesh.colors[..],
         Geometry::Shapes { .. } => &[],
@@ -62,37 +61,50 @@ fn brightest_color(scene: &Scene) -> f32 {
     colors.map(|color| color.truncate().max_element()).fold(1.0, f32::max)
 }
 
-/// What a material may look like where vertices' colours go up to `tint`: no place of it is brighter than the brightest of these. Textures' colours go up to 1;
-/// of one that follows from textures of other things, what it shows is greatest where each of them is 0 or 1, since it is a sum of what rises or falls with each.
-fn looks(material: &Material, tint: f32) -> impl Iterator<Item = Material> {
-    let physical = material.physical;
-    let ends = if physical.is_some() { 1 << 5 } else { 1 };
-    (0..ends).map(move |end| {
-        let pick = |bit: u32| (end >> bit & 1) as f32;
-        let [ambient, diffuse] = match physical {
-            None => [material.ambient, material.diffuse].map(|color| color * tint),
-            Some(physical) => {
-                let here = physical.phong(&Texels {
-                    color: Vec3::splat(tint),
-                    metalness: pick(0),
-                    roughness: pick(1),
-                    transmission: pick(2),
-                    specular: pick(3),
-                    specular_color: Vec3::splat(pick(4)),
-                });
-                return Material { name: String::new(), emission: material.emission, ..here };
-            }
-        };
-        Material { name: String::new(), ambient, diffuse, ..*material }
-    })
+/// What a material may look like where vertices' colours go up to `tint`, so that no part of what any place of it shows (matte, highlight, ambient) is brighter than
+/// in the brightest of these. Textures' colours go up to 1. Of one that follows from textures of other things, each part is a convex function of each of them, which
+/// is greatest at 0 or 1, and rises or falls with the components of a colour one by one.
+fn looks(material: &Material, tint: f32) -> Vec<Material> {
+    let Some(physical) = material.physical else {
+        let [ambient, diffuse] = [material.ambient, material.diffuse].map(|color| color * tint);
+        return vec![Material { ambient, diffuse, ..material.clone() }];
+    };
+    let mut looks = Vec::new();
+    for specular_color in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE] {
+        for ends in 0..1 << 4 {
+            let pick = |bit: u32| (ends >> bit & 1) as f32;
+            let here = physical.phong(&Texels {
+                color: Vec3::splat(tint),
+                metalness: pick(0),
+                roughness: pick(1),
+                transmission: pick(2),
+                specular: pick(3),
+                specular_color,
+            });
+            let Material { ambient, diffuse, specular, shininess, .. } = here;
+            looks.push(Material { ambient, diffuse, specular, shininess, ..material.clone() });
+        }
+    }
+    looks
 }
 
 /// What a surface shows at most of its own, of ambient light, and of what arrives from lights.
-fn surface(material: &Material, ambient: f32, arriving: f32) -> f32 {
-    let peak = material.highlight_scale().unwrap_or(1.0).max(1.0);
-    let lit = material.diffuse.max_element() + material.specular.max_element() * peak;
-    let reflected = if lit > 0.0 { lit * arriving } else { 0.0 };
-    material.emission.max_element() + material.ambient.max_element() * ambient + reflected
+fn surface(material: &Material, tint: f32, ambient: f32, arriving: f32) -> f32 {
+    let (mut around, mut matte, mut highlight) = (0f32, 0f32, 0f32);
+    for look in looks(material, tint) {
+        let peak = look.highlight_scale().unwrap_or(1.0).max(1.0);
+        around = around.max(look.ambient.max_element());
+        matte = matte.max(look.diffuse.max_element());
+        highlight = highlight.max(look.specular.max_element() * peak);
+    }
+    let lit = matte + highlight;
+    let reflected = match lit > 0.0 {
+        // Its colour, whatever arrives.
+        _ if material.unlit => matte,
+        true => lit * arriving,
+        false => 0.0,
+    };
+    material.emission.max_element() + around * ambient + reflected
 }
 
 /// By how much light is denser on one side of a surface than on the other.
@@ -105,7 +117,9 @@ fn density(material: &Material) -> f32 {
 mod tests {
     use super::*;
     use crate::math::Vec4;
-    use crate::scene::{Attenuation, Mesh, MetallicRoughness, Physical, PhysicalTextures, Workflow};
+    use crate::scene::{
+        Attenuation, Mesh, MetallicRoughness, Physical, PhysicalTextures, SpecularGlossiness, Workflow,
+    };
 
     /// A triangle from zero to 1 along x and y, of a material, and a light.
     fn bound_of(material: Material, light: Light) -> f32 {
@@ -149,6 +163,22 @@ mod tests {
             let bound = bound_of(spotted.clone(), sun.clone());
             assert!(bound >= shown && bound <= 25.0, "{texel}: {bound} {shown}");
         }
+        // What mirrors red alone there is matte in it as well.
+        let workflow = Workflow::SpecularGlossiness(SpecularGlossiness {
+            diffuse: Vec3::new(0.1, 0.0, 0.0),
+            specular: Vec3::new(0.5, 0.6, 0.0),
+            glossiness: 1.0,
+        });
+        let textures = PhysicalTextures { specular_color: Some(0), ..PhysicalTextures::default() };
+        let plated = Material { physical: Some(Physical { workflow, textures }), ..matte() };
+        for specular_color in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE, Vec3::new(1.0, 0.83, 0.0)] {
+            let here = workflow_look(&plated, &Texels { specular_color, ..Texels::default() });
+            let shown = 10.0 * (here.diffuse + here.specular).max_element();
+            assert!(bound_of(plated.clone(), sun.clone()) >= shown.max(1.0), "{specular_color}");
+        }
+        let shown = Material { unlit: true, diffuse: Vec3::splat(40.0), ..matte() };
+        let dim = Light::Directional { direction: DVec3::NEG_Z, color: Vec3::splat(0.01) };
+        assert_eq!(bound_of(shown, dim), 40.0);
         let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
         let mesh = Mesh { colors: vec![Vec4::ONE, Vec4::new(1.0, 6.0, 1.0, 1.0), Vec4::ONE], ..mesh };
         let mut scene = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![matte()]);

@@ -106,6 +106,14 @@ impl Drop for Threads {
     }
 }
 
+/// The whole number that a value of a configuration begins with, of which no point makes another number.
+fn whole(value: &str) -> Result<i64> {
+    let end = value.char_indices().find(|&(i, c)| !(c.is_ascii_digit() || i == 0 && "+-".contains(c)));
+    let (digits, rest) = value.split_at(end.map_or(value.len(), |(i, _)| i));
+    let number = digits.parse().ok().filter(|_| !rest.starts_with('.'));
+    number.ok_or_else(|| Failure::unknown("a device's threads and verbose are whole numbers"))
+}
+
 /// So many threads, 0 for one a processor.
 fn pool(count: usize) -> Result<ThreadPool> {
     let failed = |error| Failure { code: Code::OutOfMemory, message: format!("threads: {error}") };
@@ -117,25 +125,19 @@ impl Device {
     /// with most.
     ///
     /// # Errors
-    /// For one of these two whose value is no whole number, which is told without a device.
+    /// For one of these two that has a value which does not begin with a whole number, which is told without a device.
     pub fn new(configuration: &str) -> Result<Self> {
         let mut device = Self::default();
         for part in configuration.split([',', ' ', '\t', '\n']) {
-            let (name, value) = part.split_once('=').unwrap_or((part, ""));
-            let number = || {
-                value
-                    .trim()
-                    .parse::<usize>()
-                    .map_err(|_| Failure::unknown("a device's threads and verbose are whole numbers"))
-            };
-            match name.trim() {
+            let Some((name, value)) = part.split_once('=') else { continue };
+            match name {
                 "threads" => {
-                    let threads = number()?;
+                    let threads = whole(value)?;
                     if threads > 0 {
-                        device.threads = Threads::new(threads)?;
+                        device.threads = Threads::new(threads as usize)?;
                     }
                 }
-                "verbose" => device.verbose = number()? > 0,
+                "verbose" => device.verbose = whole(value)? > 0,
                 _ => {}
             }
         }

@@ -97,9 +97,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     for camera in &scene.cameras {
         view(camera, width, height, out)?;
     }
-    if let Some(background) = scene.background {
-        writeln!(out, "b {}", spaced(background))?;
-    }
+    writeln!(out, "b {}", spaced(scene.background.unwrap_or_default()))?;
     for light in &scene.lights {
         if let Light::Point { position, color, .. } = light {
             writeln!(out, "l {} {}", spaced_f64(*position), spaced(*color))?;

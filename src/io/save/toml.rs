@@ -62,7 +62,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
                 Geometry::Shapes { shapes, material } => {
                     for shape in shapes {
                         write_shape(shape, &prefix, out)?;
-                        writeln!(out, "material = {}\n", names[*material as usize])?;
+                        writeln!(out, "material = {}\n", quoted(&names[*material as usize]))?;
                     }
                 }
             }
@@ -79,7 +79,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// What materials are called, in quotes: by their own names where these tell them apart.
+/// What materials are called: by their own names where these tell them apart.
 fn names(materials: &[Material]) -> Vec<String> {
     let mut taken: HashSet<&str> = HashSet::new();
     let own: Vec<bool> = materials.iter().map(|m| !m.name.is_empty() && taken.insert(&m.name)).collect();
@@ -90,7 +90,7 @@ fn names(materials: &[Material]) -> Vec<String> {
         }
         name
     };
-    let name = |(i, is_own): (usize, bool)| quoted(&if is_own { materials[i].name.clone() } else { numbered(i) });
+    let name = |(i, is_own): (usize, bool)| if is_own { materials[i].name.clone() } else { numbered(i) };
     own.into_iter().enumerate().map(name).collect()
 }
 
@@ -252,7 +252,8 @@ fn write_light(light: &Light, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn write_material(material: &Material, name: &str, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[material.{name}]")?;
+    let is_bare = !name.is_empty() && name.bytes().all(|c| c.is_ascii_alphanumeric() || b"_-".contains(&c));
+    writeln!(out, "[material.{}]", if is_bare { name.to_owned() } else { quoted(name) })?;
     if material.unlit {
         let Material { diffuse, emission, .. } = material;
         writeln!(out, "type = \"unlit\"\ndiffuse = {}\nemission = {}", list(*diffuse), list(*emission))?;
@@ -292,14 +293,15 @@ fn write_lit(material: &Material, out: &mut dyn Write) -> io::Result<()> {
     if let Some(Absorption { color, distance }) = material.absorption.filter(|_| has_inside) {
         writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
     }
-    if let Some(gloss) = material.gloss {
+    // Of what sends nothing on nothing is seen of it, and it is refused.
+    if let Some(gloss) = material.gloss.filter(|_| material.sends_on()) {
         writeln!(out, "gloss = {gloss}")?;
     }
     Ok(())
 }
 
 fn write_mesh(mesh: &Mesh, prefix: &str, material: &str, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[[{prefix}mesh]]\nname = {}\nmaterial = {material}", quoted(&mesh.name))?;
+    writeln!(out, "[[{prefix}mesh]]\nname = {}\nmaterial = {}", quoted(&mesh.name), quoted(material))?;
     // One item a line: a mesh in one line is more than editors take.
     fn column<T>(out: &mut dyn Write, key: &str, items: &[T], line: impl Fn(&T) -> String) -> io::Result<()> {
         writeln!(out, "{key} = [")?;

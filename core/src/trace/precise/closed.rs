@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::{Precise, is_traceable, made_outside};
+use super::{Precise, is_traceable};
 use crate::math::DVec3;
+use crate::once::made_outside;
 
 /// More than distances in f64 are off by, relative to the largest coordinate of what they were computed from.
 const ROUNDING: f64 = 1e-13;

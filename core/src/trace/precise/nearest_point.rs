@@ -2,8 +2,9 @@
 //!
 //! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
-use super::{Precise, is_traceable, made_outside};
+use super::{Precise, is_traceable};
 use crate::math::DVec3;
+use crate::once::made_outside;
 use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::shape::triangle::weights_within;
 use crate::trace::bvh::{Bvh, Discs, NearestTriangle, Sought, Surveyor};

@@ -11,8 +11,9 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::{Precise, PreciseMesh, is_traceable, made_outside};
+use super::{Precise, PreciseMesh, is_traceable};
 use crate::math::DVec3;
+use crate::once::made_outside;
 
 /// So many triangles are hashed by one thread at a time.
 const TOGETHER: usize = 4096;

@@ -43,8 +43,9 @@ impl Boxes {
 
     /// Adds what is within `whole` at all times of its range and, from time 0 to 1, between `ends`.
     fn put(&mut self, item: Item, whole: Aabb, ends: [Aabb; 2], (begin, end): (f32, f32)) {
-        // What leads to and fro has ends that may be wider than the whole. Rounded they are as positions between two steps are, and as what is at a step is.
-        let reach = whole.min.abs().max(whole.max.abs()) * 1e-6;
+        // What leads to and fro has ends that may be wider than the whole. In units of 2^-24 of the largest coordinate, a position between two steps is off by 3, by 8
+        // for where between them it is, by as many for when these are, and the line and its distance from it by 8: less than 34 together.
+        let reach = whole.min.abs().max(whole.max.abs()) * 2e-6;
         let ends = ends.map(|bounds| Aabb { min: bounds.min - reach, max: bounds.max + reach });
         let is_narrower = ends[0].half_area() + ends[1].half_area() < 1.9 * whole.half_area();
         let is_within = begin >= 0.0 && end <= 1.0;

@@ -78,6 +78,7 @@ pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
         records,
         solid,
         is_plain,
+        repeats: preset == Preset::High,
         others,
         items: boxes.items,
         heeded,

@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use twincast_core::math::{Aabb, DAffine3};
+use twincast_core::once::made_outside;
 use twincast_core::trace::bvh::{BoxTree, Bvh};
-use twincast_core::trace::precise::made_outside;
 
 use crate::abi::RTCBounds;
 use crate::device::Device;
@@ -76,6 +76,8 @@ pub struct Committed {
     pub solid: Option<Bvh>,
     /// Whether each triangle there is a primitive.
     pub is_plain: bool,
+    /// Whether a ray may come to a triangle of these more than once.
+    pub repeats: bool,
     /// Everything else; none where there is nothing.
     pub others: Option<BoxTree>,
     /// What its boxes are.
@@ -99,6 +101,7 @@ impl Committed {
             records: Vec::new(),
             solid: None,
             is_plain: true,
+            repeats: false,
             others: None,
             items: Vec::new(),
             heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false },

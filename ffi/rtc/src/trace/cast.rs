@@ -132,8 +132,17 @@ pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: 
 #[inline(never)]
 fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target) {
     let ray = target.ray();
+    // Each is shown once, to filters that count.
+    let mut shown = Vec::new();
     solid.visit_triangles(&for_triangles(committed, &ray), &mut |found| {
         let hit = &found.hit;
+        if committed.repeats {
+            let name = (hit.geometry, hit.primitive);
+            if shown.contains(&name) {
+                return onwards(&target);
+            }
+            shown.push(name);
+        }
         if let Some(record) = committed.record(hit.geometry)
             && record.mask & ray.mask != 0
             && hit.t <= target.tfar()

@@ -181,6 +181,13 @@ void errors() {
   rtcCommitScene(nullptr);
   CHECK(take(nullptr) == RTC_ERROR_INVALID_ARGUMENT);
 
+  // What Embree passes over, and what it does not.
+  for (const char* good : {"", "verbose", "threads = 2", "verbose=-1", "threads=2;verbose=0", "threads=2x", "isa=avx2,nothing=1"}) {
+    RTCDevice passing = rtcNewDevice(good);
+    CHECK(passing && rtcGetDeviceError(passing) == RTC_ERROR_NONE);
+    if (passing) rtcReleaseDevice(passing);
+  }
+  for (const char* bad : {"threads=abc", "verbose=x", "threads=", "threads=1.5"}) CHECK(!rtcNewDevice(bad) && rtcGetDeviceError(nullptr) == RTC_ERROR_UNKNOWN);
   RTCDevice device = rtcNewDevice("threads=2,verbose=0");
   CHECK(take(device) == RTC_ERROR_NONE);
   rtcSetDeviceErrorFunction(
