@@ -31,9 +31,11 @@ test: packages ## run the tests of library and program
 	$(CARGO) test --locked
 
 # The longest tests of the native tracer alone and of how samples are spread, which are the same on every system: `make test` has run them.
-NATIVE = brute_force:: stress::native render::adaptive::
+NATIVE = brute_force:: stress::native stress::mutants accelerators:: render::adaptive:: documents::of_growth
 # Those that no feature changes, either, but for what Embree itself does.
-FEATURELESS = $(NATIVE) stress::the_matrix render::determinism:: render::transport:: accelerators::matrix::
+FEATURELESS = $(NATIVE) stress::the_matrix render::determinism:: render::transport::
+# What no library of the system changes, besides: how files are read, and that a render goes on where it was killed.
+SYSTEMLESS = $(NATIVE) mutation:: resume::a_render
 # With the Python package, so that one library serves both: who depends on a crate decides on its features.
 WITHOUT_FEATURES = --no-default-features -p twincast -p twincast-python
 
@@ -60,7 +62,7 @@ stress-long: build ## a hundred million random rays and ten million difficult on
 	$(TWINCAST) stress --search 3600 --seed 1 -o out/stress
 
 test-embree4: ## run the tests on Debian 13, with its Embree 4 and OpenImageIO 2.5; scripts/test-embree4.sh runs every one
-	@scripts/test-embree4.sh -- $(addprefix --skip ,$(NATIVE))
+	@scripts/test-embree4.sh -- $(addprefix --skip ,$(SYSTEMLESS))
 
 install: build ## put binary, man pages and completions under PREFIX (/usr/local); honours DESTDIR
 	install -Dm755 $(TWINCAST) '$(DESTDIR)$(PREFIX)/bin/twincast'
