@@ -28,11 +28,6 @@ pub(super) fn make_finite(geometry: &mut Geometry) -> usize {
     each(&mut mesh.colors, [0.0, 0.0, 0.0, 1.0]) + uvs(&mut mesh.uvs) + uvs(&mut mesh.second_uvs)
 }
 
-/// The largest component of a vertex's colour.
-pub(super) fn brightest_color(mesh: &Mesh) -> f32 {
-    mesh.colors.par_iter().with_min_len(TASK).map(|color| color.truncate().max_element()).reduce(|| 0.0, f32::max)
-}
-
 impl Normals {
     /// Gives a mesh the normals that are wanted.
     pub(super) fn apply(self, mesh: &mut Mesh) {

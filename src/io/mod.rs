@@ -34,11 +34,11 @@ pub use self::format::SUFFIXES;
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save};
 
-use self::finish::{bare, brightest_color, doubt_bare, make_finite, meshes};
+use self::finish::{bare, doubt_bare, make_finite, meshes};
 use crate::error::{Error, Result, Warning};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
-use crate::scene::{Geometry, Scene, fault};
+use crate::scene::{Geometry, Mesh, Scene, fault};
 
 /// How a file is understood.
 #[derive(Clone, Debug, Default)]
@@ -168,7 +168,7 @@ pub fn load_watched(
         );
         warnings.push(Warning::new(path, "", message));
     }
-    let brightest = meshes(&scene).map(brightest_color).fold(0.0, f32::max);
+    let brightest = meshes(&scene).map(Mesh::brightest_color).fold(0.0, f32::max);
     // Of meshes that a scene includes it has been told.
     if brightest > MOST_BY_ROUNDING && format != Format::Toml {
         let message = format!(

@@ -54,11 +54,11 @@ fn distance(point: DVec3, bounds: Aabb) -> f32 {
 
 /// The largest component of vertices' colours, at least 1.
 fn largest_tint(scene: &Scene) -> f32 {
-    let colors = scene.geometries.iter().flat_map(|geometry| match geometry {
-        Geometry::Mesh(mesh) => &mesh.colors[..],
-        Geometry::Shapes { .. } => &[],
-    });
-    colors.map(|color| color.truncate().max_element()).fold(1.0, f32::max)
+    let of_geometry = |geometry: &Geometry| match geometry {
+        Geometry::Mesh(mesh) => mesh.brightest_color(),
+        Geometry::Shapes { .. } => 1.0,
+    };
+    scene.geometries.iter().map(of_geometry).fold(1.0, f32::max)
 }
 
 /// What a material may look like where vertices' colours go up to `tint`, so that no part of what any place of it shows (matte, highlight, ambient) is brighter than
@@ -98,11 +98,13 @@ fn surface(material: &Material, tint: f32, ambient: f32, arriving: f32) -> f32 {
         highlight = highlight.max(look.specular.max_element() * peak);
     }
     let lit = matte + highlight;
-    let reflected = match lit > 0.0 {
+    let reflected = if material.unlit {
         // Its colour, whatever arrives.
-        _ if material.unlit => matte,
-        true => lit * arriving,
-        false => 0.0,
+        matte
+    } else if lit > 0.0 {
+        lit * arriving
+    } else {
+        0.0
     };
     material.emission.max_element() + around * ambient + reflected
 }

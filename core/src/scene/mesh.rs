@@ -123,6 +123,11 @@ impl Mesh {
         self.triangles.par_iter().with_min_len(TASK).filter(|corners| corners.iter().any(bad)).count()
     }
 
+    /// The largest component of a vertex's colour; 0 without colours.
+    pub fn brightest_color(&self) -> f32 {
+        self.colors.par_iter().with_min_len(TASK).map(|color| color.truncate().max_element()).reduce(|| 0.0, f32::max)
+    }
+
     /// Gives the mesh smooth shading normals: at each vertex the mean of the adjacent triangles' normals, weighted by
     /// the angle at the corner (Thürmer and Wüthrich 1998, *Computing vertex normals from polygonal facets*).
     /// Vertices that no triangle with an area uses get the zero vector, which shades as flat. A triangle that no ray can hit has none.

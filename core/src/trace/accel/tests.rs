@@ -17,6 +17,18 @@ use crate::ray::Ray;
 use crate::scene::{Geometry, Mesh, Scene};
 use crate::trace::World;
 
+/// Calls a check of one index, which is told its name, for each of them.
+macro_rules! for_every_index {
+    ($check:ident) => {
+        $check::<Groups>("groups");
+        $check::<Binary>("binary");
+        $check::<Grid>("grid");
+        $check::<Octree>("octree");
+        $check::<KdTree>("kd");
+        $check::<Bsp>("bsp");
+    };
+}
+
 /// A whole number from -n to n.
 fn whole(random: &mut Random, n: u64) -> f32 {
     random.below(2 * n + 1) as f32 - n as f32
@@ -142,12 +154,7 @@ fn visits_stop_when_told_and_behind_the_limit() {
         assert!((1..=24).contains(&stopped.len()), "{name}: {stopped:?}");
         assert!((10..60).contains(&limited.len()) && limited.contains(&9), "{name}: {limited:?}");
     }
-    check::<Groups>("groups");
-    check::<Binary>("binary");
-    check::<Grid>("grid");
-    check::<Octree>("octree");
-    check::<KdTree>("kd");
-    check::<Bsp>("bsp");
+    for_every_index!(check);
 }
 
 /// Small triangles of all directions on a sphere and some large ones.
@@ -234,10 +241,5 @@ fn the_first_hit_is_enough() {
             assert_eq!(found, 1, "{name}");
         }
     }
-    check::<Groups>("groups");
-    check::<Binary>("binary");
-    check::<Grid>("grid");
-    check::<Octree>("octree");
-    check::<KdTree>("kd");
-    check::<Bsp>("bsp");
+    for_every_index!(check);
 }
