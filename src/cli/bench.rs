@@ -152,7 +152,7 @@ enum ModeArg {
     Default,
     /// Native, built fastest
     NativeFast,
-    /// Native, built best: large triangles are cut up beforehand
+    /// Native, built best: large triangles are in several leaves
     NativeHigh,
     /// Native, in least memory
     NativeCompact,

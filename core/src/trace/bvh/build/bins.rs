@@ -80,27 +80,44 @@ impl<const N: usize> Bins<N> {
         sums.join::<S>(others);
     }
 
+    /// Holds what either holds.
+    pub fn join<S: Simd>(&mut self, others: &Self) {
+        self.sums.join::<S>(&others.sums);
+    }
+
     /// The cheapest plane that leaves something on both sides; None where all centres coincide.
     #[inline(always)]
     pub fn best<S: Simd>(&self, grid: &Grid, rule: &Rule) -> Option<Split> {
-        let nothing = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
-        let mut right_costs = [[0.0; 4]; N];
-        let (mut right, mut count) = nothing;
-        for (bin, right_cost) in right_costs.iter_mut().enumerate().skip(1).rev() {
-            right = join(right, load::<S>(&self.sums.boxes[bin]));
-            add_up(&mut count, &self.sums.counts[bin]);
-            *right_cost = cost::<S>(right, &count, rule).to_array();
-        }
-        let mut cheapest = Cheapest::<S>::new();
-        let (mut left, mut count) = nothing;
-        for (bin, right_cost) in right_costs.iter().enumerate().skip(1) {
-            left = join(left, load::<S>(&self.sums.boxes[bin - 1]));
-            add_up(&mut count, &self.sums.counts[bin - 1]);
-            cheapest.offer(bin, cost::<S>(left, &count, rule).add(S::V4::load(right_cost)));
-        }
-        let (axis, bin, cost) = cheapest.found()?;
+        let Sums { boxes, counts } = &self.sums;
+        let (axis, bin, cost) = swept::<S, N>(boxes, [counts, counts], rule)?;
         Some(Split { cut: Cut::Plane { axis, at: grid.border(axis, bin) }, cost })
     }
+}
+
+/// The cheapest plane before a bin that leaves something on both sides: its axis, the bin, and what it costs. Of what is in the bins on each axis
+/// there are numbers of two kinds: `counts[0]` for who are before a plane, `counts[1]` for who are behind it.
+#[inline(always)]
+pub(super) fn swept<S: Simd, const N: usize>(
+    boxes: &[[[f32; 8]; 3]; N],
+    counts: [&[[u32; 4]; N]; 2],
+    rule: &Rule,
+) -> Option<(usize, usize, f32)> {
+    let nothing = ([S::V8::splat(f32::NEG_INFINITY); 3], [0u32; 4]);
+    let mut right_costs = [[0.0; 4]; N];
+    let (mut right, mut count) = nothing;
+    for (bin, right_cost) in right_costs.iter_mut().enumerate().skip(1).rev() {
+        right = join(right, load::<S>(&boxes[bin]));
+        add_up(&mut count, &counts[1][bin]);
+        *right_cost = cost::<S>(right, &count, rule).to_array();
+    }
+    let mut cheapest = Cheapest::<S>::new();
+    let (mut left, mut count) = nothing;
+    for (bin, right_cost) in right_costs.iter().enumerate().skip(1) {
+        left = join(left, load::<S>(&boxes[bin - 1]));
+        add_up(&mut count, &counts[0][bin - 1]);
+        cheapest.offer(bin, cost::<S>(left, &count, rule).add(S::V4::load(right_cost)));
+    }
+    cheapest.found()
 }
 
 impl<const N: usize> Sums<N> {

@@ -125,7 +125,7 @@ mod tests {
     use crate::trace::bvh::simd::Portable;
     use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
-    const RULE: Rule = Rule { block: 2, leaf: 6 };
+    const RULE: Rule = Rule { block: 2, leaf: 6, samples: true };
 
     /// A binary tree, told by what is at its ends.
     enum Shape {

@@ -12,7 +12,7 @@
 //! | `collapse` | which branches of that become nodes |
 //! | `children` | a node above the subtrees |
 //! | `subtree`, `top` | small ranges, large ones |
-//! | `presplit` | large triangles in several places: the high preset |
+//! | `spatial/` | large triangles in several places: the high preset |
 //! | `morton` | neighbours along a curve: the fast preset |
 //!
 //! Ranges of items are divided in two until they fill a block, and of the branches of that binary tree those become nodes that make the
@@ -29,8 +29,8 @@ mod children;
 mod collapse;
 pub(super) mod morton;
 pub(super) mod preset;
-pub(super) mod presplit;
 mod record;
+pub(super) mod spatial;
 mod split;
 mod subtree;
 mod sweep;
@@ -38,7 +38,7 @@ mod top;
 
 use rayon::prelude::*;
 
-use self::preset::Options;
+use self::preset::{Options, Preset};
 use super::node::{Child, Node};
 use super::tree::Tree;
 use crate::memory::room;
@@ -102,7 +102,8 @@ pub(super) fn build_beside(others: usize, items: &mut [Record], block: u32, most
     }
     let threads = rayon::current_num_threads();
     let is_small = threads > 1 && items.len().saturating_mul(1 + others) < threads * FEW * TASK as usize;
-    let builder = Builder { rule: &Rule { block, leaf: block * most }, is_small, options };
+    let rule = Rule { block, leaf: block * most, samples: options.preset != Preset::High };
+    let builder = Builder { rule: &rule, is_small, options };
     let whole = top::whole(items, options.isa.demand());
     Tree::new(in_order(builder.build(whole, items, 0)))
 }

@@ -13,6 +13,8 @@ pub(super) struct Rule {
     pub block: u32,
     /// Most items in a leaf.
     pub leaf: u32,
+    /// Whether large ranges are judged by a part of their items: few that are much larger than all others are not seen then.
+    pub samples: bool,
 }
 
 impl Rule {
@@ -290,7 +292,7 @@ mod tests {
     #[test]
     fn blocks_are_begun_ones() {
         for block in [1, 2, 4, 8] {
-            let rule = Rule { block, leaf: 4 * block };
+            let rule = Rule { block, leaf: 4 * block, samples: true };
             for count in [0, 1, 2, 7, 8, 9, 31, 32, 33, 1 << 20] {
                 assert_eq!(rule.blocks(count), count.div_ceil(block as usize) as f32);
             }

@@ -137,17 +137,42 @@ pub(super) struct Local<'a, S> {
     rule: &'a Rule,
     items: &'a mut [Record],
     base: u32,
+    finder: Finder<S>,
+}
+
+/// Finds the best way to divide ranges, one after the other.
+pub(super) struct Finder<S> {
     /// Used again and again: to make them costs as much as to fill them with few items.
     few: Bins<{ bins::FEW }>,
     many: Bins<{ bins::MANY }>,
     isa: std::marker::PhantomData<S>,
 }
 
+impl<S: Simd> Finder<S> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { few: Bins::ANY, many: Bins::ANY, isa: std::marker::PhantomData }
+    }
+
+    /// The best way to divide `items`, those of `range`.
+    #[inline(always)]
+    pub fn find(&mut self, items: &[Record], range: &Range, rule: &Rule) -> Split {
+        let best = if items.len() <= sweep::MOST {
+            sweep::best::<S>(items, rule)
+        } else if items.len() < bins::LARGE {
+            binned::<S, _>(&mut self.few, items, range, rule)
+        } else {
+            binned::<S, _>(&mut self.many, items, range, rule)
+        };
+        best.unwrap_or(Split::HALF)
+    }
+}
+
 impl<'a, S: Simd> Local<'a, S> {
     /// Of `items`, the first of which has the index `base`.
     #[inline(always)]
     fn new(rule: &'a Rule, items: &'a mut [Record], base: u32) -> Self {
-        Self { rule, items, base, few: Bins::ANY, many: Bins::ANY, isa: std::marker::PhantomData }
+        Self { rule, items, base, finder: Finder::new() }
     }
 
     /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything else; none where a leaf is no worse.
@@ -163,15 +188,7 @@ impl<'a, S: Simd> Local<'a, S> {
     /// The best way to divide `range`.
     #[inline(always)]
     fn find(&mut self, range: &Range) -> Split {
-        let items = &self.items[range.within(self.base)];
-        let best = if items.len() <= sweep::MOST {
-            sweep::best::<S>(items, self.rule)
-        } else if items.len() < bins::LARGE {
-            binned::<S, _>(&mut self.few, items, range, self.rule)
-        } else {
-            binned::<S, _>(&mut self.many, items, range, self.rule)
-        };
-        best.unwrap_or(Split::HALF)
+        self.finder.find(&self.items[range.within(self.base)], range, self.rule)
     }
 
     /// Does it.
@@ -198,7 +215,7 @@ pub(super) fn binned<S: Simd, const N: usize>(
     rule: &Rule,
 ) -> Option<Split> {
     let grid = Grid::new::<S, N>(&range.centres);
-    if items.len() < 2 * SAMPLE {
+    if items.len() < 2 * SAMPLE || !rule.samples {
         bins.fill::<S>(items.iter(), &grid);
     } else {
         bins.fill::<S>(sample(items), &grid);

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::bins::{Bins, MANY};
+use super::bins::{Bins, Grid, MANY};
 use super::record::Record;
 use super::split::{Range, Rule, Split};
 use super::subtree::binned;
@@ -33,7 +33,18 @@ impl Shared<'_> {
     /// The best way to divide `range`.
     pub fn find(&mut self, range: &Range) -> Split {
         let items = &self.items[range.within(self.base)];
-        isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule }).unwrap_or(Split::HALF)
+        let found = if self.rule.samples {
+            isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule })
+        } else {
+            let grid = Grid::new::<Portable, MANY>(&range.centres);
+            let fill = |items| Box::new(isa::dispatch(self.isa, FillKernel { items, grid: &grid }));
+            let bins = items.par_chunks(CHUNK).map(fill).reduce_with(|mut all, chunk| {
+                all.join::<Portable>(&chunk);
+                all
+            });
+            bins.and_then(|bins| bins.best::<Portable>(&grid, self.rule))
+        };
+        found.unwrap_or(Split::HALF)
     }
 
     /// Does it.
@@ -110,7 +121,7 @@ pub(super) fn parts(
 }
 
 impl Range {
-    fn union(self, other: Self) -> Self {
+    pub(super) fn union(self, other: Self) -> Self {
         let max = |a: [f32; 8], b: [f32; 8]| a.max(b);
         let (bounds, centres) = (max(self.bounds, other.bounds), max(self.centres, other.centres));
         Self { bounds, centres, ..self }
@@ -139,6 +150,22 @@ impl Kernel for FindKernel<'_> {
     fn run<S: Simd>(self) -> Option<Split> {
         let mut bins = Bins::ANY;
         binned::<S, MANY>(&mut bins, self.items, self.range, self.rule)
+    }
+}
+
+/// All items in bins.
+struct FillKernel<'a> {
+    items: &'a [Record],
+    grid: &'a Grid,
+}
+
+impl Kernel for FillKernel<'_> {
+    type Output = Bins<MANY>;
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Bins<MANY> {
+        let mut bins = Bins::ANY;
+        bins.fill::<S>(self.items.iter(), self.grid);
+        bins
     }
 }
 

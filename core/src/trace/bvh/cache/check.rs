@@ -23,7 +23,8 @@ use rayon::prelude::*;
 
 use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
 use crate::trace::Part;
-use crate::trace::bvh::build::{MAX_DEPTH, presplit, triangle_items};
+use crate::trace::bvh::build::preset::Options;
+use crate::trace::bvh::build::{MAX_DEPTH, spatial, triangle_items};
 use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::{Child, Node, WIDTH, widened, widened_corners};
@@ -243,8 +244,7 @@ impl Pass<'_> {
     /// That triangles which no leaf has all of are cut into `pieces` as the builder does it.
     fn check_pieces(&self, mut pieces: Vec<Piece>, parts: &[Part]) -> Result<(), String> {
         pieces.sort_unstable_by_key(|&(number, _)| number);
-        let items = triangle_items(parts);
-        for item in presplit::presplit(&items, self.meshes) {
+        for item in spatial::pieces(triangle_items(parts), self.meshes, &Options::default()) {
             let number = self.meshes.number(item.part(), item.primitive());
             let own = &pieces[pieces.partition_point(|piece| piece.0 < number)..];
             let mut own = own.iter().take_while(|piece| piece.0 == number);

@@ -12,7 +12,7 @@ use crate::shape::triangle::Placed;
 use crate::trace::bvh::PartId;
 use crate::trace::bvh::block::{Block, LANES, Lane};
 use crate::trace::bvh::build::preset::{Options, Preset};
-use crate::trace::bvh::build::{self, presplit};
+use crate::trace::bvh::build::{self, spatial};
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::Child;
 use crate::trace::bvh::reject::filter::Filter;
@@ -55,7 +55,7 @@ impl TriangleTree {
                 let mut items = build::triangle_items(parts);
                 let count = items.len();
                 if options.preset == Preset::High {
-                    items = presplit::presplit(&items, &Meshes::new(parts));
+                    items = spatial::pieces(items, &Meshes::new(parts), options);
                 }
                 let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset.is_compact());
