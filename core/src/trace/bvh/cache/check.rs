@@ -8,7 +8,7 @@
 //! - every box is finite and holds the boxes of the node below it, or the triangles of its leaf, [`widened`]; slots without a child are empty;
 //! - every block is in one leaf, names triangles of the mesh, and has their corners;
 //! - every triangle that can be hit is in a leaf. In the high preset the leaves that name it hold all pieces that it is cut into:
-//!   these are cut once more.
+//!   these are cut once more, which takes as long as it did, so that such a tree is read in little less time than it is built where much is cut.
 //!
 //! What passes gives the hits that a tree built anew gives. It takes a tenth of the time to build: one pass over nodes and
 //! triangles, by all threads. Marks are plain stores and counts are compared in the end, for atomic exchanges took as
@@ -23,11 +23,11 @@ use rayon::prelude::*;
 
 use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
 use crate::trace::Part;
-use crate::trace::bvh::build::preset::Options;
 use crate::trace::bvh::build::{MAX_DEPTH, spatial, triangle_items};
 use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
 use crate::trace::bvh::node::{Child, Node, WIDTH, widened, widened_corners};
+use crate::trace::bvh::simd::isa::Isa;
 use crate::trace::bvh::tree::Tree;
 
 /// Nodes that are gone through by one thread at a time.
@@ -244,7 +244,7 @@ impl Pass<'_> {
     /// That triangles which no leaf has all of are cut into `pieces` as the builder does it.
     fn check_pieces(&self, mut pieces: Vec<Piece>, parts: &[Part]) -> Result<(), String> {
         pieces.sort_unstable_by_key(|&(number, _)| number);
-        for item in spatial::pieces(triangle_items(parts), self.meshes, &Options::default()) {
+        for item in spatial::pieces(triangle_items(parts), self.meshes, Isa::detect().demand()) {
             let number = self.meshes.number(item.part(), item.primitive());
             let own = &pieces[pieces.partition_point(|piece| piece.0 < number)..];
             let mut own = own.iter().take_while(|piece| piece.0 == number);

@@ -55,7 +55,7 @@ impl TriangleTree {
                 let mut items = build::triangle_items(parts);
                 let count = items.len();
                 if options.preset == Preset::High {
-                    items = spatial::pieces(items, &Meshes::new(parts), options);
+                    items = spatial::pieces(items, &Meshes::new(parts), options.isa.demand());
                 }
                 let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
                 let leaves = Leaves::new(&mut tree, &items, parts, options.preset.is_compact());

@@ -1,8 +1,8 @@
 //! Triangles referenced from several places, where that is cheaper: the high preset.
 //!
 //! Splits of space and of objects are weighed by the surface area heuristic, range by range (Stich, Friedrich, Dietrich 2009, *Spatial splits in bounding
-//! volume hierarchies*). Of that only the pieces are kept, and the tree is built over these as over anything else: which branches become nodes is chosen over
-//! more of it than a range sees. Where boxes are small and cover little but their surface, as in a scan or a terrain, no plane is looked for.
+//! volume hierarchies*). Of that only the pieces are kept, and the tree is built over these anew, as over anything else, but that large ranges are not judged by samples:
+//! which branches become nodes is chosen over more of it than a range sees. Where boxes are small and cover little but their surface, as in a scan or a terrain, no plane is looked for.
 //!
 //! Cut beforehand, where planes pass that will divide the scene anyway (Ernst, Greiner 2007, *Early split clipping for bounding volume hierarchies*;
 //! Karras, Aila 2013, *Fast parallel construction of high-quality bounding volume hierarchies*), which is simpler and takes less time, a soup of large triangles
@@ -24,7 +24,6 @@ mod task;
 use rayon::prelude::*;
 
 use super::bins;
-use super::preset::Options;
 use super::record::Record;
 use super::split::{Range, Rule};
 use super::top::Shared;
@@ -45,7 +44,7 @@ const BUDGET: f64 = 0.3;
 const COVERED: f64 = 4.0;
 
 /// A box is large that has this many times the mean surface of its range's boxes, and this share of that of the box around them.
-const LARGE: (f64, f64) = (4.0, 1.0 / 32.0);
+const LARGE_BOX: (f64, f64) = (4.0, 1.0 / 32.0);
 
 /// What of the whole surface the sides of a division may have in common before a plane is looked for that cuts.
 const OVERLAP: f32 = 1e-5;
@@ -56,19 +55,21 @@ const SCARCE: usize = 64;
 /// Items gone through by one thread at a time; fixed, so that nothing depends on threads.
 const CHUNK: usize = 1 << 13;
 
-/// Ranges of at most this many items are one thread's.
-const SMALL: usize = 1 << 13;
+/// Ranges of at most this many items, those among them that may be added, are one thread's.
+const SMALL: usize = 1 << 14;
+
+/// Divisions below each other, at most; no mesh but one made for it gets there.
+const MAX_DEPTH: usize = 64;
 
 /// What the tree's leaves hold.
 const RULE: Rule = Rule { block: LANES as u32, leaf: LANES as u32 * Child::MOST, samples: false };
 
 /// `items`, triangles of `meshes`, and for what is cut one item for each piece; at most 1.3 times as many.
-pub(in crate::trace::bvh) fn pieces(items: Vec<Record>, meshes: &Meshes, options: &Options<'_>) -> Vec<Record> {
-    let isa = options.isa.demand();
+pub(in crate::trace::bvh) fn pieces(items: Vec<Record>, meshes: &Meshes, isa: Present) -> Vec<Record> {
     let spare = ((items.len() as f64 * BUDGET) as usize).min(Child::NAMES.saturating_sub(items.len()));
     let whole = Extent::of_many(&items, isa);
     let overlap = OVERLAP * whole.range.half_area();
-    let mut parts = Splitter { meshes, isa, overlap }.divide(items, &whole, spare);
+    let mut parts = Splitter { meshes, isa, overlap }.divide(items, &whole, spare, 0);
     if parts.len() == 1 {
         return parts.remove(0);
     }
@@ -118,7 +119,8 @@ impl Extent {
     /// Its share in what may be added: none where nothing is looked for.
     fn weight(&self) -> f64 {
         let (area, mean) = (f64::from(self.range.half_area()), self.surface / f64::from(self.range.len));
-        let is_fine = self.surface <= COVERED * area && f64::from(self.largest) <= (LARGE.0 * mean).max(LARGE.1 * area);
+        let is_fine =
+            self.surface <= COVERED * area && f64::from(self.largest) <= (LARGE_BOX.0 * mean).max(LARGE_BOX.1 * area);
         if self.range.len <= RULE.block || is_fine || !self.surface.is_finite() { 0.0 } else { self.surface }
     }
 }
@@ -132,13 +134,13 @@ struct Splitter<'a> {
 }
 
 impl Splitter<'_> {
-    /// Pieces of `items`, the range `extent`, of which there may be `spare` more.
-    fn divide(&self, mut items: Vec<Record>, extent: &Extent, spare: usize) -> Vec<Vec<Record>> {
+    /// Pieces of `items`, the range `extent` with so many divisions above it, of which there may be `spare` more.
+    fn divide(&self, mut items: Vec<Record>, extent: &Extent, spare: usize, depth: usize) -> Vec<Vec<Record>> {
         let range = &extent.range;
-        if !extent.may_be_cut(spare) {
+        if !extent.may_be_cut(spare) || depth == MAX_DEPTH {
             return vec![items];
         }
-        if items.len() <= SMALL {
+        if items.len() + spare <= SMALL {
             return vec![isa::dispatch(self.isa, TaskKernel { splitter: self, items, extent: *extent, spare })];
         }
         let mut shared = Shared { rule: &RULE, items: &mut items, base: 0, isa: self.isa };
@@ -150,6 +152,8 @@ impl Splitter<'_> {
         let sides = plane.map(|plane| plane.sides_of(&items, self.meshes, spare));
         let sides = sides.filter(|sides| sides.iter().all(|side| !side.is_empty())).unwrap_or_else(|| {
             let right = items.split_off(halves[0].len as usize);
+            // It may stay as it is until the end.
+            items.shrink_to_fit();
             [std::mem::take(&mut items), right]
         });
         drop(items);
@@ -159,8 +163,8 @@ impl Splitter<'_> {
         let of_left = (spare as f64 * share(left_weight, right_weight)) as usize;
         let [left, right] = sides;
         let (mut pieces, others) = rayon::join(
-            || self.divide(left, &extents[0], of_left),
-            || self.divide(right, &extents[1], spare - of_left),
+            || self.divide(left, &extents[0], of_left, depth + 1),
+            || self.divide(right, &extents[1], spare - of_left, depth + 1),
         );
         pieces.extend(others);
         pieces
@@ -236,13 +240,13 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::World;
     use crate::math::{Aabb, Vec3};
     use crate::trace::bvh::build::triangle_items;
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::isa::Isa;
-    use crate::trace::bvh::{Bvh, Preset};
+    use crate::trace::bvh::{Bvh, Options, Preset};
     use crate::trace::{Part as Mesh, Primitives};
-    use crate::{World, math::is_traceable};
 
     fn mesh(triangles: &[[Vec3; 3]]) -> Mesh {
         let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
@@ -272,7 +276,7 @@ mod tests {
 
     fn pieces_of(triangles: &[[Vec3; 3]], isa: Isa) -> Vec<Record> {
         let parts = [mesh(triangles)];
-        pieces(triangle_items(&parts), &Meshes::new(&parts), &Options { isa, ..Options::default() })
+        pieces(triangle_items(&parts), &Meshes::new(&parts), isa.demand())
     }
 
     fn bits(pieces: &[Record]) -> Vec<[u32; 8]> {
@@ -308,6 +312,38 @@ mod tests {
         }
     }
 
+    /// Meshes that nothing divides, and those of which nothing can be measured.
+    #[test]
+    fn odd_meshes_are_cut_or_left() {
+        let one = [Vec3::new(-1.0, 0.5, 0.2), Vec3::new(0.3, 1.0, -0.4), Vec3::new(0.8, -0.9, 0.9)];
+        let scaled = |scale: f32, by: Vec3| move |triangle: &[Vec3; 3]| triangle.map(|corner| corner * scale + by);
+        let many = soup(700, 0.7);
+        let cases: [Vec<[Vec3; 3]>; 9] = [
+            Vec::new(),
+            vec![one],
+            vec![one; 20_000],
+            // Concentric, far from zero: centres are a few steps of f32 apart.
+            (1..=500).map(|i| scaled(10.0 + i as f32, Vec3::splat(1e6))(&one)).collect(),
+            many.iter().map(scaled(9e17, Vec3::ZERO)).collect(),
+            many.iter().map(scaled(1e-30, Vec3::ZERO)).collect(),
+            many.iter().map(scaled(1e-42, Vec3::ONE)).collect(),
+            many.iter().map(|&[a, b, _]| [a, b, b]).collect(),
+            many.iter().map(|triangle| triangle.map(|corner| corner.with_y(0.0))).collect(),
+        ];
+        for (case, triangles) in cases.into_iter().enumerate() {
+            let mut pieces = pieces_of(&triangles, Isa::detect());
+            assert!(pieces.len() as f64 <= (1.0 + BUDGET) * triangles.len() as f64, "case {case}");
+            pieces.sort_by_key(Record::primitive);
+            let groups = pieces.chunk_by(|a, b| a.primitive() == b.primitive());
+            assert_eq!(groups.clone().count(), triangles.len(), "case {case}");
+            for (own, corners) in groups.zip(&triangles) {
+                // What is cut covers all corners, and is within what they span.
+                let all = own.iter().fold(Aabb::EMPTY, |all, piece| all.union(piece.bounds()));
+                assert_eq!(all, Aabb::around(*corners), "case {case}");
+            }
+        }
+    }
+
     #[test]
     fn a_surface_is_left_as_it_is() {
         let triangles = surface(100);
@@ -317,8 +353,8 @@ mod tests {
 
     #[test]
     fn pieces_are_the_same_for_any_number_of_threads_and_instruction_set() {
-        let triangles = [soup(9000, 0.3), surface(40)].concat();
-        assert!(triangles.as_flattened().iter().all(|&corner| is_traceable(corner)));
+        // Several chunks, of bins too.
+        let triangles = [soup(9000, 0.3), surface(150)].concat();
         let of = |isa, threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             bits(&pool.install(|| pieces_of(&triangles, isa)))
@@ -343,7 +379,9 @@ mod tests {
             ([soup(2000, 0.05), surface(90)].concat(), 0.99),
             ([floor.clone(), surface(90)].concat(), 1.001),
             ([floor, soup(1000, 0.2), surface(60)].concat(), 0.995),
+            // Little is won here, and hardly anything lost.
             (soup(2000, 0.3), 1.01),
+            ([soup(5000, 0.05), surface(150)].concat(), 1.02),
         ];
         for (case, (triangles, most)) in cases.into_iter().enumerate() {
             let mut world = World::default();

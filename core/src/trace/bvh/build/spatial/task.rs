@@ -2,7 +2,7 @@
 
 use super::super::bins;
 use super::super::record::Record;
-use super::super::split::Range;
+use super::super::split::{Range, Split};
 use super::super::subtree::Finder;
 use super::slabs::{Grid, Plane, Slabs};
 use super::{Extent, RULE, Splitter, share};
@@ -25,7 +25,7 @@ impl Kernel for TaskKernel<'_> {
     fn run<S: Simd>(self) -> Vec<Record> {
         let Self { splitter, items, extent, mut spare } = self;
         let mut step = Step { splitter, finder: Finder::<S>::new(), sides: [Vec::new(), Vec::new()] };
-        let mut pieces = Vec::with_capacity(items.len() + spare);
+        let mut pieces = Vec::with_capacity(items.len());
         // Ranges, and their items: those of the next one last.
         let (mut open, mut waiting) = (vec![extent], items);
         while let Some(extent) = open.pop() {
@@ -34,11 +34,12 @@ impl Kernel for TaskKernel<'_> {
             // What some leave over is for those that come later.
             let others = open.iter().map(Extent::weight).sum();
             let allowed = (spare as f64 * share(extent.weight(), others)).ceil() as usize;
-            if !extent.may_be_cut(allowed) || !step.divide(&mut waiting[from..], &extent.range, allowed.min(spare)) {
+            if !extent.may_be_cut(allowed) {
                 pieces.extend_from_slice(&waiting[from..]);
                 waiting.truncate(from);
                 continue;
             }
+            step.divide(&mut waiting[from..], &extent.range, allowed.min(spare));
             waiting.truncate(from);
             let [left, right] = &mut step.sides;
             spare -= left.len() + right.len() - len;
@@ -60,14 +61,16 @@ struct Step<'a, S> {
 }
 
 impl<S: Simd> Step<'_, S> {
-    /// Divides `items`, those of `range`, of which there may be `spare` more; false where nothing divides them.
+    /// Divides `items`, those of `range`, of which there are several and may be `spare` more.
     #[inline(always)]
-    fn divide(&mut self, items: &mut [Record], range: &Range, spare: usize) -> bool {
+    fn divide(&mut self, items: &mut [Record], range: &Range, spare: usize) {
         let Self { splitter, finder, sides } = self;
         let split = finder.find(items, range, &RULE);
-        let halves = split.partition::<S>(items, range);
-        let is_divided = halves.iter().all(|half| half.len > 0);
-        let plane = if is_divided && !splitter.is_worth_a_look(&halves) {
+        let mut halves = split.partition::<S>(items, range);
+        if halves.iter().any(|half| half.len == 0) {
+            halves = Split::HALF.partition::<S>(items, range);
+        }
+        let plane = if !splitter.is_worth_a_look(&halves) {
             None
         } else if items.len() < bins::LARGE {
             plane::<S, { bins::FEW }>(splitter, items, range)
@@ -77,17 +80,13 @@ impl<S: Simd> Step<'_, S> {
         if let Some(plane) = plane.filter(|plane| plane.is_better(&halves, spare)) {
             plane.part(items, splitter.meshes, spare, sides);
             if sides.iter().all(|side| !side.is_empty()) {
-                return true;
+                return;
             }
             sides.iter_mut().for_each(Vec::clear);
         }
         let (left, right) = items.split_at(halves[0].len as usize);
         sides[0].extend_from_slice(left);
         sides[1].extend_from_slice(right);
-        if !is_divided {
-            sides.iter_mut().for_each(Vec::clear);
-        }
-        is_divided
     }
 }
 
