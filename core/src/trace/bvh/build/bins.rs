@@ -134,9 +134,7 @@ impl<const N: usize> Sums<N> {
 
     #[inline(always)]
     fn join<S: Simd>(&mut self, others: &Self) {
-        for (sum, other) in self.boxes.as_flattened_mut().iter_mut().zip(others.boxes.as_flattened()) {
-            *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
-        }
+        join_boxes::<S, N>(&mut self.boxes, &others.boxes);
         for (sum, other) in self.counts.iter_mut().zip(&others.counts) {
             add_up(sum, other);
         }
@@ -164,8 +162,16 @@ fn load<S: Simd>([x, y, z]: &[[f32; 8]; 3]) -> [S::V8; 3] {
     [S::V8::load(x), S::V8::load(y), S::V8::load(z)]
 }
 
+/// Bins with what is in the same ones of others.
 #[inline(always)]
-fn add_up(sum: &mut [u32; 4], counts: &[u32; 4]) {
+pub(super) fn join_boxes<S: Simd, const N: usize>(boxes: &mut [[[f32; 8]; 3]; N], others: &[[[f32; 8]; 3]; N]) {
+    for (sum, other) in boxes.as_flattened_mut().iter_mut().zip(others.as_flattened()) {
+        *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
+    }
+}
+
+#[inline(always)]
+pub(super) fn add_up(sum: &mut [u32; 4], counts: &[u32; 4]) {
     for (sum, count) in sum.iter_mut().zip(counts) {
         *sum += count;
     }

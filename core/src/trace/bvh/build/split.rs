@@ -188,6 +188,13 @@ impl Split {
         self.sides::<S>(range, split, left, right)
     }
 
+    /// As [`Self::partition`], down the middle where that leaves nothing on one side.
+    #[inline(always)]
+    pub fn apply<S: Simd>(&self, items: &mut [Record], range: &Range) -> [Range; 2] {
+        let sides = self.partition::<S>(items, range);
+        if sides[0].len > 0 && sides[1].len > 0 { sides } else { Self::HALF.partition::<S>(items, range) }
+    }
+
     /// The two sides of `range`, by the number of items of the left one and by their boxes.
     #[inline(always)]
     pub fn sides<S: Simd>(&self, range: &Range, left_len: usize, left: S::V8, right: S::V8) -> [Range; 2] {

@@ -194,9 +194,7 @@ impl<'a, S: Simd> Local<'a, S> {
     /// Does it.
     #[inline(always)]
     fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
-        let items = &mut self.items[range.within(self.base)];
-        let sides = split.partition::<S>(items, range);
-        if sides[0].len > 0 && sides[1].len > 0 { sides } else { Split::HALF.partition::<S>(items, range) }
+        split.apply::<S>(&mut self.items[range.within(self.base)], range)
     }
 }
 

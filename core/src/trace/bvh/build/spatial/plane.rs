@@ -31,22 +31,20 @@ impl Plane {
     }
 
     /// Adds these to `sides`.
-    pub fn part(&self, items: &[Record], meshes: &Meshes, spare: usize, sides: &mut [Vec<Record>; 2]) {
-        let Self { axis, at, sides: [left, right], .. } = self;
-        let mut spare = spare;
+    pub fn part(&self, items: &[Record], meshes: &Meshes, mut spare: usize, sides: &mut [Vec<Record>; 2]) {
+        let &Self { axis, at, .. } = self;
         for item in items {
             let bounds = item.bounds();
-            let is_whole = if bounds.max[*axis] <= *at {
+            let is_whole = if bounds.max[axis] <= at {
                 Some(0)
-            } else if bounds.min[*axis] >= *at {
+            } else if bounds.min[axis] >= at {
                 Some(1)
             } else {
-                self.whole_side(item, left, right)
+                self.whole_side(item)
             };
             let (part, primitive) = (item.part(), item.primitive());
-            let corners = || meshes.of_part(part).corners(primitive);
             let cut = match is_whole {
-                None if spare > 0 => clip::sides(&bounds, &corners(), *axis, *at),
+                None if spare > 0 => clip::sides(&bounds, &meshes.of_part(part).corners(primitive), axis, at),
                 _ => None,
             };
             if let Some(cut) = cut {
@@ -55,7 +53,7 @@ impl Plane {
                 }
                 spare -= 1;
             } else {
-                let nearer = || usize::from(bounds.min[*axis] + bounds.max[*axis] >= 2.0 * *at);
+                let nearer = || usize::from(bounds.min[axis] + bounds.max[axis] >= 2.0 * at);
                 sides[is_whole.unwrap_or_else(nearer)].push(*item);
             }
         }
@@ -63,7 +61,8 @@ impl Plane {
 
     /// The side where an item is better off whole than in pieces on both.
     #[inline(always)]
-    fn whole_side(&self, item: &Record, left: &Side, right: &Side) -> Option<usize> {
+    fn whole_side(&self, item: &Record) -> Option<usize> {
+        let [left, right] = &self.sides;
         let grown = |side: &Side| {
             let mut bounds = side.bounds;
             for (side, item) in bounds.iter_mut().zip(&item.0) {

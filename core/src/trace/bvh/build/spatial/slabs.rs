@@ -1,6 +1,6 @@
 //! The best plane that cuts what it passes: parts of triangles between equidistant planes, on all three axes in one pass.
 
-use super::super::bins::swept;
+use super::super::bins::{add_up, join_boxes, swept};
 use super::super::record::Record;
 use super::super::split::Rule;
 use crate::math::Vec3;
@@ -70,7 +70,6 @@ const TOGETHER: usize = 64;
 
 /// Parts of triangles in slabs, on each axis.
 #[repr(align(64))]
-#[derive(Clone)]
 pub(super) struct Slabs<const N: usize> {
     boxes: [[[f32; 8]; 3]; N],
     /// How many begin in a slab, and how many end.
@@ -180,15 +179,10 @@ impl<const N: usize> Slabs<N> {
 
     /// What is in either.
     pub fn join<S: Simd>(&mut self, other: &Self) {
-        for (sum, other) in self.boxes.as_flattened_mut().iter_mut().zip(other.boxes.as_flattened()) {
-            *sum = S::V8::load(other).max(S::V8::load(sum)).to_array();
-        }
-        let numbers = |slabs: &Self| [slabs.begun, slabs.ended];
-        let others = numbers(other);
-        for (sums, others) in [&mut self.begun, &mut self.ended].into_iter().zip(others) {
-            for (sum, other) in sums.as_flattened_mut().iter_mut().zip(others.as_flattened()) {
-                *sum += other;
-            }
+        join_boxes::<S, N>(&mut self.boxes, &other.boxes);
+        for slab in 0..N {
+            add_up(&mut self.begun[slab], &other.begun[slab]);
+            add_up(&mut self.ended[slab], &other.ended[slab]);
         }
     }
 
@@ -196,16 +190,19 @@ impl<const N: usize> Slabs<N> {
     #[inline(always)]
     pub fn best<S: Simd>(&self, grid: &Grid<N>, rule: &Rule) -> Option<Plane> {
         let (axis, bin, cost) = swept::<S, N>(&self.boxes, [&self.begun, &self.ended], rule)?;
-        let side = |slabs: std::ops::Range<usize>, counts: &[[u32; 4]; N]| {
-            let mut side = Side { bounds: [f32::NEG_INFINITY; 8], count: 0 };
-            for slab in slabs {
-                side.bounds = S::V8::load(&self.boxes[slab][axis]).max(S::V8::load(&side.bounds)).to_array();
-                side.count += counts[slab][axis];
-            }
-            side
-        };
-        let sides = [side(0..bin, &self.begun), side(bin..N, &self.ended)];
+        let sides = [self.side::<S>(axis, 0..bin, &self.begun), self.side::<S>(axis, bin..N, &self.ended)];
         Some(Plane { axis, at: grid.border(axis, bin), cost, sides })
+    }
+
+    /// What is in some slabs of an axis, and how many by `counts`.
+    #[inline(always)]
+    fn side<S: Simd>(&self, axis: usize, slabs: std::ops::Range<usize>, counts: &[[u32; 4]; N]) -> Side {
+        let (mut bounds, mut count) = (S::V8::splat(f32::NEG_INFINITY), 0);
+        for slab in slabs {
+            bounds = S::V8::load(&self.boxes[slab][axis]).max(bounds);
+            count += counts[slab][axis];
+        }
+        Side { bounds: bounds.to_array(), count }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::bins;
 use super::super::record::Record;
-use super::super::split::{Range, Split};
+use super::super::split::Range;
 use super::super::subtree::Finder;
 use super::slabs::{Grid, Plane, Slabs};
 use super::{Extent, RULE, Splitter, share};
@@ -65,11 +65,7 @@ impl<S: Simd> Step<'_, S> {
     #[inline(always)]
     fn divide(&mut self, items: &mut [Record], range: &Range, spare: usize) {
         let Self { splitter, finder, sides } = self;
-        let split = finder.find(items, range, &RULE);
-        let mut halves = split.partition::<S>(items, range);
-        if halves.iter().any(|half| half.len == 0) {
-            halves = Split::HALF.partition::<S>(items, range);
-        }
+        let halves = finder.find(items, range, &RULE).apply::<S>(items, range);
         let plane = if !splitter.is_worth_a_look(&halves) {
             None
         } else if items.len() < bins::LARGE {
