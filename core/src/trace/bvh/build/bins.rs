@@ -189,6 +189,7 @@ mod tests {
     use crate::math::{Aabb, Vec3};
     use crate::trace::bvh::build::record::aabb;
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
     use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
     struct Fill<'a>(&'a mut Bins<8>, &'a [Record], Grid);
@@ -211,13 +212,13 @@ mod tests {
         }
     }
 
-    /// Any number of items, runs of which fall into one bin, are what each bin's items come to one by one; whatever was there before.
+    /// Any number of items, runs of which fall into one bin, at once or in parts, are what each bin's items come to one by one; whatever was there before.
     #[test]
     fn bins_hold_what_falls_into_them() {
         let mut random = Random::new(9);
         for isa in Present::all() {
             let mut bins = Bins::<8>::ANY;
-            for count in [101, 1, 2, 3, 50, 0] {
+            for count in [102, 101, 1, 2, 3, 50, 0] {
                 let item = |i| {
                     let corner = if i % 8 < 4 { Vec3::splat(0.5) } else { random.vec3().abs() * 2.0 };
                     Record::new(&Aabb { min: corner, max: corner + Vec3::splat(0.25) }, 0, i)
@@ -225,7 +226,16 @@ mod tests {
                 let items: Vec<Record> = (0..count).map(item).collect();
                 // Centres up to 4.25: the last lie behind the last bin, and are in it.
                 let grid = dispatch(isa, Grids(&[0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 0.0]));
-                dispatch(isa, Fill(&mut bins, &items, grid));
+                if count % 2 == 0 {
+                    dispatch(isa, Fill(&mut bins, &items, grid));
+                } else {
+                    // In two parts, which are joined.
+                    let (first, others) = items.split_at(items.len() / 3);
+                    dispatch(isa, Fill(&mut bins, first, grid));
+                    let mut more = Bins::<8>::ANY;
+                    dispatch(isa, Fill(&mut more, others, grid));
+                    bins.join::<Portable>(&more);
+                }
                 for (bin, axis) in (0..8).flat_map(|bin| (0..3).map(move |axis| (bin, axis))) {
                     let inside = items.iter().filter(|item| {
                         let Aabb { min, max } = item.bounds();

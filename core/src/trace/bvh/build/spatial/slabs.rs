@@ -260,6 +260,7 @@ mod tests {
     use super::*;
     use crate::math::Aabb;
     use crate::trace::bvh::random::Random;
+    use crate::trace::bvh::simd::Portable;
     use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
     use crate::trace::{Part, Primitives};
 
@@ -322,6 +323,28 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Two parts of many triangles, joined, are all of them.
+    #[test]
+    fn slabs_are_joined() {
+        let mut random = Random::new(4);
+        let positions: Vec<Vec3> = (0..900).map(|_| random.vec3()).collect();
+        let corners = |i: u32| [3 * i, 3 * i + 1, 3 * i + 2];
+        let around = |i: u32| Aabb::around(corners(i).map(|corner| positions[corner as usize]));
+        let items: Vec<Record> = (0..300).map(|i| Record::new(&around(i), 0, i)).collect();
+        let triangles = Arc::new((0..300).map(corners).collect());
+        let primitives = Primitives::Triangles { positions: Arc::new(positions.clone()), triangles };
+        let meshes = Meshes::new(&[Part { geometry: 0, instance: 0, primitives }]);
+        let range = Record::new(&Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) }, 0, 0);
+        for isa in Present::all() {
+            let of = |items: &[Record]| dispatch(isa, Fill(items, &range.0, &meshes)).0;
+            let (whole, mut joined) = (of(&items), of(&items[..100]));
+            joined.join::<Portable>(&of(&items[100..]));
+            assert_eq!((joined.begun, joined.ended), (whole.begun, whole.ended));
+            let bounds = |slabs: &Slabs<N>| slabs.boxes.map(|axes| axes.map(|bounds| Record(bounds).bounds()));
+            assert_eq!(bounds(&joined), bounds(&whole));
         }
     }
 }
