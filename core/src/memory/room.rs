@@ -34,7 +34,13 @@ impl<T> Room<'_, T> {
     }
 }
 
-/// An array of which each chunk, given with how many values it makes, writes its own part; in order, on all threads.
+/// Values that one thread goes through by itself: to wake another one takes as long.
+pub(crate) const fn few<T>() -> usize {
+    const BYTES: usize = 1 << 17;
+    BYTES / size_of::<T>()
+}
+
+/// An array of which each chunk, given with how many values it makes, writes its own part; in order, on all threads, unless it is short.
 ///
 /// # Panics
 /// Where a chunk writes another number of values than it was given with.
@@ -50,10 +56,15 @@ pub(crate) fn fill<T: Send, C: Send>(chunks: Vec<(usize, C)>, write: impl Fn(C, 
         jobs.push((chunk, Room { slots, len: 0, first }));
         first += len;
     }
-    jobs.into_par_iter().for_each(|(chunk, mut room)| {
+    let work = |(chunk, mut room): (C, Room<'_, T>)| {
         write(chunk, &mut room);
         assert_eq!(room.len, room.slots.len(), "a chunk fills its part");
-    });
+    };
+    if len <= few::<T>() {
+        jobs.into_iter().for_each(work)
+    } else {
+        jobs.into_par_iter().for_each(work)
+    }
     // SAFETY: the rooms are the first `len` slots of the capacity, each of which has been filled: the assertion above holds
     // for all of them, or its panic has left this function.
     unsafe { array.set_len(len) };
@@ -69,15 +80,19 @@ mod tests {
 
     #[test]
     fn chunks_stand_in_order() {
-        let chunks: Vec<(usize, usize)> = (0..200).map(|i| (i * 31 % 97, i)).collect();
-        let expected: Vec<usize> = chunks.iter().flat_map(|&(len, i)| (0..len).map(move |k| 1000 * i + k)).collect();
-        let array = fill(chunks.clone(), |i, room| {
-            for k in 0..chunks[i].0 {
-                assert_eq!(room.len(), k);
-                room.push(1000 * i + k);
-            }
-        });
-        assert_eq!(array, expected);
+        for count in [3, 600] {
+            let chunks: Vec<(usize, usize)> = (0..count).map(|i| (i * 31 % 97, i)).collect();
+            let expected: Vec<usize> =
+                chunks.iter().flat_map(|&(len, i)| (0..len).map(move |k| 1000 * i + k)).collect();
+            assert_eq!(expected.len() > few::<usize>(), count > 3, "by one thread, and by all");
+            let array = fill(chunks.clone(), |i, room| {
+                for k in 0..chunks[i].0 {
+                    assert_eq!(room.len(), k);
+                    room.push(1000 * i + k);
+                }
+            });
+            assert_eq!(array, expected);
+        }
         let large: Vec<u64> = fill(vec![(0, 0), (MANY, 1)], |i, room| {
             for k in 0..MANY * i {
                 room.push(k as u64);

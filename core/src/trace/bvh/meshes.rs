@@ -1,11 +1,12 @@
 //! The meshes of a level, their triangles numbered through.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::block::Block;
-use crate::math::{Vec3, is_traceable};
+use crate::math::{Aabb, Vec3, is_traceable};
 use crate::trace::{Part, Primitives};
 
 /// Meshes, shared with the scene.
@@ -17,6 +18,12 @@ pub(super) struct Meshes {
     /// Triangles of all.
     count: usize,
 }
+
+/// Triangles gone through by one thread at a time.
+const STRETCH: usize = 1 << 14;
+
+/// Meshes of a few triangles gone through by one thread at a time: to share out each by itself would take longer than to go through it.
+const TOGETHER: usize = 64;
 
 /// A mesh and its numbers.
 #[derive(Clone)]
@@ -56,18 +63,30 @@ impl Meshes {
         all
     }
 
-    /// All of them.
-    pub fn iter(&self) -> impl Iterator<Item = &Mesh> {
-        self.meshes.iter()
+    /// All triangles in stretches of a mesh, each with how many it has: what all threads make something of.
+    pub fn stretches(&self) -> Vec<(usize, (&Mesh, Range<u32>))> {
+        let of = |mesh: &'_ Mesh| {
+            let len = mesh.triangles.len();
+            (0..len).step_by(STRETCH).map(move |first| first as u32..len.min(first + STRETCH) as u32)
+        };
+        let of = |mesh| of(mesh).map(move |range: Range<u32>| (range.len(), (mesh, range)));
+        self.meshes.iter().flat_map(of).collect()
     }
 
     /// How many triangles can be hit.
     pub fn traceable_count(&self) -> usize {
-        let of = |mesh: &Mesh| {
-            let is_traceable = |&i: &u32| mesh.corners(i).into_iter().all(is_traceable);
-            (0..mesh.triangles.len() as u32).into_par_iter().filter(is_traceable).count()
+        let of = |(_, (mesh, range)): (usize, (&Mesh, Range<u32>))| {
+            range.filter(|&i| mesh.corners(i).into_iter().all(is_traceable)).count()
         };
-        self.meshes.iter().map(of).sum()
+        self.stretches().into_par_iter().with_min_len(TOGETHER).map(of).sum()
+    }
+
+    /// The box around all vertices, those of no triangle among them, that are numbers.
+    pub fn bounds(&self) -> Aabb {
+        let include = |bounds: Aabb, &p: &Vec3| if is_traceable(p) { bounds.include(p) } else { bounds };
+        let around = |positions: &[Vec3]| positions.iter().fold(Aabb::EMPTY, include);
+        let of = |mesh: &Mesh| mesh.positions.par_chunks(STRETCH).map(around).reduce(|| Aabb::EMPTY, Aabb::union);
+        self.meshes.par_iter().with_min_len(TOGETHER).map(of).reduce(|| Aabb::EMPTY, Aabb::union)
     }
 
     /// Number of triangles.

@@ -99,7 +99,7 @@ impl Tree {
     /// Computes all boxes again, from those of the leaves' blocks.
     pub fn refit(&mut self, leaf: impl Fn(Range<u32>) -> Aabb + Sync) {
         let nodes = self.nodes.make_mut();
-        nodes.par_iter_mut().for_each(|node| {
+        nodes.par_iter_mut().with_min_len(room::few::<Node>()).for_each(|node| {
             for slot in 0..WIDTH {
                 let child = node.child[slot];
                 if child.is_leaf() && child != Child::NONE {

@@ -10,9 +10,8 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
-use crate::memory;
 use crate::memory::room;
-use crate::trace::bvh::meshes::{Mesh, Meshes};
+use crate::trace::bvh::meshes::Meshes;
 
 /// Bits of a code for the three axes together.
 const BITS: u32 = 30;
@@ -35,20 +34,15 @@ pub(in crate::trace::bvh) struct Coded {
 
 /// The traceable triangles along the curve, by number; those with equal codes as they came.
 pub(in crate::trace::bvh) fn sorted(meshes: &Meshes) -> Vec<Coded> {
-    let include = |bounds: Aabb, &p: &Vec3| if is_traceable(p) { bounds.include(p) } else { bounds };
-    let of_mesh =
-        |mesh: &Mesh| mesh.positions.par_iter().fold(|| Aabb::EMPTY, include).reduce(|| Aabb::EMPTY, Aabb::union);
-    let bounds = meshes.iter().map(of_mesh).fold(Aabb::EMPTY, Aabb::union);
-    let grid = Grid::new(&bounds);
-    let mut coded = memory::with_capacity(meshes.triangle_count());
-    for mesh in meshes.iter() {
-        coded.par_extend((0..mesh.triangles.len() as u32).into_par_iter().map(|i| {
+    let grid = Grid::new(&meshes.bounds());
+    let mut coded = room::fill(meshes.stretches(), |(mesh, range), room| {
+        for i in range {
             let corners = mesh.corners(i);
             let code = if corners.into_iter().all(is_traceable) { grid.code(&corners) } else { UNTRACEABLE };
-            Coded { code, number: mesh.first + i }
-        }));
-    }
-    if coded.par_iter().any(|item| item.code == UNTRACEABLE) {
+            room.push(Coded { code, number: mesh.first + i });
+        }
+    });
+    if coded.par_iter().with_min_len(room::few::<Coded>()).any(|item| item.code == UNTRACEABLE) {
         coded.retain(|item| item.code != UNTRACEABLE);
     }
     sorted_by_code(coded)
@@ -123,10 +117,13 @@ const CHUNK: usize = 1 << 15;
 /// Buckets of at most this many are sorted by comparing: to go through all counts would take longer.
 const BY_COMPARING: usize = 256;
 
+/// All are sorted so where they are no more than these: to wake other threads would take longer.
+const ALONE: usize = 1 << 12;
+
 /// By rising code, those with equal codes as they came: each chunk by the highest bits, what has these in common from all
 /// chunks into one bucket, and each bucket by the other bits; all of it by all threads. Numbers rise in `coded`.
 fn sorted_by_code(mut coded: Vec<Coded>) -> Vec<Coded> {
-    if coded.len() <= BY_COMPARING {
+    if coded.len() <= ALONE {
         sort_by_comparing(&mut coded);
         return coded;
     }
@@ -276,7 +273,7 @@ mod tests {
     fn sorting_is_stable() {
         let some_bits = [0x7fff_ffff, 0x7fc0_07ff, 0x00ff_ffff, 0x000f_fc00, 0x3ff];
         let many = some_bits.map(|bits| (100_000, bits));
-        for (count, bits) in [(0, 0), (1, 0), (200, 0x7fff_ffff)].into_iter().chain(many) {
+        for (count, bits) in [(0, 0), (1, 0), (200, 0x7fff_ffff), (4096, 0xff), (4097, 0xff)].into_iter().chain(many) {
             let mut state = 1u32;
             let coded: Vec<Coded> = (0..count)
                 .map(|number| {

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use crate::math::{Aabb, Vec3, is_traceable};
-use crate::memory;
-use crate::trace::{Part, Primitives};
+use crate::memory::room;
+use crate::trace::bvh::meshes::Meshes;
 
 /// A box as [-min, max]: one eight-wide maximum joins two of them (Fuetterling, Lojewski, Pfreundt, Hamann, Ebert 2017,
 /// *Accelerated single ray tracing for wide vector units*, among others). Lanes 3 and 7 carry two numbers that are not
@@ -63,22 +63,19 @@ pub(super) fn aabb(bounds: &[f32; 8]) -> Aabb {
     Aabb { min: Vec3::new(0.0 - x, 0.0 - y, 0.0 - z), max: Vec3::new(max_x, max_y, max_z) }
 }
 
-/// One item for each traceable triangle of `parts`, in order.
-pub(in crate::trace::bvh) fn triangle_items(parts: &[Part]) -> Vec<Record> {
-    let mut items = memory::with_capacity(parts.iter().map(|part| part.primitives.len()).sum());
-    for (p, part) in parts.iter().enumerate() {
-        let Primitives::Triangles { positions, triangles } = &part.primitives else { continue };
-        let positions = &positions[..];
-        items.par_extend(triangles.par_iter().enumerate().map(|(i, &[a, b, c])| {
-            let corners = [positions[a as usize], positions[b as usize], positions[c as usize]];
-            if corners.iter().all(|&corner| is_traceable(corner)) {
-                Record::new(&Aabb::around(corners), p as u32, i as u32)
+/// One item for each traceable triangle of `meshes`, in order.
+pub(in crate::trace::bvh) fn triangle_items(meshes: &Meshes) -> Vec<Record> {
+    let mut items = room::fill(meshes.stretches(), |(mesh, range), room| {
+        for i in range {
+            let corners = mesh.corners(i);
+            room.push(if corners.into_iter().all(is_traceable) {
+                Record::new(&Aabb::around(corners), mesh.part, i)
             } else {
                 Record::NOTHING
-            }
-        }));
-    }
-    if items.par_iter().any(Record::is_nothing) {
+            });
+        }
+    });
+    if items.par_iter().with_min_len(room::few::<Record>()).any(Record::is_nothing) {
         items.retain(|item| !item.is_nothing());
     }
     items

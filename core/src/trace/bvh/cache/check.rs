@@ -22,7 +22,6 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
-use crate::trace::Part;
 use crate::trace::bvh::build::{MAX_DEPTH, spatial, triangle_items};
 use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
@@ -42,7 +41,7 @@ type Piece = (u32, Aabb);
 ///
 /// # Errors
 /// What is wrong.
-pub(super) fn check(tree: &Tree, leaves: &Leaves, parts: &[Part], meshes: &Meshes, cut: bool) -> Result<usize, String> {
+pub(super) fn check(tree: &Tree, leaves: &Leaves, meshes: &Meshes, cut: bool) -> Result<usize, String> {
     let nodes = tree.nodes();
     if nodes.len() >= ROOT as usize || leaves.len() > Child::NAMES {
         return Err("has more nodes or blocks than can be numbered".to_owned());
@@ -64,7 +63,7 @@ pub(super) fn check(tree: &Tree, leaves: &Leaves, parts: &[Part], meshes: &Meshe
     }
     pass.check_shape(&all)?;
     if !all.pieces.is_empty() {
-        pass.check_pieces(all.pieces, parts)?;
+        pass.check_pieces(all.pieces)?;
     }
     let found = pass.check_triangles()?;
     if !cut && all.triangles != found {
@@ -242,9 +241,9 @@ impl Pass<'_> {
     }
 
     /// That triangles which no leaf has all of are cut into `pieces` as the builder does it.
-    fn check_pieces(&self, mut pieces: Vec<Piece>, parts: &[Part]) -> Result<(), String> {
+    fn check_pieces(&self, mut pieces: Vec<Piece>) -> Result<(), String> {
         pieces.sort_unstable_by_key(|&(number, _)| number);
-        for item in spatial::pieces(triangle_items(parts), self.meshes, Isa::detect().demand()) {
+        for item in spatial::pieces(triangle_items(self.meshes), self.meshes, Isa::detect().demand()) {
             let number = self.meshes.number(item.part(), item.primitive());
             let own = &pieces[pieces.partition_point(|piece| piece.0 < number)..];
             let mut own = own.iter().take_while(|piece| piece.0 == number);

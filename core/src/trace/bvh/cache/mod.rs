@@ -159,7 +159,7 @@ fn read(
         } else {
             Leaves::of_blocks(arrays.get(blocks)?)
         };
-        let count = check::check(&tree, &leaves, parts, &meshes, preset == Preset::High)?;
+        let count = check::check(&tree, &leaves, &meshes, preset == Preset::High)?;
         Ok(TriangleTree::new(parts, tree, leaves, count))
     };
     let trees: std::result::Result<Vec<_>, String> = levels.iter().enumerate().map(tree).collect();

@@ -37,7 +37,7 @@ pub(super) fn build(parts: &[Part], options: &Options<'_>) -> (Tree, Leaves, usi
     let nodes = nodes(&lengths, &leaves);
     let item = |(index, node): (usize, &Node)| Record::new(&node.bounds(), 0, index as u32);
     let mut items = crate::memory::with_capacity(nodes.len());
-    items.par_extend(nodes.par_iter().enumerate().map(item));
+    items.par_extend(nodes.par_iter().with_min_len(room::few::<Record>()).enumerate().map(item));
     let above = build::build(&mut items, 1, 1, &Options { progress: None, ..*options });
     (above.over(nodes, |item| items[item as usize].primitive()), leaves, count)
 }

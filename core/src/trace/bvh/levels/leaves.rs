@@ -6,7 +6,6 @@ use super::numbers::{Blocks, NONE, Numbers, numbered};
 use crate::math::{Aabb, is_traceable};
 use crate::memory::Array;
 use crate::memory::room;
-use crate::trace::Part;
 use crate::trace::bvh::block::{Block, LANES, Lane};
 use crate::trace::bvh::build::Record;
 use crate::trace::bvh::meshes::Meshes;
@@ -26,9 +25,8 @@ pub(in crate::trace::bvh) enum Leaves {
 const CHUNK: usize = 64;
 
 impl Leaves {
-    /// Makes the blocks of `tree`, whose leaves name ranges of `items`, and lets these name ranges of blocks instead.
-    pub fn new(tree: &mut Tree, items: &[Record], parts: &[Part], compact: bool) -> Self {
-        let meshes = Meshes::new(parts);
+    /// Makes the blocks of `tree`, whose leaves name ranges of `items`, triangles of `meshes`, and lets these name ranges of blocks instead.
+    pub fn new(tree: &mut Tree, items: &[Record], meshes: Meshes, compact: bool) -> Self {
         if compact {
             let block =
                 |items: &[Record]| numbered(items.iter().map(|item| meshes.number(item.part(), item.primitive())));
@@ -119,6 +117,7 @@ impl Leaves {
             Self::Blocks(blocks) => blocks
                 .make_mut()
                 .par_iter_mut()
+                .with_min_len(room::few::<Block>())
                 .map(|block| {
                     let old = std::mem::replace(block, Block::EMPTY);
                     for lane in old.used() {

@@ -52,13 +52,14 @@ impl TriangleTree {
         let (tree, leaves, count) = match options.preset {
             Preset::Fast | Preset::FastCompact => clusters::build(parts, options),
             Preset::Default | Preset::High | Preset::Compact => {
-                let mut items = build::triangle_items(parts);
+                let meshes = Meshes::new(parts);
+                let mut items = build::triangle_items(&meshes);
                 let count = items.len();
                 if options.preset == Preset::High {
-                    items = spatial::pieces(items, &Meshes::new(parts), options.isa.demand());
+                    items = spatial::pieces(items, &meshes, options.isa.demand());
                 }
                 let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
-                let leaves = Leaves::new(&mut tree, &items, parts, options.preset.is_compact());
+                let leaves = Leaves::new(&mut tree, &items, meshes, options.preset.is_compact());
                 (tree, leaves, count)
             }
         };

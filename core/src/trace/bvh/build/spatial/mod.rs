@@ -276,7 +276,8 @@ mod tests {
 
     fn pieces_of(triangles: &[[Vec3; 3]], isa: Isa) -> Vec<Record> {
         let parts = [mesh(triangles)];
-        pieces(triangle_items(&parts), &Meshes::new(&parts), isa.demand())
+        let meshes = Meshes::new(&parts);
+        pieces(triangle_items(&meshes), &meshes, isa.demand())
     }
 
     fn bits(pieces: &[Record]) -> Vec<[u32; 8]> {
@@ -348,7 +349,7 @@ mod tests {
     fn a_surface_is_left_as_it_is() {
         let triangles = surface(100);
         let pieces = pieces_of(&triangles, Isa::detect());
-        assert_eq!(bits(&pieces), bits(&triangle_items(&[mesh(&triangles)])));
+        assert_eq!(bits(&pieces), bits(&triangle_items(&Meshes::new(&[mesh(&triangles)]))));
     }
 
     #[test]
