@@ -13,11 +13,11 @@ use super::alone::Search;
 use super::build::preset::Options;
 use super::build::{self, Record};
 use super::node::{Child, Node};
-use super::query::Closest;
+use super::query::{Closest, Occluded};
 use super::reject::Blur;
 use super::reject::slab::SlabRay;
 use super::simd::isa::{self, Kernel, Present};
-use super::simd::{Simd, Vector};
+use super::simd::{Mask, Simd, Vector};
 use super::tree::Tree;
 use super::walk::{self, Enter, Visit};
 use crate::math::{Aabb, DVec3, UNIT_ROUNDOFF, Vec3};
@@ -112,6 +112,14 @@ impl BoxTree {
         }
     }
 
+    /// Names boxes that have a point in common with `bounds`, and some that are only near it: in the same leaves, or by a millionth of coordinates. What moves is
+    /// at time 0.
+    pub fn visit_overlapping(&self, bounds: &Aabb, visitor: &mut dyn FnMut(u32)) {
+        if !self.tree.is_empty() {
+            isa::dispatch(self.isa, OverlappingBoxes { boxes: self, bounds, visitor });
+        }
+    }
+
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
     /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a millionth of
     /// coordinates. What moves is at time 0.
@@ -161,6 +169,39 @@ fn wider(ends: &[Aabb; 2]) -> [Aabb; 2] {
     ends.map(|bounds| Aabb { min: bounds.min - slack, max: bounds.max + slack })
 }
 
+/// What overlaps a box, in no order.
+struct Overlap<'a>(&'a Aabb);
+
+impl Overlap<'_> {
+    #[inline(always)]
+    fn along<S: Simd>(&self, node: &Node, axis: usize) -> <S::V8 as Vector>::Mask {
+        let Self(Aabb { min, max }) = self;
+        let first = 2 * axis as u32 * Node::ROW;
+        let (low, high) = (S::row(node, first), S::row(node, first + Node::ROW));
+        low.at_most(S::V8::splat(max[axis])).and(S::V8::splat(min[axis]).at_most(high))
+    }
+}
+
+impl Enter for Overlap<'_> {
+    #[inline(always)]
+    fn enter<S: Simd>(&self, node: &Node, _limit: f32) -> (<S::V8 as Vector>::Mask, S::V8) {
+        let [x, y, z] = [self.along::<S>(node, 0), self.along::<S>(node, 1), self.along::<S>(node, 2)];
+        (x.and(y).and(z), S::V8::splat(0.0))
+    }
+
+    /// Slots without a child are from infinity to minus infinity, which overlaps what has no end.
+    #[inline(always)]
+    fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
+        there(node) & children
+    }
+}
+
+/// A bit for each slot that has a child.
+#[inline(always)]
+fn there(node: &Node) -> u32 {
+    node.children().fold(0, |there, (slot, _)| there | 1 << slot)
+}
+
 /// A ray among boxes that move.
 struct MovingRay<'a> {
     slab: SlabRay,
@@ -184,7 +225,7 @@ impl Enter for MovingRay<'_> {
     /// Of a slot without a child nothing is known between infinity and infinity.
     #[inline(always)]
     fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
-        node.children().fold(0, |there, (slot, _)| there | 1 << slot) & children
+        there(node) & children
     }
 }
 
@@ -192,6 +233,31 @@ impl Enter for MovingRay<'_> {
 fn distance(bounds: &Aabb, point: Vec3) -> f64 {
     let point = point.as_dvec3();
     (bounds.min.as_dvec3() - point).max(point - bounds.max.as_dvec3()).max(DVec3::ZERO).length()
+}
+
+struct OverlappingBoxes<'a, 'v> {
+    boxes: &'a BoxTree,
+    bounds: &'a Aabb,
+    visitor: &'a mut (dyn FnMut(u32) + 'v),
+}
+
+impl Kernel for OverlappingBoxes<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { boxes: BoxTree { tree, items, .. }, bounds, visitor } = self;
+        walk::single::<S, Occluded>(
+            tree,
+            &Overlap(bounds),
+            f32::INFINITY,
+            #[inline(always)]
+            |leaf| {
+                leaf.blocks().for_each(|item| visitor(items[item as usize]));
+                Visit::Until(f32::INFINITY)
+            },
+        );
+    }
 }
 
 struct VisitBoxes<'a, 'v> {
@@ -246,6 +312,7 @@ impl VisitBoxes<'_, '_> {
 mod tests {
     use super::*;
     use crate::math::Random;
+    use crate::trace::bvh::simd::isa::Isa;
 
     /// Every box in which a ray is at its own time is named, and few of the others, however far they move.
     #[test]
@@ -289,6 +356,42 @@ mod tests {
                 }
             }
             assert!(named < 60 * rays, "far {far}: {named} of {rays} rays");
+        }
+    }
+
+    /// Every box that overlaps another is named, those that touch it and those without an end among them, and few of the others.
+    #[test]
+    fn what_overlaps_is_found() {
+        let mut random = Random::new(64, 0);
+        let mut boxes: Vec<Aabb> = Vec::new();
+        for i in 0..4000 {
+            let centre = random.vector() * 10.0;
+            // On a grid, so that many touch, and some flat.
+            let centre = if i % 3 == 0 { (centre * 4.0).round() / 4.0 } else { centre };
+            let size = if i % 3 == 0 { Vec3::splat(0.125) } else { Vec3::splat(random.unit()) };
+            let size = if i % 7 == 0 { size * Vec3::new(1.0, 0.0, 1.0) } else { size };
+            boxes.push(Aabb { min: centre - size, max: centre + size });
+        }
+        boxes[5] = Aabb::EMPTY;
+        boxes[8].max.x = f32::MAX;
+        let whole = Aabb { min: Vec3::splat(f32::NEG_INFINITY), max: Vec3::splat(f32::INFINITY) };
+        let asked: Vec<Aabb> = boxes.iter().step_by(3).copied().chain([whole]).collect();
+        for isa in Isa::available() {
+            let tree = BoxTree::build(&boxes, Options { isa, ..Options::default() });
+            let mut named = 0;
+            for bounds in &asked {
+                let mut seen = vec![false; boxes.len()];
+                tree.visit_overlapping(bounds, &mut |i| {
+                    assert!(!std::mem::replace(&mut seen[i as usize], true), "once");
+                });
+                assert!(!seen[5], "it is nowhere");
+                named += seen.iter().filter(|seen| **seen).count();
+                for (i, other) in boxes.iter().enumerate() {
+                    let overlaps = bounds.min.cmple(other.max).all() && other.min.cmple(bounds.max).all();
+                    assert!(seen[i] || !overlaps, "{isa:?}, box {i}, {other:?}, {bounds:?}");
+                }
+            }
+            assert!(named < 100 * asked.len(), "{isa:?}: {named} for {} boxes", asked.len());
         }
     }
 

@@ -75,6 +75,7 @@ pub mod quality {
 
 /// Flags of a scene.
 pub mod scene_flag {
+    pub const DYNAMIC: u32 = 1;
     pub const COMPACT: u32 = 1 << 1;
     pub const ROBUST: u32 = 1 << 2;
     /// Of version 3: that of the context; of version 4: that of the arguments.

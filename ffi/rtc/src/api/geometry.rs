@@ -116,11 +116,16 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryMask(geometry: *const Geometry, ma
     }
 }
 
-/// Trees are built for a scene, not for a geometry: only checked.
+/// Heeded where the scene's own quality is medium: low, where all geometries of a tree ask for it, and to refit, in scenes that are dynamic.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
-    let set =
-        |_: &mut State| if quality <= quality::REFIT { Ok(()) } else { Err(Failure::unknown("invalid build quality")) };
+    let set = |state: &mut State| {
+        if quality > quality::REFIT {
+            return Err(Failure::unknown("invalid build quality"));
+        }
+        state.quality = quality;
+        Ok(())
+    };
     // SAFETY: the interface's rules.
     unsafe { modify(geometry, set) }
 }

@@ -111,6 +111,7 @@ pub struct State {
     pub flags: Option<View>,
     pub grids: Option<View>,
     pub time_range: (f32, f32),
+    pub quality: u32,
     pub mask: u32,
     pub functions: Functions,
     /// Of user geometry.
@@ -157,6 +158,7 @@ impl Geometry {
             flags: None,
             grids: None,
             time_range: (0.0, 1.0),
+            quality: quality::MEDIUM,
             mask: if cfg!(feature = "v4") { 1 } else { u32::MAX },
             functions: Functions::default(),
             primitive_count: 0,

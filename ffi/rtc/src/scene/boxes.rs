@@ -1,7 +1,6 @@
 //! Boxes of what is no triangle that stands still: at all times, and at both ends of time.
 
 use twincast_core::math::{Aabb, Affine3, Vec3};
-use twincast_core::trace::Part;
 
 use super::committed::{Body, Instance, Item, Record};
 use super::path;
@@ -23,7 +22,7 @@ impl Boxes {
     }
 
     /// Adds to what is around everything.
-    fn surround(&mut self, [start, end]: [Aabb; 2]) {
+    pub fn surround(&mut self, [start, end]: [Aabb; 2]) {
         let [a, b] = self.ends();
         self.ends = Some([a.union(start), b.union(end)]);
     }
@@ -54,10 +53,9 @@ impl Boxes {
     }
 }
 
-/// Boxes of everything that is not solid; and around all.
-pub fn other_boxes(records: &[Option<Record>], parts: &[Part]) -> Boxes {
+/// Boxes of everything that is not solid; and around all of that.
+pub fn other_boxes(records: &[Option<Box<Record>>]) -> Boxes {
     let mut boxes = Boxes::default();
-    parts.iter().for_each(|part| boxes.surround([part.bounds(); 2]));
     for (id, record) in records.iter().enumerate() {
         let Some(record) = record else { continue };
         let item = |primitive: usize| Item { geometry: id as u32, primitive: primitive as u32 };

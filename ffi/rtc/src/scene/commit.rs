@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use twincast_core::World;
 use twincast_core::math::{Aabb, Vec3};
-use twincast_core::trace::bvh::{BoxTree, Bvh, Options, Preset};
-use twincast_core::trace::{Part, Primitives};
+use twincast_core::trace::bvh::{BoxTree, Options, Preset};
 
 use super::boxes::other_boxes;
 use super::committed::{Body, Committed, Heeded, Instance, Record};
 use super::progress::Progress;
+use super::solid::Planner;
 use super::{Scene, State};
 use crate::abi::{RTCBounds, RTCBoundsFunctionArguments, RTCProgressMonitorFunction, quality, scene_flag};
 use crate::device::Callback;
@@ -30,6 +29,11 @@ impl Plan {
         Self { geometries: geometries.clone(), flags: *flags, quality: *quality, progress: *progress }
     }
 
+    /// Whether what did not change since the last commit is taken from there. Otherwise buffers are read anew, as Embree does.
+    pub fn is_dynamic(&self) -> bool {
+        self.flags & scene_flag::DYNAMIC != 0
+    }
+
     fn preset(&self, has_filters: bool) -> Preset {
         match self.quality {
             _ if self.flags & scene_flag::COMPACT != 0 => Preset::Compact,
@@ -41,48 +45,59 @@ impl Plan {
     }
 }
 
-/// Makes it.
-pub fn commit(scene: &Scene, plan: &Plan) -> Result<Committed> {
+/// Makes it. Of `old`, what was made last, that is taken which is the same.
+pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Result<Committed> {
     let progress = Progress::new(plan.progress);
     progress.at(0.0)?;
-    let mut records: Vec<Option<Record>> = Vec::with_capacity(plan.geometries.len());
-    for geometry in &plan.geometries {
-        records.push(match geometry {
-            Some(geometry) => record(geometry)?,
-            None => None,
+    let mut records: Vec<Option<Box<Record>>> = Vec::with_capacity(plan.geometries.len());
+    for (id, geometry) in plan.geometries.iter().enumerate() {
+        let Some(geometry) = geometry else {
+            records.push(None);
+            continue;
+        };
+        let before = old.as_mut().and_then(|old| old.records.get_mut(id)?.take());
+        records.push(match before.filter(|before| is_same(before, geometry)) {
+            Some(same) => Some(Box::new(Record { is_new: false, ..*same })),
+            None => record(geometry)?.map(Box::new),
         });
     }
     let heeded = heeded(&records);
     let of_queries = plan.flags & scene_flag::FILTER_IN_ARGUMENTS != 0;
     let has_filters = heeded.intersect_filter || heeded.occluded_filter || of_queries;
-    let (parts, is_plain) = solid_parts(&records);
-    let boxes = scene.device.install(|| other_boxes(&records, &parts))?;
-    let count: usize = parts.iter().map(|part| part.primitives.len()).sum();
+    let made_with = (plan.flags, plan.quality);
+    let trees = old.filter(|old| old.made_with == made_with).map(|old| [old.solid.take(), old.changing.take()]);
+    let preset = plan.preset(has_filters);
+    let [solid, changing] = Planner { records: &records, preset, is_dynamic: plan.is_dynamic() }.plan(trees);
+    let mut boxes = scene.device.install(|| other_boxes(&records))?;
+    let [(kept, count), (also_kept, changed)] = [&solid, &changing].map(|making| making.extent(&records));
+    let (kept, count) = (kept + also_kept, count + changed);
     if count + boxes.boxes.len() > BoxTree::MOST {
         return Err(Failure::operation("too many primitives in a scene"));
     }
-    let expected = expected_bytes(count, boxes.boxes.len());
+    let expected = kept + expected_bytes(count, boxes.boxes.len());
     scene.device.account(expected as isize, false)?;
     let progressed = |part: u64| progress.built(part, (count + boxes.boxes.len()).max(1) as u64);
-    let preset = plan.preset(has_filters);
-    let (solid, others) = scene.device.install(|| {
+    let ([solid, changing], others) = scene.device.install(|| {
         let options = Options { preset, progress: Some(&progressed), ..Options::default() };
-        let solid = (count > 0).then(|| Bvh::build_with(&world(parts), options));
+        let solids = [solid, changing].map(|making| making.make(&records, options));
         let others = (!boxes.boxes.is_empty()).then(|| BoxTree::moving(&boxes.boxes, options));
-        (solid, others)
+        (solids, others)
     })?;
-    let bounds = boxes.ends();
-    let bytes = solid.as_ref().map_or(0, Bvh::bytes) + others.as_ref().map_or(0, BoxTree::bytes);
+    let solids = || solid.iter().chain(&changing);
+    solids().for_each(|solid| boxes.surround([solid.bounds; 2]));
+    let bytes = solids().map(|solid| solid.bvh.bytes()).sum::<usize>() + others.as_ref().map_or(0, BoxTree::bytes);
     let committed = Committed {
         device: Arc::clone(&scene.device),
+        is_plain: is_plain(&records),
+        repeats: solids().any(|solid| solid.bvh.preset() == Preset::High),
         records,
         solid,
-        is_plain,
-        repeats: preset == Preset::High,
+        changing,
+        bounds: boxes.ends(),
         others,
         items: boxes.items,
         heeded,
-        bounds,
+        made_with,
         excludes_start: plan.flags & scene_flag::ROBUST == 0,
         near: std::sync::OnceLock::new(),
         bytes,
@@ -98,9 +113,16 @@ fn expected_bytes(triangles: usize, boxes: usize) -> usize {
     64 * triangles + 48 * boxes
 }
 
+/// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew, and instances are where their scenes are now.
+fn is_same(before: &Record, geometry: &Arc<Geometry>) -> bool {
+    let is_read = matches!(before.body, Body::Surface(_) | Body::Linear(_));
+    let is_committed = |state: &geometry::State| state.is_committed && state.version == before.version;
+    is_read && Arc::ptr_eq(&before.geometry, geometry) && is_committed(&geometry.state())
+}
+
 /// A geometry as it is now; none for one that is disabled.
 fn record(geometry: &Arc<Geometry>) -> Result<Option<Record>> {
-    let state = geometry.state().clone();
+    let state = geometry.state();
     if !state.is_enabled {
         return Ok(None);
     }
@@ -110,11 +132,17 @@ fn record(geometry: &Arc<Geometry>) -> Result<Option<Record>> {
     let body = match geometry.kind {
         Kind::Triangles | Kind::Quads | Kind::Grids => Body::Surface(Surface::new(geometry.kind, &state)?),
         Kind::Linear(shape) => Body::Linear(Linear::new(shape, &state)),
-        Kind::User => Body::User(user_geometry(geometry, &state)),
+        Kind::User => {
+            // Not held while the caller's function runs, which may ask for the geometry.
+            let own = state.clone();
+            drop(state);
+            let body = Body::User(user_geometry(geometry, &own));
+            return Ok(Some(Record::new(geometry, &own, body)));
+        }
         Kind::Instance | Kind::InstanceArray => Body::Instances(instances(geometry.kind, &state)?),
         Kind::Absent => return Ok(None),
     };
-    Ok(Some(Record { geometry: Arc::clone(geometry), mask: state.mask, functions: state.functions, body }))
+    Ok(Some(Record::new(geometry, &state, body)))
 }
 
 /// Asks the caller for the boxes.
@@ -151,7 +179,7 @@ fn instances(kind: Kind, state: &geometry::State) -> Result<Vec<Instance>> {
     (0..count).map(place).collect()
 }
 
-fn heeded(records: &[Option<Record>]) -> Heeded {
+fn heeded(records: &[Option<Box<Record>>]) -> Heeded {
     let mut masks = records.iter().flatten().map(|record| record.mask);
     let first = masks.next();
     let functions = || records.iter().flatten().map(|record| &record.functions);
@@ -160,27 +188,10 @@ fn heeded(records: &[Option<Record>]) -> Heeded {
     Heeded { mask: first.filter(|&first| masks.all(|mask| mask == first)), intersect_filter, occluded_filter }
 }
 
-/// Surfaces that stand still, and whether each of their triangles is a primitive.
-fn solid_parts(records: &[Option<Record>]) -> (Vec<Part>, bool) {
-    let mut is_plain = true;
-    let mut parts = Vec::new();
-    for (id, record) in records.iter().enumerate() {
-        if let Some(Record { body: Body::Surface(surface), .. }) = record
-            && surface.steps.is_still()
-        {
-            is_plain &= surface.is_plain();
-            let (positions, triangles) = (Arc::clone(&surface.steps[0]), Arc::clone(&surface.triangles));
-            let primitives = Primitives::Triangles { positions, triangles };
-            parts.push(Part { geometry: id as u32, instance: 0, primitives });
-        }
-    }
-    (parts, is_plain)
-}
-
-/// What stands still, in the caller's own coordinates.
-fn world(parts: Vec<Part>) -> World {
-    let mut world = World::default();
-    world.fixed = 0..parts.len();
-    world.parts = parts;
-    world
+/// Whether each triangle of surfaces that stand still is a primitive.
+fn is_plain(records: &[Option<Box<Record>>]) -> bool {
+    records.iter().flatten().all(|record| match &record.body {
+        Body::Surface(surface) => surface.is_plain() || !surface.steps.is_still(),
+        _ => true,
+    })
 }

@@ -4,21 +4,34 @@ use std::sync::{Arc, OnceLock};
 
 use twincast_core::math::{Aabb, DAffine3};
 use twincast_core::once::made_outside;
-use twincast_core::trace::bvh::{BoxTree, Bvh};
+use twincast_core::trace::bvh::BoxTree;
 
 use crate::abi::RTCBounds;
 use crate::device::Device;
-use crate::geometry::{Functions, Geometry, Linear, Motion, Surface, TimeSteps};
+use crate::geometry::{self, Functions, Geometry, Linear, Motion, Surface, TimeSteps};
 
 use super::Scene;
 use super::near::Near;
+use super::solid::Solid;
 
 /// A geometry, as it was when the scene was committed.
 pub struct Record {
     pub geometry: Arc<Geometry>,
+    /// Of what was read.
+    pub version: u64,
+    pub quality: u32,
     pub mask: u32,
     pub functions: Functions,
     pub body: Body,
+    /// Whether it is another than at the commit before.
+    pub is_new: bool,
+}
+
+impl Record {
+    pub fn new(geometry: &Arc<Geometry>, state: &geometry::State, body: Body) -> Self {
+        let &geometry::State { version, quality, mask, functions, .. } = state;
+        Self { geometry: Arc::clone(geometry), version, quality, mask, functions, body, is_new: true }
+    }
 }
 
 /// What can be hit.
@@ -71,10 +84,12 @@ pub struct Heeded {
 pub struct Committed {
     pub device: Arc<Device>,
     /// By geometry id; none where nothing is attached or enabled.
-    pub records: Vec<Option<Record>>,
+    pub records: Vec<Option<Box<Record>>>,
     /// Triangles that stand still; none where there are none.
-    pub solid: Option<Bvh>,
-    /// Whether each triangle there is a primitive.
+    pub solid: Option<Solid>,
+    /// In a scene that is dynamic, those of geometries that changed lately.
+    pub changing: Option<Solid>,
+    /// Whether each triangle of these two is a primitive.
     pub is_plain: bool,
     /// Whether a ray may come to a triangle of these more than once.
     pub repeats: bool,
@@ -83,6 +98,8 @@ pub struct Committed {
     /// What its boxes are.
     pub items: Vec<Item>,
     pub heeded: Heeded,
+    /// The scene's flags and quality.
+    pub made_with: (u32, u32),
     /// At time 0 and at time 1.
     pub bounds: [Aabb; 2],
     /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are robust.
@@ -100,11 +117,13 @@ impl Committed {
             device,
             records: Vec::new(),
             solid: None,
+            changing: None,
             is_plain: true,
             repeats: false,
             others: None,
             items: Vec::new(),
             heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false },
+            made_with: (0, 0),
             bounds: [Aabb::EMPTY; 2],
             excludes_start: false,
             near: OnceLock::new(),
@@ -115,7 +134,7 @@ impl Committed {
     /// The record of a geometry that was hit.
     #[inline(always)]
     pub fn record(&self, geometry: u32) -> Option<&Record> {
-        self.records.get(geometry as usize)?.as_ref()
+        self.records.get(geometry as usize)?.as_deref()
     }
 
     /// Boxes for point queries, made on the device's threads.

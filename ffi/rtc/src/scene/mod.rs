@@ -6,6 +6,7 @@ mod committed;
 mod near;
 mod path;
 mod progress;
+mod solid;
 
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicPtr, Ordering};
@@ -17,6 +18,8 @@ use crate::failure::{Failure, Result};
 use crate::geometry::Geometry;
 
 pub use committed::{Body, Committed, Instance, Item, Record};
+pub use near::Near;
+pub use solid::Solid;
 
 /// What the caller has set.
 pub struct State {
@@ -94,16 +97,16 @@ impl Scene {
         committed.ok_or_else(not_committed)
     }
 
-    /// Puts another committed scene in place.
-    fn replace(&self, committed: Committed) {
-        let old = self.committed.swap(Box::into_raw(Box::new(committed)), Ordering::AcqRel);
-        self.free(old);
+    /// Puts a committed scene in place, or none; what was there.
+    fn replace(&self, committed: Option<Committed>) -> Option<Box<Committed>> {
+        let new = committed.map_or(std::ptr::null_mut(), |committed| Box::into_raw(Box::new(committed)));
+        let old = self.committed.swap(new, Ordering::AcqRel);
+        // SAFETY: made by `Box::into_raw` here, and taken out before; nobody uses it, by the interface's rule.
+        (!old.is_null()).then(|| unsafe { Box::from_raw(old) })
     }
 
-    fn free(&self, old: *mut Committed) {
-        if !old.is_null() {
-            // SAFETY: made by `Box::into_raw` in `replace`, and taken out before; nobody uses it, by the interface's rule.
-            let old = unsafe { Box::from_raw(old) };
+    fn free(&self, old: Option<Box<Committed>>) {
+        if let Some(old) = old {
             // Giving back is never refused.
             _ = self.device.account(-(old.bytes as isize), true);
         }
@@ -184,20 +187,18 @@ impl Scene {
             }
             (made_of, commit::Plan::new(&state))
         };
-        match commit::commit(self, &plan) {
-            Ok(committed) => {
-                self.replace(committed);
-                let mut state = self.state();
-                (state.made_of, state.is_changed) = (Some(made_of), false);
-                Ok(())
-            }
-            Err(failure) => {
-                self.replace(Committed::empty(Arc::clone(&self.device)));
-                let mut state = self.state();
-                (state.made_of, state.is_changed) = (None, true);
-                Err(failure)
-            }
-        }
+        let mut old = if plan.is_dynamic() { self.replace(None) } else { None };
+        let result = commit::commit(self, &plan, old.as_deref_mut());
+        let (committed, result) = match result {
+            Ok(committed) => (committed, Ok(())),
+            Err(failure) => (Committed::empty(Arc::clone(&self.device)), Err(failure)),
+        };
+        let replaced = self.replace(Some(committed));
+        [old, replaced].into_iter().for_each(|old| self.free(old));
+        let mut state = self.state();
+        state.is_changed = result.is_err();
+        state.made_of = (!state.is_changed).then_some(made_of);
+        result
     }
 }
 
@@ -233,7 +234,7 @@ impl State {
 
 impl Drop for Scene {
     fn drop(&mut self) {
-        let old = std::mem::replace(self.committed.get_mut(), std::ptr::null_mut());
+        let old = self.replace(None);
         self.free(old);
     }
 }

@@ -36,30 +36,37 @@ impl Near {
         let (mut items, mut boxes, mut paths) = (Vec::new(), Vec::new(), Vec::new());
         for (id, record) in committed.records.iter().enumerate() {
             let Some(record) = record else { continue };
-            let mut add = |primitive: usize, steps: Vec<Aabb>, range: (f32, f32)| {
+            let mut add = |primitive: usize, steps: &[Aabb], range: (f32, f32)| {
                 items.push(Item { geometry: id as u32, primitive: primitive as u32 });
                 boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
-                let path = TimeSteps::new(steps, range);
-                paths.push((!path.is_still()).then_some(path));
+                paths.push((steps.len() > 1).then(|| TimeSteps::new(steps.to_vec(), range)));
             };
+            let mut steps = Vec::new();
             match &record.body {
                 Body::Surface(surface) => primitives(surface, &mut add),
                 // Points and curves are not shown: the interface's rule.
                 Body::Linear(_) => {}
                 Body::User(user) => {
                     for i in 0..user[0].len() {
-                        add(i, user.iter().map(|step| step[i]).collect(), user.range());
+                        steps.clear();
+                        steps.extend(user.iter().map(|step| step[i]));
+                        add(i, &steps, user.range());
                     }
                 }
                 Body::Instances(instances) => {
                     for (i, instance) in instances.iter().enumerate() {
                         // Where it is then is known when it is entered.
-                        add(i, vec![super::boxes::instance_bounds(instance).0], (0.0, 1.0));
+                        add(i, &[super::boxes::instance_bounds(instance).0], (0.0, 1.0));
                     }
                 }
             }
         }
         Self { tree: BoxTree::build(&boxes, Options::default()), items, paths }
+    }
+
+    /// Names primitives whose boxes overlap a box, and some that are only near it.
+    pub fn overlapping(&self, bounds: &Aabb, visitor: &mut dyn FnMut(Item)) {
+        self.tree.visit_overlapping(bounds, &mut |i| visitor(self.items[i as usize]));
     }
 
     /// Names primitives that are near a point at a time, or whenever, up to the radius that the visitor returns last.
@@ -79,28 +86,18 @@ impl Near {
     }
 }
 
-/// The boxes of each primitive, which may be several triangles in a row.
-fn primitives(surface: &Surface, add: &mut impl FnMut(usize, Vec<Aabb>, (f32, f32))) {
-    let of = |triangle: usize| -> Vec<Aabb> {
-        (0..surface.steps.len()).map(|step| surface.bounds_at(triangle, step)).collect()
-    };
-    let mut open: Option<(u32, Vec<Aabb>)> = None;
-    for triangle in 0..surface.triangles.len() {
-        let (primitive, bounds) = (surface.primitive(triangle as u32), of(triangle));
-        open = match open {
-            Some((last, mut all)) if last == primitive => {
-                all.iter_mut().zip(bounds).for_each(|(all, bounds)| *all = all.union(bounds));
-                Some((last, all))
-            }
-            before => {
-                if let Some((last, all)) = before {
-                    add(last as usize, all, surface.steps.range());
-                }
-                Some((primitive, bounds))
-            }
-        };
-    }
-    if let Some((last, all)) = open {
-        add(last as usize, all, surface.steps.range());
+/// The boxes of each primitive, which may be several triangles in a row, at each step.
+fn primitives(surface: &Surface, add: &mut impl FnMut(usize, &[Aabb], (f32, f32))) {
+    let mut steps = vec![Aabb::EMPTY; surface.steps.len()];
+    let count = surface.triangles.len();
+    for triangle in 0..count {
+        let primitive = surface.primitive(triangle as u32);
+        for (step, bounds) in steps.iter_mut().enumerate() {
+            *bounds = bounds.union(surface.bounds_at(triangle, step));
+        }
+        if triangle + 1 == count || surface.primitive(triangle as u32 + 1) != primitive {
+            add(primitive as usize, &steps, surface.steps.range());
+            steps.fill(Aabb::EMPTY);
+        }
     }
 }

@@ -8,7 +8,7 @@ use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::Named;
-use crate::scene::{Body, Committed, Instance, Item, Record};
+use crate::scene::{Body, Committed, Instance, Item, Record, Solid};
 
 /// The ray as the native tracer knows it.
 #[inline(always)]
@@ -56,22 +56,50 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
 /// The nearest hit, or any, of the target's ray; `ANY` as the target was made.
 #[inline(always)]
 pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
-    match sight(committed, query, target.mask(), ANY) {
-        Sight::Nothing => return,
-        Sight::Everything => {
-            if let Some(solid) = &committed.solid {
-                cast_solid::<ANY>(committed, solid, query, target);
-            }
-        }
-        Sight::Some => {
-            if let Some(solid) = &committed.solid {
-                show_solid(committed, solid, *query, *target);
-            }
-        }
+    let sight = sight(committed, query, target.mask(), ANY);
+    if sight == Sight::Nothing {
+        return;
     }
-    if committed.others.is_some() && !(ANY && target.tfar() < 0.0) {
+    let is_done = || ANY && target.tfar() < 0.0;
+    let mut nearest = INVALID_ID;
+    if let Some(changing) = &committed.changing {
+        nearest = cast_changing::<ANY>(committed, changing, *query, *target, sight);
+    }
+    if let Some(solid) = committed.solid.as_ref().filter(|_| !is_done()) {
+        cast_triangles::<ANY>(committed, &solid.bvh, query, target, sight, nearest);
+    }
+    if committed.others.is_some() && !is_done() {
         cast_others::<ANY>(committed, *query, *target);
     }
+}
+
+/// Among the triangles of what changed lately; the geometry that was hit. First, as they are mostly few, and what is behind need not be looked at then. By value, here and
+/// below, so that neither need lie in memory where there is nothing of that.
+#[inline(never)]
+fn cast_changing<const ANY: bool>(
+    committed: &Committed,
+    changing: &Solid,
+    query: Query,
+    target: Target,
+    sight: Sight,
+) -> u32 {
+    cast_triangles::<ANY>(committed, &changing.bvh, &query, &target, sight, INVALID_ID)
+}
+
+/// Among triangles, of which some may not pass. Geometry `nearest` has been hit before, if any: at the same distance the lower one is. The one that has been hit now.
+#[inline(always)]
+fn cast_triangles<const ANY: bool>(
+    committed: &Committed,
+    solid: &Bvh,
+    query: &Query,
+    target: &Target,
+    sight: Sight,
+    nearest: u32,
+) -> u32 {
+    if sight == Sight::Everything {
+        return cast_solid::<ANY>(committed, solid, query, target, nearest);
+    }
+    show_solid(committed, solid, *query, *target, nearest)
 }
 
 /// The same, not inlined: for callbacks and instances.
@@ -80,9 +108,15 @@ pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
     if any { cast_one::<true>(committed, query, target) } else { cast_one::<false>(committed, query, target) }
 }
 
-/// Among the triangles, of which each counts.
+/// Among triangles, of which each counts.
 #[inline(always)]
-fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query, target: &Target) {
+fn cast_solid<const ANY: bool>(
+    committed: &Committed,
+    solid: &Bvh,
+    query: &Query,
+    target: &Target,
+    nearest: u32,
+) -> u32 {
     if ANY {
         // SAFETY: nobody writes to the ray meanwhile.
         let single = unsafe { target.single() };
@@ -95,7 +129,7 @@ fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query
             let named = Named { primitive: 0, u: 0.0, v: 0.0, ng: Vec3::ZERO };
             target.take(query, 0, 0.0, &named);
         }
-        return;
+        return INVALID_ID;
     }
     let mut found = TriangleFound::NONE;
     // SAFETY: as above.
@@ -104,12 +138,15 @@ fn cast_solid<const ANY: bool>(committed: &Committed, solid: &Bvh, query: &Query
     if committed.excludes_start && is_hit && found.hit.t == single.tmin {
         is_hit = beyond_start(solid, single, &mut found);
     }
-    if is_hit {
-        let TriangleFound { hit, normal } = &found;
-        if let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], *normal) {
-            target.take(query, hit.geometry, hit.t, &named);
-        }
+    let TriangleFound { hit, normal } = &found;
+    if is_hit
+        && !(hit.t == single.tmax && nearest < hit.geometry)
+        && let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], *normal)
+    {
+        target.take(query, hit.geometry, hit.t, &named);
+        return hit.geometry;
     }
+    nearest
 }
 
 /// The nearest triangle that is not where the ray begins.
@@ -128,10 +165,12 @@ pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: 
     Some(surface.name(primitive, u, v, ng))
 }
 
-/// Among the triangles, each of which has to pass. By value, here and below, so that neither need lie in memory where there is nothing of that.
+/// Among the triangles, each of which has to pass.
 #[inline(never)]
-fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target) {
+fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target, nearest: u32) -> u32 {
     let ray = target.ray();
+    // Of a geometry in another tree the primitive does not matter.
+    let mut nearest = (nearest, 0);
     // Each is shown once, to filters that count.
     let mut shown = Vec::new();
     solid.visit_triangles(&for_triangles(committed, &ray), &mut |found| {
@@ -149,10 +188,16 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target) 
             && let Body::Surface(surface) = &record.body
         {
             let named = surface.name(hit.primitive, hit.u, hit.v, found.normal);
-            target.offer(&query, record, hit.geometry, hit.t, &named);
+            let name = (hit.geometry, named.primitive);
+            // A filter is shown others at the same distance as well.
+            let is_behind = hit.t == target.tfar() && nearest < name && !target.is_filtered(&query, record);
+            if !is_behind && target.offer(&query, record, hit.geometry, hit.t, &named) {
+                nearest = name;
+            }
         }
         onwards(&target)
     });
+    nearest.0
 }
 
 /// How far the search still goes.

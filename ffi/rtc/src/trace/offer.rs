@@ -112,11 +112,17 @@ impl Target {
         unsafe { self.hit.write(hit_of(query, geometry, named)) };
     }
 
-    /// Takes a hit, if filters let it pass. It is no farther than the ray goes.
-    pub fn offer(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) {
+    /// Whether hits of a geometry have to pass filters.
+    pub fn is_filtered(&self, query: &Query, record: &Record) -> bool {
+        filters(query, record, self.hit.is_null()) != [None; 2]
+    }
+
+    /// Takes a hit, if filters let it pass: whether they do. It is no farther than the ray goes.
+    pub fn offer(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) -> bool {
         let filters = filters(query, record, self.hit.is_null());
         if filters == [None; 2] {
-            return self.take(query, geometry, t, named);
+            self.take(query, geometry, t, named);
+            return true;
         }
         let before = self.tfar();
         let mut hit = hit_of(query, geometry, named);
@@ -135,7 +141,8 @@ impl Target {
             unsafe { filter(&raw const arguments) };
             // SAFETY: the function may have written there; it is ours.
             if unsafe { (&raw const valid).read() } == 0 {
-                return self.set_tfar(before);
+                self.set_tfar(before);
+                return false;
             }
         }
         if self.hit.is_null() {
@@ -145,6 +152,7 @@ impl Target {
             // SAFETY: writable, as who made the target promised.
             unsafe { self.hit.write((&raw const hit).read()) };
         }
+        true
     }
 }
 

@@ -1,6 +1,8 @@
 // Filters, user geometry and point queries: what callbacks are given, and what becomes of what they say.
 #include "check.h"
 
+#include <algorithm>
+#include <array>
 #include <mutex>
 #include <set>
 
@@ -345,6 +347,75 @@ static void collisions() {
   rtcReleaseScene(mixed);
 }
 
+// The same of many boxes, in several geometries, of two scenes: against all pairs. Embree tells of some more, and of things that move nothing certain.
+static void many_collisions() {
+  World w;
+  std::mt19937 random(64);
+  auto unit = [&] { return (random() >> 8) * 0x1p-24f; };
+  using Boxes = std::vector<RTCBounds>;
+  struct Group {
+    Boxes steps[2];
+  };
+  std::vector<Group> groups[2];
+  RTCScene scenes[2] = {w.scene, rtcNewScene(w.device)};
+  for (int s = 0; s < 2; s++) {
+    groups[s].resize(3);
+    for (int k = 0; k < 3; k++) {
+      Group& group = groups[s][k];
+      const bool moves = is_ours() && s == 1 && k == 1;
+      for (int i = 0; i < 700; i++) {
+        RTCBounds b[2];
+        std::memset(b, 0, sizeof b);
+        const Vec corner{unit(), unit(), unit()};
+        const float size = 0.01f + 0.05f * unit();
+        for (int step = 0; step < 2; step++) {
+          b[step].lower_x = corner.x + step, b[step].lower_y = corner.y, b[step].lower_z = corner.z;
+          b[step].upper_x = b[step].lower_x + size, b[step].upper_y = corner.y + size, b[step].upper_z = corner.z + size;
+          group.steps[step].push_back(b[step]);
+        }
+      }
+      RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+      rtcSetGeometryUserPrimitiveCount(g, 700);
+      if (moves) rtcSetGeometryTimeStepCount(g, 2);
+      rtcSetGeometryUserData(g, &group);
+      rtcSetGeometryBoundsFunction(
+          g,
+          [](const RTCBoundsFunctionArguments* a) {
+            *a->bounds_o = ((Group*)a->geometryUserPtr)->steps[a->timeStep][a->primID];
+          },
+          nullptr);
+      w.add(g, scenes[s]);
+    }
+    rtcCommitScene(scenes[s]);
+  }
+  using Pair = std::array<unsigned, 4>;
+  using Pairs = std::set<Pair>;
+  auto note = [](void* user, RTCCollision* all, unsigned count) {
+    static std::mutex turn;
+    std::lock_guard<std::mutex> mine(turn);
+    for (unsigned i = 0; i < count; i++)
+      CHECK(((Pairs*)user)->insert({all[i].geomID0, all[i].primID0, all[i].geomID1, all[i].primID1}).second);
+  };
+  auto overlap = [](const RTCBounds& a, const RTCBounds& b) {
+    return a.lower_x <= b.upper_x && b.lower_x <= a.upper_x && a.lower_y <= b.upper_y && b.lower_y <= a.upper_y &&
+           a.lower_z <= b.upper_z && b.lower_z <= a.upper_z;
+  };
+  for (auto [first, second] : {std::pair{0, 1}, {1, 0}, {0, 0}, {1, 1}}) {
+    Pairs expected, told;
+    for (unsigned g0 = 0; g0 < 3; g0++)
+      for (unsigned p0 = 0; p0 < 700; p0++)
+        for (unsigned g1 = 0; g1 < 3; g1++)
+          for (unsigned p1 = 0; p1 < 700; p1++)
+            if ((first != second || g0 != g1 || p0 != p1) &&
+                overlap(groups[first][g0].steps[0][p0], groups[second][g1].steps[0][p1]))
+              expected.insert({g0, p0, g1, p1});
+    rtcCollide(scenes[first], scenes[second], note, &told);
+    CHECK(expected.size() > 100 && std::includes(told.begin(), told.end(), expected.begin(), expected.end()));
+    CHECK(!is_ours() || told == expected);
+  }
+  rtcReleaseScene(scenes[1]);
+}
+
 #ifdef EMBREE4
 // User geometry that sends rays on into another scene, 10 to the right.
 static RTCScene beyond;
@@ -400,4 +471,5 @@ void callbacks() {
   query_functions();
   bounds_data();
   collisions();
+  many_collisions();
 }

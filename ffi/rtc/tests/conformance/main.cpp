@@ -5,6 +5,7 @@ int checks, failures;
 
 void surfaces();
 void changes();
+void dynamics();
 void callbacks();
 void rounds();
 void errors();
@@ -18,7 +19,7 @@ int main() {
     void (*run)();
   } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
                 {"rounds", rounds},     {"errors", errors},   {"packets", packets},
-                {"motions", motions},   {"starts", starts}};
+                {"motions", motions},   {"starts", starts},   {"dynamics", dynamics}};
   int all = 0;
   for (const auto& group : groups) {
     checks = failures = 0;
