@@ -4,16 +4,17 @@
 //! (Glassner 1988, *Spacetime ray tracing for animation*): boxes around whole ways would all be entered where things move by more than their size.
 //!
 //! The builder and the walk know no primitive; here they are lent to callers whose primitives the library does not have
-//! (Embree's user geometry, instances of other scenes, curves). The caller names a box by its index, and is told which
-//! of them a ray enters, or are near a point.
+//! (Embree's user geometry, instances of other scenes, curves). The caller is told which boxes a ray enters, or are near a point, by their place among
+//! the leaves: what it keeps in that order is together in memory where it is together in space.
 
 use std::fmt;
+use std::marker::PhantomData;
 
 use super::alone::Search;
 use super::build::preset::Options;
 use super::build::{self, Record};
 use super::node::{Child, Node};
-use super::query::{Closest, Occluded};
+use super::query::{Closest, Occluded, Query};
 use super::reject::Blur;
 use super::reject::slab::SlabRay;
 use super::simd::isa::{self, Kernel, Present};
@@ -29,17 +30,14 @@ pub struct BoxTree {
     tree: Tree,
     /// The same nodes at time 1, where something moves.
     end: Option<Tree>,
-    /// Which box each item of a leaf is.
-    items: Vec<u32>,
+    /// How many.
+    count: usize,
     isa: Present,
 }
 
 impl fmt::Debug for BoxTree {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BoxTree")
-            .field("boxes", &self.items.len())
-            .field("bounds", &self.bounds())
-            .finish_non_exhaustive()
+        f.debug_struct("BoxTree").field("boxes", &self.count).field("bounds", &self.bounds()).finish_non_exhaustive()
     }
 }
 
@@ -47,11 +45,11 @@ impl BoxTree {
     /// Boxes that leaves can name.
     pub const MOST: usize = Child::NAMES;
 
-    /// Over `boxes`; those that are empty or not finite are left out.
+    /// Over `boxes`; those that are empty or not finite are left out. And of which box each name is, by its index.
     ///
     /// # Panics
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
-    pub fn build(boxes: &[Aabb], options: Options<'_>) -> Self {
+    pub fn build(boxes: &[Aabb], options: Options<'_>) -> (Self, Vec<u32>) {
         let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_sound(bounds));
         Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), &options)
     }
@@ -61,7 +59,7 @@ impl BoxTree {
     ///
     /// # Panics
     /// As [`BoxTree::build`] does.
-    pub fn moving(boxes: &[[Aabb; 2]], options: Options<'_>) -> Self {
+    pub fn moving(boxes: &[[Aabb; 2]], options: Options<'_>) -> (Self, Vec<u32>) {
         if boxes.iter().all(|[start, end]| start == end) {
             let still: Vec<Aabb> = boxes.iter().map(|[start, _]| *start).collect();
             return Self::build(&still, options);
@@ -70,22 +68,23 @@ impl BoxTree {
         let halfway =
             |[start, end]: &[Aabb; 2]| Aabb { min: start.min.midpoint(end.min), max: start.max.midpoint(end.max) };
         let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(is_sound));
-        let mut still = Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), &options);
-        let Self { tree, items, .. } = &mut still;
+        let (mut still, order) =
+            Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), &options);
+        let tree = &mut still.tree;
         let mut end = Tree::new(tree.nodes().to_vec());
         for (k, tree) in [tree, &mut end].into_iter().enumerate() {
             tree.refit(|leaf| {
-                let boxes = leaf.map(|item| wider(&boxes[items[item as usize] as usize])[k]);
+                let boxes = leaf.map(|item| wider(&boxes[order[item as usize] as usize])[k]);
                 boxes.fold(Aabb::EMPTY, Aabb::union)
             });
         }
-        Self { end: Some(end), ..still }
+        (Self { end: Some(end), ..still }, order)
     }
 
-    fn over(mut items: Vec<Record>, options: &Options<'_>) -> Self {
+    fn over(mut items: Vec<Record>, options: &Options<'_>) -> (Self, Vec<u32>) {
         let isa = options.isa.demand();
         let tree = build::build(&mut items, 1, Child::MOST, options);
-        Self { tree, end: None, items: items.iter().map(Record::primitive).collect(), isa }
+        (Self { tree, end: None, count: items.len(), isa }, items.iter().map(Record::primitive).collect())
     }
 
     /// The box around all of them, a millionth of its coordinates wider; at all times from 0 to 1.
@@ -101,14 +100,23 @@ impl BoxTree {
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
         let trees = self.end.iter().chain([&self.tree]);
-        trees.map(Tree::bytes).sum::<usize>() + size_of_val(&self.items[..])
+        trees.map(Tree::bytes).sum()
     }
 
     /// Names boxes that `ray` enters at its time, or nearly, up to the t that `visitor` returns last (at first the ray's tmax), near ones
     /// mostly first, until it has seen enough. The search takes each box that the ray enters; it may take others.
     pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
+        self.visit_as::<Closest>(ray, visitor);
+    }
+
+    /// The same for a visitor to whom it does not matter which are near.
+    pub fn visit_any(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
+        self.visit_as::<Occluded>(ray, visitor);
+    }
+
+    fn visit_as<Q: Query>(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
         if !self.tree.is_empty() && ray.is_valid() {
-            isa::dispatch(self.isa, VisitBoxes { boxes: self, ray, visitor });
+            isa::dispatch(self.isa, VisitBoxes { boxes: self, ray, visitor, query: PhantomData::<Q> });
         }
     }
 
@@ -146,7 +154,7 @@ impl BoxTree {
                     continue;
                 }
                 for item in leaf.blocks() {
-                    match visitor(self.items[item as usize]) {
+                    match visitor(item) {
                         Search::Continue(limit) => radius = f64::from(limit),
                         Search::Break(()) => return,
                     }
@@ -246,27 +254,28 @@ impl Kernel for OverlappingBoxes<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { boxes: BoxTree { tree, items, .. }, bounds, visitor } = self;
+        let Self { boxes: BoxTree { tree, .. }, bounds, visitor } = self;
         walk::single::<S, Occluded>(
             tree,
             &Overlap(bounds),
             f32::INFINITY,
             #[inline(always)]
             |leaf| {
-                leaf.blocks().for_each(|item| visitor(items[item as usize]));
+                leaf.blocks().for_each(&mut *visitor);
                 Visit::Until(f32::INFINITY)
             },
         );
     }
 }
 
-struct VisitBoxes<'a, 'v> {
+struct VisitBoxes<'a, 'v, Q> {
     boxes: &'a BoxTree,
     ray: &'a Ray,
     visitor: &'a mut (dyn FnMut(u32) -> Search + 'v),
+    query: PhantomData<Q>,
 }
 
-impl Kernel for VisitBoxes<'_, '_> {
+impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
     type Output = ();
 
     #[inline(always)]
@@ -285,19 +294,19 @@ impl Kernel for VisitBoxes<'_, '_> {
     }
 }
 
-impl VisitBoxes<'_, '_> {
+impl<Q: Query> VisitBoxes<'_, '_, Q> {
     #[inline(always)]
     fn walk<S: Simd>(self, ray: &impl Enter) {
-        let Self { boxes, ray: Ray { tmax, .. }, visitor } = self;
+        let Self { boxes, ray: Ray { tmax, .. }, visitor, .. } = self;
         let mut limit = tmax.next_up();
-        walk::single::<S, Closest>(
+        walk::single::<S, Q>(
             &boxes.tree,
             ray,
             limit,
             #[inline(always)]
             |leaf| {
                 for item in leaf.blocks() {
-                    match visitor(boxes.items[item as usize]) {
+                    match visitor(item) {
                         Search::Continue(t) => limit = t,
                         Search::Break(()) => return Visit::Stop,
                     }
@@ -332,7 +341,7 @@ mod tests {
             // Some stand still, and some are flat.
             boxes.iter_mut().skip(10).step_by(9).for_each(|ends| ends[1] = ends[0]);
             boxes.iter_mut().skip(10).step_by(4).flatten().for_each(|bounds| bounds.max.y = bounds.min.y);
-            let tree = BoxTree::moving(&boxes, Options::default());
+            let (tree, order) = BoxTree::moving(&boxes, Options::default());
             let mut named = 0;
             let rays = 2000;
             for k in 0..rays {
@@ -346,7 +355,7 @@ mod tests {
                 let ray = Ray { time, ..Ray::new(target - direction * (random.unit() * 20.0), direction) };
                 let mut seen = vec![false; boxes.len()];
                 tree.visit(&ray, &mut |i| {
-                    seen[i as usize] = true;
+                    seen[order[i as usize] as usize] = true;
                     Search::Continue(f32::INFINITY)
                 });
                 assert!(!seen[7], "it is nowhere at the end");
@@ -377,12 +386,12 @@ mod tests {
         let whole = Aabb { min: Vec3::splat(f32::NEG_INFINITY), max: Vec3::splat(f32::INFINITY) };
         let asked: Vec<Aabb> = boxes.iter().step_by(3).copied().chain([whole]).collect();
         for isa in Isa::available() {
-            let tree = BoxTree::build(&boxes, Options { isa, ..Options::default() });
+            let (tree, order) = BoxTree::build(&boxes, Options { isa, ..Options::default() });
             let mut named = 0;
             for bounds in &asked {
                 let mut seen = vec![false; boxes.len()];
                 tree.visit_overlapping(bounds, &mut |i| {
-                    assert!(!std::mem::replace(&mut seen[i as usize], true), "once");
+                    assert!(!std::mem::replace(&mut seen[order[i as usize] as usize], true), "once");
                 });
                 assert!(!seen[5], "it is nowhere");
                 named += seen.iter().filter(|seen| **seen).count();

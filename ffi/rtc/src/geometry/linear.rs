@@ -102,6 +102,7 @@ impl Linear {
         }
     }
 
+    #[inline]
     fn ball_at(&self, vertex: usize, time: f32) -> Option<Ball> {
         let (before, after) = self.steps.around(time);
         let a = before.get(vertex)?;
@@ -112,6 +113,7 @@ impl Linear {
     }
 
     /// A point at a time.
+    #[inline]
     pub fn point_at(&self, primitive: usize, time: f32) -> Option<Ball> {
         self.ball_at(primitive, time)
     }

@@ -26,6 +26,7 @@ impl<T> TimeSteps<T> {
     }
 
     /// Whether it is there at a time at all. At the end of its range what follows on it is, unless that is the end of all time, 1.
+    #[inline]
     pub fn is_at(&self, time: f32) -> bool {
         let (begin, end) = self.range;
         self.is_still() || (begin..end).contains(&time) || time == end && (end >= 1.0 || begin == end)
@@ -46,6 +47,7 @@ impl<T> Deref for TimeSteps<T> {
 }
 
 /// The step before a time, and, of what moves, the next one and how far it is to that; outside of the range those at that end.
+#[inline]
 pub fn around<T>(steps: &[T], (begin, end): (f32, f32), time: f32) -> (&T, Option<(&T, f32)>) {
     if let [only] = steps {
         return (only, None);

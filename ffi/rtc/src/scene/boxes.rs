@@ -58,7 +58,7 @@ pub fn other_boxes(records: &[Option<Box<Record>>]) -> Boxes {
     let mut boxes = Boxes::default();
     for (id, record) in records.iter().enumerate() {
         let Some(record) = record else { continue };
-        let item = |primitive: usize| Item { geometry: id as u32, primitive: primitive as u32 };
+        let item = |primitive: usize| Item::new(id as u32, primitive as u32);
         match &record.body {
             Body::Surface(surface) if surface.steps.is_still() => {}
             Body::Surface(surface) => {

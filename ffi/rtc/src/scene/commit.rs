@@ -6,7 +6,7 @@ use twincast_core::math::{Aabb, Vec3};
 use twincast_core::trace::bvh::{BoxTree, Options, Preset};
 
 use super::boxes::other_boxes;
-use super::committed::{Body, Committed, Heeded, Instance, Record};
+use super::committed::{Body, Committed, Heeded, Instance, Item, Placed, Record};
 use super::progress::Progress;
 use super::solid::Planner;
 use super::{Scene, State};
@@ -85,6 +85,8 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     })?;
     let solids = || solid.iter().chain(&changing);
     solids().for_each(|solid| boxes.surround([solid.bounds; 2]));
+    let (others, order) = others.unzip();
+    let (items, placed) = in_order(&records, &boxes.items, &order.unwrap_or_default());
     let bytes = solids().map(|solid| solid.bvh.bytes()).sum::<usize>() + others.as_ref().map_or(0, BoxTree::bytes);
     let committed = Committed {
         device: Arc::clone(&scene.device),
@@ -95,7 +97,8 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         changing,
         bounds: boxes.ends(),
         others,
-        items: boxes.items,
+        items,
+        placed,
         heeded,
         made_with,
         excludes_start: plan.flags & scene_flag::ROBUST == 0,
@@ -111,6 +114,23 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
 /// Memory for a tree, before it is made.
 fn expected_bytes(triangles: usize, boxes: usize) -> usize {
     64 * triangles + 48 * boxes
+}
+
+/// What is in each box of the second tree, and the instances among that, in the order in which it names them.
+fn in_order(records: &[Option<Box<Record>>], items: &[Item], order: &[u32]) -> (Vec<Item>, Vec<Placed>) {
+    let mut placed = Vec::new();
+    let of_box = |&i: &u32| {
+        let item = items[i as usize];
+        let record = records[item.geometry as usize].as_deref();
+        match record.and_then(|record| Placed::new(record, item)) {
+            Some(place) => {
+                placed.push(place);
+                Item { placed: placed.len() as u32 - 1, ..item }
+            }
+            None => item,
+        }
+    };
+    (order.iter().map(of_box).collect(), placed)
 }
 
 /// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew, and instances are where their scenes are now.

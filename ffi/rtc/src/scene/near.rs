@@ -15,7 +15,7 @@ use crate::geometry::{Surface, TimeSteps};
 pub struct Near {
     tree: BoxTree,
     items: Vec<Item>,
-    /// As many: where those are that move.
+    /// As many, where any moves: where those are that do.
     paths: Vec<Option<TimeSteps<Aabb>>>,
 }
 
@@ -33,11 +33,12 @@ fn is_near(path: &TimeSteps<Aabb>, point: Vec3, radius: f32, time: f32) -> bool 
 
 impl Near {
     pub fn new(committed: &Committed) -> Self {
-        let (mut items, mut boxes, mut paths) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut items, mut boxes, mut paths): (Vec<Item>, Vec<Aabb>, Vec<Option<TimeSteps<Aabb>>>) =
+            Default::default();
         for (id, record) in committed.records.iter().enumerate() {
             let Some(record) = record else { continue };
             let mut add = |primitive: usize, steps: &[Aabb], range: (f32, f32)| {
-                items.push(Item { geometry: id as u32, primitive: primitive as u32 });
+                items.push(Item::new(id as u32, primitive as u32));
                 boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
                 paths.push((steps.len() > 1).then(|| TimeSteps::new(steps.to_vec(), range)));
             };
@@ -61,7 +62,9 @@ impl Near {
                 }
             }
         }
-        Self { tree: BoxTree::build(&boxes, Options::default()), items, paths }
+        let (tree, order) = BoxTree::build(&boxes, Options::default());
+        let (items, paths) = order.iter().map(|&i| (items[i as usize], paths[i as usize].take())).unzip();
+        Self { tree, items, paths }
     }
 
     /// Names primitives whose boxes overlap a box, and some that are only near it.

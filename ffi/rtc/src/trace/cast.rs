@@ -1,6 +1,6 @@
 //! One ray: the triangles, then everything else.
 
-use twincast_core::math::{DVec3, Vec3, triangle_normal};
+use twincast_core::math::{DAffine3, DVec3, Vec3, triangle_normal};
 use twincast_core::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
 use twincast_core::{Ray, TriangleMethod};
 
@@ -8,7 +8,7 @@ use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::Named;
-use crate::scene::{Body, Committed, Instance, Item, Record, Solid};
+use crate::scene::{Body, Committed, Instance, Item, Placed, Record, Scene, Solid};
 
 /// The ray as the native tracer knows it.
 #[inline(always)]
@@ -212,15 +212,21 @@ fn onwards(target: &Target) -> Search {
 fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target) {
     let Some(others) = &committed.others else { return };
     let ray = target.ray();
-    others.visit(&native(&ray), &mut |i| {
-        let Item { geometry, primitive } = committed.items[i as usize];
-        if let Some(record) = committed.record(geometry)
+    let visitor = &mut |i| {
+        let item = committed.items[i as usize];
+        if let Some(placed) = committed.placed.get(item.placed as usize) {
+            if placed.mask & ray.mask != 0 {
+                let Placed { geometry, primitive, scene, to_scene, .. } = placed;
+                enter::<ANY>(&query, &target, [*geometry, *primitive], scene, to_scene, &ray);
+            }
+        } else if let Some(record) = committed.record(item.geometry)
             && record.mask & ray.mask != 0
         {
-            cast_item::<ANY>(committed, &query, &target, record, Item { geometry, primitive }, &ray);
+            cast_item::<ANY>(committed, &query, &target, record, item, &ray);
         }
         onwards(&target)
-    });
+    };
+    if ANY { others.visit_any(&native(&ray), visitor) } else { others.visit(&native(&ray), visitor) }
 }
 
 fn cast_item<const ANY: bool>(
@@ -231,7 +237,7 @@ fn cast_item<const ANY: bool>(
     item: Item,
     ray: &RTCRay,
 ) {
-    let Item { geometry, primitive } = item;
+    let Item { geometry, primitive, .. } = item;
     match &record.body {
         Body::Surface(surface) => {
             if surface.steps.is_at(ray.time) {
@@ -245,7 +251,7 @@ fn cast_item<const ANY: bool>(
         }
         Body::Linear(linear) => {
             if linear.steps.is_at(ray.time) {
-                round::offer(linear, primitive, &native(ray), &mut |t, named| {
+                round::offer(linear, primitive, &native(ray), |t, named| {
                     if (ray.tnear..=target.tfar()).contains(&t) {
                         target.offer(query, record, geometry, t, named);
                     }
@@ -258,28 +264,37 @@ fn cast_item<const ANY: bool>(
             }
         }
         Body::Instances(instances) => {
-            if let Some(instance) = instances.get(primitive as usize) {
-                enter(query, target, instance, item, ray, ANY);
+            // Those that stand still are entered by `Placed`.
+            if let Some(Instance { scene, motion, .. }) = instances.get(primitive as usize)
+                && motion.is_at(ray.time)
+            {
+                let to_scene = motion.at(ray.time).as_daffine3().inverse();
+                enter::<ANY>(query, target, [geometry, primitive], scene, &to_scene, ray);
             }
         }
     }
 }
 
 /// Takes the ray through an instance: one level deep, as both Debians' Embree is built.
-fn enter(query: &Query, target: &Target, instance: &Instance, item: Item, ray: &RTCRay, any: bool) {
+fn enter<const ANY: bool>(
+    query: &Query,
+    target: &Target,
+    [geometry, primitive]: [u32; 2],
+    scene: &Scene,
+    to_scene: &DAffine3,
+    ray: &RTCRay,
+) {
     // SAFETY: the context is the caller's, which lives as long as the query and is this thread's, or our own.
-    let is_inside = unsafe { (*query.context).instance } != INVALID_ID;
-    if is_inside || !instance.motion.is_at(ray.time) {
+    if unsafe { (*query.context).instance } != INVALID_ID {
         return;
     }
     // SAFETY: scenes are not committed while rays are traced: the interface's rule.
-    let Some(committed) = (unsafe { instance.scene.committed() }) else { return };
-    let to_scene = instance.to_scene(ray.time);
+    let Some(committed) = (unsafe { scene.committed() }) else { return };
     let [org, dir] = [ray.org, ray.dir].map(|v| DVec3::from(v.map(f64::from)));
     let (org, dir) = (to_scene.transform_point3(org).as_vec3(), to_scene.transform_vector3(dir).as_vec3());
-    within(query, item.geometry, item.primitive, || {
+    within(query, geometry, primitive, || {
         target.set_place(org.to_array(), dir.to_array());
-        cast(committed, query, target, any);
+        cast(committed, query, target, ANY);
         target.set_place(ray.org, ray.dir);
     });
 }

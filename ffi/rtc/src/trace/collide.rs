@@ -52,7 +52,7 @@ fn all(scene: &Committed) -> impl Iterator<Item = Item> {
         Some(Body::User(steps)) => steps[0].len() as u32,
         _ => 0,
     };
-    let of = move |id: usize| (0..count(id)).map(move |primitive| Item { geometry: id as u32, primitive });
+    let of = move |id: usize| (0..count(id)).map(move |primitive| Item::new(id as u32, primitive));
     (0..scene.records.len()).flat_map(of)
 }
 

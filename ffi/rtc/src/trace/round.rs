@@ -10,15 +10,14 @@ use twincast_core::math::{DVec3, Vec3};
 use crate::geometry::{Ball, Linear, Named, Segment, Shape};
 
 /// Offers where `ray` meets a primitive, nearest first; the receiver looks at the range.
-pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, offer: &mut dyn FnMut(f32, &Named)) {
+#[inline(always)]
+pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, mut offer: impl FnMut(f32, &Named)) {
     let (org, dir) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let index = primitive as usize;
     let named = |u: f64, ng: DVec3| Named { primitive, u: u as f32, v: 0.0, ng: ng.as_vec3() };
     if linear.shape == Shape::RoundCurve {
-        if let Some(segment) = linear.segment_at(index, ray.time) {
-            for hit in Capsule::new(&segment).hits(org, dir) {
-                offer(hit.t as f32, &named(hit.u, hit.ng));
-            }
+        for hit in curve(linear, index, ray.time, org, dir) {
+            offer(hit.t as f32, &named(hit.u, hit.ng));
         }
         return;
     }
@@ -49,7 +48,14 @@ pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, offer: &mut dyn FnMut(f
     }
 }
 
+/// Where a ray meets a segment of a curve, nearest first.
+#[inline(never)]
+fn curve(linear: &Linear, segment: usize, time: f32, org: DVec3, dir: DVec3) -> Vec<Found> {
+    linear.segment_at(segment, time).map_or_else(Vec::new, |segment| Capsule::new(&segment).hits(org, dir))
+}
+
 /// Where a ray enters and leaves a ball about zero.
+#[inline]
 fn sphere(org: DVec3, dir: DVec3, radius: f64) -> Option<[f64; 2]> {
     let square = dir.length_squared();
     let middle = -org.dot(dir) / square;
