@@ -168,7 +168,17 @@ impl Committed {
         self.records.get(geometry as usize)?.as_deref()
     }
 
-    /// Boxes for point queries, made on the device's threads.
+    /// The trees over triangles that stand still.
+    pub fn solids(&self) -> impl Iterator<Item = &Solid> {
+        self.solid.iter().chain(&self.changing)
+    }
+
+    /// Whether these name each primitive in them, once.
+    pub fn names_triangles(&self) -> bool {
+        self.is_plain && !self.repeats
+    }
+
+    /// Boxes for point queries of what no tree over triangles names, made on the device's threads.
     ///
     /// # Panics
     /// Where the system gives none to a process that was forked; it is told as an error.

@@ -1,7 +1,7 @@
-//! Boxes of the primitives that point queries show: all but points and curves.
+//! Boxes of the primitives that point queries show, all but points and curves, where the trees of rays do not do.
 //!
-//! A query shows the caller each primitive near a point, triangles too. The tree of triangles knows triangles, but not quads, nor what stands
-//! beside them; scenes that are asked for points are few, and get one more tree over all boxes then. It holds what moves by where it ever is;
+//! A query shows the caller each primitive near a point, triangles too. The trees of triangles know triangles, but not quads, nor what stands
+//! beside them; scenes that are asked for points are few, and get one more tree over such boxes then. It holds what moves by where it ever is;
 //! whether it is near at the time of the query is looked at before the caller is shown it.
 
 use twincast_core::math::{Aabb, Vec3};
@@ -44,6 +44,7 @@ impl Near {
             };
             let mut steps = Vec::new();
             match &record.body {
+                Body::Surface(surface) if surface.steps.is_still() && committed.names_triangles() => {}
                 Body::Surface(surface) => primitives(surface, &mut add),
                 // Points and curves are not shown: the interface's rule.
                 Body::Linear(_) => {}

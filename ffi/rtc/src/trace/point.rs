@@ -56,7 +56,7 @@ impl Search1 {
         let limit = || self.radius() * space.stretch;
         // SAFETY: the query is the caller's.
         let time = unsafe { (*self.query).time };
-        committed.near().visit(space.point, limit(), Some(time), &mut |item| {
+        let mut visitor = |item: Item| {
             if let Some(record) = committed.record(item.geometry) {
                 changed |= match &record.body {
                     Body::Instances(instances) => {
@@ -67,7 +67,13 @@ impl Search1 {
                 };
             }
             Search::Continue(limit())
-        });
+        };
+        for solid in committed.solids().filter(|_| committed.names_triangles()) {
+            solid
+                .bvh
+                .visit_near(space.point, limit(), &mut |geometry, primitive| visitor(Item::new(geometry, primitive)));
+        }
+        committed.near().visit(space.point, limit(), Some(time), &mut visitor);
         changed
     }
 

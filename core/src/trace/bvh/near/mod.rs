@@ -7,6 +7,7 @@
 //!
 //! Points are in flight together, as rays are ([`super::flight`]): alone, one waits for each node until it knows the next.
 
+pub(super) mod ball;
 mod bounds;
 pub(super) mod closest_point;
 pub(super) mod discs;
