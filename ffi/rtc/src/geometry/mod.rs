@@ -14,6 +14,8 @@ use std::ffi::c_void;
 use std::sync::atomic::{AtomicPtr, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use smallvec::smallvec;
+
 use crate::abi::*;
 use crate::buffer::View;
 use crate::device::Device;
@@ -22,7 +24,7 @@ use crate::scene::Scene;
 
 pub use interpolate::{Place, interpolate};
 pub use linear::{Ball, Linear, Segment, Shape};
-pub use steps::{TimeSteps, around};
+pub use steps::{PerStep, TimeSteps, around};
 pub use surface::{Named, Surface};
 pub use transform::{Motion, Transform, read as read_transform, words as transform_words, write as write_transform};
 
@@ -104,9 +106,9 @@ pub struct Functions {
 pub struct State {
     pub index: Option<View>,
     /// One a time step.
-    pub vertices: Vec<Option<View>>,
+    pub vertices: PerStep<Option<View>>,
     /// One a time step, of oriented discs.
-    pub normals: Vec<Option<View>>,
+    pub normals: PerStep<Option<View>>,
     pub attributes: Vec<Option<View>>,
     pub flags: Option<View>,
     pub grids: Option<View>,
@@ -119,11 +121,11 @@ pub struct State {
     /// One of an instance, several of an instance array.
     pub scenes: Vec<Arc<Scene>>,
     /// One a time step.
-    pub transforms: Vec<Transform>,
+    pub transforms: PerStep<Transform>,
     /// The same when the geometry was committed.
-    pub placed: Vec<Transform>,
+    pub placed: PerStep<Transform>,
     /// Of instance arrays: one a time step.
-    pub transform_buffers: Vec<Option<View>>,
+    pub transform_buffers: PerStep<Option<View>>,
     /// Buffers of a geometry that this library does not have, by type and slot.
     pub absent: Vec<((u32, u32), Option<View>)>,
     pub is_enabled: bool,
@@ -152,8 +154,8 @@ impl Geometry {
         };
         let state = State {
             index: None,
-            vertices: vec![None],
-            normals: vec![None],
+            vertices: smallvec![None],
+            normals: smallvec![None],
             attributes: Vec::new(),
             flags: None,
             grids: None,
@@ -163,9 +165,9 @@ impl Geometry {
             functions: Functions::default(),
             primitive_count: 0,
             scenes: Vec::new(),
-            transforms: vec![Transform::IDENTITY],
-            placed: vec![Transform::IDENTITY],
-            transform_buffers: vec![None],
+            transforms: smallvec![Transform::IDENTITY],
+            placed: smallvec![Transform::IDENTITY],
+            transform_buffers: smallvec![None],
             absent: Vec::new(),
             is_enabled: true,
             is_committed: false,
@@ -198,7 +200,8 @@ impl Geometry {
         if !is_even(&state.vertices) || !is_even(&state.normals) {
             return Err(Failure::operation("stride of buffers have to be identical for each time step"));
         }
-        state.placed = state.transforms.clone();
+        let State { placed, transforms, .. } = &mut *state;
+        placed.clone_from(transforms);
         state.is_committed = true;
         state.version += 1;
         Ok(())

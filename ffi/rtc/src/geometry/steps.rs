@@ -2,16 +2,21 @@
 
 use std::ops::Deref;
 
+use smallvec::SmallVec;
+
+/// One a time step, of which there is mostly one alone.
+pub type PerStep<T> = SmallVec<[T; 1]>;
+
 /// What is there at equally distant times of a range, of which the first and the last are its ends; at least one. What has one alone stands still, and is
 /// there at all times.
 #[derive(Clone, Debug)]
 pub struct TimeSteps<T> {
-    steps: Vec<T>,
+    steps: PerStep<T>,
     range: (f32, f32),
 }
 
 impl<T> TimeSteps<T> {
-    pub fn new(steps: Vec<T>, range: (f32, f32)) -> Self {
+    pub fn new(steps: PerStep<T>, range: (f32, f32)) -> Self {
         Self { steps, range }
     }
 

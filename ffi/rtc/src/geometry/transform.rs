@@ -102,7 +102,7 @@ impl Motion {
     pub fn of(kind: Kind, state: &State, transforms: &[Transform], primitive: usize) -> Result<Self> {
         let range = state.time_range;
         if kind == Kind::Instance {
-            return Ok(Self::new(transforms.to_vec(), range));
+            return Ok(Self::new(transforms.into(), range));
         }
         let steps = state.transform_buffers.iter().map(|view| transform_of(view.as_ref(), primitive));
         Ok(Self::new(steps.collect::<Result<_>>()?, range))

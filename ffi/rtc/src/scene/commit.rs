@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use smallvec::{SmallVec, smallvec};
 use twincast_core::math::{Aabb, Vec3};
 use twincast_core::trace::bvh::{BoxTree, Options, Preset};
 
@@ -182,10 +183,10 @@ fn user_geometry(geometry: &Geometry, state: &geometry::State) -> TimeSteps<Vec<
     TimeSteps::new(boxes.collect(), state.time_range)
 }
 
-fn instances(kind: Kind, state: &geometry::State) -> Result<Vec<Instance>> {
+fn instances(kind: Kind, state: &geometry::State) -> Result<SmallVec<[Instance; 1]>> {
     if kind == Kind::Instance {
         let scene = state.scenes.first().ok_or_else(|| Failure::operation("an instance without a scene"))?;
-        return Ok(vec![Instance::new(Arc::clone(scene), Motion::of(kind, state, &state.placed, 0)?)]);
+        return Ok(smallvec![Instance::new(Arc::clone(scene), Motion::of(kind, state, &state.placed, 0)?)]);
     }
     let count = state.transform_buffers.first().and_then(Option::as_ref).map_or(0, |view| view.count());
     let place = |i: usize| {

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use smallvec::SmallVec;
 use twincast_core::math::{Aabb, DAffine3};
 use twincast_core::once::made_outside;
 use twincast_core::trace::bvh::BoxTree;
@@ -40,7 +41,7 @@ pub enum Body {
     Linear(Linear),
     /// User geometry: boxes of each primitive.
     User(TimeSteps<Vec<Aabb>>),
-    Instances(Vec<Instance>),
+    Instances(SmallVec<[Instance; 1]>),
 }
 
 /// A scene in its place.

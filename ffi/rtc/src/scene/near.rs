@@ -40,7 +40,7 @@ impl Near {
             let mut add = |primitive: usize, steps: &[Aabb], range: (f32, f32)| {
                 items.push(Item::new(id as u32, primitive as u32));
                 boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
-                paths.push((steps.len() > 1).then(|| TimeSteps::new(steps.to_vec(), range)));
+                paths.push((steps.len() > 1).then(|| TimeSteps::new(steps.into(), range)));
             };
             let mut steps = Vec::new();
             match &record.body {
