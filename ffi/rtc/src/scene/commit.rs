@@ -14,7 +14,7 @@ use super::{Scene, State};
 use crate::abi::{RTCBounds, RTCBoundsFunctionArguments, RTCProgressMonitorFunction, quality, scene_flag};
 use crate::device::Callback;
 use crate::failure::{Failure, Result};
-use crate::geometry::{self, Geometry, Kind, Linear, Motion, Surface, TimeSteps};
+use crate::geometry::{self, Ball, Geometry, Kind, Linear, Motion, Shape, Surface, TimeSteps};
 
 /// What is to be made.
 pub struct Plan {
@@ -93,6 +93,7 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         device: Arc::clone(&scene.device),
         is_plain: is_plain(&records),
         repeats: solids().any(|solid| solid.bvh.preset() == Preset::High),
+        balls: balls(&records, &items),
         records,
         solid,
         changing,
@@ -132,6 +133,17 @@ fn in_order(records: &[Option<Box<Record>>], items: &[Item], order: &[u32]) -> (
         }
     };
     (order.iter().map(of_box).collect(), placed)
+}
+
+/// Of each item where it is, where all are points that stand still: that of its geometry would be anywhere in memory.
+fn balls(records: &[Option<Box<Record>>], items: &[Item]) -> Vec<Ball> {
+    let ball = |item: &Item| match &records[item.geometry as usize].as_deref()?.body {
+        Body::Linear(linear) if linear.steps.is_still() && linear.shape != Shape::RoundCurve => {
+            linear.steps[0].get(item.primitive as usize).copied()
+        }
+        _ => None,
+    };
+    items.iter().map(ball).collect::<Option<_>>().unwrap_or_default()
 }
 
 /// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew, and instances are where their scenes are now.

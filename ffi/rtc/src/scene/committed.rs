@@ -9,7 +9,7 @@ use twincast_core::trace::bvh::BoxTree;
 
 use crate::abi::{INVALID_ID, RTCBounds};
 use crate::device::Device;
-use crate::geometry::{self, Functions, Geometry, Linear, Motion, Surface, TimeSteps};
+use crate::geometry::{self, Ball, Functions, Geometry, Linear, Motion, Surface, TimeSteps};
 
 use super::Scene;
 use super::near::Near;
@@ -126,6 +126,8 @@ pub struct Committed {
     pub others: Option<BoxTree>,
     /// What its boxes are, as it names them.
     pub items: Vec<Item>,
+    /// Of each of these where it is, where all are points that stand still; else none.
+    pub balls: Vec<Ball>,
     /// Instances that stand still, in the same order.
     pub placed: Vec<Placed>,
     pub heeded: Heeded,
@@ -153,6 +155,7 @@ impl Committed {
             repeats: false,
             others: None,
             items: Vec::new(),
+            balls: Vec::new(),
             placed: Vec::new(),
             heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false },
             made_with: (0, 0),

@@ -7,7 +7,7 @@ use twincast_core::{Ray, TriangleMethod};
 use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
-use crate::geometry::Named;
+use crate::geometry::{Ball, Named};
 use crate::scene::{Body, Committed, Instance, Item, Placed, Record, Scene, Solid};
 
 /// The ray as the native tracer knows it.
@@ -214,7 +214,9 @@ fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Tar
     let ray = target.ray();
     let visitor = &mut |i| {
         let item = committed.items[i as usize];
-        if let Some(placed) = committed.placed.get(item.placed as usize) {
+        if let Some(ball) = committed.balls.get(i as usize) {
+            cast_point(committed, &query, &target, item, ball, &ray);
+        } else if let Some(placed) = committed.placed.get(item.placed as usize) {
             if placed.mask & ray.mask != 0 {
                 let Placed { geometry, primitive, scene, to_scene, .. } = placed;
                 enter::<ANY>(&query, &target, [*geometry, *primitive], scene, to_scene, &ray);
@@ -227,6 +229,22 @@ fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Tar
         onwards(&target)
     };
     if ANY { others.visit_any(&native(&ray), visitor) } else { others.visit(&native(&ray), visitor) }
+}
+
+/// A point that stands still.
+#[inline(always)]
+fn cast_point(committed: &Committed, query: &Query, target: &Target, item: Item, ball: &Ball, ray: &RTCRay) {
+    let Item { geometry, primitive, .. } = item;
+    if let Some(record) = committed.record(geometry)
+        && record.mask & ray.mask != 0
+        && let Body::Linear(linear) = &record.body
+    {
+        round::offer_point(linear, primitive, ball, &native(ray), |t, named| {
+            if (ray.tnear..=target.tfar()).contains(&t) {
+                target.offer(query, record, geometry, t, named);
+            }
+        });
+    }
 }
 
 fn cast_item<const ANY: bool>(

@@ -10,7 +10,6 @@ use twincast_core::math::{DVec3, Vec3};
 use crate::geometry::{Ball, Linear, Named, Segment, Shape};
 
 /// Offers where `ray` meets a primitive, nearest first; the receiver looks at the range.
-#[inline(always)]
 pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, mut offer: impl FnMut(f32, &Named)) {
     let (org, dir) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let index = primitive as usize;
@@ -21,7 +20,16 @@ pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, mut offer: impl FnMut(f
         }
         return;
     }
-    let Some(ball) = linear.point_at(index, ray.time) else { return };
+    if let Some(ball) = linear.point_at(index, ray.time) {
+        offer_point(linear, primitive, &ball, ray, offer);
+    }
+}
+
+/// Offers where `ray` meets a point that is there now, likewise.
+#[inline]
+pub fn offer_point(linear: &Linear, primitive: u32, ball: &Ball, ray: &Ray, mut offer: impl FnMut(f32, &Named)) {
+    let (org, dir) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let named = |u: f64, ng: DVec3| Named { primitive, u: u as f32, v: 0.0, ng: ng.as_vec3() };
     let (centre, radius) = (ball.centre.as_dvec3(), f64::from(ball.radius));
     match linear.shape {
         Shape::Sphere | Shape::RoundCurve => {
@@ -38,7 +46,7 @@ pub fn offer(linear: &Linear, primitive: u32, ray: &Ray, mut offer: impl FnMut(f
             }
         }
         Shape::OrientedDisc => {
-            let normal = linear.normal_at(index, ray.time).unwrap_or(Vec3::ZERO).as_dvec3();
+            let normal = linear.normal_at(primitive as usize, ray.time).unwrap_or(Vec3::ZERO).as_dvec3();
             let t = (centre - org).dot(normal) / dir.dot(normal);
             // Not a number, nor finite, where the ray runs along the disc.
             if (org + dir * t - centre).length_squared() < radius * radius {
