@@ -1,7 +1,7 @@
 //! What ends the program while it reads, measures or renders.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -64,6 +64,52 @@ fn charts_end_at_once() {
     assert!(begin.elapsed().as_secs() < 15, "it went on");
     assert!(code == Some(130) && said.contains("interrupted"), "{code:?}: {said}");
     assert_eq!(std::fs::read_dir(folder.path().join("out")).expect("a folder").count(), 0);
+}
+
+/// A scene that is made leaves no part of itself, and the old file whole.
+#[test]
+fn writing_a_scene_ends_and_tidies_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("old.ply");
+    std::fs::write(&path, "old").expect("written");
+    let child = command()
+        .args(["make", "terrain", "--size", "3000", "-o"])
+        .arg(&path)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn();
+    let child = Running::new(child.expect("it runs"));
+    let begin = Instant::now();
+    let written = || {
+        let files = std::fs::read_dir(folder.path()).expect("a folder").flatten();
+        files.filter_map(|file| file.metadata().ok()).map(|file| file.len()).sum::<u64>()
+    };
+    while written() < 1 << 20 {
+        assert!(begin.elapsed().as_secs() < 120, "it writes");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.interrupt();
+    let (code, said) = child.end();
+    assert!(code == Some(130) && said.contains("interrupted"), "{code:?}: {said}");
+    assert_eq!(std::fs::read_to_string(&path).expect("it is there"), "old");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+}
+
+/// What a search has found until then is told, and that it did not come to its end.
+#[test]
+fn a_search_tells_what_it_found() {
+    let mut command = command();
+    command.args(["stress", "--search", "600", "--json"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it runs");
+    let mut document = child.stdout.take().expect("piped");
+    let child = Running::new(child);
+    std::thread::sleep(Duration::from_secs(2));
+    child.interrupt();
+    let mut text = String::new();
+    document.read_to_string(&mut text).expect("UTF-8");
+    let (code, said) = child.end();
+    assert!(code == Some(130) && said.contains("interrupted"), "{code:?}: {said}");
+    assert!(text.contains("\"rays\"") && text.contains("\"found\""), "{text}");
 }
 
 /// A mapped file that becomes shorter while it is read. Whether it was read before that is chance.

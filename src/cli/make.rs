@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::report::{counted, grouped};
-use super::say;
+use super::{interrupt, say};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::output::check_writable;
@@ -54,9 +54,10 @@ pub(super) fn run(args: &MakeArgs) -> Result<()> {
         let message = format!("--size {size}: {name} goes to {} ({})", recipe.largest, recipe.size);
         return Err(Error::Usage(message));
     }
+    let cancel = interrupt::install()?;
     check_writable(output)?;
-    let scene = recipe.make(size);
-    io::save(&scene, output)?;
+    let scene = interrupt::while_nothing_is_written(|| recipe.make(size));
+    io::save_until(&scene, output, cancel)?;
     if args.quiet {
         return Ok(());
     }

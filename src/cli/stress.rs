@@ -218,7 +218,7 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
         say(text)?;
     }
     match wrong {
-        0 => Ok(()),
+        0 => interrupt::check(),
         _ => Err(Error::Check(format!("{wrong} of what was found must not be: a native tracer is wrong"))),
     }
 }

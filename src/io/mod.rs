@@ -32,7 +32,7 @@ use std::path::Path;
 pub(crate) use self::format::Format;
 pub use self::format::SUFFIXES;
 pub use self::promised::{Promised, promised};
-pub use self::save::{SAVE_SUFFIXES, save};
+pub use self::save::{SAVE_SUFFIXES, save, save_until};
 
 use self::finish::{bare, doubt_bare, make_finite, meshes};
 use crate::error::{Error, Result, Warning};

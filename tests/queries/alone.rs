@@ -125,7 +125,8 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
     }
     boxes.push(Aabb::EMPTY);
     boxes.push(Aabb { min: Vec3::NAN, max: Vec3::ONE });
-    let tree = BoxTree::build(&boxes, Options::default());
+    let (tree, order) = BoxTree::build(&boxes, Options::default());
+    let index = |name: u32| order[name as usize];
     for _ in 0..300 {
         // To the middle of a box: it is on the way, exactly or not.
         let target = &boxes[random.below(500)];
@@ -133,9 +134,15 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
         let ray = Ray::new(origin, (target.min + target.max) * 0.5 - origin);
         let mut named = BTreeSet::new();
         tree.visit(&ray, &mut |i| {
-            named.insert(i);
+            named.insert(index(i));
             Search::Continue(f32::INFINITY)
         });
+        let mut in_no_order = BTreeSet::new();
+        tree.visit_any(&ray, &mut |i| {
+            in_no_order.insert(index(i));
+            Search::Continue(f32::INFINITY)
+        });
+        assert_eq!(named, in_no_order);
         for (i, bounds) in boxes[..500].iter().enumerate() {
             // In f64, and by a margin that rounding does not reach.
             if pierces(&ray, bounds, 1e-4) {
@@ -147,7 +154,7 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
         let radius = 2.0;
         let mut near = BTreeSet::new();
         tree.visit_near(origin, radius, &mut |i| {
-            near.insert(i);
+            near.insert(index(i));
             Search::Continue(radius)
         });
         let is_near =

@@ -10,6 +10,7 @@ mod toml;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
 use crate::io::format::suffix;
@@ -35,6 +36,14 @@ type Writer = fn(&Scene, &mut dyn Write) -> io::Result<()>;
 /// [`Error::Scene`] for what [`Scene::check`] refuses; [`Error::Usage`] for another suffix, and for what the format cannot say (spheres in PLY, corners that are
 /// NaN in text); [`Error::Output`] where the file cannot be written, which leaves an old one whole.
 pub fn save(scene: &Scene, path: &Path) -> Result<()> {
+    save_until(scene, path, &AtomicBool::new(false))
+}
+
+/// The same, until another thread sets `cancel`.
+///
+/// # Errors
+/// As [`save`], and [`Error::Interrupted`], which leaves an old file whole and no part of a new one.
+pub fn save_until(scene: &Scene, path: &Path, cancel: &AtomicBool) -> Result<()> {
     let suffix = suffix(path);
     type Check = fn(&Scene) -> std::result::Result<(), Unsayable>;
     let (check, write): (Check, Writer) = match suffix.as_str() {
@@ -50,12 +59,35 @@ pub fn save(scene: &Scene, path: &Path) -> Result<()> {
     check(scene).map_err(|message| Error::Usage(format!("{}: {message}", path.display())))?;
     write_atomically(path, |part| {
         let write_all = || {
-            let mut file = BufWriter::with_capacity(1 << 16, File::create(part)?);
+            let mut file = BufWriter::with_capacity(1 << 16, Until { file: File::create(part)?, cancel });
             write(scene, &mut file)?;
-            file.into_inner()?.sync_all()
+            file.into_inner()?.file.sync_all()
         };
-        write_all().map_err(|error: io::Error| Error::output(path, format!("cannot be written: {error}")))
+        write_all().map_err(|error: io::Error| match cancel.load(Ordering::Relaxed) {
+            true => Error::Interrupted,
+            false => Error::output(path, format!("cannot be written: {error}")),
+        })
     })
+}
+
+/// A file that takes nothing more once it is cancelled.
+struct Until<'a> {
+    file: File,
+    cancel: &'a AtomicBool,
+}
+
+impl Write for Until<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.cancel.load(Ordering::Relaxed) {
+            // Not the kind that is called interrupted, after which writers try again.
+            return Err(io::Error::other("cancelled"));
+        }
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// Whether something moves.
