@@ -174,14 +174,8 @@ impl Enter for Overlap<'_> {
     /// Slots without a child are from infinity to minus infinity, which overlaps what has no end.
     #[inline(always)]
     fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
-        there(node) & children
+        node.occupied() & children
     }
-}
-
-/// A bit for each slot that has a child.
-#[inline(always)]
-fn there(node: &Node) -> u32 {
-    node.children().fold(0, |there, (slot, _)| there | 1 << slot)
 }
 
 /// A ray among boxes that move.
@@ -207,7 +201,7 @@ impl Enter for MovingRay<'_> {
     /// Of a slot without a child nothing is known between infinity and infinity.
     #[inline(always)]
     fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
-        there(node) & children
+        node.occupied() & children
     }
 }
 

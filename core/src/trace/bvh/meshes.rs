@@ -78,7 +78,9 @@ impl Meshes {
         let of = |(_, (mesh, range)): (usize, (&Mesh, Range<u32>))| {
             range.filter(|&i| mesh.corners(i).into_iter().all(is_traceable)).count()
         };
-        self.stretches().into_par_iter().with_min_len(TOGETHER).map(of).sum()
+        let stretches = self.stretches();
+        let together = (STRETCH * stretches.len() / self.count.max(1)).clamp(1, TOGETHER);
+        stretches.into_par_iter().with_min_len(together).map(of).sum()
     }
 
     /// The box around all vertices, those of no triangle among them, that are numbers.

@@ -137,6 +137,12 @@ impl Node {
         self.child.into_iter().enumerate().filter(|&(_, child)| child != Child::NONE)
     }
 
+    /// A bit for each slot that has a child.
+    #[inline(always)]
+    pub fn occupied(&self) -> u32 {
+        self.children().fold(0, |occupied, (slot, _)| occupied | 1 << slot)
+    }
+
     /// The box around all children.
     pub fn bounds(&self) -> Aabb {
         (0..WIDTH).map(|slot| self.child_bounds(slot)).fold(Aabb::EMPTY, Aabb::union)

@@ -116,7 +116,7 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryMask(geometry: *const Geometry, ma
     }
 }
 
-/// Heeded where the scene's own quality is medium: low, where all geometries of a tree ask for it, and to refit, in scenes that are dynamic.
+/// Heeded in scenes that are dynamic: to refit, and low, where the scene's own quality is medium and all geometries of a tree ask for it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
     let set = |state: &mut State| {

@@ -19,6 +19,7 @@ impl Geometry {
         let count = view.count();
         let mut state = self.state();
         let before = slot(self.kind, &mut state, name)?.replace(view);
+        state.buffers += 1;
         if name == self.kind.primitives() && before.is_none_or(|before| before.count() != count) {
             state.is_committed = false;
         }

@@ -113,6 +113,8 @@ pub struct State {
     pub flags: Option<View>,
     pub grids: Option<View>,
     pub time_range: (f32, f32),
+    /// How many were set: those of a scene that is made for another reason are read, whether the geometry was committed or not.
+    pub buffers: u64,
     pub quality: u32,
     pub mask: u32,
     pub functions: Functions,
@@ -160,6 +162,7 @@ impl Geometry {
             flags: None,
             grids: None,
             time_range: (0.0, 1.0),
+            buffers: 0,
             quality: quality::MEDIUM,
             mask: if cfg!(feature = "v4") { 1 } else { u32::MAX },
             functions: Functions::default(),

@@ -30,7 +30,7 @@ impl Plan {
         Self { geometries: geometries.clone(), flags: *flags, quality: *quality, progress: *progress }
     }
 
-    /// Whether what did not change since the last commit is taken from there. Otherwise buffers are read anew, as Embree does.
+    /// Whether what did not change since the last commit is taken from there. Otherwise all buffers are read anew.
     pub fn is_dynamic(&self) -> bool {
         self.flags & scene_flag::DYNAMIC != 0
     }
@@ -65,9 +65,12 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     let heeded = heeded(&records);
     let of_queries = plan.flags & scene_flag::FILTER_IN_ARGUMENTS != 0;
     let has_filters = heeded.intersect_filter || heeded.occluded_filter || of_queries;
-    let made_with = (plan.flags, plan.quality);
-    let trees = old.filter(|old| old.made_with == made_with).map(|old| [old.solid.take(), old.changing.take()]);
     let preset = plan.preset(has_filters);
+    let made_with = (plan.flags, preset);
+    let trees = match &mut old {
+        Some(old) if old.made_with == made_with => Some([old.solid.take(), old.changing.take()]),
+        _ => None,
+    };
     let [solid, changing] = Planner { records: &records, preset, is_dynamic: plan.is_dynamic() }.plan(trees);
     let mut boxes = scene.device.install(|| other_boxes(&records))?;
     let [(kept, count), (also_kept, changed)] = [&solid, &changing].map(|making| making.extent(&records));
@@ -75,7 +78,7 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     if count + boxes.boxes.len() > BoxTree::MOST {
         return Err(Failure::operation("too many primitives in a scene"));
     }
-    let expected = kept + expected_bytes(count, boxes.boxes.len());
+    let expected = expected_bytes(count, boxes.boxes.len());
     scene.device.account(expected as isize, false)?;
     let progressed = |part: u64| progress.built(part, (count + boxes.boxes.len()).max(1) as u64);
     let ([solid, changing], others) = scene.device.install(|| {
@@ -107,9 +110,13 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         near: std::sync::OnceLock::new(),
         bytes,
     };
-    // What was announced is corrected, so that takings and givings back add up.
-    _ = scene.device.account(bytes as isize - expected as isize, true);
-    progress.at(1.0).inspect_err(|_| _ = scene.device.account(-(bytes as isize), true))?;
+    // What was announced is corrected, so that takings and givings back add up. What was kept is the old scene's, unless this one takes its place.
+    let made = bytes as isize - kept as isize;
+    _ = scene.device.account(made - expected as isize, true);
+    progress.at(1.0).inspect_err(|_| _ = scene.device.account(-made, true))?;
+    if let Some(old) = old {
+        old.bytes -= kept;
+    }
     Ok(committed)
 }
 
@@ -149,8 +156,10 @@ fn balls(records: &[Option<Box<Record>>], items: &[Item]) -> Vec<Ball> {
 /// Whether what was read of a geometry's buffers is what would be read now. The caller's own boxes are asked for anew, and instances are where their scenes are now.
 fn is_same(before: &Record, geometry: &Arc<Geometry>) -> bool {
     let is_read = matches!(before.body, Body::Surface(_) | Body::Linear(_));
-    let is_committed = |state: &geometry::State| state.is_committed && state.version == before.version;
-    is_read && Arc::ptr_eq(&before.geometry, geometry) && is_committed(&geometry.state())
+    let is_as_before = |state: &geometry::State| {
+        state.is_committed && (state.version, state.buffers) == (before.version, before.buffers)
+    };
+    is_read && Arc::ptr_eq(&before.geometry, geometry) && is_as_before(&geometry.state())
 }
 
 /// A geometry as it is now; none for one that is disabled.

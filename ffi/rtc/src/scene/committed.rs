@@ -1,11 +1,11 @@
-//! A committed scene: what rays are traced in. It never changes.
+//! A committed scene: what rays are traced in. It does not change; of a scene that is dynamic the next commit takes it apart.
 
 use std::sync::{Arc, OnceLock};
 
 use smallvec::SmallVec;
 use twincast_core::math::{Aabb, DAffine3};
 use twincast_core::once::made_outside;
-use twincast_core::trace::bvh::BoxTree;
+use twincast_core::trace::bvh::{BoxTree, Preset};
 
 use crate::abi::{INVALID_ID, RTCBounds};
 use crate::device::Device;
@@ -18,8 +18,9 @@ use super::solid::Solid;
 /// A geometry, as it was when the scene was committed.
 pub struct Record {
     pub geometry: Arc<Geometry>,
-    /// Of what was read.
+    /// Of what was read, and how many buffers had been set.
     pub version: u64,
+    pub buffers: u64,
     pub quality: u32,
     pub mask: u32,
     pub functions: Functions,
@@ -30,8 +31,8 @@ pub struct Record {
 
 impl Record {
     pub fn new(geometry: &Arc<Geometry>, state: &geometry::State, body: Body) -> Self {
-        let &geometry::State { version, quality, mask, functions, .. } = state;
-        Self { geometry: Arc::clone(geometry), version, quality, mask, functions, body, is_new: true }
+        let &geometry::State { version, buffers, quality, mask, functions, .. } = state;
+        Self { geometry: Arc::clone(geometry), version, buffers, quality, mask, functions, body, is_new: true }
     }
 }
 
@@ -131,8 +132,8 @@ pub struct Committed {
     /// Instances that stand still, in the same order.
     pub placed: Vec<Placed>,
     pub heeded: Heeded,
-    /// The scene's flags and quality.
-    pub made_with: (u32, u32),
+    /// The scene's flags, and what its trees are built with.
+    pub made_with: (u32, Preset),
     /// At time 0 and at time 1.
     pub bounds: [Aabb; 2],
     /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are robust.
@@ -158,7 +159,7 @@ impl Committed {
             balls: Vec::new(),
             placed: Vec::new(),
             heeded: Heeded { mask: None, intersect_filter: false, occluded_filter: false },
-            made_with: (0, 0),
+            made_with: (0, Preset::Default),
             bounds: [Aabb::EMPTY; 2],
             excludes_start: false,
             near: OnceLock::new(),

@@ -187,6 +187,7 @@ impl Scene {
             }
             (made_of, commit::Plan::new(&state))
         };
+        // Taken out first, for the new one is made of its parts: meanwhile there is nothing to trace rays in, which nobody may do while a scene is committed.
         let mut old = if plan.is_dynamic() { self.replace(None) } else { None };
         let result = commit::commit(self, &plan, old.as_deref_mut());
         let (committed, result) = match result {

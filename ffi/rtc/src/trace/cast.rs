@@ -189,9 +189,11 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target, 
         {
             let named = surface.name(hit.primitive, hit.u, hit.v, found.normal);
             let name = (hit.geometry, named.primitive);
-            // A filter is shown others at the same distance as well.
-            let is_behind = hit.t == target.tfar() && nearest < name && !target.is_filtered(&query, record);
-            if !is_behind && target.offer(&query, record, hit.geometry, hit.t, &named) {
+            let is_behind = hit.t == target.tfar() && nearest < name;
+            if is_behind {
+                // A filter is shown it nevertheless.
+                target.show(&query, record, hit.geometry, hit.t, &named);
+            } else if target.offer(&query, record, hit.geometry, hit.t, &named) {
                 nearest = name;
             }
         }

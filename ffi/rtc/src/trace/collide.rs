@@ -14,9 +14,9 @@ use crate::scene::{Body, Committed, Item, Near};
 const MOST: usize = 16;
 
 /// Primitives whose collisions one thread looks for at a time: fewer are not worth waking another.
-const TASK: usize = 1 << 10;
+const TASK: usize = 1 << 8;
 
-/// Primitives of which the collisions are there at the same time.
+/// Collisions that are there at the same time, about.
 const WAVE: usize = 1 << 18;
 
 /// Tells of each pair of user primitives, one of each scene, whose boxes overlap at time 0; in a scene with itself no primitive meets itself. They are looked for by the
@@ -35,9 +35,15 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
     }
     let theirs = Theirs::new(second);
     let items: Vec<Item> = all(first).collect();
-    for wave in items.chunks(WAVE) {
+    let (mut rest, mut len) = (&items[..], 4 * TASK);
+    while !rest.is_empty() {
+        let (wave, others) = rest.split_at(len.min(rest.len()));
+        rest = others;
         let find = || wave.par_chunks(TASK).map(|items| collisions(first, &theirs, items)).collect();
         let mut found: Vec<Vec<RTCCollision>> = first.device.install(find)?;
+        let count: usize = found.iter().map(Vec::len).sum();
+        // As many more as there is room for, or fewer.
+        len = if 2 * count < WAVE { 2 * len } else { (len / 2).max(TASK) };
         for collisions in found.iter_mut().flat_map(|found| found.chunks_mut(MOST)) {
             // SAFETY: the caller promised a function of this type; the list lives until it returns.
             unsafe { function(user, collisions.as_mut_ptr(), collisions.len() as u32) };
@@ -98,7 +104,8 @@ fn collisions(first: &Committed, theirs: &Theirs<'_>, items: &[Item]) -> Vec<RTC
     let mut found = Vec::new();
     for &item in items {
         let own = bounds(first, item);
-        if !own.min.cmple(own.max).all() {
+        // What has no end is in no tree either.
+        if !own.min.cmple(own.max).all() || !own.min.is_finite() || !own.max.is_finite() {
             continue;
         }
         theirs.overlapping(&own, &mut |other| {

@@ -112,9 +112,18 @@ impl Target {
         unsafe { self.hit.write(hit_of(query, geometry, named)) };
     }
 
-    /// Whether hits of a geometry have to pass filters.
-    pub fn is_filtered(&self, query: &Query, record: &Record) -> bool {
-        filters(query, record, self.hit.is_null()) != [None; 2]
+    /// Has filters see a hit where another one has been taken, which stays.
+    #[cold]
+    pub fn show(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) {
+        if self.hit.is_null() || filters(query, record, false) == [None; 2] {
+            return;
+        }
+        // SAFETY: readable and writable, as who made the target promised.
+        let before = unsafe { self.hit.read() };
+        if self.offer(query, record, geometry, t, named) {
+            // SAFETY: as above.
+            unsafe { self.hit.write(before) };
+        }
     }
 
     /// Takes a hit, if filters let it pass: whether they do. It is no farther than the ray goes.

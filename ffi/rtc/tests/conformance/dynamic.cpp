@@ -1,6 +1,8 @@
 // Scenes that are dynamic, of which little changes from one commit to the next: against what is there, in closed form.
 #include "check.h"
 
+#include <algorithm>
+
 namespace {
 
 // A level sheet over the unit square, of n x n cells.
@@ -215,9 +217,86 @@ void accounts() {
   rtcReleaseDevice(device);
 }
 
+// What is kept from one commit to the next is not announced again: a monitor that has just enough room does not refuse it.
+void announcements() {
+  static ssize_t held, peak;
+  held = peak = 0;
+  World w(RTC_SCENE_FLAG_DYNAMIC);
+  std::vector<Vec> points;
+  std::vector<unsigned> indices;
+  for (unsigned i = 0; i < 20000; i++) {
+    const float x = i % 141 / 141.f, y = i / 141 / 142.f;
+    points.insert(points.end(), {{x, y, 0}, {x + 0.01f, y, 0}, {x, y + 0.01f, 0}});
+    indices.insert(indices.end(), {3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  w.add(w.mesh(RTC_GEOMETRY_TYPE_TRIANGLE, {points}, indices));
+  RTCGeometry little = w.floor(1);
+  rtcRetainGeometry(little);
+  w.add(little);
+  rtcSetDeviceMemoryMonitorFunction(
+      w.device, [](void*, ssize_t bytes, bool) { return held += bytes, peak = std::max(peak, held), true; }, nullptr);
+  for (int i = 0; i < 4; i++) {
+    const ssize_t before = held;
+    peak = held;
+    rtcCommitGeometry(little);
+    rtcCommitScene(w.scene);
+    if (is_ours() && i > 1) CHECK(peak < before + 10000 && held < before + 10000);
+  }
+  rtcReleaseGeometry(little);
+}
+
+// At the same distance the lowest geometry is hit whatever has changed last, though filters look at both and accept them.
+void accepted_ties() {
+  for (int filtered = 0; filtered < 4; filtered++) {
+    World w(RTC_SCENE_FLAG_DYNAMIC);
+    static int asked;
+    for (int i = 0; i < 2; i++) {
+      RTCGeometry g = w.floor(1);
+      if (filtered >> i & 1) rtcSetGeometryIntersectFilterFunction(g, [](const RTCFilterFunctionNArguments*) { asked++; });
+      w.add(g);
+    }
+    for (int changed = -1; changed < 6; changed++) {
+      if (changed >= 0) rtcCommitGeometry(rtcGetGeometry(w.scene, changed / 3));
+      rtcCommitScene(w.scene);
+      asked = 0;
+      RTCRayHit r = make_ray({0.25f, 0.25f, 9}, {0, 0, -1});
+      intersect(w.scene, r);
+      CHECK(is_hit(r) && r.ray.tfar == 8);
+      if (is_ours()) CHECK(r.hit.geomID == 0 && asked == (filtered & 1) + (filtered >> 1));
+    }
+  }
+}
+
+// A buffer that takes another's place is looked at by the next commit that has something new, and so are flags and qualities.
+void other_buffers() {
+  World w(RTC_SCENE_FLAG_DYNAMIC);
+  w.add(w.floor(1));
+  w.add(w.floor(0));
+  RTCGeometry first = rtcGetGeometry(w.scene, 0), second = rtcGetGeometry(w.scene, 1);
+  auto height = [&] { return 9 - shoot(w.scene, {0.25f, 0.25f, 9}, {0, 0, -1}).ray.tfar; };
+  for (int i = 0; i < 3; i++) rtcCommitGeometry(second), rtcCommitScene(w.scene);
+  CHECK(near(height(), 1));
+  const Vec higher[4] = {{0, 0, 5}, {1, 0, 5}, {0, 1, 5}, {0, 0, 0}};
+  rtcSetSharedGeometryBuffer(first, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, higher, 0, 12, 3);
+  rtcCommitGeometry(second);
+  rtcCommitScene(w.scene);
+  CHECK(near(height(), 5));
+  for (RTCBuildQuality quality : {RTC_BUILD_QUALITY_LOW, RTC_BUILD_QUALITY_HIGH, RTC_BUILD_QUALITY_MEDIUM})
+    for (int flags : {int(RTC_SCENE_FLAG_COMPACT), int(RTC_SCENE_FLAG_DYNAMIC), int(RTC_SCENE_FLAG_DYNAMIC) | int(RTC_SCENE_FLAG_ROBUST)}) {
+      rtcSetSceneFlags(w.scene, RTCSceneFlags(flags));
+      rtcSetSceneBuildQuality(w.scene, quality);
+      rtcCommitGeometry(second);
+      rtcCommitScene(w.scene);
+      CHECK(near(height(), 5));
+    }
+}
+
 }  // namespace
 
 void dynamics() {
   stacks();
   accounts();
+  announcements();
+  accepted_ties();
+  other_buffers();
 }

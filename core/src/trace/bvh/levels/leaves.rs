@@ -130,7 +130,10 @@ impl Leaves {
             Self::Numbers(numbers) => {
                 numbers.set_meshes(meshes.clone());
                 let count = numbers.blocks().len() as u32;
-                (0..count).into_par_iter().all(|index| is_sound(numbers.put_together::<Portable>(index, &mut None)))
+                (0..count)
+                    .into_par_iter()
+                    .with_min_len(room::few::<Block>())
+                    .all(|index| is_sound(numbers.put_together::<Portable>(index, &mut None)))
             }
         }
     }

@@ -96,6 +96,8 @@ impl TriangleTree {
         let leaves = &self.leaves;
         self.tree.refit(|blocks| blocks.map(|index| leaves.bounds(index)).fold(Aabb::EMPTY, Aabb::union));
         self.parts = parts.iter().map(ids).collect();
+        // Equal, but those of the scene, so that none are kept for this alone.
+        self.topology = parts.iter().map(triangles).collect();
         Ok(())
     }
 

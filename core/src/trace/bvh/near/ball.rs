@@ -1,6 +1,7 @@
 //! Boxes that a ball reaches, near ones first: for callers who measure distances themselves (Embree's point queries).
 //!
-//! Squared distances are computed in f32, each within 4 units in the last place, and the ball is larger by more than that.
+//! Squared distances are computed in f32, each within 4 units in the last place, and the ball is larger by more than that. Those beyond f32 are the largest number,
+//! which a ball reaches that is as large.
 
 use crate::math::Vec3;
 use crate::trace::bvh::Bvh;
@@ -34,7 +35,7 @@ pub(in crate::trace::bvh) struct Ball {
 /// What squared distances are held against; less than 0 for what is no distance.
 #[inline(always)]
 fn limit(radius: f32) -> f32 {
-    if radius >= 0.0 { radius * radius * (1.0 + 1e-6) + f32::MIN_POSITIVE } else { -1.0 }
+    if radius >= 0.0 { (radius * radius * (1.0 + 1e-6) + f32::MIN_POSITIVE).min(f32::MAX) } else { -1.0 }
 }
 
 impl Ball {
@@ -60,7 +61,7 @@ impl Ball {
             let outside = low[axis].sub(p).max(p.sub(high[axis])).max(zero);
             square = outside.mul_add(outside, square);
         }
-        square
+        square.min(V::splat(f32::MAX))
     }
 
     /// A bit for each triangle of a block whose box is reached.
@@ -94,8 +95,13 @@ impl Enter for Ball {
         let low = [row::<S>(node, 0), row::<S>(node, 2), row::<S>(node, 4)];
         let high = [row::<S>(node, 1), row::<S>(node, 3), row::<S>(node, 5)];
         let square = self.squared(low, high);
-        // Slots without a child are infinitely far away.
-        (square.at_most(S::V8::splat(limit.min(f32::MAX))), square)
+        (square.at_most(S::V8::splat(limit)), square)
+    }
+
+    /// Slots without a child are as far away as anything can be, which may be near enough.
+    #[inline(always)]
+    fn select<S: Simd>(&self, node: &Node, children: u32) -> u32 {
+        node.occupied() & children
     }
 }
 
@@ -185,7 +191,9 @@ mod tests {
         let points: Vec<(Vec3, f32)> = (0..300)
             .map(|i| {
                 let near = boxes[random.below(3000) as usize];
-                let point = [random.vector() * 5.0, near.max, near.min - Vec3::X * 0.5, Vec3::splat(1e6)][i % 4];
+                let point =
+                    [random.vector() * 5.0, near.max, near.min - Vec3::X * 0.5, Vec3::splat(1e6), Vec3::X * 3e19]
+                        [i % 5];
                 (point, [0.0, 0.5, 1.0, 1e-30, 3.0, f32::INFINITY, -1.0, f32::NAN, 1e30][i % 9])
             })
             .collect();
