@@ -152,9 +152,24 @@ fn wider(ends: &[Aabb; 2]) -> [Aabb; 2] {
 }
 
 /// What overlaps a box, in no order.
-struct Overlap<'a>(&'a Aabb);
+pub(super) struct Overlap<'a>(pub &'a Aabb);
 
 impl Overlap<'_> {
+    /// Shows `leaf` the leaves of `tree` that overlap it.
+    #[inline(always)]
+    pub fn walk<S: Simd>(&self, tree: &Tree, mut leaf: impl FnMut(Child)) {
+        walk::single::<S, Occluded>(
+            tree,
+            self,
+            f32::INFINITY,
+            #[inline(always)]
+            |child| {
+                leaf(child);
+                Visit::Until(f32::INFINITY)
+            },
+        );
+    }
+
     #[inline(always)]
     fn along<S: Simd>(&self, node: &Node, axis: usize) -> <S::V8 as Vector>::Mask {
         let Self(Aabb { min, max }) = self;
@@ -247,15 +262,10 @@ impl Kernel for OverlappingBoxes<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { boxes: BoxTree { tree, .. }, bounds, visitor } = self;
-        walk::single::<S, Occluded>(
+        Overlap(bounds).walk::<S>(
             tree,
-            &Overlap(bounds),
-            f32::INFINITY,
             #[inline(always)]
-            |leaf| {
-                leaf.blocks().for_each(&mut *visitor);
-                Visit::Until(f32::INFINITY)
-            },
+            |leaf| leaf.blocks().for_each(&mut *visitor),
         );
     }
 }

@@ -61,6 +61,7 @@ mod query;
 mod random;
 mod refit;
 mod reject;
+mod removal;
 mod simd;
 mod steps;
 mod tree;

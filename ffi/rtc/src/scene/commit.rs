@@ -9,7 +9,7 @@ use twincast_core::trace::bvh::{BoxTree, Options, Preset};
 use super::boxes::other_boxes;
 use super::committed::{Body, Committed, Heeded, Instance, Item, Placed, Record};
 use super::progress::Progress;
-use super::solid::Planner;
+use super::solid::{Making, Planner, Solid};
 use super::{Scene, State};
 use crate::abi::{RTCBounds, RTCBoundsFunctionArguments, RTCProgressMonitorFunction, quality, scene_flag};
 use crate::device::Callback;
@@ -68,38 +68,38 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     let preset = plan.preset(has_filters);
     let made_with = (plan.flags, preset);
     let trees = match &mut old {
-        Some(old) if old.made_with == made_with => Some([old.solid.take(), old.changing.take()]),
-        _ => None,
+        Some(old) if old.made_with == made_with => old.take_solids(),
+        _ => Vec::new(),
     };
-    let [solid, changing] = Planner { records: &records, preset, is_dynamic: plan.is_dynamic() }.plan(trees);
+    let makings = Planner { records: &records, preset, is_dynamic: plan.is_dynamic() }.plan(trees);
     let mut boxes = scene.device.install(|| other_boxes(&records))?;
-    let [(kept, count), (also_kept, changed)] = [&solid, &changing].map(|making| making.extent(&records));
-    let (kept, count) = (kept + also_kept, count + changed);
+    let extents = || makings.iter().map(Making::extent);
+    let (kept, count) =
+        (extents().map(|(kept, _)| kept).sum::<usize>(), extents().map(|(_, count)| count).sum::<usize>());
     if count + boxes.boxes.len() > BoxTree::MOST {
         return Err(Failure::operation("too many primitives in a scene"));
     }
     let expected = expected_bytes(count, boxes.boxes.len());
     scene.device.account(expected as isize, false)?;
     let progressed = |part: u64| progress.built(part, (count + boxes.boxes.len()).max(1) as u64);
-    let ([solid, changing], others) = scene.device.install(|| {
+    let (mut solids, others) = scene.device.install(|| {
         let options = Options { preset, progress: Some(&progressed), ..Options::default() };
-        let solids = [solid, changing].map(|making| making.make(&records, options));
+        let solids: Vec<Solid> = makings.into_iter().map(|making| making.make(&records, options)).collect();
         let others = (!boxes.boxes.is_empty()).then(|| BoxTree::moving(&boxes.boxes, options));
         (solids, others)
     })?;
-    let solids = || solid.iter().chain(&changing);
-    solids().for_each(|solid| boxes.surround([solid.bounds; 2]));
+    solids.iter().for_each(|solid| boxes.surround([solid.bounds(); 2]));
     let (others, order) = others.unzip();
     let (items, placed) = in_order(&records, &boxes.items, &order.unwrap_or_default());
-    let bytes = solids().map(|solid| solid.bvh.bytes()).sum::<usize>() + others.as_ref().map_or(0, BoxTree::bytes);
+    let bytes = solids.iter().map(|solid| solid.bvh.bytes()).sum::<usize>() + others.as_ref().map_or(0, BoxTree::bytes);
     let committed = Committed {
         device: Arc::clone(&scene.device),
         is_plain: is_plain(&records),
-        repeats: solids().any(|solid| solid.bvh.preset() == Preset::High),
+        repeats: solids.iter().any(|solid| solid.bvh.preset() == Preset::High),
         balls: balls(&records, &items),
         records,
-        solid,
-        changing,
+        changing: if solids.is_empty() { Vec::new() } else { solids.split_off(1) },
+        solid: solids.pop(),
         bounds: boxes.ends(),
         others,
         items,

@@ -117,9 +117,9 @@ pub struct Committed {
     pub records: Vec<Option<Box<Record>>>,
     /// Triangles that stand still; none where there are none.
     pub solid: Option<Solid>,
-    /// In a scene that is dynamic, those of geometries that changed lately.
-    pub changing: Option<Solid>,
-    /// Whether each triangle of these two is a primitive.
+    /// In a scene that is dynamic, those that have changed since; the largest first, all smaller.
+    pub changing: Vec<Solid>,
+    /// Whether each triangle of all these is a primitive.
     pub is_plain: bool,
     /// Whether a ray may come to a triangle of these more than once.
     pub repeats: bool,
@@ -151,7 +151,7 @@ impl Committed {
             device,
             records: Vec::new(),
             solid: None,
-            changing: None,
+            changing: Vec::new(),
             is_plain: true,
             repeats: false,
             others: None,
@@ -176,6 +176,11 @@ impl Committed {
     /// The trees over triangles that stand still.
     pub fn solids(&self) -> impl Iterator<Item = &Solid> {
         self.solid.iter().chain(&self.changing)
+    }
+
+    /// The same, taken away.
+    pub fn take_solids(&mut self) -> Vec<Solid> {
+        self.solid.take().into_iter().chain(self.changing.drain(..)).collect()
     }
 
     /// Whether these name each primitive in them, once.

@@ -19,7 +19,6 @@ use crate::geometry::Geometry;
 
 pub use committed::{Body, Committed, Instance, Item, Placed, Record};
 pub use near::Near;
-pub use solid::Solid;
 
 /// What the caller has set.
 pub struct State {

@@ -1,7 +1,8 @@
 //! Trees over the triangles that stand still.
 //!
-//! A scene has one. A scene that is dynamic has two once something in it has changed: over what lasts, and over what changed lately, so that a commit builds
-//! what changed, and not the whole again.
+//! A scene has one. A scene that is dynamic has more once something in it has changed: a commit takes what changed out of the trees it was in, builds one over that, and keeps
+//! the others. What has come to rest is merged with what is not much larger, as in a log-structured merge tree (O'Neil, Cheng, Gawlick, O'Neil 1996), so that there are few trees, and each
+//! triangle is built again a few times at most.
 
 use std::sync::Arc;
 
@@ -13,25 +14,41 @@ use twincast_core::trace::{Part, Primitives};
 use super::committed::{Body, Record};
 use crate::abi::quality;
 
+/// What is at rest is merged with the next larger tree unless that has more than so many times its triangles. Each tree costs every ray some 30 ns.
+const MERGED: usize = 4;
+
+/// What has changed once soon does so again: it is not merged before it has seen so many commits go by.
+const REST: u32 = 4;
+
 /// A tree, and of what.
 #[derive(Debug)]
 pub struct Solid {
     pub bvh: Bvh,
-    /// Geometry ids, rising.
-    of: Vec<u32>,
+    /// By rising id; without those that were taken out.
+    members: Vec<Member>,
+    /// Triangles that were taken out.
+    gone: usize,
+    /// Commits in a row of which none changed anything in it.
+    rest: u32,
+}
+
+/// A geometry in a tree, as it was when that was built.
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    id: u32,
     triangles: usize,
-    pub bounds: Aabb,
+    bounds: Aabb,
 }
 
 /// How a commit comes to a tree.
 #[derive(Debug)]
 pub enum Making {
-    Nothing,
-    /// It is as it was.
+    /// It is as it was, but for what was taken out.
     Kept(Solid),
     /// Vertices have moved, and the geometries ask for no more than that boxes follow. What it is built with where that is not enough.
     Refitted(Solid, Preset),
-    Built(Vec<u32>, Preset),
+    /// Over these geometries, by rising id, which have so many triangles.
+    Built(Vec<u32>, usize, Preset),
 }
 
 /// Geometries of a scene, by id, as they are now.
@@ -46,50 +63,77 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// How the trees are made: over all, or what lasts, and over what changed lately. `old` are those of the last commit; none where they are not to be looked at.
-    pub fn plan(&self, old: Option<[Option<Solid>; 2]>) -> [Making; 2] {
-        let Self { records, .. } = *self;
-        let all: Vec<u32> = (0..records.len() as u32).filter(|&id| still_triangles(records, id) > 0).collect();
-        let Some([Some(lasting), changing]) = old else { return [self.built(all), Making::Nothing] };
-        let (others, calm) = (|id: &&u32| lasting.of.binary_search(id).is_err(), |id: &&u32| !self.has_changed(**id));
-        if lasting.of.iter().all(|id| calm(&id)) {
-            let others: Vec<u32> = all.iter().filter(others).copied().collect();
-            let calm: usize = others.iter().filter(calm).map(|&id| still_triangles(records, id)).sum();
-            // What came to rest is taken over when there is much of it: to build it again and again would take longer.
-            if 2 * calm <= lasting.triangles {
-                return [Making::Kept(lasting), self.made(others, changing)];
+    /// How the trees are made, the largest first. `old` are those of the last commit; none where they are not to be looked at.
+    pub fn plan(&self, old: Vec<Solid>) -> Vec<Making> {
+        let all = (0..self.records.len() as u32).filter(|&id| still_triangles(self.records, id) > 0);
+        let mut changed: Vec<u32> = all.filter(|&id| !old.iter().any(|solid| solid.has(id))).collect();
+        let (mut made, mut calm) = (Vec::new(), Vec::new());
+        for mut solid in old {
+            let (stay, leave): (Vec<Member>, Vec<Member>) =
+                solid.members.iter().partition(|member| !self.has_changed(member.id));
+            let is_there = |member: &Member| still_triangles(self.records, member.id) > 0;
+            if leave.is_empty() {
+                solid.rest = solid.rest.saturating_add(1);
+                let is_calm = solid.rest >= REST;
+                let list = if is_calm { &mut calm } else { &mut made };
+                list.push(Making::Kept(solid));
+            } else if self.is_refitted(&solid, &leave) {
+                let preset = self.preset_of(&solid.ids());
+                made.push(Making::Refitted(solid, preset));
+            } else {
+                changed.extend(leave.iter().filter(|member| is_there(member)).map(|member| member.id));
+                if !stay.is_empty() {
+                    let is_fit = solid.take_out(&leave) && solid.gone <= solid.triangles();
+                    calm.push(if is_fit {
+                        Making::Kept(solid)
+                    } else {
+                        self.built(stay.iter().map(|m| m.id).collect())
+                    });
+                }
             }
         }
-        let (calm, changed): (Vec<u32>, Vec<u32>) = all.iter().partition(calm);
-        if calm.is_empty() {
-            return [self.made(all, Some(lasting)), Making::Nothing];
+        made.extend(self.merged(calm));
+        if !changed.is_empty() {
+            made.push(self.built(changed));
         }
-        [self.built(calm), self.made(changed, changing)]
+        made.sort_by_key(|making| std::cmp::Reverse(making.triangles()));
+        made
+    }
+
+    /// Whether a tree is refitted of which these have changed: where all of them ask for it, and they are most of it.
+    fn is_refitted(&self, solid: &Solid, leave: &[Member]) -> bool {
+        let moved: usize = leave.iter().map(|member| still_triangles(self.records, member.id)).sum();
+        let is_wanted =
+            |member: &Member| self.asks_for(member.id, quality::REFIT) && still_triangles(self.records, member.id) > 0;
+        solid.gone == 0 && 2 * moved >= solid.triangles() && leave.iter().all(is_wanted)
+    }
+
+    /// Trees of which each has more than [`MERGED`] times the triangles of the next.
+    fn merged(&self, mut calm: Vec<Making>) -> Vec<Making> {
+        calm.sort_by_key(|making| std::cmp::Reverse(making.triangles()));
+        let mut merged: Vec<Making> = Vec::new();
+        for making in calm.into_iter().rev() {
+            match merged.last() {
+                Some(smaller) if making.triangles() <= MERGED * smaller.triangles() => {
+                    let ids = [smaller.ids(), making.ids()].concat();
+                    merged.pop();
+                    merged.push(self.built(ids));
+                }
+                _ => merged.push(making),
+            }
+        }
+        merged
     }
 
     fn has_changed(&self, id: u32) -> bool {
         record(self.records, id).is_none_or(|record| record.is_new)
     }
 
-    fn built(&self, of: Vec<u32>) -> Making {
-        if of.is_empty() {
-            return Making::Nothing;
-        }
+    fn built(&self, mut of: Vec<u32>) -> Making {
+        of.sort_unstable();
+        let triangles = of.iter().map(|&id| still_triangles(self.records, id)).sum();
         let preset = self.preset_of(&of);
-        Making::Built(of, preset)
-    }
-
-    /// Over these geometries, where there was a tree.
-    fn made(&self, of: Vec<u32>, old: Option<Solid>) -> Making {
-        let Some(old) = old.filter(|old| old.of == of) else { return self.built(of) };
-        let mut changed = of.iter().filter(|&&id| self.has_changed(id)).peekable();
-        if changed.peek().is_none() {
-            return Making::Kept(old);
-        }
-        if changed.all(|&id| self.asks_for(id, quality::REFIT)) {
-            return Making::Refitted(old, self.preset_of(&of));
-        }
-        self.built(of)
+        Making::Built(of, triangles, preset)
     }
 
     fn preset_of(&self, of: &[u32]) -> Preset {
@@ -117,27 +161,40 @@ fn still_triangles(records: &Records, id: u32) -> usize {
 }
 
 impl Making {
-    /// Memory of the tree that is there already, and triangles that another is built of.
-    pub fn extent(&self, records: &Records) -> (usize, usize) {
+    fn triangles(&self) -> usize {
         match self {
-            Self::Nothing => (0, 0),
+            Self::Kept(solid) | Self::Refitted(solid, _) => solid.triangles(),
+            Self::Built(_, triangles, _) => *triangles,
+        }
+    }
+
+    fn ids(&self) -> Vec<u32> {
+        match self {
+            Self::Kept(solid) | Self::Refitted(solid, _) => solid.ids(),
+            Self::Built(of, _, _) => of.clone(),
+        }
+    }
+
+    /// Memory of the tree that is there already, and triangles that another is built of.
+    pub fn extent(&self) -> (usize, usize) {
+        match self {
             Self::Kept(solid) | Self::Refitted(solid, _) => (solid.bvh.bytes(), 0),
-            Self::Built(of, _) => (0, of.iter().map(|&id| still_triangles(records, id)).sum()),
+            Self::Built(_, triangles, _) => (0, *triangles),
         }
     }
 
     /// The tree.
-    pub fn make(self, records: &Records, options: Options<'_>) -> Option<Solid> {
+    pub fn make(self, records: &Records, options: Options<'_>) -> Solid {
         match self {
-            Self::Nothing => None,
-            Self::Kept(solid) => Some(solid),
-            Self::Built(of, preset) => Some(Solid::build(records, of, Options { preset, ..options })),
+            Self::Kept(solid) => solid,
+            Self::Built(of, _, preset) => Solid::build(records, &of, Options { preset, ..options }),
             Self::Refitted(mut solid, preset) => {
-                let world = world(records, &solid.of);
+                let of = solid.ids();
+                let world = world(records, &of);
                 match solid.bvh.refit(&world) {
-                    Ok(()) => Some(Solid { bounds: bounds(&world), ..solid }),
+                    Ok(()) => Solid { members: members(&world), rest: 0, ..solid },
                     // There are other triangles than before, or others that can be hit.
-                    Err(_) => Some(Solid::build(records, solid.of, Options { preset, ..options })),
+                    Err(_) => Solid::build(records, &of, Options { preset, ..options }),
                 }
             }
         }
@@ -145,11 +202,34 @@ impl Making {
 }
 
 impl Solid {
-    fn build(records: &Records, of: Vec<u32>, options: Options<'_>) -> Self {
-        let world = world(records, &of);
-        let triangles = of.iter().map(|&id| still_triangles(records, id)).sum();
-        let bvh = Bvh::build_with(&world, options);
-        Self { bvh, of, triangles, bounds: bounds(&world) }
+    fn build(records: &Records, of: &[u32], options: Options<'_>) -> Self {
+        let world = world(records, of);
+        Self { bvh: Bvh::build_with(&world, options), members: members(&world), gone: 0, rest: 0 }
+    }
+
+    /// The box around what can be hit.
+    pub fn bounds(&self) -> Aabb {
+        self.members.iter().fold(Aabb::EMPTY, |all, member| all.union(member.bounds))
+    }
+
+    fn has(&self, id: u32) -> bool {
+        self.members.binary_search_by_key(&id, |member| member.id).is_ok()
+    }
+
+    fn ids(&self) -> Vec<u32> {
+        self.members.iter().map(|member| member.id).collect()
+    }
+
+    /// Those that are left.
+    fn triangles(&self) -> usize {
+        self.members.iter().map(|member| member.triangles).sum()
+    }
+
+    /// Takes some members out. Whether it could; else it is of no use any more.
+    fn take_out(&mut self, members: &[Member]) -> bool {
+        self.members.retain(|own| members.iter().all(|member| member.id != own.id));
+        self.gone += members.iter().map(|member| member.triangles).sum::<usize>();
+        members.iter().all(|member| self.bvh.take_out(member.id, &member.bounds))
     }
 }
 
@@ -166,7 +246,7 @@ fn world(records: &Records, of: &[u32]) -> World {
     world
 }
 
-/// The box around what can be hit.
-fn bounds(world: &World) -> Aabb {
-    world.parts.iter().map(Part::bounds).fold(Aabb::EMPTY, Aabb::union)
+fn members(world: &World) -> Vec<Member> {
+    let member = |part: &Part| Member { id: part.geometry, triangles: part.primitives.len(), bounds: part.bounds() };
+    world.parts.iter().map(member).collect()
 }

@@ -8,7 +8,7 @@ use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::{Ball, Named};
-use crate::scene::{Body, Committed, Instance, Item, Placed, Record, Scene, Solid};
+use crate::scene::{Body, Committed, Instance, Item, Placed, Record, Scene};
 
 /// The ray as the native tracer knows it.
 #[inline(always)]
@@ -62,8 +62,8 @@ pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &
     }
     let is_done = || ANY && target.tfar() < 0.0;
     let mut nearest = INVALID_ID;
-    if let Some(changing) = &committed.changing {
-        nearest = cast_changing::<ANY>(committed, changing, *query, *target, sight);
+    if !committed.changing.is_empty() {
+        nearest = cast_changing::<ANY>(committed, *query, *target, sight);
     }
     if let Some(solid) = committed.solid.as_ref().filter(|_| !is_done()) {
         cast_triangles::<ANY>(committed, &solid.bvh, query, target, sight, nearest);
@@ -73,17 +73,18 @@ pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &
     }
 }
 
-/// Among the triangles of what changed lately; the geometry that was hit. First, as they are mostly few, and what is behind need not be looked at then. By value, here and
+/// Among the triangles of what changed lately, the smallest trees first, for what is behind need not be looked at then; the geometry that was hit. By value, here and
 /// below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
-fn cast_changing<const ANY: bool>(
-    committed: &Committed,
-    changing: &Solid,
-    query: Query,
-    target: Target,
-    sight: Sight,
-) -> u32 {
-    cast_triangles::<ANY>(committed, &changing.bvh, &query, &target, sight, INVALID_ID)
+fn cast_changing<const ANY: bool>(committed: &Committed, query: Query, target: Target, sight: Sight) -> u32 {
+    let mut nearest = INVALID_ID;
+    for solid in committed.changing.iter().rev() {
+        nearest = cast_triangles::<ANY>(committed, &solid.bvh, &query, &target, sight, nearest);
+        if ANY && target.tfar() < 0.0 {
+            break;
+        }
+    }
+    nearest
 }
 
 /// Among triangles, of which some may not pass. Geometry `nearest` has been hit before, if any: at the same distance the lower one is. The one that has been hit now.

@@ -116,7 +116,7 @@ const DIRECTION: usize = 4;
 #[inline(always)]
 fn plain<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
     let mask = committed.heeded.mask?;
-    let solid = &committed.solid.as_ref().filter(|_| committed.changing.is_none() && committed.others.is_none())?.bvh;
+    let solid = &committed.solid.as_ref().filter(|_| committed.changing.is_empty() && committed.others.is_none())?.bvh;
     (sight(committed, query, mask, any) == Sight::Everything).then_some((solid, mask))
 }
 

@@ -138,6 +138,19 @@ impl Leaves {
         }
     }
 
+    /// Takes the triangles of a part out of some blocks; how many these were. None where the tree does not hold its triangles itself.
+    pub fn take_out(&mut self, part: u32, blocks: &[u32]) -> Option<usize> {
+        let Self::Blocks(own) = self else { return None };
+        let (own, mut count) = (own.make_mut(), 0);
+        for &index in blocks {
+            let block = &mut own[index as usize];
+            let lanes = block.used().filter(|&lane| block.part[lane] == part).fold(0, |lanes, lane| lanes | 1 << lane);
+            block.lanes &= !lanes;
+            count += lanes.count_ones() as usize;
+        }
+        Some(count)
+    }
+
     /// Where in memory a block is.
     #[inline(always)]
     pub fn address<S: Simd>(&self, index: u32) -> *const u8 {

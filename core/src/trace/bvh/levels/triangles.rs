@@ -101,6 +101,17 @@ impl TriangleTree {
         Ok(())
     }
 
+    /// Takes the triangles of a geometry out of these blocks, which are all that have any. Whether it could.
+    pub fn take_out(&mut self, geometry: u32, blocks: &[u32]) -> bool {
+        let parts = (0..self.parts.len() as u32).filter(|&part| self.parts[part as usize].geometry == geometry);
+        for part in parts {
+            let Some(count) = self.leaves.take_out(part, blocks) else { return false };
+            // In the high preset one may be in several leaves.
+            self.count = self.count.saturating_sub(count);
+        }
+        true
+    }
+
     pub fn tree(&self) -> &Tree {
         &self.tree
     }
