@@ -1,5 +1,6 @@
 //! Everything that can go wrong, and the exit code each kind ends the program with.
 
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// Result with this library's [`Error`].
@@ -58,6 +59,21 @@ pub enum Error {
 /// What a library says, in one line.
 pub fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What the system says of a file that is to be read, in words.
+#[doc(hidden)]
+pub fn system_message(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "there is no such file; mind its name and its folder".to_owned(),
+        // These are our own words.
+        ErrorKind::IsADirectory | ErrorKind::InvalidInput => error.to_string(),
+        _ => {
+            let words = error.to_string();
+            // The number says no more.
+            format!("cannot be read: {}", words.split(" (os error").next().unwrap_or_default())
+        }
+    }
 }
 
 impl Error {

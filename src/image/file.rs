@@ -11,7 +11,7 @@ use super::oiio as backend;
 use super::pure as backend;
 use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Curve, Image, Metadata, Response, channels};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, one_line, system_message};
 use crate::memory::Mapped;
 use crate::output::{self, Together};
 
@@ -219,7 +219,7 @@ pub fn read_whole(path: &Path) -> Result<Image> {
 pub(super) fn read_samples(path: &Path) -> Result<Samples> {
     let bytes = file_size(path)?;
     if JPEG.contains(&suffix(path).as_str()) {
-        let file = Mapped::open(path).map_err(|error| Error::input(path, "", error.to_string()))?;
+        let file = Mapped::open(path).map_err(|error| Error::input(path, "", system_message(&error)))?;
         if super::is_cut_short(&file) {
             return Err(Error::input(path, "", "is cut short"));
         }
@@ -319,7 +319,7 @@ fn writable_suffix(path: &Path) -> Result<String> {
 }
 
 fn file_size(path: &Path) -> Result<u64> {
-    let file = std::fs::metadata(path).map_err(|e| Error::input(path, "", e.to_string()))?;
+    let file = std::fs::metadata(path).map_err(|e| Error::input(path, "", system_message(&e)))?;
     if file.is_dir() {
         return Err(Error::input(path, "", "is a folder, not an image file"));
     }

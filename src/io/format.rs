@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::{LoadOptions, Promised, course, gltf, nff, obj, ply, stl, toml};
 use crate::error::{Error, Result, Warning};
+use crate::io::text::without_mark;
 use crate::memory::Mapped;
 use crate::scene::Scene;
 
@@ -94,7 +95,8 @@ impl Format {
 
     /// The format that the first bytes of a file tell, and its suffix, where no other format may begin so.
     fn told_by(bytes: &[u8]) -> Option<(Self, &'static str)> {
-        let is_ply = bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r");
+        let text = without_mark(bytes);
+        let is_ply = text.starts_with(b"ply\n") || text.starts_with(b"ply\r");
         if bytes.starts_with(b"glTF") { Some((Self::Gltf, "glb")) } else { is_ply.then_some((Self::Ply, "ply")) }
     }
 

@@ -35,7 +35,7 @@ pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save, save_until};
 
 use self::finish::{bare, doubt_bare, make_finite, meshes};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, system_message};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
 use crate::scene::{Geometry, Mesh, Scene, fault};
@@ -228,14 +228,5 @@ impl Unit {
             Self::Millimetre => 0.001,
             Self::Inch => 0.0254,
         }
-    }
-}
-
-/// What the system says about a file, as a message.
-fn system_message(error: &std::io::Error) -> String {
-    match error.kind() {
-        // These are our own words.
-        std::io::ErrorKind::IsADirectory | std::io::ErrorKind::InvalidInput => error.to_string(),
-        _ => format!("cannot be read: {error}"),
     }
 }

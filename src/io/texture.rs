@@ -7,7 +7,7 @@ use bytemuck::{Pod, try_cast_vec};
 use image::error::ImageError;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, one_line, system_message};
 use crate::image::{guarded, is_cut_short};
 use crate::io::Placeless;
 use crate::memory::{Mapped, process};
@@ -63,7 +63,7 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             return Ok(Err(format!("texture {:?} is missing", path.display())));
         }
-        Err(e) => return Err(Error::input(path, "", super::system_message(&e))),
+        Err(e) => return Err(Error::input(path, "", system_message(&e))),
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     match read(&bytes, &name) {

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
+use twincast::io::{LoadOptions, load};
 use twincast::math::{DVec3, Vec2, Vec3};
 use twincast::scene::{Absorption, Alpha, Attenuation, Filter, Fov, Interface, Light, Mesh, Pixels, Projection, Wrap};
 
@@ -509,6 +510,19 @@ fn faults_are_told_with_their_pointer() {
     fault("/scenes", json!([]), "/scenes", "nothing to render");
     let files = Files::one("a.gltf", "{\n \"asset\": 3}");
     refused(&files, "a.gltf", "line 2, column 11", "not valid glTF: invalid type");
+    for (text, words) in [
+        ("{\"scene\": -1}", "invalid value: integer `-1`, expected a whole number from 0 on"),
+        (
+            "{\"nodes\": [{\"mesh\": \"usize, expected u8\"}]}",
+            "string \"usize, expected u8\", expected a whole number from 0 on",
+        ),
+        ("{\"nodes\": {}}", "invalid type: object, expected an array"),
+        ("{\"nodes\": [[3]]}", "expected"),
+    ] {
+        let files = Files::one("a.gltf", text);
+        let error = load(&files.path("a.gltf"), &LoadOptions::default()).expect_err("it is refused");
+        assert!(error.exit_code() == 3 && error.to_string().contains(words), "{error}");
+    }
 }
 
 #[test]

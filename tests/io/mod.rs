@@ -188,8 +188,12 @@ fn meshes_without_an_area_are_told() {
         assert!(warnings.iter().any(|warning| warning.message.starts_with("no ray hits anything")), "{warnings:?}");
         assert_eq!(!scene.bounds().is_empty(), is_bounded, "{corners}");
     }
-    let (_, warnings) = Files::one("a.ply", ply("0 0 0\n1 0 0\n0 1 0\n")).load("a.ply");
+    let plain = ply("0 0 0\n1 0 0\n0 1 0\n");
+    let (_, warnings) = Files::one("a.ply", &plain).load("a.ply");
     assert_eq!(warnings, []);
+    // With the mark that some editors put before a text.
+    let (marked, warnings) = Files::one("a.ply", format!("\u{feff}{plain}")).load("a.ply");
+    assert_eq!((marked.primitive_count(), warnings), (1, vec![]));
 }
 
 #[test]
@@ -198,7 +202,7 @@ fn files_that_are_no_scenes() {
     fs::create_dir(files.path("folder.obj")).unwrap();
     refused(&files, "folder.obj", "", "directory");
     refused(&files, "empty.obj", "", "empty");
-    refused(&files, "absent.obj", "", "No such file");
+    refused(&files, "absent.obj", "", "there is no such file");
     refused(&files, "scene.xyz", "", "glb, gltf, nff, obj, ply, stl, test, toml");
     refused(&files, "none", "", "glb, gltf, nff, obj, ply, stl, test, toml");
     for name in ["empty.ply", "empty.stl", "empty.gltf", "empty.glb", "empty.nff", "empty.test", "empty.toml"] {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::uri::{self, Target};
 use super::{meshopt, schema};
-use crate::error::{Error, Result, Warning};
-use crate::io::{Placeless, system_message};
+use crate::error::{Error, Result, Warning, system_message};
+use crate::io::Placeless;
 use crate::memory::Mapped;
 
 /// A parsed file with its buffers.

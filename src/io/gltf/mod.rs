@@ -96,7 +96,7 @@ fn read(path: &Path, file: &Mapped<'_>, options: &LoadOptions, warnings: &mut Ve
         let place = format!("line {}, column {}", e.line(), e.column());
         // The place is in the library's own message too.
         let message = e.to_string();
-        let short = message.split(" at line ").next().unwrap_or_default();
+        let short = quotes::plain(message.split(" at line ").next().unwrap_or_default());
         Error::input(path, place, format!("not valid glTF: {short}"))
     })?;
     check_version(path, &root, warnings)?;

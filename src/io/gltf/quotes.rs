@@ -29,6 +29,32 @@ pub(super) fn shortened(message: &str) -> String {
     }
 }
 
+/// What the JSON library says, in JSON's words for the types of Rust, where it does not quote the file.
+pub(super) fn plain(message: &str) -> String {
+    const WORDS: [(&str, &str); 12] = [
+        ("expected usize", "expected a whole number from 0 on"),
+        ("expected u64", "expected a whole number from 0 on"),
+        ("expected u32", "expected a whole number from 0 on"),
+        ("expected u16", "expected a whole number from 0 on"),
+        ("expected u8", "expected a whole number from 0 to 255"),
+        ("expected i32", "expected a whole number"),
+        ("expected f32", "expected a number"),
+        ("expected f64", "expected a number"),
+        ("expected a sequence", "expected an array"),
+        ("expected a map", "expected an object"),
+        ("type: sequence", "type: array"),
+        ("type: map", "type: object"),
+    ];
+    // The last words are the library's own, as are those before what it quotes; a structure has a name that is ours.
+    let (before, expected) = message.rsplit_once(", ").unwrap_or(("", message));
+    let expected = if expected.starts_with("expected struct ") { "expected an object" } else { expected };
+    let told = |text: &str| {
+        let word = WORDS.iter().find_map(|(word, plain)| Some((text.strip_suffix(word)?, plain)));
+        word.map_or_else(|| text.to_owned(), |(head, plain)| format!("{head}{plain}"))
+    };
+    if before.is_empty() { told(expected) } else { format!("{}, {}", told(before), told(expected)) }
+}
+
 /// Where a quotation ends: at the next such mark that no backslash stands before, or with the message.
 fn end(quoted: &str, quote: char) -> usize {
     let mut is_escaped = false;

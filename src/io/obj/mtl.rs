@@ -6,10 +6,10 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, system_message};
 use crate::io::Placeless;
 use crate::io::text::{Lines, Words, name, number, quoted, without_mark};
-use crate::io::{system_message, texture};
+use crate::io::texture;
 use crate::math::{Affine2, Mat3, Vec2, Vec3};
 use crate::memory::Mapped;
 use crate::scene::{Material, Scene, Texture, Wrap};

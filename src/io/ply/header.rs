@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::io::Placeless;
-use crate::io::text::{Lines, Words, name, quoted};
+use crate::io::text::{Lines, Words, name, quoted, without_mark};
 
 /// What the header says.
 #[derive(Debug)]
@@ -125,7 +125,8 @@ impl Element {
 }
 
 /// Reads the header.
-pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
+pub(super) fn parse(path: &Path, file: &[u8]) -> Result<Header> {
+    let bytes = without_mark(file);
     let fail = |line: usize, message: String| Error::input(path, format!("line {line}"), message);
     // So that a binary file of another kind is not searched for lines.
     if !(bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")) {
@@ -138,7 +139,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
     // Lines without joining: a comment may end in a backslash. All end as the first one does: behind a `\r` alone, with which the format's author
     // has them end, a binary body may begin with `\n`.
     let end = if bytes.starts_with(b"ply\r") && !bytes.starts_with(b"ply\r\n") { b'\r' } else { b'\n' };
-    let mut length = 0;
+    let mut length = file.len() - bytes.len();
     for (index, raw) in bytes.split_inclusive(|&b| b == end).enumerate() {
         length += raw.len();
         last = index + 1;

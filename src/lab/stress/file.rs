@@ -9,7 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{Probe, hex};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, system_message};
 use crate::lab::oracle::{self, Body};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;
@@ -67,7 +67,7 @@ pub fn to_text(note: &str, world: &World, rays: &[Ray]) -> Option<String> {
 /// # Errors
 /// [`Error::Input`] for a file that is no case, naming the place.
 pub fn read(path: &Path) -> Result<(String, Probe)> {
-    let file = Mapped::open(path).map_err(|error| Error::input(path, "", error.to_string()))?;
+    let file = Mapped::open(path).map_err(|error| Error::input(path, "", system_message(&error)))?;
     let document: Document = serde_json::from_slice(&file).map_err(|error| {
         let place = format!("line {}", error.line());
         Error::input(path, place, format!("is no stress case: {error}; one has note, triangles, spheres and rays"))
