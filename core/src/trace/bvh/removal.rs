@@ -10,15 +10,24 @@ use super::tree::Tree;
 use crate::math::Aabb;
 
 impl Bvh {
-    /// Takes the fixed triangles of a geometry out, all of which are within `bounds`: no ray hits them any more. Whether it could: a compact tree does not hold triangles
-    /// itself, and stays as it was. What is taken out is not put back by [`Bvh::refit`], which is an error then.
-    pub fn take_out(&mut self, geometry: u32, bounds: &Aabb) -> bool {
+    /// Takes the fixed triangles of some geometries out, each of which has the box that is given with it around what can be hit, in the tree's coordinates: no ray hits
+    /// them any more. By rising geometry. Whether it could: a compact tree does not hold triangles itself, and stays as it was. What is taken out is not put back by
+    /// [`Bvh::refit`], which is an error then.
+    pub fn take_out(&mut self, geometries: &[(u32, Aabb)]) -> bool {
         if !self.has_fixed() {
             return true;
         }
-        let tree = self.fixed.triangles.tree();
-        let blocks = isa::dispatch(self.isa, BlocksWithin { tree, bounds });
-        self.fixed.triangles.take_out(geometry, &blocks)
+        let triangles = &mut self.fixed.triangles;
+        let (mut blocks, all) = (Vec::new(), triangles.leaves().len());
+        for (_, bounds) in geometries {
+            blocks.extend(isa::dispatch(self.isa, BlocksWithin { tree: triangles.tree(), bounds }));
+            // Many, or some that lie in each other: to go through all is less work.
+            if blocks.len() > all {
+                blocks = (0..all as u32).collect();
+                break;
+            }
+        }
+        triangles.take_out(|geometry| geometries.binary_search_by_key(&geometry, |(id, _)| *id).is_ok(), &blocks)
     }
 }
 
@@ -85,16 +94,19 @@ mod tests {
                 let options = Options { preset, isa, ..Options::default() };
                 let mut bvh = Bvh::build_with(&world, options);
                 let mut left = vec![0, 1, 2];
-                for gone in [1, 2, 0] {
-                    assert!(bvh.take_out(gone, &bounds[gone as usize]));
-                    left.retain(|&geometry| geometry != gone);
+                // One after the other, and two at once, whose boxes lie in each other.
+                let turns = if preset == Preset::Fast { [&[0u32, 2][..], &[1]] } else { [&[1][..], &[0, 2]] };
+                for gone in turns {
+                    let leaving: Vec<(u32, Aabb)> = gone.iter().map(|&id| (id, bounds[id as usize])).collect();
+                    assert!(bvh.take_out(&leaving));
+                    left.retain(|geometry| !gone.contains(geometry));
                     let mut rest = world.clone();
                     rest.parts.retain(|part| left.contains(&part.geometry));
                     rest.fixed = 0..rest.parts.len();
                     let expected = Bvh::build_with(&rest, options);
                     for ray in &rays {
                         let hit = expected.closest(ray);
-                        assert_eq!(bvh.closest(ray), hit, "{isa:?} {preset:?} without {gone}: {ray:?}");
+                        assert_eq!(bvh.closest(ray), hit, "{isa:?} {preset:?} without {gone:?}: {ray:?}");
                         assert_eq!(bvh.occluded(ray), hit.is_some());
                     }
                     let batch = crate::trace::Batch::default();
@@ -108,7 +120,7 @@ mod tests {
             }
             let mut compact = Bvh::build_with(&world, Options { preset: Preset::Compact, isa, ..Options::default() });
             let before: Vec<_> = rays.iter().map(|ray| compact.closest(ray)).collect();
-            assert!(!compact.take_out(1, &bounds[1]));
+            assert!(!compact.take_out(&[(1, bounds[1])]));
             assert!(rays.iter().zip(before).all(|(ray, hit)| compact.closest(ray) == hit));
         }
     }

@@ -82,12 +82,13 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     let expected = expected_bytes(count, boxes.boxes.len());
     scene.device.account(expected as isize, false)?;
     let progressed = |part: u64| progress.built(part, (count + boxes.boxes.len()).max(1) as u64);
-    let (mut solids, others) = scene.device.install(|| {
+    let made = scene.device.install(|| {
         let options = Options { preset, progress: Some(&progressed), ..Options::default() };
         let solids: Vec<Solid> = makings.into_iter().map(|making| making.make(&records, options)).collect();
         let others = (!boxes.boxes.is_empty()).then(|| BoxTree::moving(&boxes.boxes, options));
         (solids, others)
-    })?;
+    });
+    let (mut solids, others) = made.inspect_err(|_| _ = scene.device.account(-(expected as isize), true))?;
     solids.iter().for_each(|solid| boxes.surround([solid.bounds(); 2]));
     let (others, order) = others.unzip();
     let (items, placed) = in_order(&records, &boxes.items, &order.unwrap_or_default());

@@ -117,7 +117,7 @@ pub struct Committed {
     pub records: Vec<Option<Box<Record>>>,
     /// Triangles that stand still; none where there are none.
     pub solid: Option<Solid>,
-    /// In a scene that is dynamic, those that have changed since; the largest first, all smaller.
+    /// In a scene that is dynamic, more of them, of what has changed since the first commit; none larger than the one before it.
     pub changing: Vec<Solid>,
     /// Whether each triangle of all these is a primitive.
     pub is_plain: bool,

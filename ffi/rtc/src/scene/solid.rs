@@ -1,8 +1,8 @@
 //! Trees over the triangles that stand still.
 //!
 //! A scene has one. A scene that is dynamic has more once something in it has changed: a commit takes what changed out of the trees it was in, builds one over that, and keeps
-//! the others. What has come to rest is merged with what is not much larger, as in a log-structured merge tree (O'Neil, Cheng, Gawlick, O'Neil 1996), so that there are few trees, and each
-//! triangle is built again a few times at most.
+//! the others. What has come to rest is merged with what is not much larger, as in a log-structured merge tree (O'Neil, Cheng, Gawlick, O'Neil 1996), so that there are few trees, and
+//! what rests is built again a few times at most.
 
 use std::sync::Arc;
 
@@ -17,6 +17,9 @@ use crate::abi::quality;
 /// What is at rest is merged with the next larger tree unless that has more than so many times its triangles. Each tree costs every ray some 30 ns.
 const MERGED: usize = 4;
 
+/// Trees that are refitted by themselves, at most.
+const REFITTED: usize = 8;
+
 /// What has changed once soon does so again: it is not merged before it has seen so many commits go by.
 const REST: u32 = 4;
 
@@ -28,7 +31,7 @@ pub struct Solid {
     members: Vec<Member>,
     /// Triangles that were taken out.
     gone: usize,
-    /// Commits in a row of which none changed anything in it.
+    /// Commits since it was made.
     rest: u32,
 }
 
@@ -67,37 +70,45 @@ impl Planner<'_> {
     pub fn plan(&self, old: Vec<Solid>) -> Vec<Making> {
         let all = (0..self.records.len() as u32).filter(|&id| still_triangles(self.records, id) > 0);
         let mut changed: Vec<u32> = all.filter(|&id| !old.iter().any(|solid| solid.has(id))).collect();
-        let (mut made, mut calm) = (Vec::new(), Vec::new());
+        let is_first = old.is_empty();
+        let (mut made, mut calm, mut refitted) = (Vec::new(), Vec::new(), Vec::new());
         for mut solid in old {
+            solid.rest = solid.rest.saturating_add(1);
             let (stay, leave): (Vec<Member>, Vec<Member>) =
                 solid.members.iter().partition(|member| !self.has_changed(member.id));
             let is_there = |member: &Member| still_triangles(self.records, member.id) > 0;
-            if leave.is_empty() {
-                solid.rest = solid.rest.saturating_add(1);
-                let is_calm = solid.rest >= REST;
-                let list = if is_calm { &mut calm } else { &mut made };
-                list.push(Making::Kept(solid));
-            } else if self.is_refitted(&solid, &leave) {
+            if self.is_refitted(&solid, &leave) {
                 let preset = self.preset_of(&solid.ids());
-                made.push(Making::Refitted(solid, preset));
-            } else {
-                changed.extend(leave.iter().filter(|member| is_there(member)).map(|member| member.id));
-                if !stay.is_empty() {
-                    let is_fit = solid.take_out(&leave) && solid.gone <= solid.triangles();
-                    calm.push(if is_fit {
-                        Making::Kept(solid)
-                    } else {
-                        self.built(stay.iter().map(|m| m.id).collect())
-                    });
-                }
+                refitted.push(Making::Refitted(solid, preset));
+                continue;
             }
+            changed.extend(leave.iter().filter(|member| is_there(member)).map(|member| member.id));
+            if stay.is_empty() {
+                continue;
+            }
+            let list = if solid.rest >= REST { &mut calm } else { &mut made };
+            let is_kept = leave.is_empty() || solid.take_out(&leave);
+            let stay = || stay.iter().map(|member| member.id).collect();
+            list.push(if is_kept { Making::Kept(solid) } else { self.built(stay()) });
         }
         made.extend(self.merged(calm));
-        if !changed.is_empty() {
-            made.push(self.built(changed));
+        if refitted.len() > REFITTED {
+            // Together, and refitted together from then on.
+            refitted = vec![self.built(refitted.iter().flat_map(Making::ids).collect())];
         }
+        made.append(&mut refitted);
+        // What asks for different things is built apart, so that each has it; but for what is all new.
+        let groups = if is_first { vec![changed] } else { self.by_quality(changed) };
+        made.extend(groups.into_iter().filter(|group| !group.is_empty()).map(|group| self.built(group)));
         made.sort_by_key(|making| std::cmp::Reverse(making.triangles()));
         made
+    }
+
+    /// Those that are to be refitted, those of low quality and the others.
+    fn by_quality(&self, ids: Vec<u32>) -> Vec<Vec<u32>> {
+        let (refit, others): (Vec<u32>, Vec<u32>) = ids.iter().partition(|&&id| self.asks_for(id, quality::REFIT));
+        let (low, others): (Vec<u32>, Vec<u32>) = others.iter().partition(|&&id| self.asks_for(id, quality::LOW));
+        vec![refit, low, others]
     }
 
     /// Whether a tree is refitted of which these have changed: where all of them ask for it, and they are most of it.
@@ -105,7 +116,7 @@ impl Planner<'_> {
         let moved: usize = leave.iter().map(|member| still_triangles(self.records, member.id)).sum();
         let is_wanted =
             |member: &Member| self.asks_for(member.id, quality::REFIT) && still_triangles(self.records, member.id) > 0;
-        solid.gone == 0 && 2 * moved >= solid.triangles() && leave.iter().all(is_wanted)
+        !leave.is_empty() && solid.gone == 0 && 2 * moved >= solid.triangles() && leave.iter().all(is_wanted)
     }
 
     /// Trees of which each has more than [`MERGED`] times the triangles of the next.
@@ -225,11 +236,15 @@ impl Solid {
         self.members.iter().map(|member| member.triangles).sum()
     }
 
-    /// Takes some members out. Whether it could; else it is of no use any more.
+    /// Takes some members out, unless more would be gone then than left, or it cannot: whether it did.
     fn take_out(&mut self, members: &[Member]) -> bool {
-        self.members.retain(|own| members.iter().all(|member| member.id != own.id));
-        self.gone += members.iter().map(|member| member.triangles).sum::<usize>();
-        members.iter().all(|member| self.bvh.take_out(member.id, &member.bounds))
+        let gone = members.iter().map(|member| member.triangles).sum::<usize>();
+        if self.gone + 2 * gone > self.triangles() {
+            return false;
+        }
+        self.members.retain(|own| members.binary_search_by_key(&own.id, |member| member.id).is_err());
+        self.gone += gone;
+        self.bvh.take_out(&members.iter().map(|member| (member.id, member.bounds)).collect::<Vec<_>>())
     }
 }
 

@@ -73,7 +73,7 @@ pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &
     }
 }
 
-/// Among the triangles of what changed lately, the smallest trees first, for what is behind need not be looked at then; the geometry that was hit. By value, here and
+/// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then; the geometry that was hit. By value, here and
 /// below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
 fn cast_changing<const ANY: bool>(committed: &Committed, query: Query, target: Target, sight: Sight) -> u32 {

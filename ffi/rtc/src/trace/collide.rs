@@ -14,7 +14,7 @@ use crate::scene::{Body, Committed, Item, Near};
 const MOST: usize = 16;
 
 /// Primitives whose collisions one thread looks for at a time: fewer are not worth waking another.
-const TASK: usize = 1 << 8;
+const TASK: usize = 1 << 6;
 
 /// Collisions that are there at the same time, about.
 const WAVE: usize = 1 << 18;
@@ -35,7 +35,7 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
     }
     let theirs = Theirs::new(second);
     let items: Vec<Item> = all(first).collect();
-    let (mut rest, mut len) = (&items[..], 4 * TASK);
+    let (mut rest, mut len) = (&items[..], 2 * TASK);
     while !rest.is_empty() {
         let (wave, others) = rest.split_at(len.min(rest.len()));
         rest = others;

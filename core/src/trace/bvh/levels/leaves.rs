@@ -138,13 +138,14 @@ impl Leaves {
         }
     }
 
-    /// Takes the triangles of a part out of some blocks; how many these were. None where the tree does not hold its triangles itself.
-    pub fn take_out(&mut self, part: u32, blocks: &[u32]) -> Option<usize> {
+    /// Takes the triangles of those parts that are gone out of some blocks; how many these were. None where the tree does not hold its triangles itself.
+    pub fn take_out(&mut self, is_gone: &[bool], blocks: &[u32]) -> Option<usize> {
         let Self::Blocks(own) = self else { return None };
         let (own, mut count) = (own.make_mut(), 0);
         for &index in blocks {
             let block = &mut own[index as usize];
-            let lanes = block.used().filter(|&lane| block.part[lane] == part).fold(0, |lanes, lane| lanes | 1 << lane);
+            let gone = block.used().filter(|&lane| is_gone[block.part[lane] as usize]);
+            let lanes = gone.fold(0, |lanes, lane| lanes | 1 << lane);
             block.lanes &= !lanes;
             count += lanes.count_ones() as usize;
         }

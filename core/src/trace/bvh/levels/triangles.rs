@@ -29,7 +29,7 @@ pub(in crate::trace::bvh) struct TriangleTree {
     parts: Vec<PartId>,
     /// Of each part its triangles, if it is a mesh; shared with the scene.
     topology: Vec<Option<Triangles>>,
-    /// Triangles that can be hit.
+    /// Triangles that can be hit; of a tree in which some are several times, and from which some were taken out, no more than these.
     count: usize,
 }
 
@@ -101,15 +101,13 @@ impl TriangleTree {
         Ok(())
     }
 
-    /// Takes the triangles of a geometry out of these blocks, which are all that have any. Whether it could.
-    pub fn take_out(&mut self, geometry: u32, blocks: &[u32]) -> bool {
-        let parts = (0..self.parts.len() as u32).filter(|&part| self.parts[part as usize].geometry == geometry);
-        for part in parts {
-            let Some(count) = self.leaves.take_out(part, blocks) else { return false };
-            // In the high preset one may be in several leaves.
-            self.count = self.count.saturating_sub(count);
-        }
-        true
+    /// Takes the triangles of geometries out of these blocks, which are all that have any. Whether it could.
+    pub fn take_out(&mut self, is_gone: impl Fn(u32) -> bool, blocks: &[u32]) -> bool {
+        let is_gone: Vec<bool> = self.parts.iter().map(|part| is_gone(part.geometry)).collect();
+        let count = self.leaves.take_out(&is_gone, blocks);
+        // In the high preset one may be in several leaves.
+        self.count = self.count.saturating_sub(count.unwrap_or(0));
+        count.is_some()
     }
 
     pub fn tree(&self) -> &Tree {
