@@ -124,9 +124,7 @@ impl BoxTree {
     /// Names boxes that have a point in common with `bounds`, and some that are only near it: in the same leaves, or by a millionth of coordinates. What moves is
     /// at time 0.
     pub fn visit_overlapping(&self, bounds: &Aabb, visitor: &mut dyn FnMut(u32)) {
-        if !self.tree.is_empty() {
-            isa::dispatch(self.isa, OverlappingBoxes { boxes: self, bounds, visitor });
-        }
+        visit_overlapping(&self.tree, self.isa, bounds, visitor);
     }
 
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
@@ -151,25 +149,17 @@ fn wider(ends: &[Aabb; 2]) -> [Aabb; 2] {
     ends.map(|bounds| Aabb { min: bounds.min - slack, max: bounds.max + slack })
 }
 
-/// What overlaps a box, in no order.
-pub(super) struct Overlap<'a>(pub &'a Aabb);
+/// Names blocks, in no order, of the leaves of `tree` that overlap a box.
+pub(super) fn visit_overlapping(tree: &Tree, isa: Present, bounds: &Aabb, visitor: &mut dyn FnMut(u32)) {
+    if !tree.is_empty() {
+        isa::dispatch(isa, VisitOverlapping { tree, bounds, visitor });
+    }
+}
+
+/// What overlaps a box.
+struct Overlap<'a>(&'a Aabb);
 
 impl Overlap<'_> {
-    /// Shows `leaf` the leaves of `tree` that overlap it.
-    #[inline(always)]
-    pub fn walk<S: Simd>(&self, tree: &Tree, mut leaf: impl FnMut(Child)) {
-        walk::single::<S, Occluded>(
-            tree,
-            self,
-            f32::INFINITY,
-            #[inline(always)]
-            |child| {
-                leaf(child);
-                Visit::Until(f32::INFINITY)
-            },
-        );
-    }
-
     #[inline(always)]
     fn along<S: Simd>(&self, node: &Node, axis: usize) -> <S::V8 as Vector>::Mask {
         let Self(Aabb { min, max }) = self;
@@ -250,22 +240,27 @@ impl Kernel for NearBoxes<'_, '_> {
     }
 }
 
-struct OverlappingBoxes<'a, 'v> {
-    boxes: &'a BoxTree,
+struct VisitOverlapping<'a, 'v> {
+    tree: &'a Tree,
     bounds: &'a Aabb,
     visitor: &'a mut (dyn FnMut(u32) + 'v),
 }
 
-impl Kernel for OverlappingBoxes<'_, '_> {
+impl Kernel for VisitOverlapping<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { boxes: BoxTree { tree, .. }, bounds, visitor } = self;
-        Overlap(bounds).walk::<S>(
+        let Self { tree, bounds, visitor } = self;
+        walk::single::<S, Occluded>(
             tree,
+            &Overlap(bounds),
+            f32::INFINITY,
             #[inline(always)]
-            |leaf| leaf.blocks().for_each(&mut *visitor),
+            |leaf| {
+                leaf.blocks().for_each(&mut *visitor);
+                Visit::Until(f32::INFINITY)
+            },
         );
     }
 }

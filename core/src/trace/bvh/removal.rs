@@ -3,10 +3,7 @@
 //! As fast as what is taken out is small, whatever the tree's size. Rays still enter the boxes, so a tree of which much is gone is better built anew.
 
 use super::Bvh;
-use super::boxes::Overlap;
-use super::simd::Simd;
-use super::simd::isa::{self, Kernel};
-use super::tree::Tree;
+use super::boxes::visit_overlapping;
 use crate::math::Aabb;
 
 impl Bvh {
@@ -20,7 +17,7 @@ impl Bvh {
         let triangles = &mut self.fixed.triangles;
         let (mut blocks, all) = (Vec::new(), triangles.leaves().len());
         for (_, bounds) in geometries {
-            blocks.extend(isa::dispatch(self.isa, BlocksWithin { tree: triangles.tree(), bounds }));
+            visit_overlapping(triangles.tree(), self.isa, bounds, &mut |block| blocks.push(block));
             // Many, or some that lie in each other: to go through all is less work.
             if blocks.len() > all {
                 blocks = (0..all as u32).collect();
@@ -28,27 +25,6 @@ impl Bvh {
             }
         }
         triangles.take_out(|geometry| geometries.binary_search_by_key(&geometry, |(id, _)| *id).is_ok(), &blocks)
-    }
-}
-
-/// The blocks of leaves that overlap a box.
-struct BlocksWithin<'a> {
-    tree: &'a Tree,
-    bounds: &'a Aabb,
-}
-
-impl Kernel for BlocksWithin<'_> {
-    type Output = Vec<u32>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Vec<u32> {
-        let mut blocks = Vec::new();
-        Overlap(self.bounds).walk::<S>(
-            self.tree,
-            #[inline(always)]
-            |leaf| blocks.extend(leaf.blocks()),
-        );
-        blocks
     }
 }
 

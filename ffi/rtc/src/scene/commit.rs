@@ -58,7 +58,10 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         };
         let before = old.as_mut().and_then(|old| old.records.get_mut(id)?.take());
         records.push(match before.filter(|before| is_same(before, geometry)) {
-            Some(same) => Some(Box::new(Record { is_new: false, ..*same })),
+            Some(mut same) => {
+                same.is_new = false;
+                Some(same)
+            }
             None => record(geometry)?.map(Box::new),
         });
     }
@@ -73,9 +76,8 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     };
     let makings = Planner { records: &records, preset, is_dynamic: plan.is_dynamic() }.plan(trees);
     let mut boxes = scene.device.install(|| other_boxes(&records))?;
-    let extents = || makings.iter().map(Making::extent);
-    let (kept, count) =
-        (extents().map(|(kept, _)| kept).sum::<usize>(), extents().map(|(_, count)| count).sum::<usize>());
+    let add = |(kept, count), (more, others)| (kept + more, count + others);
+    let (kept, count) = makings.iter().map(Making::extent).fold((0, 0), add);
     if count + boxes.boxes.len() > BoxTree::MOST {
         return Err(Failure::operation("too many primitives in a scene"));
     }
@@ -88,19 +90,21 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         let others = (!boxes.boxes.is_empty()).then(|| BoxTree::moving(&boxes.boxes, options));
         (solids, others)
     });
-    let (mut solids, others) = made.inspect_err(|_| _ = scene.device.account(-(expected as isize), true))?;
+    let (solids, others) = made.inspect_err(|_| _ = scene.device.account(-(expected as isize), true))?;
     solids.iter().for_each(|solid| boxes.surround([solid.bounds(); 2]));
     let (others, order) = others.unzip();
     let (items, placed) = in_order(&records, &boxes.items, &order.unwrap_or_default());
     let bytes = solids.iter().map(|solid| solid.bvh.bytes()).sum::<usize>() + others.as_ref().map_or(0, BoxTree::bytes);
+    let repeats = solids.iter().any(|solid| solid.bvh.preset() == Preset::High);
+    let mut solids = solids.into_iter();
     let committed = Committed {
         device: Arc::clone(&scene.device),
         is_plain: is_plain(&records),
-        repeats: solids.iter().any(|solid| solid.bvh.preset() == Preset::High),
+        repeats,
         balls: balls(&records, &items),
         records,
-        changing: if solids.is_empty() { Vec::new() } else { solids.split_off(1) },
-        solid: solids.pop(),
+        solid: solids.next(),
+        changing: solids.collect(),
         bounds: boxes.ends(),
         others,
         items,

@@ -87,8 +87,6 @@ pub struct Placed {
     pub to_scene: DAffine3,
     pub scene: Arc<Scene>,
     pub mask: u32,
-    pub geometry: u32,
-    pub primitive: u32,
 }
 
 impl Placed {
@@ -96,8 +94,7 @@ impl Placed {
     pub fn new(record: &Record, item: Item) -> Option<Self> {
         let Body::Instances(instances) = &record.body else { return None };
         let Instance { scene, to_scene, .. } = instances.get(item.primitive as usize)?;
-        let Item { geometry, primitive, .. } = item;
-        Some(Self { to_scene: (*to_scene)?, scene: Arc::clone(scene), mask: record.mask, geometry, primitive })
+        Some(Self { to_scene: (*to_scene)?, scene: Arc::clone(scene), mask: record.mask })
     }
 }
 
@@ -138,7 +135,7 @@ pub struct Committed {
     pub bounds: [Aabb; 2],
     /// Whether a triangle does not count where a ray begins: at `tnear` itself Embree finds one only in scenes that are robust.
     pub excludes_start: bool,
-    /// Boxes of all primitives that point queries show, made when the first point query asks for them.
+    /// Boxes of primitives that point queries show and no tree over triangles names, made when the first point query asks for them.
     pub near: OnceLock<Near>,
     /// Memory that was accounted for.
     pub bytes: usize,

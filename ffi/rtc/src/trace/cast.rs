@@ -8,7 +8,7 @@ use super::offer::Target;
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::{Ball, Named};
-use crate::scene::{Body, Committed, Instance, Item, Placed, Record, Scene};
+use crate::scene::{Body, Committed, Item, Record, Scene};
 
 /// The ray as the native tracer knows it.
 #[inline(always)]
@@ -221,8 +221,7 @@ fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Tar
             cast_point(committed, &query, &target, item, ball, &ray);
         } else if let Some(placed) = committed.placed.get(item.placed as usize) {
             if placed.mask & ray.mask != 0 {
-                let Placed { geometry, primitive, scene, to_scene, .. } = placed;
-                enter::<ANY>(&query, &target, [*geometry, *primitive], scene, to_scene, &ray);
+                enter::<ANY>(&query, &target, item, &placed.scene, &placed.to_scene, &ray);
             }
         } else if let Some(record) = committed.record(item.geometry)
             && record.mask & ray.mask != 0
@@ -286,11 +285,10 @@ fn cast_item<const ANY: bool>(
         }
         Body::Instances(instances) => {
             // Those that stand still are entered by `Placed`.
-            if let Some(Instance { scene, motion, .. }) = instances.get(primitive as usize)
-                && motion.is_at(ray.time)
+            if let Some(instance) = instances.get(primitive as usize)
+                && instance.motion.is_at(ray.time)
             {
-                let to_scene = motion.at(ray.time).as_daffine3().inverse();
-                enter::<ANY>(query, target, [geometry, primitive], scene, &to_scene, ray);
+                enter::<ANY>(query, target, item, &instance.scene, &instance.to_scene(ray.time), ray);
             }
         }
     }
@@ -300,7 +298,7 @@ fn cast_item<const ANY: bool>(
 fn enter<const ANY: bool>(
     query: &Query,
     target: &Target,
-    [geometry, primitive]: [u32; 2],
+    Item { geometry, primitive, .. }: Item,
     scene: &Scene,
     to_scene: &DAffine3,
     ray: &RTCRay,
