@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::rays::View;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, system_message};
 use crate::io::{self, LoadOptions, UpAxis};
 use crate::math::DAffine3;
 use crate::scene::{self, Camera, Geometry, Group, Instance, Material, Mesh, Scene, choose_origin};
@@ -78,8 +78,7 @@ impl Subject {
     /// [`Error::Input`].
     pub fn check(name: &str) -> Result<()> {
         if Procedural::parse(name)?.is_none() {
-            let metadata = std::fs::metadata(name);
-            metadata.map_err(|error| Error::input(name, "", format!("cannot be read: {error}")))?;
+            std::fs::metadata(name).map_err(|error| Error::input(name, "", system_message(&error)))?;
         }
         Ok(())
     }
