@@ -42,7 +42,9 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         };
         let (count, mut first) = (self.lanes.count(), 0);
         while first + 2 * RAYS <= count {
-            let [low, high] = [self.packet(first), self.packet(first + RAYS)];
+            // Not an array that is taken apart: it would be copied.
+            let low = self.packet(first);
+            let high = self.packet(first + RAYS);
             let lanes = [self.seeing(first, mask), self.seeing(first + RAYS, mask)];
             two(solid, &Asked { packets: [&low, &high], lanes }, first);
             first += 2 * RAYS;
@@ -62,29 +64,33 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     /// The rays from lane `first` on.
     #[inline(always)]
     fn packet(&self, first: usize) -> Packet {
-        let mut packet = self.as_it_is(first);
-        if self.excludes_start {
-            packet.tmin = packet.tmin.map(after);
+        let Self { lanes, excludes_start, .. } = self;
+        if first + RAYS > lanes.count() {
+            return self.rest(first);
         }
-        packet
+        let row = |word| lanes.row::<RAYS>(word, first).map(f32::from_bits);
+        let start = row(TNEAR);
+        // Where it is wanted, at once: what is changed afterwards may be copied.
+        Packet {
+            origin: [row(0), row(1), row(2)],
+            tmin: if *excludes_start { start.map(after) } else { start },
+            direction: [row(DIRECTION), row(DIRECTION + 1), row(DIRECTION + 2)],
+            tmax: row(TFAR),
+            ..Packet::NONE
+        }
     }
 
-    #[inline(always)]
-    fn as_it_is(&self, first: usize) -> Packet {
+    /// The rays from lane `first` on, which are fewer than a packet.
+    #[cold]
+    fn rest(&self, first: usize) -> Packet {
         let mut packet = Packet::NONE;
-        let count = self.lanes.count();
-        if first + RAYS > count {
-            for lane in first..count {
-                packet.set(lane - first, &super::cast::native(&self.lanes.ray(lane)));
+        for lane in first..self.lanes.count() {
+            let mut ray = super::cast::native(&self.lanes.ray(lane));
+            if self.excludes_start {
+                ray.tmin = after(ray.tmin);
             }
-            return packet;
+            packet.set(lane - first, &ray);
         }
-        for axis in 0..3 {
-            packet.origin[axis] = self.lanes.row(axis, first).map(f32::from_bits);
-            packet.direction[axis] = self.lanes.row(DIRECTION + axis, first).map(f32::from_bits);
-        }
-        packet.tmin = self.lanes.row(TNEAR, first).map(f32::from_bits);
-        packet.tmax = self.lanes.row(TFAR, first).map(f32::from_bits);
         packet
     }
 
