@@ -39,6 +39,28 @@ mod tests {
         promised(&path)
     }
 
+    /// A binary file of a pentagon and a triangle, each with a byte for another property where there is one, and so many edges.
+    fn polygons(property: &str, edges: u32) -> Vec<u8> {
+        let other = if edges > 0 {
+            format!("element edge {edges}\nproperty int vertex1\nproperty int vertex2\n")
+        } else {
+            String::new()
+        };
+        let mut bytes = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 2\nproperty list uchar int vertex_indices\n{property}{other}end_header\n"
+        )
+        .into_bytes();
+        bytes.extend([0; 6 * 12]);
+        for corners in [5_u8, 3] {
+            bytes.push(corners);
+            bytes.extend((0..u32::from(corners)).flat_map(u32::to_le_bytes));
+            bytes.extend(vec![0; usize::from(!property.is_empty())]);
+        }
+        bytes.extend(vec![0; 8 * edges as usize]);
+        bytes
+    }
+
     /// A binary file that promises so many triangles, and has room for so many.
     fn stl(count: u32, room: usize) -> Vec<u8> {
         let mut bytes = vec![0; 84 + 50 * room];
@@ -52,6 +74,13 @@ mod tests {
         let one = Promised { triangles: 1, bytes: 4 * 12 };
         assert_eq!(of("a.ply", PLY.as_bytes()), Some(one));
         assert_eq!(of("a.PLY", PLY.as_bytes()), Some(one));
+        assert_eq!(of("a.ply", &polygons("", 0)), Some(Promised { triangles: 4, bytes: (6 + 4) * 12 }));
+        // With a colour of each face; edges behind them are no corners.
+        let colored = "property uchar red\n";
+        assert_eq!(of("a.ply", &polygons(colored, 2)), Some(Promised { triangles: 4, bytes: (6 + 4) * 12 }));
+        // What else takes room is not known.
+        let lists = "property list uchar float texcoord\n";
+        assert_eq!(of("a.ply", &polygons(lists, 2)), Some(Promised { triangles: 2, bytes: (6 + 2) * 12 }));
         let seven = Promised { triangles: 7, bytes: 7 * 12 };
         assert_eq!(of("a.stl", &stl(7, 7)), Some(seven));
         assert_eq!(of("a.stl", &stl(7, 9)), Some(seven), "what follows the last one is no triangle");

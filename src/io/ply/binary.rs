@@ -129,7 +129,7 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
     }
 
     fn least_size(&self, element: &Element) -> usize {
-        element.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum()
+        element.least_bytes()
     }
 
     #[inline]

@@ -113,6 +113,11 @@ impl Header {
 }
 
 impl Element {
+    /// Bytes that an item takes in a binary file at least: where it has lists, with nothing in them.
+    pub(super) fn least_bytes(&self) -> usize {
+        self.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum()
+    }
+
     /// The first property that is a value and has one of the names.
     pub(super) fn index(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|p| p.list.is_none() && names.contains(&p.name.as_str()))

@@ -75,14 +75,37 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     textures::scene(path, &header, parts, warnings)
 }
 
-/// What the header says of vertices and faces, if the file may hold as many; a face is a triangle at least.
+/// What the header says of vertices and faces, if the file may hold as many. A face is a triangle at least; of how many in a binary file its length tells,
+/// where nothing but the faces' corners is of an unknown size.
 pub(super) fn promised(path: &Path, file: &Mapped<'_>) -> Option<Promised> {
     let header = header::parse(path, file).ok()?;
     let count = |name: &str| header.element(name).map_or(0, |element| element.count);
-    let (vertices, triangles) = (count("vertex"), count("face"));
-    let items = vertices.checked_add(triangles)?;
+    let (vertices, faces) = (count("vertex"), count("face"));
     // No item takes less than a byte, in either encoding.
-    (items <= file.len() as u64).then(|| Promised { triangles, bytes: items * size_of::<[u32; 3]>() as u64 })
+    if vertices.checked_add(faces)? > file.len() as u64 {
+        return None;
+    }
+    // A polygon is cut into two triangles fewer than it has corners.
+    let cut = corners(&header, file.len() as u64).and_then(|corners| corners.checked_sub(faces.checked_mul(2)?));
+    let triangles = cut.unwrap_or(0).max(faces);
+    Some(Promised { triangles, bytes: (vertices + triangles) * size_of::<[u32; 3]>() as u64 })
+}
+
+/// Corners of all faces of a binary file of so many bytes: what is left when all else is taken away; none if that is not known. What follows the last element,
+/// with a warning later, counts as well.
+fn corners(header: &Header, bytes: u64) -> Option<u64> {
+    let faces = header.element("face").filter(|_| header.encoding != Encoding::Ascii)?;
+    let lists = |element: &Element| element.properties.iter().filter(|property| property.list.is_some()).count();
+    if header.elements.iter().map(lists).sum::<usize>() != 1 {
+        return None;
+    }
+    let corner = faces.properties.iter().find(|property| property.list.is_some())?.scalar.size() as u64;
+    let least = |element: &Element| element.count.checked_mul(element.least_bytes() as u64);
+    let mut left = bytes.checked_sub(header.length as u64)?;
+    for element in &header.elements {
+        left = left.checked_sub(least(element)?)?;
+    }
+    Some(left / corner)
 }
 
 fn read(path: &Path, header: &Header, mut items: impl Items, warnings: &mut Vec<Warning>) -> Result<Vec<Part>> {
