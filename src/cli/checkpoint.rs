@@ -14,8 +14,8 @@ use crate::render::{Checkpoint, is_checkpoint};
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct CheckpointArgs {
-    /// Write what is done so far this often (90s, 5m, 1h), and on Ctrl-C and SIGTERM, beside the output: picture.png has
-    /// picture.checkpoint.exr, which any viewer of OpenEXR shows; it is removed when the picture is written
+    /// Write what is done so far this often (90s, 5m, 1h), but a fifth of the time at most, and on Ctrl-C and SIGTERM, beside the output: picture.png
+    /// has picture.checkpoint.exr, which any viewer of OpenEXR shows; it is removed when the picture is written
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     checkpoint: Option<Duration>,
 

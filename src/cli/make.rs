@@ -13,12 +13,15 @@ use crate::scene::{RECIPES, Recipe};
 
 /// Make a scene by rule, at any size
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    override_usage = "twincast make [OPTIONS] --output <FILE> <NAME>\n       twincast make --list",
+    after_help = "\
 Examples:
   twincast make --list
   twincast make sphereflake --size 5 -o flake.nff
   twincast make lattice --size 10 -o teapots.toml
-  twincast make terrain --size 4096 -o terrain.ply")]
+  twincast make terrain --size 4096 -o terrain.ply"
+)]
 pub(super) struct MakeArgs {
     /// What to make; --list names all
     #[arg(required_unless_present = "list")]

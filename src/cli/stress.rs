@@ -168,8 +168,12 @@ fn failing(report: &Report) -> String {
                 // A String takes everything.
                 _ = writeln!(
                     text,
-                    "# {} {}: {:?}\ntwincast trace {} --ray {} --oracle",
-                    cell.column, replay.form, replay.fault, replay.scene, replay.ray
+                    "# {} {}: {}\ntwincast trace {} --ray {} --oracle",
+                    cell.column,
+                    replay.form,
+                    replay.fault.name(),
+                    replay.scene,
+                    replay.ray
                 );
             }
         }

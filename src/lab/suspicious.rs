@@ -44,13 +44,14 @@ impl Suspicious {
 
     /// Counts with what they count, in the order of the reports.
     pub fn rows(&self) -> [(&'static str, u64); 6] {
+        let named = |count, one, several| (if count == 1 { one } else { several }, count);
         [
-            ("degenerate triangles", self.degenerate),
-            ("NaN or infinite triangles", self.not_finite),
-            ("duplicate triangles", self.duplicate),
-            ("open edges", self.open_edges),
-            ("non-manifold edges", self.non_manifold_edges),
-            ("edges with flipped winding", self.flipped_edges),
+            named(self.degenerate, "degenerate triangle", "degenerate triangles"),
+            named(self.not_finite, "NaN or infinite triangle", "NaN or infinite triangles"),
+            named(self.duplicate, "duplicate triangle", "duplicate triangles"),
+            named(self.open_edges, "open edge", "open edges"),
+            named(self.non_manifold_edges, "non-manifold edge", "non-manifold edges"),
+            named(self.flipped_edges, "edge with flipped winding", "edges with flipped winding"),
         ]
     }
 }

@@ -23,7 +23,8 @@ use crate::math::Vec4;
 pub struct Checkpoint<'a> {
     /// The file, with the suffix `.exr`.
     pub path: &'a Path,
-    /// How often it is written, and whenever the render is interrupted; none where it is gone on from and no more.
+    /// How often it is written, and whenever the render is interrupted; none where it is gone on from and no more. Where writing takes
+    /// long it is written less often, so that it takes a fifth of the time at most.
     pub every: Option<Duration>,
     /// Whether to go on from what it holds.
     pub resume: bool,
@@ -46,18 +47,21 @@ pub(crate) fn is_checkpoint(path: &Path) -> bool {
 pub(super) struct Keeper<'k> {
     path: &'k Path,
     every: Duration,
+    /// When the last one was finished, and how long that took.
     last: Instant,
+    took: Duration,
     identity: Vec<(&'static str, String)>,
 }
 
 impl Keeper<'_> {
     /// Writes, if the last time is long enough ago.
     pub(super) fn write_if_due(&mut self, canvas: &Canvas, done: u32) -> Result<()> {
-        if self.last.elapsed() < self.every {
+        if !is_due(self.last.elapsed(), self.every, self.took) {
             return Ok(());
         }
+        let begun = Instant::now();
         self.write(canvas, done)?;
-        self.last = Instant::now();
+        (self.last, self.took) = (Instant::now(), begun.elapsed());
         Ok(())
     }
 
@@ -68,6 +72,14 @@ impl Keeper<'_> {
         let metadata = Metadata { texts, ..Metadata::default() };
         image::write_channels(self.path, &canvas.image(), &planes(canvas), &metadata, &WriteOptions::default())
     }
+}
+
+/// Rendering takes so many times as long as writing checkpoints, at least: nobody renders on meanwhile.
+const RENDERED: u32 = 4;
+
+/// Whether one is due so long after the last one, which took so long to write.
+fn is_due(since: Duration, every: Duration, took: Duration) -> bool {
+    since >= every.max(took.saturating_mul(RENDERED))
 }
 
 impl Renderer<'_> {
@@ -98,7 +110,7 @@ impl Renderer<'_> {
                 return Err(broken());
             }
         }
-        let keeper = every.map(|every| Keeper { path, every, last: Instant::now(), identity });
+        let keeper = every.map(|every| Keeper { path, every, last: Instant::now(), took: Duration::ZERO, identity });
         Ok((canvas, done, keeper))
     }
 }
@@ -201,4 +213,17 @@ fn fill(canvas: &mut Canvas, channels: &Channels) -> Option<()> {
         }
     }
     Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writing_takes_a_fifth_of_the_time_at_most() {
+        let seconds = Duration::from_secs;
+        assert!(is_due(seconds(60), seconds(60), seconds(1)) && !is_due(seconds(59), seconds(60), seconds(1)));
+        assert!(is_due(seconds(80), seconds(60), seconds(20)) && !is_due(seconds(79), seconds(60), seconds(20)));
+        assert!(is_due(seconds(0), seconds(0), seconds(0)) && !is_due(seconds(3), seconds(0), seconds(1)));
+    }
 }

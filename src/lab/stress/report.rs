@@ -105,8 +105,11 @@ impl Cell {
         if self.is_exact && self.mark != '.' {
             let example = self.replay.first().map_or(String::new(), |replay| {
                 format!(
-                    "; the first: twincast trace {} --ray {} ({:?}, {})",
-                    replay.scene, replay.ray, replay.fault, replay.form
+                    "; the first: twincast trace {} --ray {} ({}, {})",
+                    replay.scene,
+                    replay.ray,
+                    replay.fault.name(),
+                    replay.form
                 )
             });
             let error = verdict.t_relative_max;

@@ -23,6 +23,20 @@ pub enum Fault {
     Inconsistent,
 }
 
+impl Fault {
+    /// As in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FalseMiss => "false miss",
+            Self::FalseHit => "false hit",
+            Self::WrongPrimitive => "wrong primitive",
+            Self::SwappedTie => "swapped tie",
+            Self::NotANumber => "not a number",
+            Self::Inconsistent => "inconsistent",
+        }
+    }
+}
+
 /// What must not happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
