@@ -5,7 +5,10 @@ use twincast::math::{DAffine3, DVec2, DVec3, Vec3, Vec4};
 use twincast::scene::{
     Absorption, Camera, Fov, Geometry, Interface, Material, Mesh, Projection, RECIPES, Scene, Unlit,
 };
-use twincast::{Error, Shape};
+use twincast::shade::{Attributes, SurfacePoint};
+use twincast::trace::brute::Brute;
+use twincast::trace::{Tracer, World};
+use twincast::{Error, Ray, Shape};
 
 use super::Files;
 
@@ -175,6 +178,33 @@ fn far_meshes_stay_where_they_are() {
         let Geometry::Mesh(mesh) = &again.geometries[0] else { panic!("a triangle is a mesh") };
         let place = |i: u32| again.instances[0].transform.transform_point3(mesh.point(mesh.positions[i as usize]));
         assert_eq!(mesh.triangles[0].map(place), corners, "{name}");
+    }
+}
+
+/// What a mirror shows of a mesh is seen from the front where it was: glass would be entered as if it were left.
+#[test]
+fn mirrored_meshes_keep_their_front() {
+    let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+    let files = Files::one("none", "");
+    // Every format has words for its lights and materials.
+    let plain = RECIPES[0].make(1);
+    for (mirror, is_front) in
+        [(DVec3::ONE, true), (DVec3::new(-1.0, 1.0, 1.0), true), (DVec3::new(1.0, 1.0, -1.0), false)]
+    {
+        let unlit = Scene::from_geometries(vec![Geometry::Mesh(mesh.clone())], vec![plain.materials[0].clone()]);
+        let mut scene = Scene { lights: plain.lights.clone(), cameras: plain.cameras.clone(), ..unlit };
+        scene.instances[0].transform = DAffine3::from_scale(mirror);
+        let front = |scene: &Scene| {
+            let world = World::new(scene).unwrap();
+            let ray = Ray::new(Vec3::new(0.25 * mirror.x as f32, 0.25, 3.0), Vec3::NEG_Z);
+            let hit = Brute::new(&world).closest(&ray).unwrap();
+            SurfacePoint::new(scene, &world, &ray, &hit, Attributes::default()).front
+        };
+        assert_eq!(front(&scene), is_front, "{mirror}");
+        for name in ["a.nff", "a.ply", "a.toml"] {
+            save(&scene, &files.path(name)).unwrap();
+            assert_eq!(front(&files.scene(name)), is_front, "{name}, {mirror}");
+        }
     }
 }
 

@@ -125,6 +125,12 @@ fn placed(scene: &Scene) -> impl Iterator<Item = (&Geometry, &DAffine3)> {
     })
 }
 
+/// A triangle's corners in the order that has its front, once they are moved by `transform`, where it is before: a mirroring turns the winding.
+fn wound(corners: [u32; 3], transform: &DAffine3) -> [u32; 3] {
+    let [a, b, c] = corners;
+    if transform.matrix3.determinant() < 0.0 { [a, c, b] } else { corners }
+}
+
 /// Numbers with spaces between.
 fn spaced(v: Vec3) -> String {
     format!("{} {} {}", v.x, v.y, v.z)

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Unsayable, check_finite, is_colored, moves, placed, spaced, spaced_f64};
+use super::{Unsayable, check_finite, is_colored, moves, placed, spaced, spaced_f64, wound};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use crate::scene::{
     Alpha, Attenuation, Camera, Fov, Geometry, Interface, Light, Material, Mesh, Projection, Scene, Specular, Unlit,
@@ -149,7 +149,7 @@ fn write_mesh(mesh: &Mesh, transform: &DAffine3, out: &mut dyn Write) -> io::Res
     let for_normals = transform.matrix3.inverse().transpose();
     for corners in mesh.triangles.iter() {
         writeln!(out, "{} 3", if mesh.normals.is_empty() { "p" } else { "pp" })?;
-        for &i in corners {
+        for i in wound(*corners, transform) {
             match mesh.normals.get(i as usize) {
                 None => writeln!(out, "{}", place(i))?,
                 Some(normal) => {

@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::{Unsayable, is_colored, moves, placed};
+use super::{Unsayable, is_colored, moves, placed, wound};
 use crate::io::polygon::triangulate;
 use crate::math::DVec3;
 use crate::scene::{Geometry, Scene, choose_origin};
@@ -81,10 +81,10 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&[3])?;
         out.write_all(bytemuck::bytes_of(&corners.map(|i| (first + i).to_le())))
     };
-    for (geometry, _) in placed(scene) {
+    for (geometry, transform) in placed(scene) {
         match geometry {
             Geometry::Mesh(mesh) => {
-                mesh.triangles.iter().try_for_each(|corners| face(first, corners))?;
+                mesh.triangles.iter().try_for_each(|corners| face(first, &wound(*corners, transform)))?;
                 first += mesh.positions.len() as u32;
             }
             Geometry::Shapes { shapes, .. } => {

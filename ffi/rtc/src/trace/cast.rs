@@ -4,7 +4,7 @@ use twincast_core::math::{DAffine3, DVec3, Vec3, triangle_normal};
 use twincast_core::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
 use twincast_core::{Ray, TriangleMethod};
 
-use super::offer::Target;
+use super::offer::{Nearest, Target};
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::{Ball, Named};
@@ -56,28 +56,40 @@ pub fn sight(committed: &Committed, query: &Query, mask: u32, any: bool) -> Sigh
 /// The nearest hit, or any, of the target's ray; `ANY` as the target was made.
 #[inline(always)]
 pub fn cast_one<const ANY: bool>(committed: &Committed, query: &Query, target: &Target) {
-    let sight = sight(committed, query, target.mask(), ANY);
-    if sight == Sight::Nothing {
-        return;
-    }
-    let is_done = || ANY && target.tfar() < 0.0;
-    let mut nearest = INVALID_ID;
-    if !committed.changing.is_empty() {
-        nearest = cast_changing::<ANY>(committed, *query, *target, sight);
-    }
-    if let Some(solid) = committed.solid.as_ref().filter(|_| !is_done()) {
-        cast_triangles::<ANY>(committed, &solid.bvh, query, target, sight, nearest);
-    }
-    if committed.others.is_some() && !is_done() {
-        cast_others::<ANY>(committed, *query, *target);
-    }
+    cast_after::<ANY>(committed, query, target, INVALID_ID);
 }
 
-/// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then; the geometry that was hit. By value, here and
+/// The same where geometry `nearest` has been hit before: at the same distance the lower one is, here and below. The one that has been hit now;
+/// [`INVALID_ID`] stands for none, before and after.
+#[inline(always)]
+fn cast_after<const ANY: bool>(committed: &Committed, query: &Query, target: &Target, mut nearest: u32) -> u32 {
+    let sight = sight(committed, query, target.mask(), ANY);
+    if sight == Sight::Nothing {
+        return nearest;
+    }
+    let is_done = || ANY && target.tfar() < 0.0;
+    if !committed.changing.is_empty() {
+        nearest = cast_changing::<ANY>(committed, *query, *target, sight, nearest);
+    }
+    if let Some(solid) = committed.solid.as_ref().filter(|_| !is_done()) {
+        nearest = cast_triangles::<ANY>(committed, &solid.bvh, query, target, sight, nearest);
+    }
+    if committed.others.is_some() && !is_done() {
+        nearest = cast_others::<ANY>(committed, *query, *target, nearest);
+    }
+    nearest
+}
+
+/// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then. By value, here and
 /// below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
-fn cast_changing<const ANY: bool>(committed: &Committed, query: Query, target: Target, sight: Sight) -> u32 {
-    let mut nearest = INVALID_ID;
+fn cast_changing<const ANY: bool>(
+    committed: &Committed,
+    query: Query,
+    target: Target,
+    sight: Sight,
+    mut nearest: u32,
+) -> u32 {
     for solid in committed.changing.iter().rev() {
         nearest = cast_triangles::<ANY>(committed, &solid.bvh, &query, &target, sight, nearest);
         if ANY && target.tfar() < 0.0 {
@@ -87,7 +99,7 @@ fn cast_changing<const ANY: bool>(committed: &Committed, query: Query, target: T
     nearest
 }
 
-/// Among triangles, of which some may not pass. Geometry `nearest` has been hit before, if any: at the same distance the lower one is. The one that has been hit now.
+/// Among triangles, of which some may not pass.
 #[inline(always)]
 fn cast_triangles<const ANY: bool>(
     committed: &Committed,
@@ -103,10 +115,17 @@ fn cast_triangles<const ANY: bool>(
     show_solid(committed, solid, *query, *target, nearest)
 }
 
-/// The same, not inlined: for callbacks and instances.
+/// As [`cast_one`], not inlined: for rays that callbacks send on.
+#[cfg(feature = "v4")]
 #[inline(never)]
 pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
     if any { cast_one::<true>(committed, query, target) } else { cast_one::<false>(committed, query, target) }
+}
+
+/// As [`cast_after`], not inlined: for instances.
+#[inline(never)]
+fn cast_inside<const ANY: bool>(committed: &Committed, query: &Query, target: &Target, nearest: u32) -> u32 {
+    cast_after::<ANY>(committed, query, target, nearest)
 }
 
 /// Among triangles, of which each counts.
@@ -141,7 +160,7 @@ fn cast_solid<const ANY: bool>(
     }
     let TriangleFound { hit, normal } = &found;
     if is_hit
-        && !(hit.t == single.tmax && nearest < hit.geometry)
+        && !(hit.t == single.tmax && nearest <= hit.geometry)
         && let Some(named) = name_solid(committed, hit.geometry, hit.primitive, [hit.u, hit.v], *normal)
     {
         target.take(query, hit.geometry, hit.t, &named);
@@ -170,8 +189,7 @@ pub fn name_solid(committed: &Committed, geometry: u32, primitive: u32, [u, v]: 
 #[inline(never)]
 fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target, nearest: u32) -> u32 {
     let ray = target.ray();
-    // Of a geometry in another tree the primitive does not matter.
-    let mut nearest = (nearest, 0);
+    let mut nearest = Nearest::of(nearest);
     // Each is shown once, to filters that count.
     let mut shown = Vec::new();
     solid.visit_triangles(&for_triangles(committed, &ray), &mut |found| {
@@ -189,18 +207,11 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target, 
             && let Body::Surface(surface) = &record.body
         {
             let named = surface.name(hit.primitive, hit.u, hit.v, found.normal);
-            let name = (hit.geometry, named.primitive);
-            let is_behind = hit.t == target.tfar() && nearest < name;
-            if is_behind {
-                // A filter is shown it nevertheless.
-                target.show(&query, record, hit.geometry, hit.t, &named);
-            } else if target.offer(&query, record, hit.geometry, hit.t, &named) {
-                nearest = name;
-            }
+            target.offer_to(&mut nearest, &query, record, hit.geometry, hit.t, &named);
         }
         onwards(&target)
     });
-    nearest.0
+    nearest.geometry
 }
 
 /// How far the search still goes.
@@ -212,30 +223,44 @@ fn onwards(target: &Target) -> Search {
 
 /// Among everything that is not a triangle that stands still.
 #[inline(never)]
-fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target) {
-    let Some(others) = &committed.others else { return };
+fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target, nearest: u32) -> u32 {
+    let Some(others) = &committed.others else { return nearest };
     let ray = target.ray();
+    let mut nearest = Nearest::of(nearest);
     let visitor = &mut |i| {
         let item = committed.items[i as usize];
         if let Some(ball) = committed.balls.get(i as usize) {
-            cast_point(committed, &query, &target, item, ball, &ray);
+            cast_point(committed, &query, &target, item, ball, &ray, &mut nearest);
         } else if let Some(placed) = committed.placed.get(item.placed as usize) {
             if placed.mask & ray.mask != 0 {
-                enter::<ANY>(&query, &target, item, &placed.scene, &placed.to_scene, &ray);
+                enter::<ANY>(&query, &target, item, &placed.scene, &placed.to_scene, &ray, &mut nearest);
             }
         } else if let Some(record) = committed.record(item.geometry)
             && record.mask & ray.mask != 0
         {
-            cast_item::<ANY>(committed, &query, &target, record, item, &ray);
+            cast_item::<ANY>(committed, &query, &target, record, item, &ray, &mut nearest);
         }
         onwards(&target)
     };
-    if ANY { others.visit_any(&native(&ray), visitor) } else { others.visit(&native(&ray), visitor) }
+    if ANY {
+        others.visit_any(&native(&ray), visitor)
+    } else {
+        others.visit(&native(&ray), visitor)
+    }
+    nearest.geometry
 }
 
 /// A point that stands still.
 #[inline(always)]
-fn cast_point(committed: &Committed, query: &Query, target: &Target, item: Item, ball: &Ball, ray: &RTCRay) {
+fn cast_point(
+    committed: &Committed,
+    query: &Query,
+    target: &Target,
+    item: Item,
+    ball: &Ball,
+    ray: &RTCRay,
+    nearest: &mut Nearest,
+) {
     let Item { geometry, primitive, .. } = item;
     if let Some(record) = committed.record(geometry)
         && record.mask & ray.mask != 0
@@ -243,7 +268,7 @@ fn cast_point(committed: &Committed, query: &Query, target: &Target, item: Item,
     {
         round::offer_point(linear, primitive, ball, &native(ray), |t, named| {
             if (ray.tnear..=target.tfar()).contains(&t) {
-                target.offer(query, record, geometry, t, named);
+                target.offer_to(nearest, query, record, geometry, t, named);
             }
         });
     }
@@ -256,6 +281,7 @@ fn cast_item<const ANY: bool>(
     record: &Record,
     item: Item,
     ray: &RTCRay,
+    nearest: &mut Nearest,
 ) {
     let Item { geometry, primitive, .. } = item;
     match &record.body {
@@ -265,7 +291,7 @@ fn cast_item<const ANY: bool>(
                 let native = Ray { tmax: target.tfar(), ..for_triangles(committed, ray) };
                 if let Some(hit) = TriangleMethod::Exact.intersect(&native, corners) {
                     let named = surface.name(primitive, hit.u as f32, hit.v as f32, triangle_normal(corners));
-                    target.offer(query, record, geometry, hit.t as f32, &named);
+                    target.offer_to(nearest, query, record, geometry, hit.t as f32, &named);
                 }
             }
         }
@@ -273,14 +299,18 @@ fn cast_item<const ANY: bool>(
             if linear.steps.is_at(ray.time) {
                 round::offer(linear, primitive, &native(ray), |t, named| {
                     if (ray.tnear..=target.tfar()).contains(&t) {
-                        target.offer(query, record, geometry, t, named);
+                        target.offer_to(nearest, query, record, geometry, t, named);
                     }
                 });
             }
         }
         Body::User(user) => {
             if user.is_at(ray.time) {
+                let before = target.tfar();
                 user::cast::<ANY>(query, target, record, item);
+                if target.tfar() != before {
+                    *nearest = Nearest { geometry, primitive };
+                }
             }
         }
         Body::Instances(instances) => {
@@ -288,7 +318,7 @@ fn cast_item<const ANY: bool>(
             if let Some(instance) = instances.get(primitive as usize)
                 && instance.motion.is_at(ray.time)
             {
-                enter::<ANY>(query, target, item, &instance.scene, &instance.to_scene(ray.time), ray);
+                enter::<ANY>(query, target, item, &instance.scene, &instance.to_scene(ray.time), ray, nearest);
             }
         }
     }
@@ -302,6 +332,7 @@ fn enter<const ANY: bool>(
     scene: &Scene,
     to_scene: &DAffine3,
     ray: &RTCRay,
+    nearest: &mut Nearest,
 ) {
     // SAFETY: the context is the caller's, which lives as long as the query and is this thread's, or our own.
     if unsafe { (*query.context).instance } != INVALID_ID {
@@ -311,11 +342,19 @@ fn enter<const ANY: bool>(
     let Some(committed) = (unsafe { scene.committed() }) else { return };
     let [org, dir] = [ray.org, ray.dir].map(|v| DVec3::from(v.map(f64::from)));
     let (org, dir) = (to_scene.transform_point3(org).as_vec3(), to_scene.transform_vector3(dir).as_vec3());
+    // At the distance of the hit so far everything in here is, or nothing: as if none had been hit, or the lowest that can be.
+    let own = Nearest { geometry, primitive };
+    let before = if *nearest <= own { 0 } else { INVALID_ID };
+    let tfar = target.tfar();
+    let mut now = before;
     within(query, geometry, primitive, || {
         target.set_place(org.to_array(), dir.to_array());
-        cast(committed, query, target, ANY);
+        now = cast_inside::<ANY>(committed, query, target, before);
         target.set_place(ray.org, ray.dir);
     });
+    if now != before || target.tfar() != tfar {
+        *nearest = own;
+    }
 }
 
 /// Runs `work` with the context naming an instance.

@@ -19,6 +19,20 @@ const _: () = {
     assert!(offset_of!(SingleRay, tmax) == offset_of!(RTCRay, tfar));
 };
 
+/// What has been hit so far, or instances that it is in; at the same distance the lowest is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Nearest {
+    pub geometry: u32,
+    pub primitive: u32,
+}
+
+impl Nearest {
+    /// Some primitive of a geometry that has no others among what is still looked at; nothing, if that is [`INVALID_ID`](crate::abi::INVALID_ID).
+    pub const fn of(geometry: u32) -> Self {
+        Self { geometry, primitive: 0 }
+    }
+}
+
 /// A ray of the caller's, and where its hit goes; nowhere for a ray that asks for any hit.
 ///
 /// Pointers and not references: callbacks are given the same ray, and write to it.
@@ -112,9 +126,28 @@ impl Target {
         unsafe { self.hit.write(hit_of(query, geometry, named)) };
     }
 
+    /// As [`Target::offer`], unless `nearest` is as far and lower.
+    #[inline]
+    pub fn offer_to(
+        &self,
+        nearest: &mut Nearest,
+        query: &Query,
+        record: &Record,
+        geometry: u32,
+        t: f32,
+        named: &Named,
+    ) {
+        let own = Nearest { geometry, primitive: named.primitive };
+        if t == self.tfar() && *nearest <= own {
+            self.show(query, record, geometry, t, named);
+        } else if self.offer(query, record, geometry, t, named) {
+            *nearest = own;
+        }
+    }
+
     /// Has filters see a hit where another one has been taken, which stays.
     #[cold]
-    pub fn show(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) {
+    fn show(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) {
         if self.hit.is_null() || filters(query, record, false) == [None; 2] {
             return;
         }
@@ -127,7 +160,7 @@ impl Target {
     }
 
     /// Takes a hit, if filters let it pass: whether they do. It is no farther than the ray goes.
-    pub fn offer(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) -> bool {
+    fn offer(&self, query: &Query, record: &Record, geometry: u32, t: f32, named: &Named) -> bool {
         let filters = filters(query, record, self.hit.is_null());
         if filters == [None; 2] {
             self.take(query, geometry, t, named);

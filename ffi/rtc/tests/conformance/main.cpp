@@ -12,6 +12,7 @@ void errors();
 void packets();
 void motions();
 void starts();
+void ties();
 
 int main() {
   const struct {
@@ -19,7 +20,7 @@ int main() {
     void (*run)();
   } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
                 {"rounds", rounds},     {"errors", errors},   {"packets", packets},
-                {"motions", motions},   {"starts", starts},   {"dynamics", dynamics}};
+                {"motions", motions},   {"starts", starts},   {"dynamics", dynamics}, {"ties", ties}};
   int all = 0;
   for (const auto& group : groups) {
     checks = failures = 0;
