@@ -125,6 +125,11 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
+    /// Whether it contains points, but none without end.
+    pub fn is_bounded(&self) -> bool {
+        !self.is_empty() && self.min.is_finite() && self.max.is_finite()
+    }
+
     /// The middle. Halves before it adds, so that large boxes do not overflow.
     #[inline]
     pub fn centre(&self) -> Vec3 {

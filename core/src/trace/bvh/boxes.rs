@@ -51,7 +51,7 @@ impl BoxTree {
     /// # Panics
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> (Self, Vec<u32>) {
-        let kept = boxes.iter().enumerate().filter(|(_, bounds)| is_sound(bounds));
+        let kept = boxes.iter().enumerate().filter(|(_, bounds)| bounds.is_bounded());
         Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), &options)
     }
 
@@ -68,7 +68,7 @@ impl BoxTree {
         // What is near halfway is together.
         let halfway =
             |[start, end]: &[Aabb; 2]| Aabb { min: start.min.midpoint(end.min), max: start.max.midpoint(end.max) };
-        let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(is_sound));
+        let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(Aabb::is_bounded));
         let (mut still, order) =
             Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), &options);
         let tree = &mut still.tree;
@@ -135,11 +135,6 @@ impl BoxTree {
             isa::dispatch(self.isa, NearBoxes { tree: &self.tree, point, radius, visitor });
         }
     }
-}
-
-/// Whether there is something in it that can be hit.
-fn is_sound(bounds: &Aabb) -> bool {
-    bounds.min.cmple(bounds.max).all() && bounds.min.is_finite() && bounds.max.is_finite()
 }
 
 /// Both wider by what it rounds to go from one to the other: a product of either, a difference and a sum.

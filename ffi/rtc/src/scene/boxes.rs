@@ -31,7 +31,7 @@ impl Boxes {
     fn add(&mut self, item: Item, steps: impl Iterator<Item = Aabb>, range: (f32, f32)) {
         self.steps.clear();
         self.steps.extend(steps);
-        if self.steps.iter().any(|bounds| !(bounds.min.cmple(bounds.max).all())) {
+        if self.steps.iter().any(Aabb::is_empty) {
             return;
         }
         let ends = path::ends(&self.steps, range);
@@ -81,7 +81,7 @@ pub fn other_boxes(records: &[Option<Box<Record>>]) -> Boxes {
             Body::Instances(instances) => {
                 for (i, instance) in instances.iter().enumerate() {
                     let (whole, ends) = instance_bounds(instance);
-                    if whole.min.cmple(whole.max).all() {
+                    if !whole.is_empty() {
                         boxes.surround(ends);
                         boxes.put(item(i), whole, ends, instance.motion.range());
                     }
@@ -99,7 +99,7 @@ pub fn instance_bounds(instance: &Instance) -> (Aabb, [Aabb; 2]) {
     let Some(committed) = (unsafe { scene.committed() }) else { return (Aabb::EMPTY, [Aabb::EMPTY; 2]) };
     let [start, end] = committed.bounds;
     let all = start.union(end);
-    if !all.min.cmple(all.max).all() {
+    if all.is_empty() {
         return (Aabb::EMPTY, [Aabb::EMPTY; 2]);
     }
     let reach = all.min.abs().max(all.max.abs());

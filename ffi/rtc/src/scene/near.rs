@@ -38,6 +38,10 @@ impl Near {
         for (id, record) in committed.records.iter().enumerate() {
             let Some(record) = record else { continue };
             let mut add = |primitive: usize, steps: &[Aabb], range: (f32, f32)| {
+                // Rays pass through what is nowhere at some step, too.
+                if steps.iter().any(Aabb::is_empty) {
+                    return;
+                }
                 items.push(Item::new(id as u32, primitive as u32));
                 boxes.push(steps.iter().copied().fold(Aabb::EMPTY, Aabb::union));
                 paths.push((steps.len() > 1).then(|| TimeSteps::new(steps.into(), range)));

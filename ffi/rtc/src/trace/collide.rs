@@ -105,7 +105,7 @@ fn collisions(first: &Committed, theirs: &Theirs<'_>, items: &[Item]) -> Vec<RTC
     for &item in items {
         let own = bounds(first, item);
         // What has no end is in no tree either.
-        if !own.min.cmple(own.max).all() || !own.min.is_finite() || !own.max.is_finite() {
+        if !own.is_bounded() {
             continue;
         }
         theirs.overlapping(&own, &mut |other| {

@@ -125,7 +125,8 @@ impl Search1 {
             committed,
             &Space {
                 point: to_scene.transform_point3(point.as_dvec3()).as_vec3(),
-                stretch: (stretch * (1.0 + 1e-6)) as f32,
+                // Similarities are so to a hundred-thousandth, of the squares of lengths; more than half as much along some axis, and what is rounded here.
+                stretch: (stretch * (1.0 + 2e-5)) as f32,
                 similarity: similarity as f32,
                 is_instance: true,
             },

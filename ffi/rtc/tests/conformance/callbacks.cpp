@@ -260,6 +260,33 @@ static void moving_points() {
     }
 }
 
+// What is nowhere at one of its steps is nowhere.
+static void absent_points() {
+  World w;
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 3);
+  rtcSetGeometryTimeStepCount(g, 2);
+  auto bounds = [](const RTCBoundsFunctionArguments* a) {
+    const bool is_there = a->primID != 1 || a->timeStep == 0;
+    RTCBounds& b = *a->bounds_o;
+    b.lower_x = b.lower_y = b.lower_z = is_there ? -1 : INFINITY;
+    b.upper_x = b.upper_y = b.upper_z = is_there ? 1 : -INFINITY;
+  };
+  rtcSetGeometryBoundsFunction(g, bounds, nullptr);
+  w.add(g);
+  rtcCommitScene(w.scene);
+  for (float time : {0.f, 0.5f, 1.f}) {
+    std::set<unsigned> shown;
+    RTCPointQuery q;
+    q.x = q.y = q.z = 0, q.time = time, q.radius = 1;
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(
+        w.scene, &q, &context, [](RTCPointQueryFunctionArguments* a) { return ((std::set<unsigned>*)a->userPtr)->insert(a->primID), false; }, &shown);
+    CHECK(shown == (std::set<unsigned>{0, 2}));
+  }
+}
+
 // The query's function is asked before the geometry's; points and curves are shown to neither.
 static std::vector<char> asked;
 static void query_functions() {
@@ -468,6 +495,7 @@ void callbacks() {
   user_geometry();
   points();
   moving_points();
+  absent_points();
   query_functions();
   bounds_data();
   collisions();
