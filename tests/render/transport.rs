@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use twincast::math::{DVec3, Mat3, Vec3, Vec4};
+use twincast::math::{DAffine3, DMat3, DVec3, Mat3, Vec3, Vec4};
 use twincast::render::Control;
 use twincast::scene::{
     AreaShape, Camera, Environment, Geometry, Integrator, Interface, Light, Material, Mesh, Specular,
@@ -49,6 +49,37 @@ fn means(scene: &Scene, camera: &Camera, settings: &Settings) -> Vec<(&'static s
         engines(&world).iter().filter(fast).map(|e| (e.name, mean(&render(scene, camera, settings, e)))).collect();
     assert_eq!(means.len(), 1 + usize::from(cfg!(feature = "embree")));
     means
+}
+
+/// A ball that glows shows what it sends out and no more, whatever it is made of: it is convex, and nothing of it lights it, be it a lamp by itself, in the
+/// place of one, or turned and scaled.
+#[test]
+fn a_glowing_ball_does_not_light_itself() {
+    let lamp = Material { emission: Vec3::splat(3.0), ..matte(0.8) };
+    for (centre, radius, scale) in
+        [(DVec3::ZERO, 1.0, 1.0), (DVec3::new(7.0, -2.0, 30.0), 0.5, 0.7), (DVec3::ZERO, 0.01, 1.0)]
+    {
+        let mut scene = scene(vec![(sphere(Vec3::ZERO, radius), lamp.clone())]);
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 2.0) / 3.0, 0.7) * scale;
+        scene.instances[0].transform =
+            DAffine3 { matrix3: if scale == 1.0 { DMat3::IDENTITY } else { turn }, translation: centre };
+        let radius = f64::from(radius) * scale;
+        let camera = Camera::look_at(centre + DVec3::new(1.0, 2.0, 3.0) * radius, centre, DVec3::Y, 0.1).unwrap();
+        let shape = AreaShape::Sphere { centre, radius };
+        let in_its_place = Light::Area { shape, radiance: Vec3::splat(3.0) };
+        for (lights, integrators) in [
+            (scene.lights.clone(), &[Integrator::Path][..]),
+            (vec![in_its_place], &[Integrator::RayCast, Integrator::Whitted, Integrator::Path]),
+        ] {
+            let scene = Scene { lights, ..scene.clone() };
+            for &integrator in integrators {
+                let settings = Settings { integrator: Some(integrator), ..settings(8, 8, 16) };
+                for (engine, found) in means(&scene, &camera, &settings) {
+                    assert!((found - 3.0).abs().max_element() < 1e-5, "{engine}, {integrator}, {centre}: {found}");
+                }
+            }
+        }
+    }
 }
 
 /// Howell's B-3: what a square metre above an element, from the place over it to (a, b), at distance 1, sends it, as a share of all.

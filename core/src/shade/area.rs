@@ -72,21 +72,25 @@ fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumina
     color.is_finite().then_some(Illumination { to_light, color, end, density })
 }
 
-/// From a direction of the cone that the sphere fills.
+/// From a direction of the cone that the sphere fills; none where a point on it looks away from it.
 fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -> Option<Illumination> {
     let offset = centre - point;
     let distance = offset.length();
     let axis = offset.try_normalize().unwrap_or(DVec3::Y);
-    let opening = opening(distance, radius);
+    let side = Side::of(point, centre, radius);
+    let opening = opening(distance, radius, side);
     let height = xi.x * opening;
     let (cosine, off_axis) = (1.0 - height, (height * (2.0 - height)).max(0.0).sqrt());
     let [x, y] = tangents(axis);
     let angle = xi.y * std::f64::consts::TAU;
     let to_light = axis * cosine + (x * libm::cos(angle) + y * libm::sin(angle)) * off_axis;
+    if side == Side::On && cosine <= 0.0 {
+        return None;
+    }
     // The solid angle is 2 pi times the opening.
     let color = radiance * (2.0 * opening) as f32;
     let half_chord = (radius * radius - (distance * off_axis).powi(2)).max(0.0).sqrt();
-    let way = distance * cosine + if is_outside(distance, radius) { -half_chord } else { half_chord };
+    let way = distance * cosine + if side == Side::Outside { -half_chord } else { half_chord };
     let at = point + to_light * way.max(0.0);
     let density = Some(1.0 / (std::f64::consts::TAU * opening));
     let end = Some(short_of(at, to_light, point, half_chord / radius));
@@ -94,14 +98,35 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -
 }
 
 /// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point inside.
-fn opening(distance: f64, radius: f64) -> f64 {
+fn opening(distance: f64, radius: f64, side: Side) -> f64 {
     let sine = (radius / distance).min(1.0);
-    if is_outside(distance, radius) { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 }
+    if side == Side::Outside { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 2.0 }
 }
 
-/// What lies on the sphere, up to rounding, counts as inside: it sees all of it.
-fn is_outside(distance: f64, radius: f64) -> bool {
-    distance > radius * (1.0 + 1e-6)
+/// Where a point is, of a sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    /// It sees a cone full of it.
+    Outside,
+    /// It sees it in one half of all directions, and nothing of it in the other: what has its place is convex and does not light itself.
+    On,
+    /// It sees it wherever it looks.
+    Inside,
+}
+
+impl Side {
+    fn of(point: DVec3, centre: DVec3, radius: f64) -> Self {
+        // By what f32 may round of where it is, and of what stands in its place.
+        let slack = f64::from(gamma(ROUNDINGS)) * (centre.abs().max_element() + radius);
+        let above = (point - centre).length() - radius;
+        if above.abs() <= slack.min(radius / 16.0) {
+            Self::On
+        } else if above > 0.0 {
+            Self::Outside
+        } else {
+            Self::Inside
+        }
+    }
 }
 
 /// How densely [`illuminate`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where the
@@ -121,7 +146,8 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
             normal * (std::f64::consts::PI * radius * radius)
         }
         AreaShape::Sphere { centre, radius } => {
-            return Some(1.0 / (std::f64::consts::TAU * opening((centre - point).length(), radius)));
+            let opening = opening((centre - point).length(), radius, Side::of(point, centre, radius));
+            return Some(1.0 / (std::f64::consts::TAU * opening));
         }
     };
     let offset = at - point;
@@ -227,6 +253,22 @@ mod tests {
     fn within_a_ball_of_light_everything_is_as_bright() {
         let ball = AreaShape::Sphere { centre: DVec3::new(0.1, 0.2, 0.3), radius: 2.0 };
         assert!((reflected(&ball, DVec3::ZERO, DVec3::Y) - 1.0).abs() < 1e-3);
+    }
+
+    /// A ball is convex: what stands on it, to within f32, is not lit by it but from its inside.
+    #[test]
+    fn a_ball_does_not_light_itself() {
+        for (centre, radius) in [(DVec3::ZERO, 1.0), (DVec3::new(3.0, -40.0, 7.0), 0.125), (DVec3::splat(0.1), 1e-3)] {
+            let ball = AreaShape::Sphere { centre, radius };
+            for k in 0..50 {
+                let angle = f64::from(k);
+                let outwards = DVec3::new(angle.sin(), (0.37 * angle).cos(), angle.cos()).normalize();
+                let point = (centre + outwards * radius).as_vec3().as_dvec3();
+                assert_eq!(mean(20, &ball, point, outwards), 0.0, "{centre}, {radius}");
+                let inside = mean(20, &ball, point, -outwards);
+                assert!((inside - 1.0).abs() < 0.01, "{centre}, {radius}: {inside}");
+            }
+        }
     }
 
     /// However flat a ray comes in: f32 moves a surface across itself, and not along the ray.
