@@ -752,5 +752,5 @@ fn many_faulty_meshes_are_told_together() {
     assert_eq!(told.lines().filter(|line| line.starts_with("geometry ")).count(), 20, "{told}");
     let (_, others) = told.split_once("5 other geometries (--json has each):\n").expect("the others");
     assert!(others.trim_start().starts_with("5 degenerate triangles\n"), "{told}");
-    assert_eq!(told.matches("1 degenerate triangles").count(), 20, "{told}");
+    assert_eq!(told.matches("1 degenerate triangle\n").count(), 20, "{told}");
 }
