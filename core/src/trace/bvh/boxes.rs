@@ -278,7 +278,7 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
         match end {
             None => self.walk::<S>(&slab),
             Some(end) => {
-                // Of NaN itself, which enters everything.
+                // NaN stays NaN, with which every box is entered.
                 let time = ray.time.clamp(0.0, 1.0);
                 self.walk::<S>(&MovingRay { slab, start: tree.nodes(), end: end.nodes(), time });
             }

@@ -77,7 +77,7 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryTimeStepCount(geometry: *const Geo
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryTimeRange(geometry: *const Geometry, start: f32, end: f32) {
     let set = |state: &mut State| {
-        // Not a number neither.
+        // NaN is refused as well.
         if start.partial_cmp(&end).is_none_or(|order| order.is_gt()) {
             return Err(Failure::argument("startTime has to be smaller or equal to the endTime"));
         }

@@ -46,25 +46,27 @@ impl Plan {
     }
 }
 
+/// The geometries as they are now, by id; of `old` those that are the same.
+fn records(geometries: &[Option<Arc<Geometry>>], mut old: Option<&mut Committed>) -> Result<Vec<Option<Box<Record>>>> {
+    let each = geometries.iter().enumerate().map(|(id, geometry)| {
+        let Some(geometry) = geometry else { return Ok(None) };
+        let before = old.as_mut().and_then(|old| old.records.get_mut(id)?.take());
+        match before.filter(|before| is_same(before, geometry)) {
+            Some(mut same) => {
+                same.is_new = false;
+                Ok(Some(same))
+            }
+            None => Ok(record(geometry)?.map(Box::new)),
+        }
+    });
+    each.collect()
+}
+
 /// Makes it. Of `old`, what was made last, that is taken which is the same.
 pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Result<Committed> {
     let progress = Progress::new(plan.progress);
     progress.at(0.0)?;
-    let mut records: Vec<Option<Box<Record>>> = Vec::with_capacity(plan.geometries.len());
-    for (id, geometry) in plan.geometries.iter().enumerate() {
-        let Some(geometry) = geometry else {
-            records.push(None);
-            continue;
-        };
-        let before = old.as_mut().and_then(|old| old.records.get_mut(id)?.take());
-        records.push(match before.filter(|before| is_same(before, geometry)) {
-            Some(mut same) => {
-                same.is_new = false;
-                Some(same)
-            }
-            None => record(geometry)?.map(Box::new),
-        });
-    }
+    let records = records(&plan.geometries, old.as_deref_mut())?;
     let heeded = heeded(&records);
     let of_queries = plan.flags & scene_flag::FILTER_IN_ARGUMENTS != 0;
     let has_filters = heeded.intersect_filter || heeded.occluded_filter || of_queries;
@@ -104,7 +106,7 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         balls: balls(&records, &items),
         records,
         solid: solids.next(),
-        changing: solids.collect(),
+        smaller: solids.collect(),
         bounds: boxes.ends(),
         others,
         items,
@@ -116,9 +118,9 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
         bytes,
     };
     // What was announced is corrected, so that takings and givings back add up. What was kept is the old scene's, unless this one takes its place.
-    let made = bytes as isize - kept as isize;
-    _ = scene.device.account(made - expected as isize, true);
-    progress.at(1.0).inspect_err(|_| _ = scene.device.account(-made, true))?;
+    let more = bytes as isize - kept as isize;
+    _ = scene.device.account(more - expected as isize, true);
+    progress.at(1.0).inspect_err(|_| _ = scene.device.account(-more, true))?;
     if let Some(old) = old {
         old.bytes -= kept;
     }

@@ -112,10 +112,10 @@ pub struct Committed {
     pub device: Arc<Device>,
     /// By geometry id; none where nothing is attached or enabled.
     pub records: Vec<Option<Box<Record>>>,
-    /// Triangles that stand still; none where there are none.
+    /// The largest tree over triangles that stand still; none where there are none.
     pub solid: Option<Solid>,
-    /// In a scene that is dynamic, more of them, of what has changed since the first commit; none larger than the one before it.
-    pub changing: Vec<Solid>,
+    /// The other ones, of a scene that is dynamic and has changed since the first commit; none larger than the one before it.
+    pub smaller: Vec<Solid>,
     /// Whether each triangle of all these is a primitive.
     pub is_plain: bool,
     /// Whether a ray may come to a triangle of these more than once.
@@ -148,7 +148,7 @@ impl Committed {
             device,
             records: Vec::new(),
             solid: None,
-            changing: Vec::new(),
+            smaller: Vec::new(),
             is_plain: true,
             repeats: false,
             others: None,
@@ -172,12 +172,12 @@ impl Committed {
 
     /// The trees over triangles that stand still.
     pub fn solids(&self) -> impl Iterator<Item = &Solid> {
-        self.solid.iter().chain(&self.changing)
+        self.solid.iter().chain(&self.smaller)
     }
 
     /// The same, taken away.
     pub fn take_solids(&mut self) -> Vec<Solid> {
-        self.solid.take().into_iter().chain(self.changing.drain(..)).collect()
+        self.solid.take().into_iter().chain(self.smaller.drain(..)).collect()
     }
 
     /// Whether these name each primitive in them, once.

@@ -114,8 +114,10 @@ impl Planner<'_> {
     /// Whether a tree is refitted of which these have changed: where all of them ask for it, and they are most of it.
     fn is_refitted(&self, solid: &Solid, leave: &[Member]) -> bool {
         let moved: usize = leave.iter().map(|member| still_triangles(self.records, member.id)).sum();
-        let is_wanted =
-            |member: &Member| self.asks_for(member.id, quality::REFIT) && still_triangles(self.records, member.id) > 0;
+        // Of others there is nothing to refit.
+        let is_wanted = |member: &Member| {
+            self.asks_for(member.id, quality::REFIT) && still_triangles(self.records, member.id) == member.triangles
+        };
         !leave.is_empty() && solid.gone == 0 && 2 * moved >= solid.triangles() && leave.iter().all(is_wanted)
     }
 
@@ -204,8 +206,11 @@ impl Making {
                 let world = world(records, &of);
                 match solid.bvh.refit(&world) {
                     Ok(()) => Solid { members: members(&world), rest: 0, ..solid },
-                    // There are other triangles than before, or others that can be hit.
-                    Err(_) => Solid::build(records, &of, Options { preset, ..options }),
+                    // Triangles have other corners than before, or others of them can be hit.
+                    Err(_) => {
+                        drop(solid);
+                        Solid::build(records, &of, Options { preset, ..options })
+                    }
                 }
             }
         }
@@ -236,14 +241,14 @@ impl Solid {
         self.members.iter().map(|member| member.triangles).sum()
     }
 
-    /// Takes some members out, unless more would be gone then than left, or it cannot: whether it did.
+    /// Takes some members out, unless more would be gone then than left, or it cannot: whether it did. If not, this is good for nothing but to be built anew.
     fn take_out(&mut self, members: &[Member]) -> bool {
-        let gone = members.iter().map(|member| member.triangles).sum::<usize>();
-        if self.gone + 2 * gone > self.triangles() {
+        let leaving = members.iter().map(|member| member.triangles).sum::<usize>();
+        if self.gone + leaving > self.triangles() - leaving {
             return false;
         }
         self.members.retain(|own| members.binary_search_by_key(&own.id, |member| member.id).is_err());
-        self.gone += gone;
+        self.gone += leaving;
         self.bvh.take_out(&members.iter().map(|member| (member.id, member.bounds)).collect::<Vec<_>>())
     }
 }

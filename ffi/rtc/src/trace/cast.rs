@@ -68,8 +68,8 @@ fn cast_after<const ANY: bool>(committed: &Committed, query: &Query, target: &Ta
         return nearest;
     }
     let is_done = || ANY && target.tfar() < 0.0;
-    if !committed.changing.is_empty() {
-        nearest = cast_changing::<ANY>(committed, *query, *target, sight, nearest);
+    if !committed.smaller.is_empty() {
+        nearest = cast_smaller::<ANY>(committed, *query, *target, sight, nearest);
     }
     if let Some(solid) = committed.solid.as_ref().filter(|_| !is_done()) {
         nearest = cast_triangles::<ANY>(committed, &solid.bvh, query, target, sight, nearest);
@@ -83,14 +83,14 @@ fn cast_after<const ANY: bool>(committed: &Committed, query: &Query, target: &Ta
 /// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then. By value, here and
 /// below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
-fn cast_changing<const ANY: bool>(
+fn cast_smaller<const ANY: bool>(
     committed: &Committed,
     query: Query,
     target: Target,
     sight: Sight,
     mut nearest: u32,
 ) -> u32 {
-    for solid in committed.changing.iter().rev() {
+    for solid in committed.smaller.iter().rev() {
         nearest = cast_triangles::<ANY>(committed, &solid.bvh, &query, &target, sight, nearest);
         if ANY && target.tfar() < 0.0 {
             break;

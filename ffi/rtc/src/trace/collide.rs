@@ -19,7 +19,7 @@ const TASK: usize = 1 << 6;
 /// Collisions that are there at the same time, about.
 const WAVE: usize = 1 << 18;
 
-/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at time 0; in a scene with itself no primitive meets itself. They are looked for by the
+/// Tells of each pair of user primitives, one of each scene, whose boxes overlap at their first time steps; in a scene with itself no primitive meets itself. They are looked for by the
 /// device's threads, and told by the caller's own, always in the same order.
 ///
 /// # Errors
@@ -62,7 +62,7 @@ fn all(scene: &Committed) -> impl Iterator<Item = Item> {
     (0..scene.records.len()).flat_map(of)
 }
 
-/// The box of a user primitive at time 0.
+/// The box of a user primitive at its first time step.
 fn bounds(scene: &Committed, item: Item) -> Aabb {
     match scene.record(item.geometry).map(|record| &record.body) {
         Some(Body::User(steps)) => steps[0][item.primitive as usize],

@@ -25,7 +25,7 @@ impl Words for RTCRayHit {
 ///
 /// # Safety
 /// As long as the lanes are there, [`word`](Lanes::word) is where this thread can read each of [`Record`](Lanes::Record)'s words of each of
-/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`TFAR`] and the words of hits.
+/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`word::TFAR`] and the words of hits.
 pub unsafe trait Lanes {
     /// A ray, or a ray and its hit.
     type Record: Words;
@@ -66,7 +66,7 @@ pub unsafe trait Lanes {
     /// Writes one word that answers, of rays in a row, eight at most.
     #[inline(always)]
     fn set_row<const N: usize>(&self, word: usize, first: usize, values: [u32; N]) {
-        assert!(self.has::<N>(word, first) && (word == TFAR || word >= RAY_WORDS));
+        assert!(self.has::<N>(word, first) && (word == word::TFAR || word >= RAY_WORDS));
         // SAFETY: they are there and answer, and who implements this promises that they can be written to, and lie side by side.
         unsafe { self.word(word, first).cast::<[u32; N]>().write(values) };
     }
@@ -87,7 +87,7 @@ pub unsafe trait Lanes {
     /// Writes where a ray ends.
     #[inline(always)]
     fn set_tfar(&self, lane: usize, tfar: f32) {
-        self.set_row(TFAR, lane, [tfar.to_bits()]);
+        self.set_row(word::TFAR, lane, [tfar.to_bits()]);
     }
 
     /// Writes a hit, and that the ray ends there.
@@ -97,7 +97,7 @@ pub unsafe trait Lanes {
         // SAFETY: a hit begins with that many words.
         let words = unsafe { (&raw const *hit).cast::<[u32; HIT_WORDS]>().read() };
         // SAFETY: all words are there, and who implements this promises that these can be written to.
-        unsafe { self.word(TFAR, lane).write(tfar.to_bits()) };
+        unsafe { self.word(word::TFAR, lane).write(tfar.to_bits()) };
         for (k, word) in words.into_iter().enumerate() {
             // SAFETY: as above.
             unsafe { self.word(RAY_WORDS + k, lane).write(word) };
@@ -118,15 +118,28 @@ pub unsafe trait Lanes {
     }
 }
 
-/// When it is sent.
-#[cfg(feature = "v3")]
-const TIME: usize = 7;
+/// Words of a ray, and those of its hit behind them.
+pub mod word {
+    use std::mem::offset_of;
 
-/// Where a ray ends.
-pub const TFAR: usize = 8;
+    use crate::abi::{RAY_WORDS, RTCHit, RTCRay};
 
-/// What it sees.
-pub const MASK: usize = 9;
+    pub const ORIGIN: usize = offset_of!(RTCRay, org) / 4;
+    pub const TNEAR: usize = offset_of!(RTCRay, tnear) / 4;
+    pub const DIRECTION: usize = offset_of!(RTCRay, dir) / 4;
+    #[cfg(feature = "v3")]
+    pub const TIME: usize = offset_of!(RTCRay, time) / 4;
+    pub const TFAR: usize = offset_of!(RTCRay, tfar) / 4;
+    pub const MASK: usize = offset_of!(RTCRay, mask) / 4;
+    pub const NORMAL: usize = RAY_WORDS + offset_of!(RTCHit, ng) / 4;
+    pub const U: usize = RAY_WORDS + offset_of!(RTCHit, u) / 4;
+    pub const V: usize = RAY_WORDS + offset_of!(RTCHit, v) / 4;
+    pub const PRIMITIVE: usize = RAY_WORDS + offset_of!(RTCHit, primitive) / 4;
+    pub const GEOMETRY: usize = RAY_WORDS + offset_of!(RTCHit, geometry) / 4;
+    pub const INSTANCE: usize = RAY_WORDS + offset_of!(RTCHit, instance) / 4;
+    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
+    pub const INSTANCE_PRIMITIVE: usize = RAY_WORDS + offset_of!(RTCHit, instance_primitive) / 4;
+}
 
 const _: () = {
     use std::mem::offset_of;
@@ -138,7 +151,6 @@ const _: () = {
     assert!(offset_of!(Packet, tmax) == 8 * offset_of!(RTCRay, tfar));
     assert!(size_of::<Packet>() <= 8 * size_of::<RTCRay>() && Packet::RAYS == 8);
     assert!(size_of::<RTCRay>() == 4 * RAY_WORDS && size_of::<RTCHit>() >= 4 * HIT_WORDS);
-    assert!(offset_of!(RTCRay, tfar) == 4 * TFAR && offset_of!(RTCRay, mask) == 4 * MASK);
 };
 
 /// A packet: all first words, all second words and so on.
@@ -192,7 +204,7 @@ pub struct Pointers<'a, T> {
 pub struct Spare {
     zero: [u32; 8],
     ones: [u32; 8],
-    /// What nobody reads; written to through a shared reference.
+    /// Stands for tfar, ids, flags and hits: what is read is what was written last, at first 0. Written to through a shared reference.
     sink: std::cell::UnsafeCell<[u32; 8]>,
 }
 
@@ -231,8 +243,8 @@ unsafe impl<T: Words> Lanes for Pointers<'_, T> {
         if array.is_null() {
             return match word {
                 // Rays begin at 0 and at time 0, and see everything.
-                MASK => self.spare.ones.as_ptr().cast_mut(),
-                0..=TIME => self.spare.zero.as_ptr().cast_mut(),
+                word::MASK => self.spare.ones.as_ptr().cast_mut(),
+                0..=word::TIME => self.spare.zero.as_ptr().cast_mut(),
                 _ => self.spare.sink.get().cast(),
             };
         }

@@ -8,9 +8,9 @@ use twincast_core::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{Sight, after, cast_one, name_solid, sight};
-use super::lanes::{Lanes, MASK, TFAR};
+use super::lanes::{Lanes, word};
 use super::offer::{Target, hit_of};
-use crate::abi::{RAY_WORDS, RTCRay, RTCRayHit};
+use crate::abi::{RTCRay, RTCRayHit};
 use crate::scene::Committed;
 
 /// Rays of a packet.
@@ -26,7 +26,7 @@ struct Called<'a, L, V> {
 
 impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     /// Calls `two` and `one` with the triangles, packets of rays that see all of them and nothing else, and the first lane; or `alone` with every
-    /// lane.
+    /// lane that is valid.
     #[inline(always)]
     fn each(
         &self,
@@ -37,7 +37,7 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         two: impl Fn(&Bvh, &Asked<'_, 2>, usize),
         one: impl Fn(&Bvh, &Asked<'_, 1>, usize),
     ) {
-        let Some((solid, mask)) = plain(committed, query, any) else {
+        let Some((solid, mask)) = only_triangles(committed, query, any) else {
             return (0..self.lanes.count()).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
         };
         let (count, mut first) = (self.lanes.count(), 0);
@@ -69,13 +69,13 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
             return self.rest(first);
         }
         let row = |word| lanes.row::<RAYS>(word, first).map(f32::from_bits);
-        let start = row(TNEAR);
+        let start = row(word::TNEAR);
         // Where it is wanted, at once: what is changed afterwards may be copied.
         Packet {
-            origin: [row(0), row(1), row(2)],
+            origin: [row(word::ORIGIN), row(word::ORIGIN + 1), row(word::ORIGIN + 2)],
             tmin: if *excludes_start { start.map(after) } else { start },
-            direction: [row(DIRECTION), row(DIRECTION + 1), row(DIRECTION + 2)],
-            tmax: row(TFAR),
+            direction: [row(word::DIRECTION), row(word::DIRECTION + 1), row(word::DIRECTION + 2)],
+            tmax: row(word::TFAR),
             ..Packet::NONE
         }
     }
@@ -101,28 +101,24 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         let (count, mut seeing) = (lanes.count(), 0);
         if first + RAYS > count {
             for lane in first..count {
-                let [own] = lanes.row(MASK, lane);
+                let [own] = lanes.row(word::MASK, lane);
                 seeing |= u32::from(is_valid(lane) && own & mask != 0) << (lane - first);
             }
             return seeing;
         }
-        for (lane, own) in lanes.row::<RAYS>(MASK, first).into_iter().enumerate() {
+        for (lane, own) in lanes.row::<RAYS>(word::MASK, first).into_iter().enumerate() {
             seeing |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
         }
         seeing
     }
 }
 
-/// Words of a ray.
-const TNEAR: usize = 3;
-const DIRECTION: usize = 4;
-
 /// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in common to see all of them; the
 /// others see none.
 #[inline(always)]
-fn plain<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
+fn only_triangles<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
     let mask = committed.heeded.mask?;
-    let solid = &committed.solid.as_ref().filter(|_| committed.changing.is_empty() && committed.others.is_none())?.bvh;
+    let solid = &committed.solid.as_ref().filter(|_| committed.smaller.is_empty() && committed.others.is_none())?.bvh;
     (sight(committed, query, mask, any) == Sight::Everything).then_some((solid, mask))
 }
 
@@ -178,17 +174,18 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     }
     let PacketHits { t, u, v, normal, primitive, geometry, .. } = hits;
     let [nx, ny, nz] = normal;
-    lanes.set_row(TFAR, first, t.map(f32::to_bits));
-    for (word, row) in [nx, ny, nz, u, v].into_iter().enumerate() {
-        lanes.set_row(RAY_WORDS + word, first, row.map(f32::to_bits));
+    lanes.set_row(word::TFAR, first, t.map(f32::to_bits));
+    let [x, y, z] = [word::NORMAL, word::NORMAL + 1, word::NORMAL + 2];
+    for (word, row) in [(x, nx), (y, ny), (z, nz), (word::U, u), (word::V, v)] {
+        lanes.set_row(word, first, row.map(f32::to_bits));
     }
-    lanes.set_row(RAY_WORDS + 5, first, *primitive);
-    lanes.set_row(RAY_WORDS + 6, first, *geometry);
+    lanes.set_row(word::PRIMITIVE, first, *primitive);
+    lanes.set_row(word::GEOMETRY, first, *geometry);
     // SAFETY: the context is the caller's, which lives as long as the query, or our own.
     let context = unsafe { query.context.read() };
-    lanes.set_row(RAY_WORDS + 7, first, [context.instance; RAYS]);
+    lanes.set_row(word::INSTANCE, first, [context.instance; RAYS]);
     #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    lanes.set_row(RAY_WORDS + 8, first, [context.instance_primitive; RAYS]);
+    lanes.set_row(word::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
 }
 
 /// A bit for each ray that was hit where it begins.
@@ -196,7 +193,7 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
 fn at_start(lanes: &impl Lanes, first: usize, hits: &PacketHits) -> u32 {
     let mut at_start = 0;
     if hits.lanes == 0xff {
-        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.row::<RAYS>(TNEAR, first)).enumerate() {
+        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.row::<RAYS>(word::TNEAR, first)).enumerate() {
             at_start |= u32::from(*t == f32::from_bits(tnear)) << lane;
         }
         return at_start;
@@ -226,7 +223,7 @@ fn tell_beyond_start(
         .for_each(|lane| intersect_lane(committed, query, lanes, first + lane));
 }
 
-/// The same, lane by lane, of those in `open`: where rays miss, and where triangles are parts of other primitives.
+/// Writes the hits of the lanes in `open`, one by one: where some rays miss, and where triangles are parts of other primitives.
 #[inline(always)]
 fn tell_some(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits, mut open: u32) {
     let PacketHits { t, u, v, normal: [nx, ny, nz], primitive, geometry, .. } = hits;

@@ -42,7 +42,7 @@ pub use some::Travel;
 /// What was decided at once of a ray of which there was doubt, if [`Noted`] says that anything was; room for it is made where it is first needed, for few rays need it.
 pub(super) type Doubted = Option<Found>;
 
-/// Whether a search goes on, up to some t.
+/// Whether a search goes on, and up to which t, or which radius; whoever wants what lies at t itself gives `t.next_up()`.
 pub type Search = ControlFlow<(), f32>;
 
 impl Bvh {
