@@ -77,7 +77,8 @@ impl<'a> Statement<'a> {
     pub(super) fn share(&mut self) -> Placeless<f32> {
         let number = self.number()?;
         let share = Some(number as f32).filter(|x| x.is_finite() && *x >= 0.0);
-        share.ok_or_else(|| format!("{number} where a number from 0 up is expected: {}", self.usage))
+        let range = if number >= 0.0 { "up to 3.4e38" } else { "from 0 up" };
+        share.ok_or_else(|| format!("{number} where a number {range} is expected: {}", self.usage))
     }
 
     /// Three such numbers as a linear colour.
@@ -156,7 +157,8 @@ mod tests {
         check("1 2 nan", |s| s.vector().map(drop), "\"nan\"");
         check("0 0 0", |s| s.direction().map(drop), "no direction");
         check("-0.5", |s| s.share().map(drop), "-0.5");
-        check("1e300", |s| s.share().map(drop), "from 0 up");
+        check("1e300", |s| s.share().map(drop), "a number up to 3.4e38");
+        check("-1", |s| s.share().map(drop), "a number from 0 up");
         check("1.5", |s| s.whole().map(drop), "\"1.5\" where a whole number");
         check("0 1", |s| s.picture_size().map(drop), "0 x 1 pixels");
         check("180", |s| s.angle_of_view().map(drop), "below 180");

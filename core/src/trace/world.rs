@@ -351,9 +351,15 @@ fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     if can_place(transform) && transform_end.is_none_or(|end| end.as_affine3().is_finite()) {
         return Ok(());
     }
-    let remedy = "give it a scale that is neither zero nor beyond what f32 holds";
-    let message = format!("instance {index} ({name:?}) has a singular transform; {remedy}");
-    Err(Error::Scene(message))
+    let is_far =
+        [Some(transform), transform_end.as_ref()].into_iter().flatten().any(|end| !end.as_affine3().is_finite());
+    let problem = match is_far {
+        true => {
+            "is placed, or moves, to where f32 does not reach; bring it within 3.4e38 of zero, and its scale below that"
+        }
+        false => "has a singular transform; give it a scale that is neither zero nor beyond what f32 holds",
+    };
+    Err(Error::Scene(format!("instance {index} ({name:?}) {problem}")))
 }
 
 #[cfg(test)]
@@ -374,7 +380,7 @@ mod tests {
         };
         assert!(World::new(&scene(1e6)).is_ok());
         let told = World::new(&scene(1e39)).expect_err("refused").to_string();
-        assert!(told.contains("beyond what f32 holds"), "{told}");
+        assert!(told.contains("moves, to where f32 does not reach"), "{told}");
     }
 
     /// Wherever the scene lies, and so wherever zero is for tracers.

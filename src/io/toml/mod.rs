@@ -105,7 +105,11 @@ fn parse(text: &str) -> Read<Spanned<DeTable<'_>>> {
 /// Lists of tables that files may have by the million.
 const MANY: [&str; 1 + SINGLES.len()] = {
     let mut many = ["instance"; 1 + SINGLES.len()];
-    many.split_at_mut(1).1.copy_from_slice(&SINGLES);
+    let mut i = 0;
+    while i < SINGLES.len() {
+        many[1 + i] = SINGLES[i].0;
+        i += 1;
+    }
     many
 };
 

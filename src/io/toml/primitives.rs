@@ -8,27 +8,25 @@ use crate::io::parts::{Parts, Sorted};
 use crate::math::{DMat3, DVec3, Vec2};
 use crate::scene::{Geometry, Mesh};
 
-/// Reads a shape of its table; material and unknown keys are left to the caller.
-type ReadShape = fn(&mut Table<'_>) -> Read<DShape>;
+/// How a primitive is read of its table; material and unknown keys are left to the caller.
+#[derive(Clone, Copy)]
+pub(super) enum Kind {
+    Shape(fn(&mut Table<'_>) -> Read<DShape>),
+    Triangle,
+}
 
 /// The keys of single primitives.
-pub(super) const SINGLES: [&str; 9] =
-    ["sphere", "plane", "disk", "box", "cylinder", "cone", "ellipsoid", "polygon", "triangle"];
-
-/// How the shape of a key is read; triangles are none.
-fn shape(key: &str) -> Option<ReadShape> {
-    Some(match key {
-        "sphere" => sphere,
-        "plane" => plane,
-        "disk" => disk,
-        "box" => cuboid,
-        "cylinder" => cylinder,
-        "cone" => cone,
-        "ellipsoid" => ellipsoid,
-        "polygon" => polygon,
-        _ => return None,
-    })
-}
+pub(super) const SINGLES: [(&str, Kind); 9] = [
+    ("sphere", Kind::Shape(sphere)),
+    ("plane", Kind::Shape(plane)),
+    ("disk", Kind::Shape(disk)),
+    ("box", Kind::Shape(cuboid)),
+    ("cylinder", Kind::Shape(cylinder)),
+    ("cone", Kind::Shape(cone)),
+    ("ellipsoid", Kind::Shape(ellipsoid)),
+    ("polygon", Kind::Shape(polygon)),
+    ("triangle", Kind::Triangle),
+];
 
 /// A primitive with a table of its own.
 pub(super) struct Single {
@@ -45,10 +43,10 @@ enum What {
 }
 
 impl Single {
-    fn read(key: &str, mut table: Table<'_>) -> Read<Self> {
-        let what = match shape(key) {
-            Some(read) => What::Shape(read(&mut table)?),
-            None => What::Triangle(triangle(&mut table)?),
+    fn read(kind: Kind, mut table: Table<'_>) -> Read<Self> {
+        let what = match kind {
+            Kind::Shape(read) => What::Shape(read(&mut table)?),
+            Kind::Triangle => What::Triangle(triangle(&mut table)?),
         };
         let name = |value: Value<'_>| Ok((value.text()?.into(), value.at));
         let (material, at) = (table.optional("material", name)?, table.at());
@@ -68,8 +66,8 @@ pub(super) type Singles = [Vec<Single>; SINGLES.len()];
 /// Those of a body.
 pub(super) fn singles(body: &mut Table<'_>) -> Read<Singles> {
     let mut singles = SINGLES.map(|_| Vec::new());
-    for (key, singles) in SINGLES.into_iter().zip(&mut singles) {
-        *singles = body.tables(key)?.into_iter().map(|table| Single::read(key, table)).collect::<Read<_>>()?;
+    for ((key, kind), singles) in SINGLES.into_iter().zip(&mut singles) {
+        *singles = body.tables(key)?.into_iter().map(|table| Single::read(kind, table)).collect::<Read<_>>()?;
     }
     Ok(singles)
 }
@@ -77,7 +75,7 @@ pub(super) fn singles(body: &mut Table<'_>) -> Read<Singles> {
 /// The same, sorted by what `material` makes of the names of their materials.
 pub(super) fn sorted(singles: Singles, mut material: impl FnMut(Option<(&str, usize)>) -> Read<u32>) -> Read<Sorted> {
     let mut parts = Parts::default();
-    for (key, singles) in SINGLES.into_iter().zip(singles) {
+    for ((key, _), singles) in SINGLES.into_iter().zip(singles) {
         for Single { what, material: name, at } in singles {
             let material = material(name.as_ref().map(|(name, at)| (&**name, *at)))?;
             let added = match what {

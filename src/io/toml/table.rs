@@ -153,8 +153,13 @@ impl<'t> Value<'t> {
 
     /// A number from 0 up, in single precision.
     pub(super) fn share(self) -> Read<f32> {
-        let number = self.number()? as f32;
-        if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(self.unlike("a number from 0 up")) }
+        let number = self.number()?;
+        let share = number as f32;
+        match number >= 0.0 {
+            true if share.is_finite() => Ok(share),
+            true => Err(self.unlike("a number up to 3.4e38")),
+            false => Err(self.unlike("a number from 0 up")),
+        }
     }
 
     /// A list of `N` finite numbers.
