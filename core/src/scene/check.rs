@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{AreaShape, Attenuation, Environment, Fog, Geometry, Group, Light, Mesh, Scene};
+use super::{Alpha, AreaShape, Attenuation, Environment, Fog, Geometry, Group, Light, Material, Mesh, Scene};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, LARGEST_COORDINATE, Vec3};
 
@@ -52,23 +52,8 @@ pub fn fault(scene: &Scene) -> std::result::Result<(), String> {
         }
     }
     for material in &scene.materials {
-        let values = [
-            material.ambient,
-            material.diffuse,
-            material.specular,
-            material.reflection,
-            material.transmission,
-            material.emission,
-            Vec3::new(material.shininess, material.ior, material.gloss.unwrap_or(0.0)),
-            Vec3::splat(material.opacity),
-            material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
-        ];
-        if !values.into_iter().all(is_sound) || material.ior == 0.0 {
-            return Err(format!("material {:?} has values that are negative or not finite", material.name));
-        }
-        if material.textures().any(|t| t as usize >= scene.textures.len()) {
-            return Err(format!("material {:?} has a texture that does not exist", material.name));
-        }
+        check_material(material, scene.textures.len())
+            .map_err(|message| format!("material {:?} {message}", material.name))?;
     }
     for texture in &scene.textures {
         check_pixels(texture.width, texture.height, texture.pixels.len())
@@ -93,12 +78,40 @@ pub fn fault(scene: &Scene) -> std::result::Result<(), String> {
     {
         return Err(format!("fog has the absorption {absorption}, the color {color} and the reach {reach}"));
     }
-    if let Some(Environment { image, intensity, rotation }) = &scene.environment {
-        check_pixels(image.width, image.height, image.pixels.len())
-            .map_err(|message| format!("the environment {message}"))?;
-        if !(intensity.is_finite() && *intensity >= 0.0 && rotation.is_finite()) {
-            return Err(format!("the environment has the intensity {intensity} and the rotation {rotation}"));
-        }
+    if let Some(environment) = &scene.environment {
+        check_environment(environment).map_err(|message| format!("the environment {message}"))?;
+    }
+    Ok(())
+}
+
+fn check_material(material: &Material, textures: usize) -> std::result::Result<(), &'static str> {
+    let cutoff = if let Alpha::Mask { cutoff } = material.alpha { cutoff } else { 0.0 };
+    let values = [
+        material.ambient,
+        material.diffuse,
+        material.specular,
+        material.reflection,
+        material.transmission,
+        material.emission,
+        Vec3::new(material.shininess, material.ior, material.gloss.unwrap_or(0.0)),
+        Vec3::new(material.opacity, cutoff, 0.0),
+        material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
+    ];
+    // A normal map may be turned inside out.
+    if !values.into_iter().all(is_sound) || material.ior == 0.0 || !material.normal_scale.is_finite() {
+        return Err("has values that are negative or not finite");
+    }
+    match material.textures().all(|texture| (texture as usize) < textures) {
+        true => Ok(()),
+        false => Err("has a texture that does not exist"),
+    }
+}
+
+fn check_environment(environment: &Environment) -> std::result::Result<(), String> {
+    let Environment { image, intensity, rotation } = environment;
+    check_pixels(image.width, image.height, image.pixels.len())?;
+    if !(intensity.is_finite() && *intensity >= 0.0 && rotation.is_finite()) {
+        return Err(format!("has the intensity {intensity} and the rotation {rotation}"));
     }
     Ok(())
 }
@@ -228,7 +241,7 @@ mod tests {
     fn finds_every_fault() {
         assert_eq!(fault(&good()), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
-        let faults: [(&str, Breaks); 22] = [
+        let faults: [(&str, Breaks); 24] = [
             ("sphere: the radius is -1", |scene, _| {
                 let shapes = vec![Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: -1.0 })];
                 scene.geometries.push(Geometry::Shapes { shapes, material: 0 });
@@ -284,6 +297,8 @@ mod tests {
                 scene.lights.push(Light::Area { shape, radiance: Vec3::ONE });
             }),
             ("negative or not finite", |scene, _| scene.materials[0].diffuse = Vec3::NEG_ONE),
+            ("negative or not finite", |scene, _| scene.materials[0].alpha = Alpha::Mask { cutoff: f32::NAN }),
+            ("negative or not finite", |scene, _| scene.materials[0].normal_scale = f32::INFINITY),
             ("0 of 1 pixels", |scene, _| scene.textures.push(Texture { width: 1, height: 1, ..Texture::default() })),
         ];
         for (expected, fault) in faults {
