@@ -160,6 +160,11 @@ pub fn through_links(path: &Path) -> PathBuf {
     place
 }
 
+/// What decides a file's format: what stands behind the last dot of its name, in lower case; empty where there is none.
+pub fn suffix(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
 /// `.STEM.PROCESS-NUMBER.part.SUFFIX`.
 fn part_name(file_name: &Path) -> String {
     static NUMBER: AtomicU32 = AtomicU32::new(0);

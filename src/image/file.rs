@@ -13,7 +13,7 @@ use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Curve, Image, Metadata, Response, channels};
 use crate::error::{Error, Result, one_line, system_message};
 use crate::memory::Mapped;
-use crate::output::{self, Together};
+use crate::output::{self, Together, suffix};
 
 /// How an image is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -290,11 +290,6 @@ fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
         let linear = options.response.curve == Curve::Linear;
         Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0, linear }
     }
-}
-
-/// In lower case; empty where there is none.
-fn suffix(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Whether this build writes pictures of such a name.

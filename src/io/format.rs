@@ -6,6 +6,7 @@ use super::{LoadOptions, Promised, course, gltf, nff, obj, ply, stl, toml};
 use crate::error::{Error, Result, Warning};
 use crate::io::text::without_mark;
 use crate::memory::Mapped;
+use crate::output::suffix;
 use crate::scene::Scene;
 
 /// A format of scene files.
@@ -53,11 +54,6 @@ pub const SUFFIXES: [&str; TABLE.len()] = {
 /// The suffixes of formats that hold meshes and not a scene, which would bring a second camera and other light where it is included.
 pub(super) fn mesh_suffixes() -> impl Iterator<Item = &'static str> {
     TABLE.iter().filter(|(_, format)| format.holds_meshes()).map(|(suffix, _)| *suffix)
-}
-
-/// What decides the format, in lower case.
-pub(super) fn suffix(path: &Path) -> String {
-    path.extension().and_then(|s| s.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
 impl Format {

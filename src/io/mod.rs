@@ -38,6 +38,7 @@ use self::finish::{bare, doubt_bare, make_finite, meshes};
 use crate::error::{Error, Result, Warning, system_message};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
+use crate::output::suffix;
 use crate::scene::{Geometry, Mesh, Scene, fault};
 
 /// How a file is understood.
@@ -149,7 +150,7 @@ pub fn load_watched(
         return Err(Error::input(path, "", "is empty, where a scene is needed"));
     }
     let format = Format::of(path).ok_or_else(|| {
-        let message = format!("unknown suffix {:?}; known are {}", format::suffix(path), SUFFIXES.join(", "));
+        let message = format!("unknown suffix {:?}; known are {}", suffix(path), SUFFIXES.join(", "));
         Error::input(path, "", message)
     })?;
     if !format.has_animations() && (options.animation != Animation::default() || options.variant.is_some()) {

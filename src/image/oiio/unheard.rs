@@ -8,6 +8,7 @@ use std::io;
 use std::path::Path;
 
 use super::bridge::Result;
+use crate::output::suffix;
 
 /// Suffixes of pictures that are written so.
 const UNHEARD: [&str; 22] = [
@@ -18,10 +19,6 @@ const UNHEARD: [&str; 22] = [
 /// Whether a file of this name is written so.
 pub(super) fn are_written_to(path: &Path) -> bool {
     UNHEARD.contains(&suffix(path).as_str())
-}
-
-fn suffix(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Has `write` make a file of a picture of this size, and holds it against that.

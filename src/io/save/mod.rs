@@ -13,9 +13,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
-use crate::io::format::suffix;
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::output::write_atomically;
+use crate::output::{suffix, write_atomically};
 use crate::scene::{Geometry, Mesh, Scene};
 
 /// The suffixes that [`save`] knows.

@@ -7,6 +7,7 @@ use super::table::{Read, Table, Value};
 use crate::error::{Error, Result, Warning};
 use crate::io::{LoadOptions, Normals, Unit, UpAxis, format, load};
 use crate::math::DAffine3;
+use crate::output::suffix;
 use crate::scene::{Geometry, Scene};
 
 /// What is included once, however often it is named.
@@ -39,7 +40,7 @@ impl Include {
         let value = table.need("path")?;
         let name = value.text()?;
         let path = folder.join(name);
-        let suffix = format::suffix(&path);
+        let suffix = suffix(&path);
         if !format::mesh_suffixes().any(|known| known == suffix) {
             let known: Vec<&str> = format::mesh_suffixes().collect();
             return Err(value.fault(format!("{name:?} is no mesh file; known are {}", known.join(", "))));

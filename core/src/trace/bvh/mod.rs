@@ -55,6 +55,7 @@ mod levels;
 mod meshes;
 mod near;
 mod node;
+mod overlap;
 mod packet;
 mod query;
 #[cfg(test)]

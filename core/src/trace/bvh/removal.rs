@@ -3,7 +3,7 @@
 //! As fast as what is taken out is small, whatever the tree's size. Rays still enter the boxes, so a tree of which much is gone is better built anew.
 
 use super::Bvh;
-use super::boxes::visit_overlapping;
+use super::overlap::visit_overlapping;
 use crate::math::Aabb;
 
 impl Bvh {
