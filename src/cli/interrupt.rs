@@ -8,7 +8,10 @@ use super::leave::leave;
 use super::signals;
 use crate::error::{Error, Result};
 
+/// Whether the user wants the process to end.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Whether work is to stop, for that or because it would be in vain.
+static STOP: AtomicBool = AtomicBool::new(false);
 static INSTALLED: AtomicBool = AtomicBool::new(false);
 /// Whether files are being read or something is measured, and nothing is written.
 static HARMLESS: AtomicBool = AtomicBool::new(false);
@@ -18,10 +21,12 @@ static TRYING: AtomicBool = AtomicBool::new(false);
 /// Has Ctrl-C set the flag that is returned, and a second one end the process with exit code 130. May be asked for again.
 pub(super) fn install() -> Result<&'static AtomicBool> {
     if INSTALLED.swap(true, Ordering::Relaxed) {
-        return Ok(&INTERRUPTED);
+        return Ok(&STOP);
     }
     ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+        let is_second = INTERRUPTED.swap(true, Ordering::Relaxed);
+        STOP.store(true, Ordering::Relaxed);
+        if is_second {
             leave(130);
         }
         leave_if_harmless();
@@ -29,7 +34,12 @@ pub(super) fn install() -> Result<&'static AtomicBool> {
     .map_err(|error| Error::Unavailable(format!("Ctrl-C cannot be handled: {error}")))?;
     #[cfg(unix)]
     signals::have_termination_interrupt();
-    Ok(&INTERRUPTED)
+    Ok(&STOP)
+}
+
+/// Whether the user, or who else sends signals, wants the process to end.
+pub(super) fn is_wanted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
 }
 
 /// Reads or measures something, in the midst of which Ctrl-C ends the process: no loader need ask for it.
@@ -40,7 +50,7 @@ pub(super) fn while_nothing_is_written<T>(work: impl FnOnce() -> T) -> T {
 /// Tries something out that Ctrl-C must let come to its end, for it tidies up.
 pub(super) fn while_trying<T>(try_out: impl FnOnce() -> T) -> T {
     let done = during(&TRYING, try_out);
-    if INTERRUPTED.load(Ordering::Relaxed) {
+    if is_wanted() {
         leave_if_harmless();
     }
     done
@@ -61,7 +71,7 @@ fn during<T>(flag: &AtomicBool, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Between two phases of work: an error once Ctrl-C was pressed.
+/// Between two phases of work: an error once it is to stop.
 pub(super) fn check() -> Result<()> {
-    if INTERRUPTED.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    if STOP.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
 }

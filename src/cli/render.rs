@@ -222,6 +222,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         });
         warn(display.and_then(Display::finish).as_slice());
         if !args.quiet
+            && interrupt::is_wanted()
             && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &asked.kept)
         {
             kept.tell()?;

@@ -39,8 +39,8 @@ impl Trial {
     pub(super) fn join<T>(self, outcome: Result<T>) -> Result<T> {
         let tried = self.thread.join().unwrap_or_else(|panic| resume_unwind(panic));
         if tried.is_err() {
-            // It was not the user who stopped it, and what follows may go on.
-            self.cancel.store(false, Ordering::Relaxed);
+            // Unless the user has stopped it as well, what follows may go on.
+            self.cancel.store(interrupt::is_wanted(), Ordering::Relaxed);
         }
         tried.and(outcome)
     }
