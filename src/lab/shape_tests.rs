@@ -6,47 +6,103 @@ use crate::lab::exact_shapes::crossings;
 use crate::math::{DVec3, Mat3, Random, Vec3};
 use crate::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Ray, Shape, ShapeHit, Sphere};
 
-/// One of each kind, of about the size 1, near zero; points that rays are aimed at: corners, rims, poles.
-fn sample(kind: usize, random: &mut Random) -> (Shape, Vec<Vec3>) {
+/// What is made at random. A new shape is listed here, and the compiler asks for the rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Sphere,
+    Plane,
+    LevelDisk,
+    Disk,
+    Cuboid,
+    UprightCylinder,
+    Cylinder,
+    UprightCone,
+    Cone,
+    Ellipsoid,
+    GridPolygon,
+    Star,
+}
+
+impl Kind {
+    const ALL: [Self; 12] = [
+        Self::Sphere,
+        Self::Plane,
+        Self::LevelDisk,
+        Self::Disk,
+        Self::Cuboid,
+        Self::UprightCylinder,
+        Self::Cylinder,
+        Self::UprightCone,
+        Self::Cone,
+        Self::Ellipsoid,
+        Self::GridPolygon,
+        Self::Star,
+    ];
+
+    /// Whether centres and radii are on a grid, so that rays along the axes touch exactly.
+    const fn is_on_grid(self) -> bool {
+        matches!(self, Self::Sphere | Self::LevelDisk | Self::UprightCylinder | Self::UprightCone)
+    }
+
+    /// Whether rays touch edges, rims and silhouettes often: corners are f32 numbers, or on a grid.
+    const fn touches(self) -> bool {
+        !matches!(self, Self::Plane | Self::Disk | Self::Cylinder | Self::Cone | Self::Ellipsoid)
+    }
+
+    /// Those with an inside, of which capped ones are closed.
+    const SOLID: [Self; 7] = [
+        Self::Sphere,
+        Self::Cuboid,
+        Self::UprightCylinder,
+        Self::Cylinder,
+        Self::UprightCone,
+        Self::Cone,
+        Self::Ellipsoid,
+    ];
+}
+
+/// One of a kind, of about the size 1, near zero; points that rays are aimed at: corners, rims, poles.
+fn sample(kind: Kind, random: &mut Random) -> (Shape, Vec<Vec3>) {
     let v = |random: &mut Random| random.vector();
-    // On a grid, so that rays along the axes touch exactly.
-    let is_grid = [0, 2, 5, 7].contains(&kind);
+    let is_grid = kind.is_on_grid();
     let centre = if is_grid { (v(random) * 8.0).round() / 8.0 } else { v(random) };
     let radius = if is_grid { (1 + random.below(8)) as f32 / 8.0 } else { 0.05 + random.unit() };
     let (shape, mut targets) = match kind {
-        0 => (Shape::Sphere(Sphere { centre, radius }), vec![centre + Vec3::X * radius, centre - Vec3::Z * radius]),
-        1 => (Shape::Plane(Plane::new(centre, v(random)).unwrap()), vec![centre]),
-        2 => (Shape::Disk(Disk::new(centre, Vec3::Y, radius).unwrap()), vec![centre + Vec3::X * radius]),
-        3 => (Shape::Disk(Disk::new(centre, v(random), radius).unwrap()), vec![centre]),
-        4 => {
+        Kind::Sphere => {
+            (Shape::Sphere(Sphere { centre, radius }), vec![centre + Vec3::X * radius, centre - Vec3::Z * radius])
+        }
+        Kind::Plane => (Shape::Plane(Plane::new(centre, v(random)).unwrap()), vec![centre]),
+        Kind::LevelDisk => (Shape::Disk(Disk::new(centre, Vec3::Y, radius).unwrap()), vec![centre + Vec3::X * radius]),
+        Kind::Disk => (Shape::Disk(Disk::new(centre, v(random), radius).unwrap()), vec![centre]),
+        Kind::Cuboid => {
             let (p, q) = (v(random), v(random));
             let cuboid = Cuboid::new(p.min(q), p.max(q)).unwrap();
             (Shape::Cuboid(cuboid), vec![p, q, Vec3::new(p.x, q.y, p.z), Vec3::new(q.x, q.y, p.z)])
         }
-        5 | 6 => {
-            let (base, apex) = (centre, if kind == 5 { centre + Vec3::Y } else { v(random) });
+        Kind::UprightCylinder | Kind::Cylinder => {
+            let (base, apex) = (centre, if kind == Kind::UprightCylinder { centre + Vec3::Y } else { v(random) });
             let capped = random.below(2) == 0;
             let cylinder = Cylinder::new(base, apex, radius, capped).unwrap();
             (Shape::Cylinder(cylinder), vec![base, apex, base + Vec3::X * radius, base - Vec3::Z * radius])
         }
-        7 | 8 => {
-            let (base, apex) = (centre, if kind == 7 { centre + Vec3::Y } else { v(random) });
+        Kind::UprightCone | Kind::Cone => {
+            let (base, apex) = (centre, if kind == Kind::UprightCone { centre + Vec3::Y } else { v(random) });
             let apex_radius = if random.below(2) == 0 { 0.0 } else { random.unit() };
             let cone = Cone::new(base, radius, apex, apex_radius, random.below(2) == 0).unwrap();
             (Shape::Cone(cone), vec![base, apex, base + Vec3::X * radius, base - Vec3::Z * radius])
         }
-        9 => {
+        Kind::Ellipsoid => {
             let axes = Mat3::from_cols(v(random), v(random), v(random));
             (Shape::Ellipsoid(Ellipsoid::new(centre, axes).unwrap()), vec![centre + axes.x_axis])
         }
-        10 => {
+        Kind::GridPolygon => {
             // Flat, concave, with corners on a grid: many are in a row.
             let corners =
                 [(0, 0), (2, 0), (2, 1), (3, 0), (4, 0), (4, 3), (3, 3), (3, 1), (2, 2), (1, 2), (1, 1), (0, 1)];
             let corners: Vec<Vec3> = corners.map(|(x, y)| Vec3::new(x as f32 / 4.0, y as f32 / 4.0, 0.25)).to_vec();
             (Shape::Polygon(Arc::new(Polygon::new(corners.clone()).unwrap())), corners)
         }
-        _ => {
+        Kind::Star => {
             // A star in a plane at random, so that its corners are off it by their rounding.
             let n = 5 + random.below(30) as usize;
             let (x, y) = (v(random), v(random));
@@ -61,8 +117,6 @@ fn sample(kind: usize, random: &mut Random) -> (Shape, Vec<Vec3>) {
     targets.push(centre);
     (shape, targets)
 }
-
-const KINDS: usize = 12;
 
 /// The same shape, times a power of two, which rounds nothing.
 fn scaled(shape: &Shape, s: f32) -> Shape {
@@ -148,7 +202,7 @@ fn assert_exact(shape: &Shape, ray: &Ray) -> usize {
 
 #[test]
 fn verdicts_are_exact_and_t_is_within_its_bound_at_every_scale() {
-    for kind in 0..KINDS {
+    for kind in Kind::ALL {
         let (mut hits, mut touches) = (0, 0);
         for case in 0..3000 {
             let mut random = Random::new(kind as u64, case);
@@ -163,9 +217,9 @@ fn verdicts_are_exact_and_t_is_within_its_bound_at_every_scale() {
             hits += usize::from(assert_exact(&shape, &ray) > 0);
             touches += usize::from(crossings(&ray, &shape, None).iter().any(|(_, touches)| *touches));
         }
-        assert!(hits > 800, "kind {kind}: {hits} hits");
-        if ![1, 3, 6, 8, 9].contains(&kind) {
-            assert!(touches > 20, "kind {kind}: {touches} rays touch an edge, a rim or a silhouette");
+        assert!(hits > 800, "{kind:?}: {hits} hits");
+        if kind.touches() {
+            assert!(touches > 20, "{kind:?}: {touches} rays touch an edge, a rim or a silhouette");
         }
     }
 }
@@ -226,7 +280,7 @@ fn closed_forms() {
 /// Seen from outside, v grows to the left of where u does, on all sides of everything.
 #[test]
 fn no_texture_is_mirrored() {
-    for kind in 0..12 {
+    for kind in Kind::ALL {
         let mut seen = 0;
         for case in 0..200 {
             let mut random = Random::new(kind as u64 + 300, case);
@@ -252,7 +306,7 @@ fn no_texture_is_mirrored() {
             assert!(p.perp_dot(q) > 0.0, "{shape:?} at {at}: {p} {q}");
             seen += 1;
         }
-        assert!(seen > 20, "{kind}: {seen}");
+        assert!(seen > 20, "{kind:?}: {seen}");
     }
 }
 
@@ -272,7 +326,7 @@ fn normals_and_parameters() {
     let cuboid = Shape::Cuboid(Cuboid::new(Vec3::ZERO, Vec3::ONE).unwrap());
     close(cuboid.normal(DVec3::new(0.3, 0.0, 0.7)), DVec3::NEG_Y);
 
-    for kind in [0, 4, 5, 6, 7, 8, 9] {
+    for kind in Kind::SOLID {
         let mut seen = 0;
         for case in 0..400 {
             let mut random = Random::new(kind as u64 + 100, case);
@@ -308,14 +362,14 @@ fn normals_and_parameters() {
                 }
             }
         }
-        assert!(seen > 50, "kind {kind}: {seen}");
+        assert!(seen > 50, "{kind:?}: {seen}");
     }
 }
 
 #[test]
 fn moving_a_shape_moves_its_hits() {
     let way = DVec3::new(4.0, -8.0, 16.0);
-    for kind in 0..KINDS {
+    for kind in Kind::ALL {
         let mut compared = 0;
         for case in 0..50 {
             let mut random = Random::new(kind as u64 + 200, case);
@@ -333,14 +387,14 @@ fn moving_a_shape_moves_its_hits() {
             }
             compared += a.len();
         }
-        assert!(compared >= 10, "kind {kind}: {compared} hits");
+        assert!(compared >= 10, "{kind:?}: {compared} hits");
     }
 }
 
 /// From inside a closed shape every ray leaves it once, through rims, edges and tips too.
 #[test]
 fn nothing_leaks_from_inside() {
-    for kind in [0, 4, 5, 6, 7, 8, 9] {
+    for kind in Kind::SOLID {
         let mut tried = 0;
         for case in 0..4000 {
             let mut random = Random::new(kind as u64 + 300, case);
@@ -364,7 +418,7 @@ fn nothing_leaks_from_inside() {
                 tried += 1;
             }
         }
-        assert!(tried > 300, "kind {kind}: {tried}");
+        assert!(tried > 300, "{kind:?}: {tried}");
     }
 }
 
