@@ -1,5 +1,7 @@
 //! Scenes that are written and read again.
 
+use std::sync::Arc;
+
 use twincast::io::save;
 use twincast::math::{DAffine3, DVec2, DVec3, Vec3, Vec4};
 use twincast::scene::{
@@ -8,7 +10,7 @@ use twincast::scene::{
 use twincast::shade::{Attributes, SurfacePoint};
 use twincast::trace::brute::Brute;
 use twincast::trace::{Tracer, World};
-use twincast::{Error, Ray, Shape};
+use twincast::{Error, Polygon, Ray, Shape};
 
 use super::Files;
 
@@ -184,14 +186,18 @@ fn far_meshes_stay_where_they_are() {
 /// What a mirror shows of a mesh is seen from the front where it was: glass would be entered as if it were left.
 #[test]
 fn mirrored_meshes_keep_their_front() {
-    let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+    let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    let polygon = Shape::Polygon(Arc::new(Polygon::new(corners.clone()).unwrap()));
+    let things = [
+        (Geometry::Mesh(Mesh::new(corners, vec![[0, 1, 2]])), &["a.nff", "a.ply", "a.toml"][..]),
+        (Geometry::Shapes { shapes: vec![polygon], material: 0 }, &["a.ply", "a.toml"]),
+    ];
     let files = Files::one("none", "");
     // Every format has words for its lights and materials.
     let plain = RECIPES[0].make(1);
-    for (mirror, is_front) in
-        [(DVec3::ONE, true), (DVec3::new(-1.0, 1.0, 1.0), true), (DVec3::new(1.0, 1.0, -1.0), false)]
-    {
-        let unlit = Scene::from_geometries(vec![Geometry::Mesh(mesh.clone())], vec![plain.materials[0].clone()]);
+    let mirrors = [(DVec3::ONE, true), (DVec3::new(-1.0, 1.0, 1.0), true), (DVec3::new(1.0, 1.0, -1.0), false)];
+    for ((thing, names), (mirror, is_front)) in things.iter().flat_map(|thing| mirrors.map(|mirror| (thing, mirror))) {
+        let unlit = Scene::from_geometries(vec![thing.clone()], vec![plain.materials[0].clone()]);
         let mut scene = Scene { lights: plain.lights.clone(), cameras: plain.cameras.clone(), ..unlit };
         scene.instances[0].transform = DAffine3::from_scale(mirror);
         let front = |scene: &Scene| {
@@ -201,7 +207,7 @@ fn mirrored_meshes_keep_their_front() {
             SurfacePoint::new(scene, &world, &ray, &hit, Attributes::default()).front
         };
         assert_eq!(front(&scene), is_front, "{mirror}");
-        for name in ["a.nff", "a.ply", "a.toml"] {
+        for name in *names {
             save(&scene, &files.path(name)).unwrap();
             assert_eq!(front(&files.scene(name)), is_front, "{name}, {mirror}");
         }

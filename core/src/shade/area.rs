@@ -4,7 +4,7 @@
 use super::ellipse::SphericalEllipse;
 use super::light::Illumination;
 use super::rectangle::SphericalRectangle;
-use crate::math::{DVec2, DVec3, Vec3, gamma, tangents};
+use crate::math::{DVec2, DVec3, UNIT_ROUNDOFF, Vec3, gamma, tangents};
 use crate::scene::AreaShape;
 
 /// Chained f32 roundings in the test of a ray against what stands in a light's place; generous.
@@ -116,8 +116,8 @@ enum Side {
 
 impl Side {
     fn of(point: DVec3, centre: DVec3, radius: f64) -> Self {
-        // By what f32 may round of where it is, and of what stands in its place.
-        let slack = f64::from(gamma(ROUNDINGS)) * (centre.abs().max_element() + radius);
+        // By what f32 rounds of the centre, along all axes, and of the radius of what stands in its place; not by more, for what stands beside it is not on it.
+        let slack = f64::from(UNIT_ROUNDOFF) * (2.0 * centre.abs().max_element() + 16.0 * radius);
         let above = (point - centre).length() - radius;
         if above.abs() <= slack.min(radius / 16.0) {
             Self::On
@@ -268,6 +268,21 @@ mod tests {
                 let inside = mean(20, &ball, point, -outwards);
                 assert!((inside - 1.0).abs() < 0.01, "{centre}, {radius}: {inside}");
             }
+        }
+    }
+
+    /// What stands close beside a ball far from zero sees the cone that it fills: (r / d)^2 under it, to where its shadow rays would end behind it.
+    #[test]
+    fn what_is_beside_a_ball_is_not_on_it() {
+        let (centre, radius) = (DVec3::new(1000.0, 0.1, 1000.0), 0.1);
+        let ball = AreaShape::Sphere { centre, radius };
+        for above in [0.01, 0.003] {
+            let distance = radius * (1.0 + above);
+            let point = centre - DVec3::Y * distance;
+            let expected = (radius / distance).powi(2);
+            assert!((reflected(&ball, point, DVec3::Y) - expected).abs() < 1e-4);
+            let end = illuminate(&ball, Vec3::ONE, point, DVec2::new(0.01, 0.5)).unwrap().end.unwrap();
+            assert!((end - point).length() < 0.05 * radius, "{end}");
         }
     }
 

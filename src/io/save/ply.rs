@@ -92,7 +92,7 @@ pub(super) fn write(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
                     let corners: Vec<DVec3> = polygon.corners().iter().map(|p| p.as_dvec3()).collect();
                     let mut triangles = Vec::new();
                     triangulate(&corners, &mut triangles).map_err(io::Error::other)?;
-                    triangles.iter().try_for_each(|corners| face(first, corners))?;
+                    triangles.iter().try_for_each(|corners| face(first, &wound(*corners, transform)))?;
                     first += corners.len() as u32;
                 }
             }
