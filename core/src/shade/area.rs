@@ -77,7 +77,7 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -
     let offset = centre - point;
     let distance = offset.length();
     let axis = offset.try_normalize().unwrap_or(DVec3::Y);
-    let side = Side::of(point, centre, radius);
+    let side = Side::of(distance, centre, radius);
     let opening = opening(distance, radius, side);
     let height = xi.x * opening;
     let (cosine, off_axis) = (1.0 - height, (height * (2.0 - height)).max(0.0).sqrt());
@@ -115,10 +115,11 @@ enum Side {
 }
 
 impl Side {
-    fn of(point: DVec3, centre: DVec3, radius: f64) -> Self {
+    /// Of a point so far from the centre.
+    fn of(distance: f64, centre: DVec3, radius: f64) -> Self {
         // By what f32 rounds of the centre, along all axes, and of the radius of what stands in its place; not by more, for what stands beside it is not on it.
         let slack = f64::from(UNIT_ROUNDOFF) * (2.0 * centre.abs().max_element() + 16.0 * radius);
-        let above = (point - centre).length() - radius;
+        let above = distance - radius;
         if above.abs() <= slack.min(radius / 16.0) {
             Self::On
         } else if above > 0.0 {
@@ -146,8 +147,8 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
             normal * (std::f64::consts::PI * radius * radius)
         }
         AreaShape::Sphere { centre, radius } => {
-            let opening = opening((centre - point).length(), radius, Side::of(point, centre, radius));
-            return Some(1.0 / (std::f64::consts::TAU * opening));
+            let distance = (centre - point).length();
+            return Some(1.0 / (std::f64::consts::TAU * opening(distance, radius, Side::of(distance, centre, radius))));
         }
     };
     let offset = at - point;

@@ -4,7 +4,7 @@ use super::{present, with};
 use crate::abi::*;
 use crate::scene::{Committed, Scene};
 use crate::trace::{
-    Packed, Query, Target, UserCall, cast, cast_one, intersect_lanes, occluded_lanes, run_filters, within,
+    Packed, Query, Target, UserCall, cast_inside, cast_one, intersect_lanes, occluded_lanes, run_filters, within,
 };
 
 /// Asks a committed scene.
@@ -127,7 +127,12 @@ unsafe fn forward(
         within(query, instance, instance_primitive, || {
             target.set_place(new.org, new.dir);
             target.set_span(new.tnear, new.time);
-            cast(committed, query, &target, any);
+            // Of what was hit before the ray was sent on nothing is known.
+            if any {
+                cast_inside::<true>(committed, query, &target, INVALID_ID);
+            } else {
+                cast_inside::<false>(committed, query, &target, INVALID_ID);
+            }
             target.set_place(before.org, before.dir);
             target.set_span(before.tnear, before.time);
         });

@@ -80,6 +80,12 @@ fn cast_after<const ANY: bool>(committed: &Committed, query: &Query, target: &Ta
     nearest
 }
 
+/// The same, not inlined: for instances, and for rays that callbacks send on.
+#[inline(never)]
+pub fn cast_inside<const ANY: bool>(committed: &Committed, query: &Query, target: &Target, nearest: u32) -> u32 {
+    cast_after::<ANY>(committed, query, target, nearest)
+}
+
 /// Among the triangles of all trees but the largest, the smallest first, for what is behind need not be looked at then. By value, here and
 /// below, so that neither need lie in memory where there is nothing of that.
 #[inline(never)]
@@ -113,19 +119,6 @@ fn cast_triangles<const ANY: bool>(
         return cast_solid::<ANY>(committed, solid, query, target, nearest);
     }
     show_solid(committed, solid, *query, *target, nearest)
-}
-
-/// As [`cast_one`], not inlined: for rays that callbacks send on.
-#[cfg(feature = "v4")]
-#[inline(never)]
-pub fn cast(committed: &Committed, query: &Query, target: &Target, any: bool) {
-    if any { cast_one::<true>(committed, query, target) } else { cast_one::<false>(committed, query, target) }
-}
-
-/// As [`cast_after`], not inlined: for instances.
-#[inline(never)]
-fn cast_inside<const ANY: bool>(committed: &Committed, query: &Query, target: &Target, nearest: u32) -> u32 {
-    cast_after::<ANY>(committed, query, target, nearest)
 }
 
 /// Among triangles, of which each counts.

@@ -25,7 +25,7 @@ impl Words for RTCRayHit {
 ///
 /// # Safety
 /// As long as the lanes are there, [`word`](Lanes::word) is where this thread can read each of [`Record`](Lanes::Record)'s words of each of
-/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`word::TFAR`] and the words of hits.
+/// [`count`](Lanes::count) rays, those of eight in a row side by side, and write to those that answer, which are [`field::TFAR`] and the words of hits.
 pub unsafe trait Lanes {
     /// A ray, or a ray and its hit.
     type Record: Words;
@@ -66,7 +66,7 @@ pub unsafe trait Lanes {
     /// Writes one word that answers, of rays in a row, eight at most.
     #[inline(always)]
     fn set_row<const N: usize>(&self, word: usize, first: usize, values: [u32; N]) {
-        assert!(self.has::<N>(word, first) && (word == word::TFAR || word >= RAY_WORDS));
+        assert!(self.has::<N>(word, first) && (word == field::TFAR || word >= RAY_WORDS));
         // SAFETY: they are there and answer, and who implements this promises that they can be written to, and lie side by side.
         unsafe { self.word(word, first).cast::<[u32; N]>().write(values) };
     }
@@ -87,7 +87,7 @@ pub unsafe trait Lanes {
     /// Writes where a ray ends.
     #[inline(always)]
     fn set_tfar(&self, lane: usize, tfar: f32) {
-        self.set_row(word::TFAR, lane, [tfar.to_bits()]);
+        self.set_row(field::TFAR, lane, [tfar.to_bits()]);
     }
 
     /// Writes a hit, and that the ray ends there.
@@ -97,7 +97,7 @@ pub unsafe trait Lanes {
         // SAFETY: a hit begins with that many words.
         let words = unsafe { (&raw const *hit).cast::<[u32; HIT_WORDS]>().read() };
         // SAFETY: all words are there, and who implements this promises that these can be written to.
-        unsafe { self.word(word::TFAR, lane).write(tfar.to_bits()) };
+        unsafe { self.word(field::TFAR, lane).write(tfar.to_bits()) };
         for (k, word) in words.into_iter().enumerate() {
             // SAFETY: as above.
             unsafe { self.word(RAY_WORDS + k, lane).write(word) };
@@ -118,8 +118,8 @@ pub unsafe trait Lanes {
     }
 }
 
-/// Words of a ray, and those of its hit behind them.
-pub mod word {
+/// At which word of a ray its fields begin, and those of its hit behind them.
+pub mod field {
     use std::mem::offset_of;
 
     use crate::abi::{RAY_WORDS, RTCHit, RTCRay};
@@ -243,8 +243,8 @@ unsafe impl<T: Words> Lanes for Pointers<'_, T> {
         if array.is_null() {
             return match word {
                 // Rays begin at 0 and at time 0, and see everything.
-                word::MASK => self.spare.ones.as_ptr().cast_mut(),
-                0..=word::TIME => self.spare.zero.as_ptr().cast_mut(),
+                field::MASK => self.spare.ones.as_ptr().cast_mut(),
+                0..=field::TIME => self.spare.zero.as_ptr().cast_mut(),
                 _ => self.spare.sink.get().cast(),
             };
         }

@@ -22,7 +22,7 @@ mod user;
 
 pub use cast::cast_one;
 #[cfg(feature = "v4")]
-pub use cast::{cast, within};
+pub use cast::{cast_inside, within};
 pub use collide::collide;
 pub use lanes::Packed;
 #[cfg(feature = "v3")]

@@ -8,7 +8,7 @@ use twincast_core::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{Sight, after, cast_one, name_solid, sight};
-use super::lanes::{Lanes, word};
+use super::lanes::{Lanes, field};
 use super::offer::{Target, hit_of};
 use crate::abi::{RTCRay, RTCRayHit};
 use crate::scene::Committed;
@@ -69,19 +69,19 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
             return self.rest(first);
         }
         let row = |word| lanes.row::<RAYS>(word, first).map(f32::from_bits);
-        let start = row(word::TNEAR);
+        let start = row(field::TNEAR);
         // Where it is wanted, at once: what is changed afterwards may be copied.
         Packet {
-            origin: [row(word::ORIGIN), row(word::ORIGIN + 1), row(word::ORIGIN + 2)],
+            origin: [row(field::ORIGIN), row(field::ORIGIN + 1), row(field::ORIGIN + 2)],
             tmin: if *excludes_start { start.map(after) } else { start },
-            direction: [row(word::DIRECTION), row(word::DIRECTION + 1), row(word::DIRECTION + 2)],
-            tmax: row(word::TFAR),
+            direction: [row(field::DIRECTION), row(field::DIRECTION + 1), row(field::DIRECTION + 2)],
+            tmax: row(field::TFAR),
             ..Packet::NONE
         }
     }
 
     /// The rays from lane `first` on, which are fewer than a packet.
-    #[cold]
+    #[inline(always)]
     fn rest(&self, first: usize) -> Packet {
         let mut packet = Packet::NONE;
         for lane in first..self.lanes.count() {
@@ -101,12 +101,12 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         let (count, mut seeing) = (lanes.count(), 0);
         if first + RAYS > count {
             for lane in first..count {
-                let [own] = lanes.row(word::MASK, lane);
+                let [own] = lanes.row(field::MASK, lane);
                 seeing |= u32::from(is_valid(lane) && own & mask != 0) << (lane - first);
             }
             return seeing;
         }
-        for (lane, own) in lanes.row::<RAYS>(word::MASK, first).into_iter().enumerate() {
+        for (lane, own) in lanes.row::<RAYS>(field::MASK, first).into_iter().enumerate() {
             seeing |= u32::from(is_valid(first + lane) && own & mask != 0) << lane;
         }
         seeing
@@ -174,18 +174,18 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     }
     let PacketHits { t, u, v, normal, primitive, geometry, .. } = hits;
     let [nx, ny, nz] = normal;
-    lanes.set_row(word::TFAR, first, t.map(f32::to_bits));
-    let [x, y, z] = [word::NORMAL, word::NORMAL + 1, word::NORMAL + 2];
-    for (word, row) in [(x, nx), (y, ny), (z, nz), (word::U, u), (word::V, v)] {
+    lanes.set_row(field::TFAR, first, t.map(f32::to_bits));
+    let [x, y, z] = [field::NORMAL, field::NORMAL + 1, field::NORMAL + 2];
+    for (word, row) in [(x, nx), (y, ny), (z, nz), (field::U, u), (field::V, v)] {
         lanes.set_row(word, first, row.map(f32::to_bits));
     }
-    lanes.set_row(word::PRIMITIVE, first, *primitive);
-    lanes.set_row(word::GEOMETRY, first, *geometry);
+    lanes.set_row(field::PRIMITIVE, first, *primitive);
+    lanes.set_row(field::GEOMETRY, first, *geometry);
     // SAFETY: the context is the caller's, which lives as long as the query, or our own.
     let context = unsafe { query.context.read() };
-    lanes.set_row(word::INSTANCE, first, [context.instance; RAYS]);
+    lanes.set_row(field::INSTANCE, first, [context.instance; RAYS]);
     #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    lanes.set_row(word::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
+    lanes.set_row(field::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
 }
 
 /// A bit for each ray that was hit where it begins.
@@ -193,7 +193,7 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
 fn at_start(lanes: &impl Lanes, first: usize, hits: &PacketHits) -> u32 {
     let mut at_start = 0;
     if hits.lanes == 0xff {
-        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.row::<RAYS>(word::TNEAR, first)).enumerate() {
+        for (lane, (t, tnear)) in hits.t.iter().zip(lanes.row::<RAYS>(field::TNEAR, first)).enumerate() {
             at_start |= u32::from(*t == f32::from_bits(tnear)) << lane;
         }
         return at_start;
