@@ -152,34 +152,48 @@ fn outputs_are_checked_before_the_scene_is_read() {
     }
 }
 
-/// Of several outputs none is put in place where one cannot be written.
+/// A picture that is finished is not lost with figures that cannot be written, nor with another picture.
 #[cfg(target_os = "linux")]
 #[test]
-fn where_one_output_fails_all_stay_as_they_were() {
+fn where_one_output_fails_the_others_are_kept() {
     use crate::io::Files;
     let files = Files::one("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").and("a.png", "old");
     let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
-    let render = |stats: &str| {
-        let picture = path("a.png");
-        fails(&[
-            "render",
-            &path("a.obj"),
-            "-o",
-            &picture,
-            "--stats",
-            stats,
-            "--size",
-            "8x8",
-            "--backend",
-            "native",
-            "-q",
-        ])
+    let full = path("full.png");
+    std::os::unix::fs::symlink("/dev/full", &full).expect("a link");
+    for more in [&["--stats", "/dev/full"][..], &["-o", &full, "-o", &path("b.png")]] {
+        std::fs::write(path("a.png"), "old").expect("written");
+        let usual = ["render", &path("a.obj"), "-o", &path("a.png"), "--size", "8x8", "--backend", "native", "-q"];
+        let (code, message) = fails(&[&usual[..], more].concat());
+        assert!(code == 4 && message.contains("full") && message.contains("a.png: is written"), "{code} {message}");
+        assert!(std::fs::read(files.path("a.png")).expect("replaced").starts_with(b"\x89PNG"));
+        assert_eq!(message.contains("b.png: is written"), more.len() == 4, "{message}");
+    }
+    assert!(files.path("b.png").is_file());
+}
+
+/// What no output can hold is told before the work, and so are folders that take no report.
+#[test]
+fn outputs_that_cannot_be_are_refused_before_the_work() {
+    use crate::io::Files;
+    let files = Files::one("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    std::fs::create_dir(files.path("failing.txt")).expect("a folder");
+    let path = |name: &str| files.path(name).to_str().expect("UTF-8").to_owned();
+    let long = format!("{}=LDE", "a".repeat(254));
+    let render = |more: &[&str]| {
+        let usual = ["render", &path("a.obj"), "--backend", "native", "-q", "--size", "70x65536", "--spp", "65536"];
+        fails(&[&usual[..], more].concat())
     };
-    let (code, message) = render("/dev/full");
-    assert!(code == 4 && message.contains("/dev/full"), "{code} {message}");
-    assert_eq!(std::fs::read(files.path("a.png")).expect("still there"), b"old");
-    assert_eq!(render(&path("a.json")), (0, String::new()));
-    assert!(std::fs::read(files.path("a.png")).expect("replaced").starts_with(b"\x89PNG"));
+    let (code, message) = render(&["-o", &path("a.exr"), "-o", &path("a.jpg")]);
+    assert!(code == 4 && message.contains("a.jpg: 70 x 65536 pixels are too many"), "{code} {message}");
+    for (aovs, words) in [(long.as_str(), "up to 253 bytes"), ("CryptoObject00=LDE", "that of another layer")] {
+        let (code, message) = render(&["-o", &path("a.exr"), "--aov", aovs]);
+        assert!(code == 2 && message.contains(words), "{code} {message}");
+    }
+    let folder = files.path("failing.txt").parent().expect("a folder").to_str().expect("UTF-8").to_owned();
+    let (code, message) = fails(&["stress", "-o", &folder, "--rays", "1000000000"]);
+    assert!(code == 4 && message.contains("failing.txt: is a folder"), "{code} {message}");
+    assert!(!files.path("matrix.json").exists() && !files.path("a.exr").exists());
 }
 
 /// Help that nobody gets is no success.
@@ -688,6 +702,11 @@ fn scenes_are_made_by_rule() {
         let (code, message) = fails(&args);
         assert!(code == 2 && message.contains(words), "{code}: {message}");
     }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/dev/null", path("null.ply")).unwrap();
+        assert_eq!(fails(&["make", "terrain", "--size", "4", "-o", &path("null.ply"), "-q"]), (0, String::new()));
+    }
     let (code, message) = fails(&["make", "tetra", "-o", &path("none/b.nff")]);
     assert!(code == 4 && message.contains("does not exist"), "{message}");
 }
@@ -709,6 +728,11 @@ fn frames_of_an_animation() {
     }
     let other = ["--time", "0.5", "-o", &path("t.exr"), "--reference", &path("f.02.exr"), "--threshold", "0.001"];
     assert_eq!(render(&other).0, 1, "it moves");
+    // Every frame is made where one is not as it should be.
+    let compared = ["--frames", "0-2", "--fps", "2", "-o", &path("n.%d.exr"), "--reference", &path("f.00.exr")];
+    let (code, said) = render(&[&compared[..], &["--threshold", "0.001"]].concat());
+    assert!(code == 1 && said.contains("frame 1: ") && said.contains("frame 2: "), "{code} {said}");
+    assert!(!said.contains("frame 0") && files.path("n.2.exr").is_file(), "{said}");
     // None of them was interrupted: all begin anew.
     assert_eq!(render(&["--frames", "0-1", "--fps", "2", "--resume", "-o", &numbered]), (0, String::new()));
     // What is there stays, what is missing is made.

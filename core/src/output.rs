@@ -27,7 +27,8 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) ->
     files.put_in_place()
 }
 
-/// Files that are put in place together, once all of them are whole: where one cannot be written, all old ones stay. Devices and pipes are written to at once.
+/// Files that are put in place together, once all of them are written; where one cannot be, its user decides what becomes of the others.
+/// Devices and pipes are written to at once.
 #[derive(Default)]
 pub struct Together(Vec<Part>);
 
@@ -45,6 +46,11 @@ impl Together {
                 Ok(())
             }
         }
+    }
+
+    /// Of those that are whole.
+    pub fn names(&self) -> impl Iterator<Item = &Path> {
+        self.0.iter().map(|part| part.place.as_path())
     }
 
     /// Puts all of them in place.
@@ -89,7 +95,7 @@ fn reason(what: &str, error: &io::Error) -> String {
 }
 
 enum Target {
-    /// A device, a pipe or a socket.
+    /// A device, a pipe or a socket, of which none can be replaced, or [synced](fs::File::sync_all).
     Special,
     /// A file, or nothing yet.
     File(Part),
@@ -136,6 +142,13 @@ impl Part {
         if let Some(permissions) = &self.permissions {
             fs::set_permissions(&self.name, permissions.clone())?;
         }
+        // What follows a loss of power would be an empty file otherwise. Not every file system can tell.
+        match fs::File::open(&self.name)?.sync_all() {
+            Err(error) if !matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => {
+                return Err(error);
+            }
+            _ => {}
+        }
         fs::rename(&self.name, &self.place)
     }
 }
@@ -168,8 +181,9 @@ pub fn suffix(path: &Path) -> String {
 /// `.STEM.PROCESS-NUMBER.part.SUFFIX`.
 fn part_name(file_name: &Path) -> String {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
-    // At most 60 letters of the stem: with all of it the name could be longer than a file system takes.
-    let stem: String = file_name.file_stem().unwrap_or_default().to_string_lossy().chars().take(60).collect();
+    // At most 60 bytes of the stem: with all of it the name could be longer than a file system takes.
+    let stem = file_name.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = &stem[..(0..=60.min(stem.len())).rfind(|&end| stem.is_char_boundary(end)).unwrap_or(0)];
     let suffix = file_name.extension().map(|s| format!(".{}", s.to_string_lossy())).unwrap_or_default();
     format!(".{stem}.{}-{}.part{suffix}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed))
 }
@@ -313,5 +327,6 @@ mod tests {
     fn long_names_fit() {
         let folder = tempfile::tempdir().unwrap();
         check_writable(&folder.path().join(format!("{}.json", "é".repeat(120)))).unwrap();
+        check_writable(&folder.path().join(format!("{}.json", "😀".repeat(62)))).unwrap();
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::common::parse_vector;
+use super::common::{finite_list, parse_vector};
 use crate::error::{Error, Result};
 use crate::image;
 use crate::math::{DAabb, DVec2, DVec3};
@@ -225,11 +225,11 @@ fn unknown_camera(name: &str, cameras: &[Camera]) -> String {
 
 /// The camera as flags that give it again.
 pub(crate) fn camera_flags(camera: &Camera, bounds: &DAabb) -> String {
-    let pose = |Pose { eye, frame }: Pose, suffix: &str| {
-        let forward = -frame.z_axis;
+    let pose = |pose: Pose, suffix: &str| {
+        let Pose { eye, frame } = pose;
         // Any point ahead would do; one as far as the middle of the scene reads well.
-        let ahead = (bounds.centre() - eye).dot(forward);
-        let target = eye + forward * if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
+        let ahead = (eye - bounds.centre()).dot(frame.z_axis);
+        let target = pose.target(if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 });
         let (eye, target, up) = (list(eye), list(target), list(frame.y_axis));
         format!("--eye{suffix} {eye} --look-at{suffix} {target} --up{suffix} {up}")
     };
@@ -273,17 +273,17 @@ fn list(v: DVec3) -> String {
 
 /// When the shutter opens and closes.
 fn parse_shutter(text: &str) -> std::result::Result<[f32; 2], String> {
-    let numbers = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
-    let shutter = numbers.filter(|&[open, close]| 0.0 <= open && open <= close && close <= 1.0);
-    shutter.ok_or_else(|| "expected two times from 0 to 1, the earlier first, as in 0,0.5".to_owned())
+    let times = finite_list(text).filter(|&[open, close]| 0.0 <= open && open <= close && close <= 1.0);
+    times
+        .map(|times| times.map(|time| time as f32))
+        .ok_or_else(|| "expected two times from 0 to 1, the earlier first, as in 0,0.5".to_owned())
 }
 
 /// Two finite numbers with a comma between.
 fn parse_shift(text: &str) -> std::result::Result<DVec2, String> {
-    let numbers =
-        text.split_once(',').and_then(|(x, y)| Some(DVec2::new(x.trim().parse().ok()?, y.trim().parse().ok()?)));
-    let shift = numbers.filter(|shift| shift.is_finite());
-    shift.ok_or_else(|| "expected two numbers with a comma between, as in 0.25,0".to_owned())
+    finite_list(text)
+        .map(DVec2::from_array)
+        .ok_or_else(|| "expected two numbers with a comma between, as in 0.25,0".to_owned())
 }
 
 /// A finite number above 0.
@@ -294,12 +294,8 @@ fn parse_length(text: &str) -> std::result::Result<f64, String> {
 
 /// Five finite numbers with commas between.
 fn parse_distortion(text: &str) -> std::result::Result<Distortion, String> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
-    match numbers.as_deref() {
-        Some(&[k1, k2, k3, p1, p2]) => Ok(Distortion { k1, k2, k3, p1, p2 }),
-        _ => Err("expected five numbers with commas between, as in -0.28,0.07,0,0.001,0".to_owned()),
-    }
+    let distortion = finite_list(text).map(|[k1, k2, k3, p1, p2]| Distortion { k1, k2, k3, p1, p2 });
+    distortion.ok_or_else(|| "expected five numbers with commas between, as in -0.28,0.07,0,0.001,0".to_owned())
 }
 
 /// An angle of view in degrees.

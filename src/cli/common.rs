@@ -178,12 +178,14 @@ fn parse_fps(text: &str) -> std::result::Result<f64, String> {
 
 /// Three finite numbers with commas between.
 pub(crate) fn parse_vector(text: &str) -> std::result::Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
-    match numbers.as_deref() {
-        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
-        _ => Err("expected three numbers with commas between, as in 1,2.5,-3".to_owned()),
-    }
+    let vector = finite_list(text).map(DVec3::from_array);
+    vector.ok_or_else(|| "expected three numbers with commas between, as in 1,2.5,-3".to_owned())
+}
+
+/// So many finite numbers with commas between.
+pub(super) fn finite_list<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let finite = |number: &str| number.trim().parse().ok().filter(|number: &f64| number.is_finite());
+    text.split(',').map(finite).collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
 /// A number of bytes: `1.6G`, `500M`, `2GiB`, `123456`. K, M, G and T are powers of 1024.

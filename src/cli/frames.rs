@@ -40,6 +40,7 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         let message = format!("--frames: {path} would hold every frame in turn; put %04d into its name");
         return Err(Error::Usage(message));
     }
+    let mut failed = Vec::new();
     for number in first..=last {
         let frame = frame(args, number);
         if args.frames.skip_existing && frame.output.iter().all(|path| path.is_file()) {
@@ -48,10 +49,14 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         if !args.quiet {
             say(format_args!("{:<8}  {number} of {first}-{last}", "frame"))?;
         }
-        render(&frame)?;
+        match render(&frame) {
+            // Of a frame that is not as it should be the next ones do not know.
+            Err(Error::Check(message)) => failed.push(format!("frame {number}: {message}")),
+            rendered => rendered?,
+        }
         interrupt::check()?;
     }
-    Ok(())
+    if failed.is_empty() { Ok(()) } else { Err(Error::Check(failed.join("\n  "))) }
 }
 
 /// The arguments that render one frame.

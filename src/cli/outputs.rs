@@ -86,17 +86,24 @@ pub(super) fn write_pictures(
     metadata: &Metadata,
     options: &WriteOptions,
 ) -> Result<()> {
-    paths.iter().try_for_each(|path| {
+    let write = |path: &PathBuf| {
         let channels = if image::holds_channels(path) { channels } else { &[] };
         image::write_beside(files, path, picture, channels, metadata, options)
-    })
+    };
+    // Each is tried: one that cannot be written says nothing of the others.
+    paths.iter().map(write).fold(Ok(()), Result::and)
 }
 
 /// Writes a JSON document, to be put in place with `files`.
 pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(document).map_err(|error| Error::output(path, error.to_string()))?;
     text.push('\n');
-    files.write(path, |part| fill(path, part, &text))
+    write_beside(files, path, &text)
+}
+
+/// Writes a text, likewise.
+pub(super) fn write_beside(files: &mut Together, path: &Path, text: &str) -> Result<()> {
+    files.write(path, |part| fill(path, part, text))
 }
 
 /// Writes a text.

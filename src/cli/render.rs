@@ -229,29 +229,34 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         }
         let (outcome, denoise) = outcome?;
         let mut files = Together::default();
-        let write_seconds = args.write(&mut files, &asked, &outcome.passes[0])?;
-
         let pass = &outcome.passes[0];
-        let [width, height] = asked.size();
-        let stats = Stats {
-            scene: args.scene.scene.display().to_string(),
-            triangles: placed_triangles(scene),
-            size: [width, height],
-            spp: settings.spp,
-            mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
-            threads: rayon::current_num_threads(),
-            packet: settings.batch.width.rays(),
-            load_seconds: asked.load_seconds,
-            prepare_seconds,
-            write_seconds,
-            peak_memory: process::peak(),
-            denoise,
-            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
-        };
-        if let Some(path) = &args.stats {
-            outputs::write_json(&mut files, path, &stats)?;
+        let written = args.write(&mut files, &asked, pass).and_then(|write_seconds| {
+            let [width, height] = asked.size();
+            let stats = Stats {
+                scene: args.scene.scene.display().to_string(),
+                triangles: placed_triangles(scene),
+                size: [width, height],
+                spp: settings.spp,
+                mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
+                threads: rayon::current_num_threads(),
+                packet: settings.batch.width.rays(),
+                load_seconds: asked.load_seconds,
+                prepare_seconds,
+                write_seconds,
+                peak_memory: process::peak(),
+                denoise,
+                engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
+            };
+            args.stats.as_ref().map_or(Ok(()), |path| outputs::write_json(&mut files, path, &stats))?;
+            Ok(stats)
+        });
+        if written.is_err() {
+            // The work is not lost with the one output that cannot be written.
+            let whole = files.names().map(|path| Warning::new(path, "", "is written, unlike another output"));
+            warn(&whole.collect::<Vec<_>>());
         }
         files.put_in_place()?;
+        let stats = written?;
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         if !args.quiet {
             let camera = &asked.camera_source;
@@ -316,6 +321,7 @@ impl RenderArgs {
         let aspect = f64::from(settings.width) / f64::from(settings.height);
         let (camera, camera_source) = self.camera.choose(&scene, aspect)?;
         let asked = Asked { scene, load_seconds, settings, accel, pictures, kept, camera, camera_source };
+        asked.pictures.iter().try_for_each(|path| image::check_sides(path, asked.size()))?;
         self.check_reference(reference, asked.size())?;
         Ok(asked)
     }

@@ -12,7 +12,11 @@ use super::engine::BackendArg;
 use super::{interrupt, outputs, progress, say};
 use crate::error::{Error, Result};
 use crate::lab::stress::{Case, Column, Found, Report, Search, Setup, catalogue, columns, file, heat_map};
+use crate::output::Together;
 use crate::render::Control;
+
+/// What goes into the folder of a matrix.
+const MATRIX: [&str; 3] = ["matrix.json", "matrix.svg", "failing.txt"];
 
 /// Run every method on the cases on which ray casters are known to fail
 ///
@@ -81,6 +85,11 @@ pub(super) fn run(args: &StressArgs) -> Result<()> {
     let columns = args.columns()?;
     if let Some(folder) = &args.output {
         fs::create_dir_all(folder).map_err(|error| Error::output(folder, error.to_string()))?;
+        let files = args.search.map_or(MATRIX.to_vec(), |_| vec!["found-0.json"]);
+        let files: Vec<PathBuf> = files.into_iter().map(|name| folder.join(name)).collect();
+        let cases: Vec<PathBuf> =
+            args.cases.iter().map(PathBuf::from).filter(|path| file::is_case_file(path)).collect();
+        outputs::check(&[], &files, &cases)?;
     }
     let control = Control { cancel: Some(cancel), ..Control::default() };
     match args.search {
@@ -146,15 +155,17 @@ fn matrix(args: &StressArgs, columns: Vec<Column>, control: Control<'_>) -> Resu
     let report = setup.run(Control { on_tile: Some(&on_tile), ..control });
     bar.finish_and_clear();
     let report = report?;
-    if let Some(folder) = &args.output {
-        outputs::write_text(&folder.join("matrix.json"), &document(&report)?)?;
-        outputs::write_text(&folder.join("matrix.svg"), &heat_map(&report))?;
-        outputs::write_text(&folder.join("failing.txt"), &failing(&report))?;
-    }
     if args.json {
         say(document(&report)?)?
     } else {
         say(report.to_string().trim_end())?
+    }
+    if let Some(folder) = &args.output {
+        let mut files = Together::default();
+        for (name, text) in MATRIX.into_iter().zip([document(&report)?, heat_map(&report), failing(&report)]) {
+            outputs::write_beside(&mut files, &folder.join(name), &text)?;
+        }
+        files.put_in_place()?;
     }
     report.check()
 }
@@ -204,13 +215,16 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
     let (rays, found) = search.run(control)?;
     let wrong = found.iter().filter(|found| found.column.is_exact()).count();
     let mut findings = Findings { seed: args.seed, rays, found: Vec::new() };
+    let (mut files, mut written) = (Together::default(), Ok(()));
     for (i, Found { who, fault, text, .. }) in found.into_iter().enumerate() {
-        let file = args.output.as_ref().map(|folder| folder.join(format!("found-{i}.json")));
-        if let Some(path) = &file {
-            outputs::write_text(path, &text)?;
+        let mut file = args.output.as_ref().map(|folder| folder.join(format!("found-{i}.json")));
+        // What was found is told all the same where it cannot be written.
+        if let Some(Err(error)) = file.as_ref().map(|path| outputs::write_beside(&mut files, path, &text)) {
+            (file, written) = (None, written.and(Err(error)));
         }
         findings.found.push(Finding { who, fault, file });
     }
+    files.put_in_place()?;
     if args.json {
         say(document(&findings)?)?;
     } else {
@@ -221,6 +235,7 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
         }
         say(text)?;
     }
+    written?;
     match wrong {
         0 => interrupt::check(),
         _ => Err(Error::Check(format!("{wrong} of what was found must not be: a native tracer is wrong"))),

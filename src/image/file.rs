@@ -70,8 +70,14 @@ const WITH_ALPHA: [&str; 4] = ["png", "tif", "tiff", "tga"];
 
 const JPEG: [&str; 6] = ["jpg", "jpeg", "jpe", "jif", "jfif", "jfi"];
 
-/// libjpeg's limit. Checked here because some of its users end the process where it is exceeded.
-const LONGEST_JPEG: u32 = 65_500;
+/// The most pixels along a side that formats hold, by their suffixes: others hold all pictures that are rendered, or find out themselves.
+/// Checked here because some users of libjpeg end the process where its limit is exceeded.
+const LONGEST: [(&[&str], u32); 4] = [
+    (&JPEG, 65_500),
+    (&["webp"], 16_383),
+    (&["ico"], 256),
+    (&["bw", "gif", "iff", "int", "inta", "rgb", "rgba", "rla", "sgi", "tga", "tpic", "z"], 65_535),
+];
 
 /// Most pixels in a file that is read: 4 GiB as [`Image`].
 const MOST_PIXELS: u64 = 1 << 28;
@@ -130,10 +136,7 @@ pub(crate) fn write_beside(
     if options.tile == 0 || options.tile > 1 << 16 {
         return Err(Error::Usage(format!("tiles of {0} x {0} pixels; 1 to 65536 is possible", options.tile)));
     }
-    if JPEG.contains(&suffix.as_str()) && width.max(height) > LONGEST_JPEG {
-        let message = format!("{width} x {height} pixels are too many for JPEG, which ends at {LONGEST_JPEG}");
-        return Err(Error::output(path, message));
-    }
+    check_sides(path, [width, height])?;
     if !channels.is_empty() && !EXR.contains(&suffix.as_str()) {
         return Err(Error::output(path, "only OpenEXR files (.exr) hold more channels than colours"));
     }
@@ -146,6 +149,23 @@ pub(crate) fn write_beside(
 /// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.
 pub fn holds_channels(path: &Path) -> bool {
     EXR.contains(&suffix(path).as_str())
+}
+
+/// Whether the format that the suffix says holds pictures of this width and height.
+///
+/// # Errors
+/// [`Error::Output`] where it does not.
+pub(crate) fn check_sides(path: &Path, [width, height]: [u32; 2]) -> Result<()> {
+    let suffix = suffix(path);
+    match LONGEST.iter().find(|(suffixes, _)| suffixes.contains(&suffix.as_str())) {
+        Some((_, most)) if width.max(height) > *most => Err(Error::output(
+            path,
+            format!(
+                "{width} x {height} pixels are too many for .{suffix}, which ends at {most}; choose another format"
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Loads what image files take, as the first of them would.

@@ -36,7 +36,7 @@ pub use file::{
     Depth, WriteOptions, check_writable, holds_channels, read, read_channels, read_metadata, read_whole, write,
     write_channels,
 };
-pub(crate) use file::{check_suffix, has_common_suffix, keeps_radiance, prepare, write_beside};
+pub(crate) use file::{check_sides, check_suffix, has_common_suffix, keeps_radiance, prepare, write_beside};
 pub(crate) use guarded::guarded;
 pub(crate) use jpeg::is_cut_short;
 pub use metadata::{Metadata, Window};

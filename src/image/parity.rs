@@ -34,7 +34,11 @@ fn metadata() -> Metadata {
         samples_per_pixel: Some(64),
         render_time_seconds: Some(12.5),
         window: Some(Window { x: 3, y: 50, full: [1000, 300] }),
-        texts: vec![("a/b".to_owned(), "two words".to_owned()), ("a/c".to_owned(), "{}".to_owned())],
+        texts: vec![
+            ("a/b".to_owned(), "two words".to_owned()),
+            ("a/c".to_owned(), "{}".to_owned()),
+            ("a/d".to_owned(), "Tür 相机".to_owned()),
+        ],
     }
 }
 
@@ -101,6 +105,8 @@ fn channels_are_identical() {
         Channel::uint("primitive", (0..pixels).map(|i| u32::MAX - i).collect()),
         Channel::float("depth.Z", (0..pixels).map(|i| if i == 7 { f32::INFINITY } else { 1.0 / i as f32 }).collect()),
         Channel::float("A light.R", vec![-1.5; pixels as usize]),
+        Channel::uint("Tür", vec![1; pixels as usize]),
+        Channel::float("相机.Z", vec![0.5; pixels as usize]),
     ];
     for kind in [Type::Half, Type::Float] {
         let encoding = Encoding { kind, ..HALF };
@@ -112,7 +118,7 @@ fn channels_are_identical() {
         for file in [&a, &b] {
             for read in [oiio::read_channels, pure::read_channels] {
                 let mut found = read(file, &|_, _| Ok(())).unwrap();
-                assert_eq!((found.width, found.height, found.channels.len()), (150, 70, 7));
+                assert_eq!((found.width, found.height, found.channels.len()), (150, 70, 4 + channels.len()));
                 let reds: Vec<u32> = colours.pixels.iter().map(|p| p.x.to_bits()).collect();
                 let read: Vec<u32> = found.floats("R").unwrap().iter().map(|x| x.to_bits()).collect();
                 assert_eq!(reds, read, "{file:?}");

@@ -112,6 +112,16 @@ pub(super) fn tiled(encoding: Encoding) -> openexr::Encoding {
     }
 }
 
+/// A text of a file, in UTF-8 as OpenImageIO writes it. The crate's own conversion is to Latin-1, and knows no other letters.
+pub(super) fn text(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+/// What a text of a file says.
+pub(super) fn string(text: &Text) -> String {
+    String::from_utf8_lossy(text.as_slice()).into_owned()
+}
+
 pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
     let mut attributes = openexr::LayerAttributes {
         world_to_camera: metadata.world_to_camera.as_ref().map(narrow),
@@ -120,11 +130,11 @@ pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
     };
     let mut put = |name: &str, value: Option<AttributeValue>| {
         if let Some(value) = value {
-            attributes.other.insert(Text::from(name), value);
+            attributes.other.insert(text(name), value);
         }
     };
     let number = |x: Option<f64>| x.map(|x| AttributeValue::F32(x as f32));
-    put(SOFTWARE, Text::new_or_none(&metadata.software).map(AttributeValue::Text));
+    put(SOFTWARE, Some(AttributeValue::Text(text(&metadata.software))));
     put(WORLD_TO_SCREEN, metadata.world_to_screen.as_ref().map(narrow).map(AttributeValue::Matrix4x4));
     put(FOVCOT, number(metadata.fovcot));
     put(
@@ -132,8 +142,8 @@ pub(super) fn attributes(metadata: &Metadata) -> openexr::LayerAttributes {
         metadata.samples_per_pixel.map(|n| AttributeValue::I32(i32::try_from(n).unwrap_or(i32::MAX))),
     );
     put(RENDER_TIME_SECONDS, number(metadata.render_time_seconds));
-    for (name, text) in &metadata.texts {
-        put(name, Text::new_or_none(text).map(AttributeValue::Text));
+    for (name, value) in &metadata.texts {
+        put(name, Some(AttributeValue::Text(text(value))));
     }
     attributes
 }
@@ -202,7 +212,7 @@ fn read_exr(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Sampl
         (_, _, _, Some(y)) => vec![y],
         _ if planes.len() == 1 => vec![&planes[0].sample_data],
         _ => {
-            let names: Vec<_> = planes.iter().map(|c| c.name.to_string()).collect();
+            let names: Vec<_> = planes.iter().map(|c| string(&c.name)).collect();
             return Err(format!("no channels R, G and B, or Y; it has {}", names.join(", ")));
         }
     };
@@ -228,22 +238,22 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
         let [width, height] = [display.size.0, display.size.1].map(|n| i32::try_from(n).unwrap_or(-1));
         (display.position == openexr::Vec2(0, 0)).then(|| Window::of_signed([at.0, at.1], [width, height])).flatten()
     };
-    let number = |name: &str| match attributes.other.get(&Text::from(name)) {
+    let number = |name: &str| match attributes.other.get(&text(name)) {
         Some(&AttributeValue::F32(x)) => Some(f64::from(x)),
         _ => None,
     };
     Ok(Metadata {
-        software: match attributes.other.get(&Text::from(SOFTWARE)) {
-            Some(AttributeValue::Text(name)) => name.to_string(),
-            _ => attributes.software_name.as_ref().map(Text::to_string).unwrap_or_default(),
+        software: match attributes.other.get(&text(SOFTWARE)) {
+            Some(AttributeValue::Text(name)) => string(name),
+            _ => attributes.software_name.as_ref().map(string).unwrap_or_default(),
         },
         world_to_camera: attributes.world_to_camera.as_ref().map(widen),
-        world_to_screen: match attributes.other.get(&Text::from(WORLD_TO_SCREEN)) {
+        world_to_screen: match attributes.other.get(&text(WORLD_TO_SCREEN)) {
             Some(AttributeValue::Matrix4x4(m)) => Some(widen(m)),
             _ => None,
         },
         fovcot: number(FOVCOT),
-        samples_per_pixel: match attributes.other.get(&Text::from(SAMPLES_PER_PIXEL)) {
+        samples_per_pixel: match attributes.other.get(&text(SAMPLES_PER_PIXEL)) {
             Some(&AttributeValue::I32(n)) => n.try_into().ok(),
             _ => None,
         },
@@ -255,7 +265,7 @@ pub(super) fn read_metadata(path: &Path) -> Result<Metadata> {
 
 fn texts(attributes: &openexr::LayerAttributes) -> Vec<(String, String)> {
     let named = attributes.other.iter().filter_map(|(name, value)| match value {
-        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+        AttributeValue::Text(text) => Some((string(name), string(text))),
         _ => None,
     });
     let mut texts: Vec<_> = named.filter(|(name, _)| is_text(name)).collect();

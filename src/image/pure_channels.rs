@@ -6,7 +6,7 @@ use exr::prelude::{self as openexr, FlatSamples, WritableImage, f16};
 
 use super::file::Encoding;
 use super::metadata::Metadata;
-use super::pure::{Planes, attributes, read_planes, tiled, within};
+use super::pure::{Planes, attributes, read_planes, string, text, tiled, within};
 use super::samples::{Samples, Values};
 use super::{Channel, Channels, Plane};
 
@@ -37,7 +37,7 @@ pub(super) fn write(
             Plane::Float(values) => FlatSamples::F32(values.clone()),
             Plane::Uint(values) => FlatSamples::U32(values.clone()),
         };
-        openexr::AnyChannel::new(name.as_str(), plane)
+        openexr::AnyChannel::new(text(name), plane)
     }));
     let layer = openexr::Layer::new(
         (samples.width as usize, samples.height as usize),
@@ -57,7 +57,7 @@ pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Resul
             FlatSamples::F32(values) => Plane::Float(values),
             FlatSamples::U32(values) => Plane::Uint(values),
         };
-        Channel { name: channel.name.to_string(), plane }
+        Channel { name: string(&channel.name), plane }
     });
     Ok(Channels { width, height, channels: channels.collect() })
 }

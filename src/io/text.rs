@@ -57,15 +57,13 @@ impl<'a> Iterator for Lines<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         let line = self.physical()?;
         let number = self.line;
-        let has_comment = || Words::new(line, number).any(|word| word.starts_with(b"#"));
-        let continued = line.strip_suffix(b"\\").filter(|_| !has_comment());
-        let Some(begin) = continued else {
+        let Some(begin) = continued(line) else {
             return Some((number, Cow::Borrowed(line)));
         };
         let mut joined = begin.to_vec();
         while let Some(line) = self.physical() {
             joined.push(b' ');
-            match line.strip_suffix(b"\\") {
+            match continued(line) {
                 Some(part) => joined.extend_from_slice(part),
                 None => {
                     joined.extend_from_slice(line);
@@ -75,6 +73,12 @@ impl<'a> Iterator for Lines<'a> {
         }
         Some((number, Cow::Owned(joined)))
     }
+}
+
+/// What stands before the backslash that continues a line; none where there is none, or in a comment.
+fn continued(line: &[u8]) -> Option<&[u8]> {
+    let has_comment = || Words::new(line, 0).any(|word| word.starts_with(b"#"));
+    line.strip_suffix(b"\\").filter(|_| !has_comment())
 }
 
 /// Words of a text, and the line that the last one stood in.
@@ -211,6 +215,12 @@ pub(super) fn name(bytes: &[u8]) -> String {
     str::from_utf8(bytes).map_or_else(|_| bytes.iter().copied().map(char::from).collect(), str::to_owned)
 }
 
+/// What of a name stands before a comment: a `#` behind white space. Names hold both, so that the whole is to be tried before.
+pub(super) fn before_comment(name: &str) -> &str {
+    let begin = name.match_indices('#').map(|(at, _)| at).find(|at| name[..*at].ends_with(char::is_whitespace));
+    begin.map_or(name, |at| name[..at].trim_end())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,6 +234,8 @@ mod tests {
         assert_eq!(Lines::new(b"").next(), None);
         let lines: Vec<_> = Lines::new(b" # C:\\\nv 1 # D:\\\n").map(|(n, l)| (n, l.into_owned())).collect();
         assert_eq!(lines, [(1, b" # C:\\".to_vec()), (2, b"v 1 # D:\\".to_vec())]);
+        let lines: Vec<_> = Lines::new(b"f 1 2 \\\n3 # C:\\\nf 2\n").map(|(n, l)| (n, l.into_owned())).collect();
+        assert_eq!(lines, [(1, b"f 1 2  3 # C:\\".to_vec()), (3, b"f 2".to_vec())]);
         let lines: Vec<_> = Lines::new(b"a\rb \\\rc\r\rd\n\re\r").map(|(n, l)| (n, l.into_owned())).collect();
         assert_eq!(
             lines,

@@ -76,6 +76,23 @@ fn scenes_come_back_from_nff_and_toml() {
     }
 }
 
+/// However far away it stands, a camera looks where it looked.
+#[test]
+fn far_cameras_come_back() {
+    let files = Files::one("empty", "");
+    for far in [1e3, 1e10, 1e17] {
+        let mut scene = RECIPES[0].make(1);
+        let eye = DVec3::new(far, -far, 0.5 * far);
+        let camera = Camera::look_at(eye, eye + DVec3::new(3.0, 1.0, -2.0) * far, DVec3::Y, 1.0).unwrap();
+        scene.cameras = vec![Camera { name: "far".into(), ..camera.clone() }];
+        for name in ["far.nff", "far.toml"] {
+            save(&scene, &files.path(name)).unwrap();
+            let again = &files.scene(name).cameras[0];
+            assert!((0..3).all(|k| close(again.frame.col(k), camera.frame.col(k))), "{name} {far}: {again:?}");
+        }
+    }
+}
+
 #[test]
 fn a_lattice_stays_one_mesh_in_toml() {
     let files = Files::one("empty", "");

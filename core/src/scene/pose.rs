@@ -16,6 +16,13 @@ pub struct Pose {
 }
 
 impl Pose {
+    /// A point straight ahead, so far away at least, and not so near that its coordinates would not tell the direction.
+    pub fn target(&self, distance: f64) -> DVec3 {
+        // Rounding then turns it by 2^-42 at most.
+        let least = self.eye.abs().max_element() / 1024.0;
+        self.eye - self.frame.z_axis * distance.max(least)
+    }
+
     /// Scale and shear move the eye and leave the frame a rotation.
     pub(super) fn transformed(&self, transform: &DAffine3) -> Self {
         let back = (transform.matrix3 * self.frame.z_axis).normalize();

@@ -35,13 +35,8 @@ pub(super) fn write(path: &Path, size: [u32; 2], write: impl FnOnce(&Path) -> Re
     // The name was that of the memory.
     fs::remove_file(path).map_err(cannot)?;
     written?;
-    let mut copy = || {
-        let mut file = File::create_new(path)?;
-        io::copy(&mut memory, &mut file)?;
-        // Some file systems tell only then.
-        file.sync_all()
-    };
-    copy().map_err(cannot)
+    let mut place = File::create_new(path).map_err(cannot)?;
+    io::copy(&mut memory, &mut place).map(drop).map_err(cannot)
 }
 
 /// A file in memory, and `path` as a name of it; none where there are no such files, or no links to them.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result, Warning, system_message};
 use crate::io::Placeless;
-use crate::io::text::{Lines, Words, name, number, quoted, without_mark};
+use crate::io::text::{Lines, Words, before_comment, name, number, quoted, without_mark};
 use crate::io::texture;
 use crate::math::{Affine2, Mat3, Vec2, Vec3};
 use crate::memory::Mapped;
@@ -68,8 +68,12 @@ impl Library {
         if names.trim().is_empty() {
             return Ok(());
         }
-        let whole = texture::beside(obj, names);
-        // A name may contain spaces; the format also lets several names stand in a line.
+        let mut whole = texture::beside(obj, names);
+        // A name may contain spaces and more; the format also lets several names stand in a line, and comments behind them.
+        let names = before_comment(names);
+        if !whole.is_file() {
+            whole = texture::beside(obj, names);
+        }
         let files: Vec<PathBuf> = if whole.is_file() {
             vec![whole]
         } else {
@@ -147,7 +151,8 @@ impl Library {
         // Transparent, mirrors.
         let mut first: [Option<(&Entry, usize)>; 2] = [None; 2];
         for name in names {
-            let Some(entry) = self.entries.get(&name) else {
+            let entry = self.entries.get(&name).or_else(|| self.entries.get(before_comment(&name)));
+            let Some(entry) = entry else {
                 // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
                 if !name.is_empty() && !self.files.is_empty() {
                     let message = format!("material {} is in no material library; it is grey", quoted(name.as_bytes()));

@@ -60,7 +60,7 @@ pub fn save_until(scene: &Scene, path: &Path, cancel: &AtomicBool) -> Result<()>
         let write_all = || {
             let mut file = BufWriter::with_capacity(1 << 16, Until { file: File::create(part)?, cancel });
             write(scene, &mut file)?;
-            file.into_inner()?.file.sync_all()
+            file.flush()
         };
         write_all().map_err(|error: io::Error| match cancel.load(Ordering::Relaxed) {
             true => Error::Interrupted,

@@ -127,7 +127,7 @@ fn view(camera: &Camera, width: u32, height: u32, out: &mut dyn Write) -> io::Re
     let half = camera.projection.half_extent(f64::from(width) / rows).map_or(1.0, |half| half.y);
     let share = if height > 1 { (rows - 1.0) / rows } else { 1.0 };
     let angle = 2.0 * libm::atan(half * share);
-    let at = camera.eye - camera.frame.z_axis;
+    let at = camera.pose(0.0).target(1.0);
     writeln!(out, "v\nfrom {}\nat {}", spaced_f64(camera.eye), spaced_f64(at))?;
     writeln!(out, "up {}\nangle {}\nhither 0", spaced_f64(camera.frame.y_axis), angle.to_degrees())?;
     writeln!(out, "resolution {width} {height}")

@@ -9,7 +9,7 @@ use crate::image::Curve;
 use crate::math::{DAffine3, DVec2, DVec3, Mat3, UVec3, Vec3};
 use crate::scene::{
     Absorption, Accel, Alpha, AreaShape, Attenuation, Camera, Distortion, Fog, Fov, Geometry, Interface, Light,
-    Material, Mesh, Pose, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
+    Material, Mesh, Projection, Request, Resolution, Scene, Specular, ThinLens, Unlit,
 };
 use crate::shape::{Shape, Sphere, SphereMethod, TriangleMethod};
 
@@ -176,11 +176,11 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
 
 fn write_camera(camera: &Camera, name: &str, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(name), list_f64(camera.eye))?;
-    let (at, up) = (camera.eye - camera.frame.z_axis, camera.frame.y_axis);
+    let (at, up) = (camera.pose(0.0).target(1.0), camera.frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
-    if let Some(Pose { eye, frame }) = camera.end {
-        writeln!(out, "eye_end = {}\nlook_at_end = {}", list_f64(eye), list_f64(eye - frame.z_axis))?;
-        writeln!(out, "up_end = {}", list_f64(frame.y_axis))?;
+    if let Some(end) = camera.end {
+        writeln!(out, "eye_end = {}\nlook_at_end = {}", list_f64(end.eye), list_f64(end.target(1.0)))?;
+        writeln!(out, "up_end = {}", list_f64(end.frame.y_axis))?;
     }
     match camera.projection {
         Projection::Perspective(Fov::Vertical(vertical)) => writeln!(out, "fov = {}", vertical.to_degrees())?,

@@ -18,6 +18,16 @@ const RANKS: usize = 6;
 /// A number and a share for each.
 pub(super) const CHANNELS: usize = 2 * RANKS;
 
+/// Layers, before their ranks.
+const OBJECTS: &str = "CryptoObject";
+const MATERIALS: &str = "CryptoMaterial";
+
+/// Whether a layer of that name is one of these.
+pub(super) fn is_layer(name: &str) -> bool {
+    let rank = [OBJECTS, MATERIALS].iter().find_map(|layer| name.strip_prefix(layer));
+    rank.is_some_and(|rank| rank.len() == 2 && rank.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 /// What covers a pixel: ids and the weights of the samples that hit them, in the order in which they were hit first.
 pub(in crate::render) type Coverage = Vec<(u32, f32)>;
 
@@ -77,11 +87,11 @@ impl Mattes {
             let names = scene.instances.iter().enumerate().flat_map(|(i, instance)| {
                 scene.group_geometries(instance.group).map(move |(g, geometry)| object_name(scene, i, g, geometry))
             });
-            put("CryptoObject", objects, &mut { names });
+            put(OBJECTS, objects, &mut { names });
         }
         if self.has_materials {
             let names = scene.geometries.iter().map(|geometry| material_name(scene, geometry.material()));
-            put("CryptoMaterial", materials, &mut { names });
+            put(MATERIALS, materials, &mut { names });
         }
         (channels, texts)
     }

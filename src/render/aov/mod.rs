@@ -70,6 +70,9 @@ pub enum Aov {
     },
 }
 
+/// Bytes of a layer's name at most: with a dot and a component it may have 255.
+const LONGEST_NAME: usize = 253;
+
 /// Names of what is no light.
 const PLAIN: [(&str, Aov); 12] = [
     ("depth", Aov::Depth),
@@ -140,9 +143,12 @@ impl FromStr for Aov {
         };
         let paths = Expression::new(paths)?;
         let name: String = name.chars().filter(|c| !c.is_whitespace()).collect();
-        if name.is_empty() || name.contains('.') || PLAIN.iter().any(|(plain, _)| *plain == name) {
+        let is_reserved = PLAIN.iter().any(|(plain, _)| *plain == name) || cryptomatte::is_layer(&name);
+        if name.is_empty() || name.len() > LONGEST_NAME || name.contains(['.', '\0']) || is_reserved {
             let remedy = format!("name it, as in NAME={}", paths.text());
-            return Err(format!("{text:?}: {name:?} cannot be the name of a layer, which has no dot; {remedy}"));
+            return Err(format!(
+                "{text:?}: {name:?} cannot be the name of a layer, which has up to {LONGEST_NAME} bytes, no dot, and not that of another layer; {remedy}"
+            ));
         }
         Ok(Self::Light { name, paths })
     }
