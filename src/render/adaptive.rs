@@ -55,8 +55,9 @@ impl Adaptive {
         }
         let fewest = spp.max(FEWEST);
         if self.max_spp < fewest {
+            let why = if spp > FEWEST { "as many as it begins with" } else { "as many as tell the noise" };
             let message =
-                format!("at most {} samples a pixel: a noise threshold needs at least {fewest}", self.max_spp);
+                format!("at most {} samples a pixel: a noise threshold needs {fewest} at least, {why}", self.max_spp);
             return Err(Error::Usage(message));
         }
         Ok(())

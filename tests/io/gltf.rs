@@ -320,6 +320,18 @@ fn sparse_accessors() {
     refused(&Files::one("a.gltf", document.to_string()), "a.gltf", "/accessors/0/sparse/indices", "past the view's 4");
 }
 
+/// Whole numbers may have a fraction of zero or an exponent; of a key that is there twice the last counts.
+#[test]
+fn numbers_are_what_json_says() {
+    let document = document();
+    let expected = corners(meshes(&Files::one("a.gltf", document.to_string()).scene("a.gltf"))[0]);
+    let text = document.to_string().replace("5126", "5.126e3").replace("\"count\":3", "\"count\":7,\"count\":3.0");
+    assert!(text.contains("5.126e3") && text.contains("3.0"), "{text}");
+    assert_eq!(corners(meshes(&Files::one("a.gltf", &text).scene("a.gltf"))[0]), expected);
+    let broken = text.replace("5.126e3", "5.1265e3");
+    refused(&Files::one("a.gltf", broken), "a.gltf", "line 1, column", "expected");
+}
+
 #[test]
 fn deep_hierarchies() {
     let mut nodes: Vec<Value> =

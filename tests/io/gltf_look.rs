@@ -72,6 +72,11 @@ fn colours_of_vertices_multiply_the_base_colour() {
         });
         assert!(got.abs_diff_eq(expected, 1e-6), "{metallic} metal, {transmission} glass: {got}, {expected}");
     }
+    // What is no share of light is cut.
+    let mut maker = square(json!({"extensions": {UNLIT: {}}}));
+    let colors = maker.floats("VEC3", &[2.0, 0.5, -1.0].repeat(4));
+    maker.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
+    assert_eq!(halves(&maker.files().scene("a.gltf"))[0], Vec3::new(1.0, 0.5, 0.0));
     // Without a material it is glTF's own, a rough metal.
     let bare = |material: Option<Value>| {
         let mut maker = square(material.clone().unwrap_or(json!({})));

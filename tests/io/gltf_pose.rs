@@ -231,6 +231,19 @@ fn skins_follow_their_joints() {
     assert_eq!(scene.instances[0].transform, twincast::math::DAffine3::IDENTITY, "its own place does not count");
 }
 
+/// Its node's place does not matter to a skinned mesh, but whether that is mirrored decides which side of a triangle is its front.
+#[test]
+fn skins_of_mirrored_nodes_keep_their_front() {
+    let order = |scale: [f64; 3]| {
+        let mut maker = skinned();
+        maker.json["nodes"][0]["scale"] = json!(scale);
+        corners(meshes(&posed(&maker.files(), Animation::default()))[0])[0]
+    };
+    let [a, b, c] = order([1.0; 3]);
+    assert_eq!(order([-1.0, 1.0, 1.0]), [a, c, b]);
+    assert_eq!(order([-2.0, -1.0, 1.0]), [a, b, c]);
+}
+
 #[test]
 fn faults_of_skins() {
     let broken = |change: &dyn Fn(&mut Maker), place: &str, words: &str| {
@@ -311,6 +324,27 @@ fn coordinates_and_colours_are_displaced_too() {
     let short = maker.floats("VEC2", &[0., 0.]);
     maker.json["meshes"][0]["primitives"][0]["targets"][0]["TEXCOORD_0"] = json!(short);
     fault(&maker.files(), Animation::default(), "/accessors/", "TEXCOORD_0 has 1 elements for 3 positions");
+}
+
+/// Zeros that are not stored count once, however many targets they are.
+#[test]
+fn many_targets_may_move_little() {
+    let (vertices, targets) = (25_000, 1_000);
+    let mut maker = Maker::triangle();
+    let positions = maker.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0.].repeat(vertices / 3 + 1));
+    let indices = maker.view(&[1, 0, 0, 0]);
+    let values = maker.view(&[0.001f32, 0.0, 0.0].map(f32::to_le_bytes).concat());
+    let count = 3 * (vertices / 3 + 1);
+    let sparse = json!({"componentType": 5126, "count": count, "type": "VEC3", "sparse": {"count": 1,
+        "indices": {"bufferView": indices, "componentType": 5125}, "values": {"bufferView": values}}});
+    let accessors = maker.json["accessors"].as_array_mut().unwrap();
+    accessors.push(sparse);
+    let target = json!({"POSITION": accessors.len() - 1});
+    maker.json["meshes"] = json!([{"primitives": [{"attributes": {"POSITION": positions}, "targets": vec![target; targets]}],
+        "weights": vec![1; targets]}]);
+    let scene = posed(&maker.files(), Animation::default());
+    let moved = corners(meshes(&scene)[0])[0][1];
+    assert!(moved.abs_diff_eq(Vec3::new(2.0, 0.0, 0.0), 1e-3), "{moved}");
 }
 
 #[test]

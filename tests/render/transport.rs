@@ -496,8 +496,20 @@ fn auto_traces_paths_where_nothing_else_shows_anything() {
     };
     let (integrator, why, image) = of(None);
     assert_eq!((integrator, &image), (Integrator::Path, &of(Some(Integrator::Path)).2));
-    assert!(why.starts_with("path (only surfaces that glow light the scene)"), "{why}");
+    assert!(why.starts_with("path (only what glows, or is behind everything, lights the scene)"), "{why}");
     assert_eq!(of(Some(Integrator::Whitted)).2.pixels[0].truncate(), Vec3::ZERO);
+    // So it is where nothing glows but what is behind everything.
+    let mut under = scene(vec![(sphere(Vec3::ZERO, 1.0), matte(0.5))]);
+    under.unlit = twincast::scene::Unlit::Darkness;
+    let chosen = |scene: &Scene| {
+        let world = World::new(scene).unwrap();
+        let camera = Camera::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, 0.5).unwrap();
+        let settings = Settings { integrator: None, ..settings(4, 4, 1) };
+        Renderer::new(scene, &world, camera, settings).unwrap().plan().integrator
+    };
+    assert_eq!(chosen(&under), Integrator::RayCast);
+    under.background = Some(Vec3::ONE);
+    assert_eq!(chosen(&under), Integrator::Path);
 }
 
 /// What would be wrong without a word is refused.

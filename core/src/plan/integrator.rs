@@ -13,7 +13,7 @@ pub(super) struct Needs<'a> {
     pub(super) is_lit: bool,
     /// Whether the scene has no light but what glows, and no headlight is added.
     pub(super) is_dark: bool,
-    /// Whether anything glows that is no light's body. Asked only where it matters.
+    /// Whether anything glows that is no light's body, or the background does. Asked only where it matters.
     pub(super) emitters: &'a dyn Fn() -> bool,
 }
 
@@ -23,7 +23,7 @@ pub(super) fn choose(wish: Option<Integrator>, needs: &Needs<'_>) -> (Integrator
         return (wish, "asked for");
     }
     if needs.is_dark && needs.is_lit && (needs.emitters)() {
-        (Integrator::Path, "only surfaces that glow light the scene")
+        (Integrator::Path, "only what glows, or is behind everything, lights the scene")
     } else if needs.sends_on {
         (Integrator::Whitted, "mirrors or glass send rays on")
     } else {

@@ -216,6 +216,11 @@ impl Case<'_> {
         self.wishes.background.or(self.scene.background)
     }
 
+    /// Whether what is behind everything is light to paths.
+    fn shines(&self) -> bool {
+        self.background().is_some_and(|color| color != Vec3::ZERO)
+    }
+
     /// Whether anything glows that light comes from.
     fn has_bodies(&self) -> bool {
         let Self { scene, world, census, .. } = self;
@@ -232,7 +237,7 @@ impl Case<'_> {
             sends_on: census.materials.sending_on > 0,
             is_lit: census.materials.lit > 0,
             is_dark: is_meant_dark && census.lights.bright.is_empty() && !census.environment && !census.ambient,
-            emitters: &|| self.has_bodies(),
+            emitters: &|| self.shines() || self.has_bodies(),
         };
         let (chosen, why) = integrator::choose(wishes.integrator, &asked);
         let is_free = chosen == Integrator::RayCast && wishes.integrator.is_none();
@@ -253,9 +258,7 @@ impl Case<'_> {
             return Lighting::None;
         }
         let is_unlit = scene.unlit == Unlit::Headlight && scene.lights.is_empty() && scene.environment.is_none();
-        // To paths, what is behind everything is light too.
-        let shines = || self.background().is_some_and(|color| color != Vec3::ZERO);
-        let finds_light = || integrator == Integrator::Path && (shines() || self.has_bodies());
+        let finds_light = || integrator == Integrator::Path && (self.shines() || self.has_bodies());
         if is_unlit && !finds_light() { Lighting::Headlight } else { Lighting::Lights(census.lights.reaching.clone()) }
     }
 

@@ -69,7 +69,7 @@ impl Polygon {
         let tolerance = Self::FLATNESS * size;
         InvalidShape::unless(distance <= tolerance, || {
             format!(
-                "corner {farthest}, {}, is {distance:.3e} off the plane of the polygon, of which {tolerance:.3e} is let \
+                "corner {farthest} (from 0), {}, is {distance:.3e} off the plane of the polygon, of which {tolerance:.3e} is let \
                  pass; divide it into triangles",
                 name(farthest)
             )

@@ -2,9 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use rayon::slice::ChunksMut;
 use twincast::math::DVec3;
 use twincast::trace::precise::NearestPoint;
 
@@ -60,6 +61,11 @@ fn along_order<T: Copy + Send + Sync>(
             ask(&points, answers);
         }
     })
+}
+
+/// Writes answers where Python gets them, whose room was asked for beforehand.
+fn tell<T: Copy + Send + Sync>(chunks: ChunksMut<'_, T>, answers: &[T]) {
+    chunks.zip(answers.par_chunks(CHUNK)).for_each(|(told, answers)| told.copy_from_slice(answers));
 }
 
 #[pymethods]
@@ -120,26 +126,31 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rows = points.rows("points")?;
-        let distances = pool::interruptible(py, threads, |cancel| {
+        let mut told = Answers::new(py, rows.len(), 1)?;
+        let chunks = told.chunks()?;
+        pool::interruptible(py, threads, |cancel| {
             self.precise.prepare_for_points();
             // Distances alone need no more than they did.
             let counted = if samples > 0 { self.precise.distinct() } else { &self.precise };
             let is_closed = samples > 0 && counted.is_closed();
-            along(&rows, cancel, f64::NAN, |points, distances| {
-                let mut inside = vec![false; points.len()];
-                self.precise.distance_squared_batch(points, distances);
-                if is_closed {
-                    self.are_inside_closed(counted, points, distances, &mut inside);
-                } else if samples > 0 {
-                    are_inside(counted, points, samples, false, &mut inside);
-                }
-                for ((distance, inside), &point) in distances.iter_mut().zip(inside).zip(points) {
-                    let length = root(*distance, point);
-                    *distance = if inside { -length } else { length };
-                }
-            })
+            tell(
+                chunks,
+                &along(&rows, cancel, f64::NAN, |points, distances| {
+                    let mut inside = vec![false; points.len()];
+                    self.precise.distance_squared_batch(points, distances);
+                    if is_closed {
+                        self.are_inside_closed(counted, points, distances, &mut inside);
+                    } else if samples > 0 {
+                        are_inside(counted, points, samples, false, &mut inside);
+                    }
+                    for ((distance, inside), &point) in distances.iter_mut().zip(inside).zip(points) {
+                        let length = root(*distance, point);
+                        *distance = if inside { -length } else { length };
+                    }
+                }),
+            );
         })?;
-        Ok(distances.into_pyarray(py))
+        Ok(told.flat())
     }
 
     /// Whether each point is inside: the majority of `samples` rays from it cross the meshes an odd number of times. With `both_ways`
@@ -154,10 +165,13 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let rows = points.rows("points")?;
-        let inside = pool::interruptible(py, threads, |cancel| {
+        let mut told = Answers::new(py, rows.len(), 1)?;
+        let chunks = told.chunks()?;
+        pool::interruptible(py, threads, |cancel| {
             let counted = self.precise.distinct();
-            along(&rows, cancel, false, |points, inside| are_inside(counted, points, samples, both_ways, inside))
+            let ask = |points: &[DVec3], inside: &mut [bool]| are_inside(counted, points, samples, both_ways, inside);
+            tell(chunks, &along(&rows, cancel, false, ask));
         })?;
-        Ok(inside.into_pyarray(py))
+        Ok(told.flat())
     }
 }

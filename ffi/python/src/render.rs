@@ -52,8 +52,10 @@ impl Wishes {
         let (width, height) = self.size.unwrap_or((asked.width, asked.height));
         let integrator = match self.integrator.as_deref() {
             None => asked.integrator,
-            Some("auto") => None,
-            Some(name) => Some(by_name("integrator", name, Integrator::ALL.map(|it| (it.name(), it)))?),
+            Some(name) => {
+                let [a, b, c] = Integrator::ALL.map(|it| (it.name(), Some(it)));
+                by_name("integrator", name, [a, b, c, ("auto", None)])?
+            }
         };
         Ok(Settings {
             width,

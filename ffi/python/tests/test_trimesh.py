@@ -185,3 +185,19 @@ def test_a_process_that_was_forked(sphere, rng):
     answer = queue.get(timeout=60)
     child.join()
     assert np.array_equal(answer, expected)
+
+
+def test_copies_are_of_the_same_class():
+    class Own(twincast.RayMeshIntersector):
+        def __init__(self, mesh, extra):
+            super().__init__(mesh)
+            self.extra = extra
+
+    class Mesh:
+        vertices = np.float64([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        faces = np.int64([[0, 1, 2]])
+
+    own = Own(Mesh(), 7)
+    for twin in (copy.copy(own), copy.deepcopy(own)):
+        assert type(twin) is Own and twin.extra == 7 and twin.mesh is own.mesh
+        assert twin.intersects_first([[0.25, 0.25, 1]], [[0, 0, -1]]).tolist() == [0]

@@ -36,7 +36,7 @@ type Fault = (&'static str, String);
 impl<'a> View<'a> {
     /// Checks an accessor whose `type` has to be one of `kinds`.
     pub(super) fn new(document: &'a Document<'_>, index: usize, kinds: &[&str]) -> Result<Self> {
-        Self::told(document, index, |accessor| Self::check(document, accessor, kinds))
+        Self::told(document, index, |accessor| Self::check(document, index, accessor, kinds))
     }
 
     /// The same where the elements were decoded from elsewhere: as 32-bit floats, one after the other.
@@ -83,7 +83,12 @@ impl<'a> View<'a> {
         Ok(Self { count, component, components, normalized, base: None, file: None, sparse: None })
     }
 
-    fn check(document: &'a Document<'_>, accessor: &Accessor, kinds: &[&str]) -> std::result::Result<Self, Fault> {
+    fn check(
+        document: &'a Document<'_>,
+        index: usize,
+        accessor: &Accessor,
+        kinds: &[&str],
+    ) -> std::result::Result<Self, Fault> {
         let mut view = Self::typed(accessor, kinds)?;
         let Self { count, component, components, .. } = view;
         let size = components * component.size();
@@ -100,9 +105,8 @@ impl<'a> View<'a> {
                 Some((range(bytes, accessor.byte_offset, count, stride, size, component)?, stride))
             }
             None => {
-                document
-                    .spend_zeros(accessor.count.saturating_mul(size as u64), MOST_ZEROS)
-                    .map_err(|m| ("/count", m))?;
+                let zeros = accessor.count.saturating_mul(size as u64);
+                document.spend_zeros(index, zeros, MOST_ZEROS).map_err(|m| ("/count", m))?;
                 None
             }
         };

@@ -19,6 +19,8 @@ pub(super) struct Deformation<'d> {
     pub(super) weights: &'d [f32],
     /// Matrices of the joints.
     pub(super) skin: Option<&'d [DAffine3]>,
+    /// Whether triangles turn about: those of a skinned mesh whose node is mirrored.
+    pub(super) is_mirrored: bool,
 }
 
 /// What moves the vertices of one primitive.

@@ -1,6 +1,7 @@
 //! A parsed file with its buffers, and what lies in them.
 
-use std::cell::{Cell, OnceCell};
+use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::uri::{self, Target};
@@ -16,8 +17,9 @@ pub(super) struct Document<'a> {
     buffers: Vec<Bytes<'a>>,
     /// The contents of buffer views that are compressed, once they were asked for.
     decoded: Vec<OnceCell<Vec<u8>>>,
-    /// Bytes that accessors without data stand for so far.
-    zeros: Cell<u64>,
+    /// Accessors without data that were asked for, and the bytes that they stand for.
+    zeros: RefCell<HashSet<usize>>,
+    zero_bytes: Cell<u64>,
     /// Bytes that meshes have taken so far, and the most they may.
     taken: Cell<u64>,
     most: u64,
@@ -72,7 +74,8 @@ impl<'a> Document<'a> {
             root,
             buffers: Vec::new(),
             decoded,
-            zeros: Cell::new(0),
+            zeros: RefCell::default(),
+            zero_bytes: Cell::new(0),
             taken: Cell::new(0),
             // Decoding makes data a few times larger, sharing between primitives a few times more; a file far beyond that
             // is made to exhaust memory.
@@ -198,10 +201,12 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Counts bytes that accessors without data stand for, up to `most`.
-    pub(super) fn spend_zeros(&self, bytes: u64, most: u64) -> Placeless<()> {
-        self.zeros.set(self.zeros.get().saturating_add(bytes));
-        if self.zeros.get() > most {
+    /// Counts bytes that an accessor without data stands for, up to `most` of all of them: once, for whoever makes memory of them counts that besides.
+    pub(super) fn spend_zeros(&self, accessor: usize, bytes: u64, most: u64) -> Placeless<()> {
+        if self.zeros.borrow_mut().insert(accessor) {
+            self.zero_bytes.set(self.zero_bytes.get().saturating_add(bytes));
+        }
+        if self.zero_bytes.get() > most {
             return Err(format!("accessors without data stand for more than {most} bytes"));
         }
         Ok(())

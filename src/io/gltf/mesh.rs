@@ -26,6 +26,8 @@ struct Shape {
     /// Weights of morph targets, as bits; none where no target counts.
     weights: Vec<u32>,
     skin: Option<usize>,
+    /// Whether a skinned mesh's node is mirrored.
+    is_mirrored: bool,
 }
 
 /// The groups of a document's meshes, made when a node first shows them.
@@ -82,12 +84,15 @@ impl<'a> Groups<'a> {
             return Err(document.error(format!("{told_by}/weights"), "a weight that is not finite"));
         }
         let weights = if weights.iter().all(|weight| *weight == 0.0) { &[] } else { weights };
-        let shape = Shape { mesh, weights: weights.iter().map(|weight| weight.to_bits()).collect(), skin: node.skin };
+        // Where its node is does not matter to a skinned mesh, but which side of it is the front.
+        let is_mirrored = node.skin.is_some() && pose.world(index).is_some_and(|at| at.matrix3.determinant() < 0.0);
+        let bits = weights.iter().map(|weight| weight.to_bits()).collect();
+        let shape = Shape { mesh, weights: bits, skin: node.skin, is_mirrored };
         if let Some(known) = self.known.get(&shape) {
             return Ok(*known);
         }
         let joints = node.skin.map(|skin| self.joints(skin, pose, &format!("{pointer}/skin"))).transpose()?;
-        let deformation = Deformation { weights, skin: joints.as_deref().map(Vec::as_slice) };
+        let deformation = Deformation { weights, skin: joints.as_deref().map(Vec::as_slice), is_mirrored };
         let group = self.make(scene, mesh, deformation)?;
         self.known.insert(shape, group);
         Ok(group)
@@ -169,6 +174,9 @@ impl<'a> Groups<'a> {
         let lacks = |set: Option<u32>, view: &Option<View<'_>>| set.is_some() && view.is_none();
         self.bare += usize::from(lacks(sets.0[0], &uvs) || lacks(sets.0[1], &second_uvs));
 
+        if deformation.is_mirrored {
+            triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        }
         attributes.used = compact(triangles.as_flattened_mut(), positions.count);
         // Positions 12, normals 12, uvs 8 a set, colours 16, what deforms 48, and 12 a triangle.
         let is_deformed = deformation.skin.is_some() || !deformation.weights.is_empty();
@@ -185,9 +193,8 @@ impl<'a> Groups<'a> {
         let colors = match colors {
             Some(view) => {
                 let alpha = if view.components() == 4 { Vec4::ZERO } else { Vec4::W };
-                // Where there are targets these may leave the range of colours.
-                let most = if deformation.weights.is_empty() { Vec4::INFINITY } else { Vec4::ONE };
-                let color = |color| (Vec4::from(color) + alpha).clamp(Vec4::ZERO, most);
+                // With what displaces them they may leave the range of colours, which the specification cuts either way.
+                let color = |color| (Vec4::from(color) + alpha).clamp(Vec4::ZERO, Vec4::ONE);
                 Displacements::read(&attributes, targets, ("COLOR_0", &["VEC3", "VEC4"]), &view, color)?
             }
             None => Vec::new(),

@@ -92,7 +92,7 @@ fn read(path: &Path, file: &Mapped<'_>, options: &LoadOptions, warnings: &mut Ve
         let message = format!("{} bytes after the end that the header gives are ignored", parts.rest);
         warnings.push(Warning::new(path, format!("byte {}", file.len() - parts.rest), message));
     }
-    let root: schema::Root = serde_json::from_slice(parts.json).map_err(|e| {
+    let root = schema::parse(parts.json).map_err(|e| {
         let place = format!("line {}, column {}", e.line(), e.column());
         // The place is in the library's own message too.
         let message = e.to_string();

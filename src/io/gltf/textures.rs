@@ -25,6 +25,8 @@ pub(super) struct Textures<'a> {
     known: HashMap<(usize, [u32; 6], bool), u32>,
     /// By what glTF's images are made of; None where the file is missing.
     pictures: HashMap<Source<'a>, Option<Texture>>,
+    /// The same by the image: to look at what it is made of takes as long as that is.
+    images: HashMap<usize, Option<Texture>>,
     /// By the address of a picture's pixels, and whether as numbers.
     means: HashMap<(usize, bool), Vec4>,
     pub(super) warnings: Vec<Warning>,
@@ -109,6 +111,7 @@ impl<'a> Textures<'a> {
             list: Vec::new(),
             known: HashMap::new(),
             pictures: HashMap::new(),
+            images: HashMap::new(),
             means: HashMap::new(),
             warnings: Vec::new(),
         }
@@ -194,13 +197,18 @@ impl<'a> Textures<'a> {
             return Ok(None);
         };
         document.check_index(&format!("/textures/{index}/{told_by}"), image, root.images.len(), "image")?;
-        Ok(match self.pictures.entry(Source::of(document, image)?) {
+        if let Some(known) = self.images.get(&image) {
+            return Ok(known.clone());
+        }
+        let picture = match self.pictures.entry(Source::of(document, image)?) {
             Entry::Occupied(known) => known.get().clone(),
             Entry::Vacant(free) => {
                 let picture = decoded(document, image, free.key(), &mut self.warnings)?;
                 free.insert(picture).clone()
             }
-        })
+        };
+        self.images.insert(image, picture.clone());
+        Ok(picture)
     }
 }
 

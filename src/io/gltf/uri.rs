@@ -25,6 +25,7 @@ pub(super) fn resolve(base: &Path, uri: &str) -> Placeless<Target> {
         let (head, data) = rest.split_once(',').ok_or("a data URI without a comma")?;
         let last = head.rsplit_once(';').map_or("", |(_, last)| last);
         return match last.trim().eq_ignore_ascii_case("base64") {
+            true if data.contains('%') => base64(&percent(data)?).map(Target::Data),
             true => base64(data.as_bytes()).map(Target::Data),
             false => percent(data).map(Target::Data),
         };
@@ -118,6 +119,7 @@ mod tests {
         let base = Path::new("models/a.gltf");
         assert_eq!(resolve(base, "my%20tex.png"), Ok(Target::File("models/my tex.png".into())));
         assert_eq!(resolve(base, "data:,a%2Cb"), Ok(Target::Data(b"a,b".to_vec())));
+        assert_eq!(resolve(base, "data:;base64,Zm9%2FYg%3D%3D"), Ok(Target::Data(b"fo\x7fb".to_vec())));
         for head in ["data:image/png;base64", "data:;BASE64", "DATA:text/plain;charset=x; base64"] {
             assert_eq!(resolve(base, &format!("{head},Zg==")), Ok(Target::Data(b"f".to_vec())), "{head}");
         }

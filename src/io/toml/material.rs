@@ -139,7 +139,7 @@ fn absorption(table: &mut Table<'_>, transmission: Vec3, interface: Interface) -
             Err(table.fault("\"attenuation_color\" is for what lets light through: give it a \"transmission\""))
         }
         (Some(_), Some(_)) if interface == Interface::Thin => Err(table.fault(
-            "\"attenuation_color\" is for what has an inside, and \"thin\" glass has none; give it a \"transmission\"",
+            "\"attenuation_color\" is for what has an inside, and \"thin\" glass has none; leave out one of the two",
         )),
         (Some(color), Some(distance)) => Ok(Some(Absorption { color, distance })),
         (None, None) => Ok(None),

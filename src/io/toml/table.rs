@@ -56,7 +56,20 @@ impl<'t> Table<'t> {
 
     /// The value of a key that must be there.
     pub(super) fn need(&mut self, key: &'static str) -> Read<Value<'t>> {
-        self.get(key).ok_or_else(|| self.fault(format!("{} lacks {key:?}", self.name)))
+        let found = self.get(key);
+        let lacks = || self.fault(format!("{} lacks {key:?}", self.name));
+        found.ok_or_else(|| self.misspelt(key).unwrap_or_else(lacks))
+    }
+
+    /// That a key stands there which nobody has asked for so far, and which is nearly `key`.
+    fn misspelt(&self, key: &str) -> Option<Fault> {
+        let mut others = self.entries.keys().filter(|other| !self.asked.contains(&other.get_ref().as_ref()));
+        others.find_map(|other| {
+            let word = other.get_ref().as_ref();
+            let near = suggestion(word, [key]);
+            let message = || format!("{} has no key {}{near}", self.name, quoted(word.as_bytes()));
+            (!near.is_empty()).then(|| Fault { at: other.span().start, message: message() })
+        })
     }
 
     /// The value of a key as `read` has it, if it is there.
@@ -235,6 +248,7 @@ impl<'t> Value<'t> {
     pub(super) fn table(self, name: String) -> Read<Table<'t>> {
         match self.value {
             DeValue::Table(entries) => Ok(Table::new(entries, self.at, name)),
+            DeValue::Array(_) => Err(self.fault(format!("several tables [[{0}]] where one is; write [{0}]", self.key))),
             _ => Err(self.unlike("a table")),
         }
     }

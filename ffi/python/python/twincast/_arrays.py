@@ -60,7 +60,8 @@ def indices(name: str, value: Any, columns: int = 3) -> np.ndarray:
         Where its shape is another, or a number is below 0 or above 2**32 - 1.
     """
     array = _array(name, value)
-    if array.size == 0:
+    # An empty list has neither columns nor a type of its own.
+    if array.shape in ((0,), (0, columns)) and array.dtype.kind in "Oiuf":
         return np.zeros((0, columns), dtype=np.uint32)
     if array.dtype.kind == "O":
         _check_objects(name, array, numbers.Integral, "integers")

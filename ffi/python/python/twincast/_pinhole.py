@@ -19,6 +19,10 @@ def rays_looking_at(
     if not 0 < fov_deg < 180:
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
     center, eye, up = (_arrays.vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
+    for name, vector in [("center", center), ("eye", eye), ("up", up)]:
+        # Of what is longer, or shorter, a float does not hold the square.
+        if not (size := np.abs(vector).max()) <= 1e100 or name == "up" and 0 < size < 1e-100:
+            raise ValueError(f"{name} must have a length from 1e-100 to 1e100, not {vector.tolist()}")
     ahead = center - eye
     # Open3D's camera has x to the left and y up, so that its pictures are turned by half a turn; who is used to that turns them back.
     left = np.cross(up, ahead)

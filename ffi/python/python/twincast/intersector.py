@@ -154,7 +154,10 @@ class RayMeshIntersector:
         self.__dict__.update(state)
 
     def __copy__(self) -> RayMeshIntersector:
-        return RayMeshIntersector(self.mesh, self._scale_to_box, threads=self._threads)
+        # Of a class that is derived from this one with all that it has besides.
+        twin = object.__new__(type(self))
+        twin.__setstate__(self.__getstate__())
+        return twin
 
     def __deepcopy__(self, memo: dict[int, Any]) -> RayMeshIntersector:
         # As trimesh's: the copy asks the same mesh.

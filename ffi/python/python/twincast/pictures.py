@@ -108,19 +108,21 @@ def render(
     }
     if eye is not None and camera is not None:
         raise ValueError("camera must be left out where eye is given: either says where the view is from")
-    for name, value in [("up_axis", up_axis), ("unit", unit), ("normals", normals)]:
-        _arguments.text(name, value)
+    for name, value in [("up_axis", up_axis), ("unit", unit)]:
+        if not isinstance(value, str):
+            raise TypeError(f"{name} must be a string, not {value!r}")
+    _arguments.text("normals", normals)
     is_file = isinstance(scene, (str, os.PathLike))
     if not is_file and (up_axis, unit) != ("y", "m"):
         raise ValueError("up_axis and unit are those of a file: meshes are taken as they are")
     meshes = None if is_file else _meshes(scene)
     wishes["view"] = _view(meshes, eye, look_at, up, fov)
     if meshes is not None:
-        return _native.render_meshes(meshes, wishes, normals or "flat")
+        return _native.render_meshes(meshes, wishes, "flat" if normals is None else normals)
     path = os.fspath(scene)
     if not os.path.exists(path):
         raise FileNotFoundError(f"no such scene file: {path}")
-    picture, complaints = _native.render_file(path, wishes, up_axis, unit, normals or "file")
+    picture, complaints = _native.render_file(path, wishes, up_axis, unit, "file" if normals is None else normals)
     for complaint in complaints:
         warnings.warn(complaint, stacklevel=2)
     return picture

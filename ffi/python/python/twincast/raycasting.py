@@ -274,7 +274,7 @@ class RaycastingScene(Meshes):
         """
         from ._pinhole import rays_from_matrices, rays_looking_at
 
-        by_matrices = bool({"intrinsic_matrix", "extrinsic_matrix"} & kwargs.keys()) or bool(args and np.ndim(args[0]))
+        by_matrices = bool({"intrinsic_matrix", "extrinsic_matrix"} & kwargs.keys()) or bool(args and len(args) + len(kwargs) < 5 and np.ndim(args[0]))
         make = rays_from_matrices if by_matrices else rays_looking_at
         return make(*args, **kwargs).view(Result)
 

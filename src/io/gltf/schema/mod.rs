@@ -16,6 +16,31 @@ pub(super) use motion::{Animation, AnimationSampler, Skin};
 
 pub(super) type Extensions = Map<String, Value>;
 
+/// Reads the JSON of a file.
+///
+/// # Errors
+/// What is wrong with it, and where.
+pub(super) fn parse(json: &[u8]) -> serde_json::Result<Root> {
+    serde_json::from_slice(json).or_else(|error| {
+        // Whole numbers may be written as `3.0` or `5.126e3`, and of a key that is there twice the last counts: both are rare enough for a second look.
+        let plain = serde_json::from_slice(json).ok().and_then(|value| serde_json::from_value(plain(value)).ok());
+        plain.ok_or(error)
+    })
+}
+
+/// The same with whole numbers written as that.
+fn plain(value: Value) -> Value {
+    match value {
+        Value::Number(number) => match number.as_f64() {
+            Some(whole) if number.is_f64() && whole.trunc() == whole && whole.abs() < 9e15 => Value::from(whole as i64),
+            _ => Value::Number(number),
+        },
+        Value::Array(values) => values.into_iter().map(plain).collect(),
+        Value::Object(members) => members.into_iter().map(|(key, value)| (key, plain(value))).collect(),
+        other => other,
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root {
