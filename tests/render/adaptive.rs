@@ -207,8 +207,8 @@ fn settings_that_do_not_go_together_are_refused() {
     let world = World::new(&scene).unwrap();
     for (settings, words) in [
         (Settings { adaptive: to(0.0, 64), ..settings(8, 8, 4) }, "above 0"),
-        (Settings { adaptive: to(0.1, 8), ..settings(8, 8, 4) }, "at least 16"),
-        (Settings { adaptive: to(0.1, 99), ..settings(8, 8, 100) }, "at least 100"),
+        (Settings { adaptive: to(0.1, 8), ..settings(8, 8, 4) }, "needs 16 at least"),
+        (Settings { adaptive: to(0.1, 99), ..settings(8, 8, 100) }, "needs 100 at least"),
         (Settings { adaptive: to(0.1, 64), sampling: Sampling::Stratified, ..settings(8, 8, 4) }, "take sobol"),
         (Settings { tile: 24, ..settings(8, 8, 4) }, "tiles of 24x24"),
     ] {
