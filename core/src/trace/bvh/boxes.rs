@@ -94,6 +94,20 @@ impl BoxTree {
         self.end.iter().fold(self.tree.bounds(), |bounds, end| bounds.union(end.bounds()))
     }
 
+    /// Of what moves, at time 0.
+    pub(super) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Whether any of them moves.
+    pub(super) fn moves(&self) -> bool {
+        self.end.is_some()
+    }
+
+    pub(super) fn isa(&self) -> Present {
+        self.isa
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.tree.is_empty()

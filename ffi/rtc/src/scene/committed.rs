@@ -87,6 +87,9 @@ pub struct Placed {
     pub to_scene: DAffine3,
     pub scene: Arc<Scene>,
     pub mask: u32,
+    /// Which instance it is.
+    pub geometry: u32,
+    pub primitive: u32,
 }
 
 impl Placed {
@@ -94,7 +97,8 @@ impl Placed {
     pub fn new(record: &Record, item: Item) -> Option<Self> {
         let Body::Instances(instances) = &record.body else { return None };
         let Instance { scene, to_scene, .. } = instances.get(item.primitive as usize)?;
-        Some(Self { to_scene: (*to_scene)?, scene: Arc::clone(scene), mask: record.mask })
+        let Item { geometry, primitive, .. } = item;
+        Some(Self { to_scene: (*to_scene)?, scene: Arc::clone(scene), mask: record.mask, geometry, primitive })
     }
 }
 
@@ -178,6 +182,12 @@ impl Committed {
     /// The same, taken away.
     pub fn take_solids(&mut self) -> Vec<Solid> {
         self.solid.take().into_iter().chain(self.smaller.drain(..)).collect()
+    }
+
+    /// All that is no triangle of its own, where that is instances that stand still, in the order of [`Committed::others`].
+    #[inline(always)]
+    pub fn only_placed(&self) -> Option<&[Placed]> {
+        (self.placed.len() == self.items.len()).then_some(&self.placed[..])
     }
 
     /// Whether these name each primitive in them, once.

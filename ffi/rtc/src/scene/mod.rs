@@ -17,7 +17,7 @@ use crate::device::{Callback, Device};
 use crate::failure::{Failure, Result};
 use crate::geometry::Geometry;
 
-pub use committed::{Body, Committed, Instance, Item, Record};
+pub use committed::{Body, Committed, Instance, Item, Placed, Record};
 pub use near::Near;
 
 /// What the caller has set.

@@ -8,7 +8,7 @@ use super::offer::{Nearest, Target};
 use super::{Query, round, user};
 use crate::abi::{INVALID_ID, RTCRay};
 use crate::geometry::{Ball, Named};
-use crate::scene::{Body, Committed, Item, Record, Scene};
+use crate::scene::{Body, Committed, Item, Placed, Record, Scene};
 
 /// The ray as the native tracer knows it.
 #[inline(always)]
@@ -216,17 +216,24 @@ fn onwards(target: &Target) -> Search {
 
 /// Among everything that is not a triangle that stands still.
 #[inline(never)]
-fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target, nearest: u32) -> u32 {
+pub fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target: Target, nearest: u32) -> u32 {
     let Some(others) = &committed.others else { return nearest };
     let ray = target.ray();
     let mut nearest = Nearest::of(nearest);
+    let only_placed = committed.only_placed();
     let visitor = &mut |i| {
+        if let Some(placed) = only_placed.and_then(|placed| placed.get(i as usize)) {
+            if placed.mask & ray.mask != 0 {
+                enter::<ANY>(&query, &target, placed, &ray, &mut nearest);
+            }
+            return onwards(&target);
+        }
         let item = committed.items[i as usize];
         if let Some(ball) = committed.balls.get(i as usize) {
             cast_point(committed, &query, &target, item, ball, &ray, &mut nearest);
         } else if let Some(placed) = committed.placed.get(item.placed as usize) {
             if placed.mask & ray.mask != 0 {
-                enter::<ANY>(&query, &target, item, &placed.scene, &placed.to_scene, &ray, &mut nearest);
+                enter::<ANY>(&query, &target, placed, &ray, &mut nearest);
             }
         } else if let Some(record) = committed.record(item.geometry)
             && record.mask & ray.mask != 0
@@ -311,17 +318,25 @@ fn cast_item<const ANY: bool>(
             if let Some(instance) = instances.get(primitive as usize)
                 && instance.motion.is_at(ray.time)
             {
-                enter::<ANY>(query, target, item, &instance.scene, &instance.to_scene(ray.time), ray, nearest);
+                let own = Nearest { geometry, primitive };
+                enter_at::<ANY>(query, target, own, &instance.scene, &instance.to_scene(ray.time), ray, nearest);
             }
         }
     }
 }
 
-/// Takes the ray through an instance: one level deep, as both Debians' Embree is built.
-fn enter<const ANY: bool>(
+/// Takes the ray through an instance that stands still.
+#[inline(always)]
+pub fn enter<const ANY: bool>(query: &Query, target: &Target, placed: &Placed, ray: &RTCRay, nearest: &mut Nearest) {
+    let &Placed { ref scene, ref to_scene, geometry, primitive, .. } = placed;
+    enter_at::<ANY>(query, target, Nearest { geometry, primitive }, scene, to_scene, ray, nearest);
+}
+
+/// Takes the ray through instance `own`: one level deep, as both Debians' Embree is built.
+fn enter_at<const ANY: bool>(
     query: &Query,
     target: &Target,
-    Item { geometry, primitive, .. }: Item,
+    own: Nearest,
     scene: &Scene,
     to_scene: &DAffine3,
     ray: &RTCRay,
@@ -336,11 +351,10 @@ fn enter<const ANY: bool>(
     let [org, dir] = [ray.org, ray.dir].map(|v| DVec3::from(v.map(f64::from)));
     let (org, dir) = (to_scene.transform_point3(org).as_vec3(), to_scene.transform_vector3(dir).as_vec3());
     // At the distance of the hit so far everything in here is, or nothing: as if none had been hit, or the lowest that can be.
-    let own = Nearest { geometry, primitive };
     let before = if *nearest <= own { 0 } else { INVALID_ID };
     let tfar = target.tfar();
     let mut now = before;
-    within(query, geometry, primitive, || {
+    within(query, own.geometry, own.primitive, || {
         target.set_place(org.to_array(), dir.to_array());
         now = cast_inside::<ANY>(committed, query, target, before);
         target.set_place(ray.org, ray.dir);

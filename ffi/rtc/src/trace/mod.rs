@@ -8,11 +8,13 @@
 //! | `round` | points and round curves |
 //! | `lanes` | rays as the caller lays them out: one, packets, streams |
 //! | `packet` | several rays at a time |
+//! | `company` | the same among instances |
 //! | `point` | what is near a point |
 //! | `collide` | what of two scenes may touch |
 
 mod cast;
 mod collide;
+mod company;
 mod lanes;
 mod offer;
 mod packet;

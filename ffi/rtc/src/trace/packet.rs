@@ -8,9 +8,10 @@ use twincast_core::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{Sight, after, cast_one, name_solid, sight};
+use super::company::{self, Crowd};
 use super::lanes::{Lanes, field};
 use super::offer::{Target, hit_of};
-use crate::abi::{RTCRay, RTCRayHit};
+use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
 use crate::scene::Committed;
 
 /// Rays of a packet.
@@ -25,21 +26,14 @@ struct Called<'a, L, V> {
 }
 
 impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
-    /// Calls `two` and `one` with the triangles, packets of rays that see all of them and nothing else, and the first lane; or `alone` with every
-    /// lane that is valid.
+    /// Calls `two` and `one` with packets of rays, which ask for triangles with this mask and nothing else, and their first lane.
     #[inline(always)]
-    fn each(
+    fn each_packet(
         &self,
-        committed: &Committed,
-        query: &Query,
-        any: bool,
-        alone: impl Fn(usize),
+        (solid, mask): (&Bvh, u32),
         two: impl Fn(&Bvh, &Asked<'_, 2>, usize),
         one: impl Fn(&Bvh, &Asked<'_, 1>, usize),
     ) {
-        let Some((solid, mask)) = only_triangles(committed, query, any) else {
-            return (0..self.lanes.count()).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
-        };
         let (count, mut first) = (self.lanes.count(), 0);
         while first + 2 * RAYS <= count {
             // Not an array that is taken apart: it would be copied.
@@ -61,32 +55,47 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         }
     }
 
-    /// The rays from lane `first` on.
+    /// Calls `among` with each packet, its first lane and a bit for each of its rays that is asked for, for what is not triangles alone.
+    fn each_company(&self, among: impl Fn(&Packet, usize, u32)) {
+        let starts = (0..self.lanes.count()).step_by(RAYS);
+        starts.for_each(|first| among(&self.packet_from(first, false), first, self.seeing(first, u32::MAX)));
+    }
+
+    /// Calls `alone` with each lane that is asked for.
+    fn each_lane(&self, alone: impl Fn(usize)) {
+        (0..self.lanes.count()).filter(|&lane| (self.is_valid)(lane)).for_each(alone);
+    }
+
+    /// The rays from lane `first` on, for triangles.
     #[inline(always)]
     fn packet(&self, first: usize) -> Packet {
-        let Self { lanes, excludes_start, .. } = self;
-        if first + RAYS > lanes.count() {
-            return self.rest(first);
-        }
-        let row = |word| lanes.row::<RAYS>(word, first).map(f32::from_bits);
-        let start = row(field::TNEAR);
-        // Where it is wanted, at once: what is changed afterwards may be copied.
-        Packet {
-            origin: [row(field::ORIGIN), row(field::ORIGIN + 1), row(field::ORIGIN + 2)],
-            tmin: if *excludes_start { start.map(after) } else { start },
-            direction: [row(field::DIRECTION), row(field::DIRECTION + 1), row(field::DIRECTION + 2)],
-            tmax: row(field::TFAR),
-            ..Packet::NONE
+        self.packet_from(first, self.excludes_start)
+    }
+
+    /// The same; where wanted, from behind their beginnings.
+    #[inline(always)]
+    fn packet_from(&self, first: usize, excludes_start: bool) -> Packet {
+        let lanes = self.lanes;
+        match lanes.count() - first {
+            RAYS.. => packet_of(|word| lanes.row::<RAYS>(word, first), excludes_start),
+            4 => {
+                let row = |word| {
+                    let [a, b, c, d] = lanes.row::<4>(word, first);
+                    [a, b, c, d, a, b, c, d]
+                };
+                packet_of(row, excludes_start)
+            }
+            _ => self.rest(first, excludes_start),
         }
     }
 
     /// The rays from lane `first` on, which are fewer than a packet.
     #[inline(always)]
-    fn rest(&self, first: usize) -> Packet {
+    fn rest(&self, first: usize, excludes_start: bool) -> Packet {
         let mut packet = Packet::NONE;
         for lane in first..self.lanes.count() {
             let mut ray = super::cast::native(&self.lanes.ray(lane));
-            if self.excludes_start {
+            if excludes_start {
                 ray.tmin = after(ray.tmin);
             }
             packet.set(lane - first, &ray);
@@ -113,10 +122,25 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     }
 }
 
+/// A packet of rows of words; where wanted, of rays from behind their beginnings.
+#[inline(always)]
+fn packet_of(row: impl Fn(usize) -> [u32; RAYS], excludes_start: bool) -> Packet {
+    let row = |word| row(word).map(f32::from_bits);
+    let start = row(field::TNEAR);
+    // Where it is wanted, at once: what is changed afterwards may be copied.
+    Packet {
+        origin: [row(field::ORIGIN), row(field::ORIGIN + 1), row(field::ORIGIN + 2)],
+        tmin: if excludes_start { start.map(after) } else { start },
+        direction: [row(field::DIRECTION), row(field::DIRECTION + 1), row(field::DIRECTION + 2)],
+        tmax: row(field::TFAR),
+        ..Packet::NONE
+    }
+}
+
 /// The triangles, where there is nothing else and no filter is run, and the mask with which rays must have a bit in common to see all of them; the
 /// others see none.
 #[inline(always)]
-fn only_triangles<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
+pub fn only_triangles<'a>(committed: &'a Committed, query: &Query, any: bool) -> Option<(&'a Bvh, u32)> {
     let mask = committed.heeded.mask?;
     let solid = &committed.solid.as_ref().filter(|_| committed.smaller.is_empty() && committed.others.is_none())?.bvh;
     (sight(committed, query, mask, any) == Sight::Everything).then_some((solid, mask))
@@ -130,18 +154,26 @@ pub fn intersect_lanes(
     lanes: &impl Lanes<Record = RTCRayHit>,
     is_valid: impl Fn(usize) -> bool,
 ) {
-    let alone = |lane: usize| intersect_lane(committed, query, lanes, lane);
-    let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
-        solid.closest_packets(asked, |[low, high]| {
-            tell(committed, query, lanes, first, low);
-            tell(committed, query, lanes, first + RAYS, high);
-        });
-    };
-    let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
-        solid.closest_packets(asked, |[hits]| tell(committed, query, lanes, first, hits));
-    };
     // Hits where rays begin are seen afterwards: there are none, nearly always.
-    Called { lanes, excludes_start: false, is_valid }.each(committed, query, false, alone, two, one);
+    let called = Called { lanes, excludes_start: false, is_valid };
+    if let Some(triangles) = only_triangles(committed, query, false) {
+        let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
+            solid.closest_packets(asked, |[low, high]| {
+                tell(committed, query, lanes, first, low);
+                tell(committed, query, lanes, first + RAYS, high);
+            });
+        };
+        let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
+            solid.closest_packets(asked, |[hits]| tell(committed, query, lanes, first, hits));
+        };
+        called.each_packet(triangles, two, one);
+    } else if let Some(crowd) = Crowd::new(committed, query, false) {
+        called.each_company(|packet, first, asked| {
+            company::closest(committed, &crowd, query, lanes, first, packet, asked);
+        });
+    } else {
+        called.each_lane(|lane| intersect_lane(committed, query, lanes, lane));
+    }
 }
 
 /// The nearest hit of one ray.
@@ -159,7 +191,7 @@ fn intersect_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane
 
 /// Writes the hits of the rays from lane `first` on.
 #[inline(always)]
-fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits) {
+pub fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, hits: &PacketHits) {
     if hits.lanes == 0 {
         return;
     }
@@ -186,6 +218,13 @@ fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usize, 
     lanes.set_row(field::INSTANCE, first, [context.instance; RAYS]);
     #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
     lanes.set_row(field::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
+}
+
+/// The geometry that a ray has hit, or the instance that this is in.
+pub fn named_at(lanes: &impl Lanes, lane: usize) -> u32 {
+    let [geometry] = lanes.row(field::GEOMETRY, lane);
+    let [instance] = lanes.row(field::INSTANCE, lane);
+    if instance == INVALID_ID { geometry } else { instance }
 }
 
 /// A bit for each ray that was hit where it begins.
@@ -245,26 +284,38 @@ pub fn occluded_lanes(
     lanes: &impl Lanes<Record = RTCRay>,
     is_valid: impl Fn(usize) -> bool,
 ) {
-    let alone = |lane: usize| {
-        let mut ray = lanes.ray(lane);
-        // SAFETY: it is ours.
-        let target = unsafe { Target::any(&raw mut ray) };
-        cast_one::<true>(committed, query, &target);
-        lanes.set_tfar(lane, target.tfar());
-    };
-    let end = |first: usize, mut occluded: u32| {
-        while occluded != 0 {
-            lanes.set_tfar(first + occluded.trailing_zeros() as usize, f32::NEG_INFINITY);
-            occluded &= occluded - 1;
-        }
-    };
-    let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
-        let [low, high] = solid.occluded_packets(asked);
-        end(first, low | high << RAYS);
-    };
-    let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
-        let [occluded] = solid.occluded_packets(asked);
-        end(first, occluded);
-    };
-    Called { lanes, excludes_start: committed.excludes_start, is_valid }.each(committed, query, true, alone, two, one);
+    let called = Called { lanes, excludes_start: committed.excludes_start, is_valid };
+    if let Some(triangles) = only_triangles(committed, query, true) {
+        let end = |first: usize, mut occluded: u32| {
+            while occluded != 0 {
+                lanes.set_tfar(first + occluded.trailing_zeros() as usize, f32::NEG_INFINITY);
+                occluded &= occluded - 1;
+            }
+        };
+        let two = |solid: &Bvh, asked: &Asked<'_, 2>, first: usize| {
+            let [low, high] = solid.occluded_packets(asked);
+            end(first, low | high << RAYS);
+        };
+        let one = |solid: &Bvh, asked: &Asked<'_, 1>, first: usize| {
+            let [occluded] = solid.occluded_packets(asked);
+            end(first, occluded);
+        };
+        called.each_packet(triangles, two, one);
+    } else if let Some(crowd) = Crowd::new(committed, query, true) {
+        called.each_company(|packet, first, asked| {
+            company::occluded(committed, &crowd, query, lanes, first, packet, asked);
+        });
+    } else {
+        called.each_lane(|lane| occluded_lane(committed, query, lanes, lane));
+    }
+}
+
+/// Whether one ray hits anything.
+#[inline(always)]
+fn occluded_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane: usize) {
+    let mut ray = lanes.ray(lane);
+    // SAFETY: it is ours.
+    let target = unsafe { Target::any(&raw mut ray) };
+    cast_one::<true>(committed, query, &target);
+    lanes.set_tfar(lane, target.tfar());
 }

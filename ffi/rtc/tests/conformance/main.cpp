@@ -13,6 +13,7 @@ void packets();
 void motions();
 void starts();
 void ties();
+void crowds();
 
 int main() {
   const struct {
@@ -20,7 +21,7 @@ int main() {
     void (*run)();
   } groups[] = {{"surfaces", surfaces}, {"changes", changes}, {"callbacks", callbacks},
                 {"rounds", rounds},     {"errors", errors},   {"packets", packets},
-                {"motions", motions},   {"starts", starts},   {"dynamics", dynamics}, {"ties", ties}};
+                {"motions", motions},   {"starts", starts},   {"dynamics", dynamics}, {"ties", ties},         {"crowds", crowds}};
   int all = 0;
   for (const auto& group : groups) {
     checks = failures = 0;

@@ -10,11 +10,14 @@
 //! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
 //!   ([`Doubts`]). So the bits are those of single rays.
 //!
+//! Boxes of which callers know what is in them are walked by the beam alone ([`BoxTree::visit_packet`](super::boxes::BoxTree::visit_packet)).
+//!
 //! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
 //! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
 
 mod alone;
 mod beam;
+mod boxes;
 mod doubts;
 mod finish;
 mod octet;
@@ -27,7 +30,7 @@ use super::alone::{SingleRay, TriangleFound};
 use super::query::{Closest, Occluded};
 use super::simd::isa::{self, Kernel};
 use super::simd::{Array, Mask, Simd, Vector, size};
-use crate::math::Vec3;
+use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 use alone::{ClosestAlone, OccludedAlone};
 use beam::Beam;
@@ -235,7 +238,8 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
     fn run<S: Simd>(self) {
         let Self { bvh, asked, scratch } = self;
         let mut own = None;
-        if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
+        let bounds = bvh.fixed.triangles.tree().bounds();
+        if let Some((asked, beam)) = together::<S, N>(bounds, asked, &mut own) {
             let Scratch { found, hits } = scratch;
             let mut doubts = Doubts::new(found);
             let mut octets = [Octet::nothing(); N];
@@ -266,7 +270,8 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
     fn run<S: Simd>(self) {
         let Self { bvh, asked, scratch, occluded } = self;
         let mut own = None;
-        if let Some((asked, beam)) = together::<S, N>(bvh, asked, &mut own) {
+        let bounds = bvh.fixed.triangles.tree().bounds();
+        if let Some((asked, beam)) = together::<S, N>(bounds, asked, &mut own) {
             let mut doubts = Doubts::new(&mut scratch.found);
             let mut octets = [Octet::nothing(); N];
             way::trace::<S, Occluded, N>(bvh, &asked, &beam, &mut doubts, &mut octets);
@@ -281,10 +286,10 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
     }
 }
 
-/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or one too wide.
+/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or one too wide for what is within `bounds`.
 #[inline(always)]
 fn together<'a, S: Simd, const N: usize>(
-    bvh: &Bvh,
+    bounds: Aabb,
     asked: &Asked<'a, N>,
     own: &'a mut Option<[Packet; N]>,
 ) -> Option<(Asked<'a, N>, Beam)> {
@@ -293,20 +298,48 @@ fn together<'a, S: Simd, const N: usize>(
         *valid = asked.packets[number].valid::<S>() & asked.lanes[number];
         all &= *valid;
     }
-    let packets = if all == 0xff { asked.packets } else { own.insert(only(asked, &valid)?).each_ref() };
-    let beam = Beam::new::<S, N>(&packets, bvh.fixed.triangles.tree().bounds())?;
+    let packets = if all == 0xff { asked.packets } else { own.insert(only::<S, N>(asked, &valid)?).each_ref() };
+    let beam = Beam::new::<S, N>(&packets, bounds)?;
     (!beam.is_wide).then_some((Asked { packets, lanes: valid }, beam))
 }
 
 /// The packets with valid rays alone, and copies of one of these in the other lanes; none where there are none.
-#[cold]
-#[inline(never)]
-fn only<const N: usize>(asked: &Asked<'_, N>, valid: &[u32; N]) -> Option<[Packet; N]> {
+#[inline(always)]
+fn only<S: Simd, const N: usize>(asked: &Asked<'_, N>, valid: &[u32; N]) -> Option<[Packet; N]> {
     let first = valid.iter().position(|&lanes| lanes != 0)?;
-    let ray = asked.packets[first].ray(valid[first].trailing_zeros() as usize % RAYS);
-    let mut packets = asked.packets.map(Packet::clone);
-    for (packet, &valid) in packets.iter_mut().zip(valid) {
-        each(!valid).for_each(|lane| packet.set(lane, &ray));
+    let (source, lane) = (asked.packets[first], valid[first].trailing_zeros() as usize % RAYS);
+    let mut packets = [const { Packet::NONE }; N];
+    for (packet, (other, &valid)) in packets.iter_mut().zip(asked.packets.iter().zip(valid)) {
+        let stays = S::V8::splat(0.5).less(S::V8::load(&LANES[valid as usize % LANES.len()]));
+        for axis in 0..3 {
+            packet.origin[axis] = fill::<S>(stays, &other.origin[axis], source.origin[axis][lane]);
+            packet.direction[axis] = fill::<S>(stays, &other.direction[axis], source.direction[axis][lane]);
+        }
+        packet.tmin = fill::<S>(stays, &other.tmin, source.tmin[lane]);
+        packet.tmax = fill::<S>(stays, &other.tmax, source.tmax[lane]);
     }
     Some(packets)
 }
+
+/// A row, with another number where it does not stay.
+#[inline(always)]
+fn fill<S: Simd>(stays: <S::V8 as Vector>::Mask, row: &[f32; RAYS], other: f32) -> [f32; RAYS] {
+    S::V8::select(stays, S::V8::load(row), S::V8::splat(other)).to_array()
+}
+
+/// For each mask of a packet 1 in the lanes of its bits.
+static LANES: [[f32; RAYS]; 1 << RAYS] = {
+    let mut lanes = [[0.0; RAYS]; 1 << RAYS];
+    let mut mask = 0;
+    while mask < lanes.len() {
+        let mut lane = 0;
+        while lane < RAYS {
+            if mask >> lane & 1 != 0 {
+                lanes[mask][lane] = 1.0;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    lanes
+};

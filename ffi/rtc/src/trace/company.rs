@@ -1,0 +1,262 @@
+//! Several rays at a time among instances that stand still: as long as they go the same way, they go from one scene into the next together.
+
+use twincast_core::math::Vec3;
+use twincast_core::trace::bvh::{Asked, BoxTree, Bvh, Packet, PacketHits, Search};
+
+use super::Query;
+use super::cast::{after, cast_others, enter, name_solid, within};
+use super::lanes::{Lanes, field};
+use super::offer::{Nearest, Target, hit_of};
+use super::packet::{named_at, only_triangles, tell};
+use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
+use crate::scene::{Committed, Placed};
+
+/// Rays of a packet.
+const RAYS: usize = Packet::RAYS;
+
+/// What packets are traced in by [`closest`] and [`occluded`].
+#[derive(Clone, Copy)]
+pub struct Crowd<'a> {
+    boxes: &'a BoxTree,
+    placed: &'a [Placed],
+    /// Which rays see the triangles beside the instances.
+    mask: u32,
+}
+
+impl<'a> Crowd<'a> {
+    /// None where there is anything but triangles that stand still and such instances, or where filters are run.
+    #[inline(always)]
+    pub fn new(committed: &'a Committed, query: &Query, any: bool) -> Option<Self> {
+        let heeded = &committed.heeded;
+        let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
+        // SAFETY: the context is the caller's, which lives as long as the query, or our own.
+        let is_inside = unsafe { (*query.context).instance } != INVALID_ID;
+        if has_filter || query.filter.is_some() || is_inside || !committed.smaller.is_empty() {
+            return None;
+        }
+        let mask = if committed.solid.is_some() { heeded.mask? } else { 0 };
+        Some(Self { boxes: committed.others.as_ref()?, placed: committed.only_placed()?, mask })
+    }
+}
+
+/// Rays on their way.
+struct Company<'a, L> {
+    query: &'a Query,
+    lanes: &'a L,
+    /// Of these the packet's first.
+    first: usize,
+    packet: &'a Packet,
+    /// Which geometries each ray sees.
+    masks: [u32; RAYS],
+    /// Where each ends by now; below 0 for those that have found what they wanted.
+    tmax: [f32; RAYS],
+    nearest: [Nearest; RAYS],
+}
+
+/// The nearest hits of those rays from lane `first` on that `asked` has a bit for.
+pub fn closest(
+    committed: &Committed,
+    crowd: &Crowd<'_>,
+    query: &Query,
+    lanes: &impl Lanes<Record = RTCRayHit>,
+    first: usize,
+    packet: &Packet,
+    asked: u32,
+) {
+    let mut company = Company::new(query, lanes, first, packet, asked);
+    if let Some(solid) = &committed.solid {
+        let seeing = company.seeing(asked, crowd.mask);
+        let triangles = Asked { packets: [packet], lanes: [seeing] };
+        solid.bvh.closest_packets(&triangles, |[hits]| tell(committed, query, lanes, first, hits));
+        company.look_again(seeing);
+    }
+    company.visit::<false>(committed, crowd, asked);
+}
+
+/// Whether each of these rays hits anything.
+pub fn occluded(
+    committed: &Committed,
+    crowd: &Crowd<'_>,
+    query: &Query,
+    lanes: &impl Lanes<Record = RTCRay>,
+    first: usize,
+    packet: &Packet,
+    mut asked: u32,
+) {
+    let mut company = Company::new(query, lanes, first, packet, asked);
+    if let Some(solid) = &committed.solid {
+        let seeing = company.seeing(asked, crowd.mask);
+        let occluded = company.occluded_by(&solid.bvh, packet, committed.excludes_start, seeing);
+        asked &= !occluded;
+    }
+    if asked != 0 {
+        company.visit::<true>(committed, crowd, asked);
+    }
+}
+
+/// The lanes of a bit mask.
+fn each(lanes: u32) -> impl Iterator<Item = usize> {
+    (0..RAYS).filter(move |lane| lanes >> lane & 1 != 0)
+}
+
+impl<'a, L: Lanes> Company<'a, L> {
+    #[inline(always)]
+    fn new(query: &'a Query, lanes: &'a L, first: usize, packet: &'a Packet, asked: u32) -> Self {
+        let mut masks = [0; RAYS];
+        each(asked).for_each(|lane| [masks[lane]] = lanes.row(field::MASK, first + lane));
+        Self { query, lanes, first, packet, masks, tmax: packet.tmax, nearest: [Nearest::of(INVALID_ID); RAYS] }
+    }
+
+    /// Those of some rays that see geometries with a mask.
+    #[inline(always)]
+    fn seeing(&self, lanes: u32, mask: u32) -> u32 {
+        let mut seeing = 0;
+        for (lane, own) in self.masks.iter().enumerate() {
+            seeing |= u32::from(own & mask != 0) << lane;
+        }
+        seeing & lanes
+    }
+
+    /// Where rays end, and what they have hit, as the caller has it now.
+    fn look_again(&mut self, lanes: u32) {
+        for lane in each(lanes) {
+            let [tfar] = self.lanes.row(field::TFAR, self.first + lane).map(f32::from_bits);
+            if tfar != self.tmax[lane] {
+                self.tmax[lane] = tfar;
+                self.nearest[lane] = Nearest::of(named_at(self.lanes, self.first + lane));
+            }
+        }
+    }
+
+    /// Goes through the instances.
+    fn visit<const ANY: bool>(&mut self, committed: &Committed, crowd: &Crowd<'_>, asked: u32) {
+        let packet = self.packet;
+        let Crowd { boxes, placed, .. } = *crowd;
+        let mut visitor = |i: u32, lanes: u32| {
+            let placed = &placed[i as usize];
+            let open = if ANY { self.open(lanes) } else { lanes };
+            let seeing = self.seeing(open, placed.mask);
+            if seeing != 0 {
+                self.enter::<ANY>(boxes, placed, seeing);
+            }
+            self.onwards(lanes)
+        };
+        let are_together = if ANY {
+            boxes.visit_packet_any(packet, asked, &mut visitor)
+        } else {
+            boxes.visit_packet(packet, asked, &mut visitor)
+        };
+        if !are_together {
+            let query = *self.query;
+            for lane in each(asked) {
+                self.alone::<ANY>(lane, |target, nearest| {
+                    nearest.geometry = cast_others::<ANY>(committed, query, *target, nearest.geometry);
+                });
+            }
+        }
+    }
+
+    /// Those of some rays that still want something.
+    #[inline(always)]
+    fn open(&self, lanes: u32) -> u32 {
+        let mut open = 0;
+        for (lane, tmax) in self.tmax.iter().enumerate() {
+            open |= u32::from(*tmax >= 0.0) << lane;
+        }
+        open & lanes
+    }
+
+    /// How far they still look, all together.
+    #[inline(always)]
+    fn onwards(&self, lanes: u32) -> Search {
+        let most = each(lanes).map(|lane| self.tmax[lane]).fold(f32::NEG_INFINITY, f32::max);
+        if most < 0.0 { Search::Break(()) } else { Search::Continue(most.next_up()) }
+    }
+
+    /// Takes rays through an instance.
+    #[inline(always)]
+    fn enter<const ANY: bool>(&mut self, boxes: &BoxTree, placed: &Placed, seeing: u32) {
+        let Placed { to_scene, scene, geometry, primitive, .. } = placed;
+        // SAFETY: scenes are not committed while rays are traced: the interface's rule.
+        let Some(inner) = (unsafe { scene.committed() }) else { return };
+        let mut alone = seeing;
+        if let Some((solid, mask)) = only_triangles(inner, self.query, ANY) {
+            let seeing = self.seeing(seeing, mask);
+            let packet = boxes.placed(self.packet, to_scene, &self.tmax);
+            alone = 0;
+            if ANY {
+                self.occluded_by(solid, &packet, inner.excludes_start, seeing);
+            } else {
+                let asked = Asked { packets: [&packet], lanes: [seeing] };
+                within(self.query, *geometry, *primitive, || {
+                    solid.closest_packets(&asked, |[hits]| alone = self.take(inner, placed, hits));
+                });
+            }
+        }
+        let query = *self.query;
+        for lane in each(alone) {
+            self.alone::<ANY>(lane, |target, nearest| enter::<ANY>(&query, target, placed, &target.ray(), nearest));
+        }
+    }
+
+    /// Has those rays end that triangles are in the way of: a bit for each.
+    #[inline(always)]
+    fn occluded_by(&mut self, solid: &Bvh, packet: &Packet, excludes_start: bool, seeing: u32) -> u32 {
+        let beyond = excludes_start.then(|| Packet { tmin: packet.tmin.map(after), ..packet.clone() });
+        let packet = beyond.as_ref().unwrap_or(packet);
+        let [occluded] = solid.occluded_packets(&Asked { packets: [packet], lanes: [seeing] });
+        for lane in each(occluded) {
+            self.tmax[lane] = f32::NEG_INFINITY;
+            self.lanes.set_tfar(self.first + lane, f32::NEG_INFINITY);
+        }
+        occluded
+    }
+
+    /// Takes hits in an instance, those that are nearer, or as near and lower. A bit for each ray that is to be traced by itself: one that was hit where it begins, and
+    /// that does not count.
+    #[inline(always)]
+    fn take(&mut self, inner: &Committed, placed: &Placed, hits: &PacketHits) -> u32 {
+        let own = Nearest { geometry: placed.geometry, primitive: placed.primitive };
+        let mut alone = 0;
+        for lane in each(hits.lanes) {
+            let t = hits.t[lane];
+            if inner.excludes_start && t == self.packet.tmin[lane] {
+                alone |= 1 << lane;
+                continue;
+            }
+            if t == self.tmax[lane] && self.nearest[lane] <= own {
+                continue;
+            }
+            let ng = Vec3::from(hits.normal.map(|row| row[lane]));
+            let (geometry, primitive) = (hits.geometry[lane], hits.primitive[lane]);
+            if let Some(named) = name_solid(inner, geometry, primitive, [hits.u[lane], hits.v[lane]], ng) {
+                self.lanes.set_hit(self.first + lane, t, &hit_of(self.query, geometry, &named));
+                (self.tmax[lane], self.nearest[lane]) = (t, own);
+            }
+        }
+        alone
+    }
+
+    /// Has `work` trace a ray by itself, and told what is as near as where it ends.
+    fn alone<const ANY: bool>(&mut self, lane: usize, work: impl FnOnce(&Target, &mut Nearest)) {
+        let at = self.first + lane;
+        let nearest = &mut self.nearest[lane];
+        if ANY {
+            let mut ray = self.lanes.ray(at);
+            // SAFETY: it is ours.
+            let target = unsafe { Target::any(&raw mut ray) };
+            work(&target, nearest);
+            self.tmax[lane] = target.tfar();
+            self.lanes.set_tfar(at, target.tfar());
+            return;
+        }
+        let mut own = RTCRayHit { ray: self.lanes.ray(at), hit: self.lanes.hit(at) };
+        let own = &raw mut own;
+        // SAFETY: it is ours, and used through this pointer alone.
+        let target = unsafe { Target::closest(own) };
+        work(&target, nearest);
+        self.tmax[lane] = target.tfar();
+        // SAFETY: as above.
+        self.lanes.set_hit(at, target.tfar(), unsafe { &(*own).hit });
+    }
+}
