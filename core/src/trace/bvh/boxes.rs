@@ -99,6 +99,11 @@ impl BoxTree {
         &self.tree
     }
 
+    /// How many.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
     /// Whether any of them moves.
     pub(super) fn moves(&self) -> bool {
         self.end.is_some()

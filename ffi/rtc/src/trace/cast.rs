@@ -221,6 +221,13 @@ pub fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target:
     let ray = target.ray();
     let mut nearest = Nearest::of(nearest);
     let only_placed = committed.only_placed();
+    if let Some([placed]) = only_placed {
+        // Its own tree tells as fast as one over its box that nothing is there.
+        if placed.mask & ray.mask != 0 && native(&ray).is_valid() {
+            enter::<ANY>(&query, &target, placed, &ray, &mut nearest);
+        }
+        return nearest.geometry;
+    }
     let visitor = &mut |i| {
         if let Some(placed) = only_placed.and_then(|placed| placed.get(i as usize)) {
             if placed.mask & ray.mask != 0 {

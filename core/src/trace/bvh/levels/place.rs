@@ -113,20 +113,7 @@ impl Place {
     pub fn eight<S: Simd>(&self, world: [S::V8; 8]) -> EightRays<S::V8> {
         let splat = S::V8::splat;
         let [x, y, z, dx, dy, dz, tmin, tmax] = world;
-        let [mx, my, mz, b] = self.columns();
-        let origin = [halves::<S>(x), halves::<S>(y), halves::<S>(z)];
-        let direction = [halves::<S>(dx), halves::<S>(dy), halves::<S>(dz)];
-        let (mut points, mut vectors) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
-        for axis in 0..3 {
-            let m = [S::D4::splat(mx[axis]), S::D4::splat(my[axis]), S::D4::splat(mz[axis])];
-            let offset = S::D4::splat(b[axis]);
-            for half in 0..2 {
-                let point = row_times::<S>(m, [origin[0][half], origin[1][half], origin[2][half]]).add(offset);
-                points[axis].as_chunks_mut().0[half] = point.narrow().to_array();
-                let vector = row_times::<S>(m, [direction[0][half], direction[1][half], direction[2][half]]);
-                vectors[axis].as_chunks_mut().0[half] = vector.narrow().to_array();
-            }
-        }
+        let (points, vectors) = eight_times::<S>(self.columns(), [x, y, z], [dx, dy, dz]);
         let [lx, ly, lz] = [S::V8::load(&points[0]), S::V8::load(&points[1]), S::V8::load(&points[2])];
         let [lp, lq, lr] = [S::V8::load(&vectors[0]), S::V8::load(&vectors[1]), S::V8::load(&vectors[2])];
         let [relative, absolute] = self.off();
@@ -267,6 +254,30 @@ impl<V: Vector> EightRays<V> {
 #[inline(always)]
 fn row_times<S: Simd>([a, b, c]: [S::D4; 3], [x, y, z]: [S::D4; 3]) -> S::D4 {
     a.mul(x).add(b.mul(y)).add(c.mul(z))
+}
+
+/// Points and vectors, eight of each, times a matrix: its columns, and a translation that counts for points alone. Sums are added up in the order of
+/// [`DAffine3::transform_point3`].
+#[inline(always)]
+pub(in crate::trace::bvh) fn eight_times<S: Simd>(
+    [mx, my, mz, b]: &[[f64; 3]; 4],
+    [x, y, z]: [S::V8; 3],
+    [dx, dy, dz]: [S::V8; 3],
+) -> ([[f32; 8]; 3], [[f32; 8]; 3]) {
+    let origin = [halves::<S>(x), halves::<S>(y), halves::<S>(z)];
+    let direction = [halves::<S>(dx), halves::<S>(dy), halves::<S>(dz)];
+    let (mut points, mut vectors) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+    for axis in 0..3 {
+        let m = [S::D4::splat(mx[axis]), S::D4::splat(my[axis]), S::D4::splat(mz[axis])];
+        let offset = S::D4::splat(b[axis]);
+        for half in 0..2 {
+            let point = row_times::<S>(m, [origin[0][half], origin[1][half], origin[2][half]]).add(offset);
+            points[axis].as_chunks_mut().0[half] = point.narrow().to_array();
+            let vector = row_times::<S>(m, [direction[0][half], direction[1][half], direction[2][half]]);
+            vectors[axis].as_chunks_mut().0[half] = vector.narrow().to_array();
+        }
+    }
+    (points, vectors)
 }
 
 /// A matrix, column by column, times a vector.

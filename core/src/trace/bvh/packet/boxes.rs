@@ -6,6 +6,7 @@ use super::{Asked, Packet, RAYS, together};
 use crate::math::DAffine3;
 use crate::trace::bvh::alone::Search;
 use crate::trace::bvh::boxes::BoxTree;
+use crate::trace::bvh::levels::place::eight_times;
 use crate::trace::bvh::query::{Closest, Occluded, Query};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::simd::isa::{self, Kernel};
@@ -13,7 +14,7 @@ use crate::trace::bvh::walk::{self, Visit};
 
 impl BoxTree {
     /// [`BoxTree::visit`] of those rays of a packet that `lanes` has a bit for, as one: names boxes that any of them may enter, up to the t that `visitor` returns
-    /// last. Not where they go different ways, or boxes move: then none is named, and the answer is no.
+    /// last; one that is alone at once, by whoever is valid. Not where they go different ways, or boxes move: then none is named, and the answer is no.
     pub fn visit_packet(&self, packet: &Packet, lanes: u32, visitor: &mut dyn FnMut(u32, u32) -> Search) -> bool {
         self.visit_packet_as::<Closest>(packet, lanes, visitor)
     }
@@ -57,6 +58,14 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { boxes, packet, lanes, visitor, .. } = self;
+        if boxes.count() == 1 {
+            // What is in it looks where rays go, too.
+            let valid = packet.valid::<S>() & lanes;
+            if valid != 0 {
+                _ = visitor(0, valid);
+            }
+            return true;
+        }
         let mut own = None;
         let asked = Asked { packets: [packet], lanes: [lanes] };
         let Some((asked, beam)) = together::<S, 1>(boxes.tree().bounds(), &asked, &mut own) else { return false };
@@ -89,20 +98,12 @@ struct Place<'a> {
 impl Kernel for Place<'_> {
     type Output = ();
 
-    /// Sums in the order of [`DAffine3::transform_point3`], so that each ray is where it would be by itself.
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { packet, place, placed } = self;
-        let [x, y, z] = place.matrix3.to_cols_array_2d();
-        let shift = place.translation.to_array();
-        for axis in 0..3 {
-            for lane in 0..RAYS {
-                let row = |v: &[[f32; RAYS]; 3]| {
-                    x[axis] * f64::from(v[0][lane]) + y[axis] * f64::from(v[1][lane]) + z[axis] * f64::from(v[2][lane])
-                };
-                placed.origin[axis][lane] = (row(&packet.origin) + shift[axis]) as f32;
-                placed.direction[axis][lane] = row(&packet.direction) as f32;
-            }
-        }
+        let [x, y, z, dx, dy, dz, ..] = packet.rows::<S>();
+        let [mx, my, mz] = place.matrix3.to_cols_array_2d();
+        let columns = [mx, my, mz, place.translation.to_array()];
+        (placed.origin, placed.direction) = eight_times::<S>(&columns, [x, y, z], [dx, dy, dz]);
     }
 }
