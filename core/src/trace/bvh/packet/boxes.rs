@@ -107,3 +107,70 @@ impl Kernel for Place<'_> {
         (placed.origin, placed.direction) = eight_times::<S>(&columns, [x, y, z], [dx, dy, dz]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Aabb, Random, Vec3};
+    use crate::trace::bvh::Isa;
+    use crate::trace::bvh::build::preset::Options;
+
+    /// Every box that a ray enters by itself is named, with a bit for each ray that is asked for, and rays are placed as points and vectors are.
+    #[test]
+    fn what_single_rays_enter_packets_enter() {
+        let mut random = Random::new(66, 0);
+        let mut together = 0;
+        for round in 0..400 {
+            let count = [1, 2, 60, 3000][round % 4];
+            let boxes: Vec<Aabb> = (0..count)
+                .map(|_| {
+                    let centre = random.vector() * 10.0;
+                    Aabb { min: centre - random.unit(), max: centre + random.unit() }
+                })
+                .collect();
+            let isa = Isa::available().nth(round % Isa::available().count()).expect("one at least");
+            let (tree, _) = BoxTree::build(&boxes, Options { isa, ..Options::default() });
+            let (eye, ahead) = (random.vector() * 30.0, random.direction());
+            let spread = [1e-3, 0.05, 2.0][round % 3];
+            let mut packet = Packet::NONE;
+            for lane in 0..RAYS {
+                let direction = if lane == 5 && round % 5 == 0 { Vec3::ZERO } else { ahead + random.vector() * spread };
+                packet.set(lane, &crate::Ray::new(eye, direction));
+            }
+            let lanes = if round % 7 == 0 { 0b1011_0110 } else { 0xff };
+            let mut named = vec![0; count];
+            let mut visitor = |i: u32, lanes: u32| {
+                named[i as usize] |= lanes;
+                Search::Continue(f32::INFINITY)
+            };
+            let is_together = if round % 2 == 0 {
+                tree.visit_packet(&packet, lanes, &mut visitor)
+            } else {
+                tree.visit_packet_any(&packet, lanes, &mut visitor)
+            };
+            assert!(is_together || named.iter().all(|lanes| *lanes == 0));
+            together += usize::from(is_together);
+            for lane in 0..RAYS {
+                let is_asked = lanes >> lane & 1 != 0 && packet.ray(lane).is_valid();
+                assert!(is_asked || named.iter().all(|lanes| lanes >> lane & 1 == 0), "{round} {lane}");
+                if is_together && is_asked {
+                    tree.visit(&packet.ray(lane), &mut |i| {
+                        assert!(named[i as usize] >> lane & 1 != 0, "{round}: box {i} of ray {lane}");
+                        Search::Continue(f32::INFINITY)
+                    });
+                }
+            }
+            let turn = glam::DQuat::from_scaled_axis(random.vector().as_dvec3());
+            let place = DAffine3::from_scale_rotation_translation(random.vector().as_dvec3(), turn, ahead.as_dvec3());
+            let tmax = [random.unit(); RAYS];
+            let placed = tree.placed(&packet, &place, &tmax);
+            for lane in 0..RAYS {
+                let (ray, moved) = (packet.ray(lane), placed.ray(lane));
+                assert_eq!(moved.origin, place.transform_point3(ray.origin.as_dvec3()).as_vec3());
+                assert_eq!(moved.direction, place.transform_vector3(ray.direction.as_dvec3()).as_vec3());
+                assert_eq!((moved.tmin, moved.tmax), (ray.tmin, tmax[lane]));
+            }
+        }
+        assert!(together > 150, "{together}");
+    }
+}
