@@ -89,6 +89,9 @@ template <int N> void packet(RTCScene scene, bool coherent) {
     packet.ray.dir_x[i] = s.dir_x, packet.ray.dir_y[i] = s.dir_y, packet.ray.dir_z[i] = s.dir_z;
     packet.ray.tfar[i] = s.tfar, packet.ray.mask[i] = s.mask;
     packet.hit.geomID[i] = packet.hit.primID[i] = packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+#ifdef EMBREE4
+    packet.hit.instPrimID[0][i] = single[i].hit.instPrimID[0] = RTC_INVALID_GEOMETRY_ID;
+#endif
   }
   typename Packet<N>::Ray rays = packet.ray;
   Query query;
@@ -107,6 +110,9 @@ template <int N> void packet(RTCScene scene, bool coherent) {
     if (same && is_hit(r))
       same = packet.hit.primID[i] == r.hit.primID && packet.hit.u[i] == r.hit.u && packet.hit.v[i] == r.hit.v && packet.hit.Ng_x[i] == r.hit.Ng_x &&
              packet.hit.Ng_y[i] == r.hit.Ng_y && packet.hit.Ng_z[i] == r.hit.Ng_z;
+#ifdef EMBREE4
+    same = same && packet.hit.instPrimID[0][i] == r.hit.instPrimID[0];
+#endif
     differ += !same, all++;
     // Filters ask of closest hits alone, so that there may be more of these.
     differ += (rays.tfar[i] < 0) != occluded(scene, any.ray), all++;
@@ -143,6 +149,20 @@ void crowds() {
         w.add(twin);
       }
     }
+#ifdef EMBREE4
+    if (below(3) == 0) {
+      RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_INSTANCE_ARRAY);
+      rtcSetGeometryInstancedScene(g, scenes[0]);
+      float(*m)[12] = (float(*)[12])rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_TRANSFORM, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, 48, 7);
+      for (int i = 0; i < 7; i++) {
+        const Vec at = place(3);
+        const float own[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, at.x, at.y, at.z};
+        std::memcpy(m[i], own, sizeof own);
+      }
+      rtcSetGeometryMask(g, ~0u);
+      w.add(g);
+    }
+#endif
     for (RTCScene scene : scenes) rtcReleaseScene(scene);
     rtcCommitScene(w.scene);
     for (int k = 0; k < 20; k++)
