@@ -23,45 +23,76 @@ use crate::error::{Error, Result};
 /// nothing is left beside it.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let mut files = Together::default();
-    files.write(path, write)?;
-    files.put_in_place()
+    files.write(path, write);
+    files.put_in_place().into_result()
 }
 
-/// Files that are put in place together, once all of them are written; where one cannot be, its user decides what becomes of the others.
-/// Devices and pipes are written to at once.
+/// The same for what can be made again: a loss of power may leave an empty file.
+///
+/// # Errors
+/// As of [`write_atomically`].
+pub fn write_passing(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let mut files = Together { is_passing: true, ..Together::default() };
+    files.write(path, write);
+    files.put_in_place().into_result()
+}
+
+/// Files that are put in place together, once the work is done. One that cannot be written does not cost the others. Devices and pipes are written to at once.
 #[derive(Default)]
-pub struct Together(Vec<Part>);
+pub struct Together {
+    parts: Vec<Part>,
+    faults: Vec<Error>,
+    is_passing: bool,
+}
+
+/// What became of them.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// Those that are in place.
+    pub paths: Vec<PathBuf>,
+    /// Why others are not: what was there before is still there.
+    pub faults: Vec<Error>,
+}
+
+impl Written {
+    /// # Errors
+    /// The first of those that there were.
+    pub fn into_result(self) -> Result<()> {
+        self.faults.into_iter().next().map_or(Ok(()), Err)
+    }
+}
 
 impl Together {
     /// Has `write` make a file, as for [`write_atomically`], which is put in place with the others.
-    ///
-    /// # Errors
-    /// What `write` returns, and [`Error::Output`] where there is no place for the file.
-    pub fn write(&mut self, path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-        match Part::beside(path)? {
-            Target::Special => write(path),
-            Target::File(part) => {
-                write(&part.name)?;
-                self.0.push(part);
-                Ok(())
-            }
+    pub fn write(&mut self, path: &Path, write: impl FnOnce(&Path) -> Result<()>) {
+        let written = Part::beside(path).and_then(|target| match target {
+            Target::Special => write(path).map(|()| None),
+            Target::File(part) => write(&part.name).map(|()| Some(part)),
+        });
+        match written {
+            Ok(part) => self.parts.extend(part),
+            Err(fault) => self.fail(fault),
         }
     }
 
-    /// Of those that are whole.
-    pub fn names(&self) -> impl Iterator<Item = &Path> {
-        self.0.iter().map(|part| part.place.as_path())
+    /// Keeps that there is a file which cannot be written.
+    pub fn fail(&mut self, fault: Error) {
+        self.faults.push(fault);
     }
 
-    /// Puts all of them in place.
-    ///
-    /// # Errors
-    /// [`Error::Output`] where one cannot be, though it could be written: those before it are in place, and those after it are removed.
-    pub fn put_in_place(self) -> Result<()> {
-        self.0.iter().try_for_each(|part| {
-            part.put_in_place()
-                .map_err(|e| Error::output(&part.place, reason("cannot put the finished file in place", &e)))
-        })
+    /// Puts those in place that are whole, each of them that can be.
+    pub fn put_in_place(self) -> Written {
+        let mut written = Written { paths: Vec::new(), faults: self.faults };
+        for part in &self.parts {
+            match part.put_in_place(self.is_passing) {
+                Ok(()) => written.paths.push(part.path.clone()),
+                Err(error) => {
+                    let message = reason("cannot put the finished file in place", &error);
+                    written.faults.push(Error::output(&part.path, message));
+                }
+            }
+        }
+        written
     }
 }
 
@@ -104,6 +135,8 @@ enum Target {
 /// A file that is not yet whole. It is removed when dropped.
 struct Part {
     name: PathBuf,
+    /// As it was called.
+    path: PathBuf,
     /// Where it belongs, links resolved.
     place: PathBuf,
     /// Those of the file that it replaces.
@@ -135,21 +168,28 @@ impl Part {
             return Err(Error::output(path, format!("the folder {} does not exist", folder.display())));
         }
         let name = folder.join(part_name(Path::new(file_name)));
-        Ok(Target::File(Self { name, place, permissions }))
+        Ok(Target::File(Self { name, path: path.to_owned(), place, permissions }))
     }
 
-    fn put_in_place(&self) -> io::Result<()> {
+    fn put_in_place(&self, is_passing: bool) -> io::Result<()> {
+        if !is_passing {
+            self.sync()?;
+        }
         if let Some(permissions) = &self.permissions {
             fs::set_permissions(&self.name, permissions.clone())?;
         }
-        // What follows a loss of power would be an empty file otherwise. Not every file system can tell.
-        match fs::File::open(&self.name)?.sync_all() {
-            Err(error) if !matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => {
-                return Err(error);
-            }
-            _ => {}
-        }
         fs::rename(&self.name, &self.place)
+    }
+}
+
+impl Part {
+    /// Waits until the disk has it: what follows a loss of power would be an empty file otherwise.
+    fn sync(&self) -> io::Result<()> {
+        match fs::OpenOptions::new().write(true).open(&self.name)?.sync_all() {
+            // Not every file system can tell.
+            Err(error) if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
+            synced => synced,
+        }
     }
 }
 
@@ -302,25 +342,37 @@ mod tests {
     }
 
     #[test]
-    fn of_several_none_is_put_in_place_where_one_fails() {
+    fn of_several_those_are_put_in_place_that_can_be() {
         let folder = tempfile::tempdir().unwrap();
-        let [a, b] = ["a.txt", "b.txt"].map(|name| folder.path().join(name));
-        fs::write(&a, "old").unwrap();
-        let make = |fails: bool| {
-            let mut files = Together::default();
-            let new = |part: &Path| fs::write(part, "new").map_err(|e| cannot_create(part, &e));
-            files.write(&a, new)?;
-            files.write(&b, |part| if fails { Err(Error::output(part, "full")) } else { new(part) })?;
-            files.put_in_place()
-        };
-        assert!(make(true).is_err());
-        assert_eq!(
-            (fs::read_to_string(&a).unwrap(), names(folder.path())),
-            ("old".to_owned(), vec!["a.txt".to_owned()])
-        );
-        make(false).unwrap();
-        assert_eq!([&a, &b].map(|path| fs::read_to_string(path).unwrap()), ["new", "new"]);
-        assert_eq!(names(folder.path()), ["a.txt", "b.txt"]);
+        let [a, b, c] = ["a.txt", "b.txt", "c.txt"].map(|name| folder.path().join(name));
+        fs::write(&b, "old").unwrap();
+        let mut files = Together::default();
+        let new = |part: &Path| fs::write(part, "new").map_err(|e| cannot_create(part, &e));
+        files.write(&a, new);
+        files.write(&b, |part| new(part).and(Err(Error::output(part, "full"))));
+        files.write(&c, new);
+        // Something that cannot be replaced has come to the first one's place meanwhile.
+        fs::create_dir_all(a.join("in")).unwrap();
+        let written = files.put_in_place();
+        assert_eq!(written.paths, std::slice::from_ref(&c));
+        assert!(written.faults[0].to_string().contains("full"), "{:?}", written.faults);
+        assert!(written.faults[1].to_string().contains("a.txt: cannot put"), "{:?}", written.faults);
+        assert_eq!([&b, &c].map(|path| fs::read_to_string(path).unwrap()), ["old", "new"]);
+        assert_eq!(names(folder.path()), ["a.txt", "b.txt", "c.txt"]);
+    }
+
+    /// Whoever may not read a file may replace it.
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_read_is_replaced_all_the_same() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o200)).unwrap();
+        write_atomically(&path, |part| fs::write(part, "new").map_err(|e| cannot_create(part, &e))).unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o200);
+        assert_eq!(fs::metadata(&path).unwrap().len(), 3);
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(super) struct FrameArgs {
     #[arg(long, value_name = "A-B", value_parser = parse_frames, conflicts_with_all = ["time", "print_camera"], requires = "output")]
     frames: Option<[u32; 2]>,
 
-    /// Leave out frames whose pictures are there
+    /// Leave out frames whose pictures and statistics are there
     #[arg(long, requires = "frames")]
     skip_existing: bool,
 }
@@ -40,10 +40,10 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         let message = format!("--frames: {path} would hold every frame in turn; put %04d into its name");
         return Err(Error::Usage(message));
     }
-    let mut failed = Vec::new();
+    let mut failed = 0;
     for number in first..=last {
         let frame = frame(args, number);
-        if args.frames.skip_existing && frame.output.iter().all(|path| path.is_file()) {
+        if args.frames.skip_existing && frame.output.iter().chain(&frame.stats).all(|path| path.is_file()) {
             continue;
         }
         if !args.quiet {
@@ -51,12 +51,19 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         }
         match render(&frame) {
             // Of a frame that is not as it should be the next ones do not know.
-            Err(Error::Check(message)) => failed.push(format!("frame {number}: {message}")),
+            Err(Error::Check(message)) => {
+                super::complain("error", &format_args!("frame {number}: {message}"));
+                failed += 1;
+            }
             rendered => rendered?,
         }
         interrupt::check()?;
     }
-    if failed.is_empty() { Ok(()) } else { Err(Error::Check(failed.join("\n  "))) }
+    match failed {
+        0 => Ok(()),
+        1 => Err(Error::Check("a frame is not as it should be".to_owned())),
+        _ => Err(Error::Check(format!("{failed} frames are not as they should be"))),
+    }
 }
 
 /// The arguments that render one frame.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use crate::image::{self, Channel, Image, Metadata, WriteOptions};
-use crate::output::{self, Together};
+use crate::output::{self, Together, Written};
 
 /// Whether every picture and the other files can be written, before anything is done for them; and whether none of them
 /// would replace another, nor one of the `inputs`.
@@ -77,6 +77,17 @@ pub(super) fn try_out(pictures: &[PathBuf]) -> Result<()> {
     common.try_for_each(|path| image::check_writable(path))
 }
 
+/// Puts files in place. Where there are some that cannot be written, the others are told.
+pub(super) fn put_in_place(files: Together) -> Result<()> {
+    let Written { paths, faults } = files.put_in_place();
+    let mut faults = faults.into_iter();
+    let Some(first) = faults.next() else { return Ok(()) };
+    let whole = paths.iter().map(|path| Warning::new(path, "", "is written, unlike another output"));
+    super::warn(&whole.collect::<Vec<_>>());
+    faults.for_each(|fault| super::complain("error", &fault));
+    Err(first)
+}
+
 /// Writes one picture to each path, in the format its suffix says, with the channels where that holds any; to be put in place with `files`.
 pub(super) fn write_pictures(
     files: &mut Together,
@@ -85,25 +96,26 @@ pub(super) fn write_pictures(
     channels: &[Channel],
     metadata: &Metadata,
     options: &WriteOptions,
-) -> Result<()> {
-    let write = |path: &PathBuf| {
+) {
+    for path in paths {
         let channels = if image::holds_channels(path) { channels } else { &[] };
-        image::write_beside(files, path, picture, channels, metadata, options)
-    };
-    // Each is tried: one that cannot be written says nothing of the others.
-    paths.iter().map(write).fold(Ok(()), Result::and)
+        if let Err(fault) = image::write_beside(files, path, picture, channels, metadata, options) {
+            files.fail(fault);
+        }
+    }
 }
 
 /// Writes a JSON document, to be put in place with `files`.
-pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Serialize) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(document).map_err(|error| Error::output(path, error.to_string()))?;
-    text.push('\n');
-    write_beside(files, path, &text)
+pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Serialize) {
+    match serde_json::to_string_pretty(document) {
+        Ok(text) => write_beside(files, path, &(text + "\n")),
+        Err(error) => files.fail(Error::output(path, error.to_string())),
+    }
 }
 
 /// Writes a text, likewise.
-pub(super) fn write_beside(files: &mut Together, path: &Path, text: &str) -> Result<()> {
-    files.write(path, |part| fill(path, part, text))
+pub(super) fn write_beside(files: &mut Together, path: &Path, text: &str) {
+    files.write(path, |part| fill(path, part, text));
 }
 
 /// Writes a text.

@@ -230,33 +230,27 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         let (outcome, denoise) = outcome?;
         let mut files = Together::default();
         let pass = &outcome.passes[0];
-        let written = args.write(&mut files, &asked, pass).and_then(|write_seconds| {
-            let [width, height] = asked.size();
-            let stats = Stats {
-                scene: args.scene.scene.display().to_string(),
-                triangles: placed_triangles(scene),
-                size: [width, height],
-                spp: settings.spp,
-                mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
-                threads: rayon::current_num_threads(),
-                packet: settings.batch.width.rays(),
-                load_seconds: asked.load_seconds,
-                prepare_seconds,
-                write_seconds,
-                peak_memory: process::peak(),
-                denoise,
-                engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
-            };
-            args.stats.as_ref().map_or(Ok(()), |path| outputs::write_json(&mut files, path, &stats))?;
-            Ok(stats)
-        });
-        if written.is_err() {
-            // The work is not lost with the one output that cannot be written.
-            let whole = files.names().map(|path| Warning::new(path, "", "is written, unlike another output"));
-            warn(&whole.collect::<Vec<_>>());
+        let write_seconds = args.write(&mut files, &asked, pass);
+        let [width, height] = asked.size();
+        let stats = Stats {
+            scene: args.scene.scene.display().to_string(),
+            triangles: placed_triangles(scene),
+            size: [width, height],
+            spp: settings.spp,
+            mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
+            threads: rayon::current_num_threads(),
+            packet: settings.batch.width.rays(),
+            load_seconds: asked.load_seconds,
+            prepare_seconds,
+            write_seconds,
+            peak_memory: process::peak(),
+            denoise,
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
+        };
+        if let Some(path) = &args.stats {
+            outputs::write_json(&mut files, path, &stats);
         }
-        files.put_in_place()?;
-        let stats = written?;
+        outputs::put_in_place(files)?;
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         if !args.quiet {
             let camera = &asked.camera_source;
@@ -327,7 +321,7 @@ impl RenderArgs {
     }
 
     /// Writes the pictures, to be put in place with `files`; in how many seconds.
-    fn write(&self, files: &mut Together, asked: &Asked, pass: &Pass) -> Result<f64> {
+    fn write(&self, files: &mut Together, asked: &Asked, pass: &Pass) -> f64 {
         let start = Instant::now();
         let picture = &pass.picture;
         let mean_spp = picture.samples as f64 / asked.pixels() as f64;
@@ -338,13 +332,13 @@ impl RenderArgs {
         };
         let response = self.response.choose(&asked.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };
-        outputs::write_pictures(files, &asked.pictures, &picture.image, &picture.channels, &metadata, &options)?;
+        outputs::write_pictures(files, &asked.pictures, &picture.image, &picture.channels, &metadata, &options);
         let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
         let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, &asked.settings.window()));
         let bright = |path| Some((path, too_bright(&picture.image, &options.response)?));
         let told = beyond.or_else(|| of_codes.and_then(bright));
         warn(told.map(|(path, message)| Warning::new(path, "", message)).as_slice());
-        Ok(start.elapsed().as_secs_f64())
+        start.elapsed().as_secs_f64()
     }
 
     /// The pictures to write: those of the flags, else the one that the scene names.

@@ -163,9 +163,9 @@ fn matrix(args: &StressArgs, columns: Vec<Column>, control: Control<'_>) -> Resu
     if let Some(folder) = &args.output {
         let mut files = Together::default();
         for (name, text) in MATRIX.into_iter().zip([document(&report)?, heat_map(&report), failing(&report)]) {
-            outputs::write_beside(&mut files, &folder.join(name), &text)?;
+            outputs::write_beside(&mut files, &folder.join(name), &text);
         }
-        files.put_in_place()?;
+        outputs::put_in_place(files)?;
     }
     report.check()
 }
@@ -215,16 +215,16 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
     let (rays, found) = search.run(control)?;
     let wrong = found.iter().filter(|found| found.column.is_exact()).count();
     let mut findings = Findings { seed: args.seed, rays, found: Vec::new() };
-    let (mut files, mut written) = (Together::default(), Ok(()));
+    let mut files = Together::default();
     for (i, Found { who, fault, text, .. }) in found.into_iter().enumerate() {
-        let mut file = args.output.as_ref().map(|folder| folder.join(format!("found-{i}.json")));
-        // What was found is told all the same where it cannot be written.
-        if let Some(Err(error)) = file.as_ref().map(|path| outputs::write_beside(&mut files, path, &text)) {
-            (file, written) = (None, written.and(Err(error)));
+        let file = args.output.as_ref().map(|folder| folder.join(format!("found-{i}.json")));
+        if let Some(path) = &file {
+            outputs::write_beside(&mut files, path, &text);
         }
         findings.found.push(Finding { who, fault, file });
     }
-    files.put_in_place()?;
+    // What was found is told all the same where it cannot be written.
+    let written = outputs::put_in_place(files);
     if args.json {
         say(document(&findings)?)?;
     } else {

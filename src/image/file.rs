@@ -115,10 +115,10 @@ pub fn write_channels(
 ) -> Result<()> {
     let mut files = Together::default();
     write_beside(&mut files, path, image, channels, metadata, options)?;
-    files.put_in_place()
+    files.put_in_place().into_result()
 }
 
-/// The same, as one of several files that are put in place together.
+/// The same, as one of several files that are put in place together, which know of what goes wrong with the file.
 pub(crate) fn write_beside(
     files: &mut Together,
     path: &Path,
@@ -143,7 +143,8 @@ pub(crate) fn write_beside(
     channels::check(channels, image.pixels.len())?;
     let encoding = encoding(&suffix, options, image);
     let coding = (encoding, &options.response);
-    files.write(path, |part| write_part(path, part, image, channels, coding, metadata))
+    files.write(path, |part| write_part(path, part, image, channels, coding, metadata));
+    Ok(())
 }
 
 /// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.

@@ -13,6 +13,11 @@ pub(super) fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str
     near.map(|(_, known)| format!("; did you mean {known:?}?")).unwrap_or_default()
 }
 
+/// Whether a word is a known one with a slip of a finger or two: not where it may well be another.
+pub(super) fn is_slip(word: &str, known: &str) -> bool {
+    word.len() <= 40 && distance(word, known) <= (known.len() / 3).min(2)
+}
+
 /// Letters to insert, delete, replace or exchange with their neighbour to make one word of the other, in any case
 /// (Damerau 1964, *A technique for computer detection and correction of spelling errors*; by the recurrence of Wagner and
 /// Fischer 1974, *The string-to-string correction problem*).

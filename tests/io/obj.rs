@@ -104,9 +104,11 @@ fn slips_cost_no_more_than_what_they_are() {
     assert_eq!((material.diffuse, material.specular), (Vec3::splat(0.25), Vec3::splat(0.5)));
     assert!(warnings.len() == 1 && warnings[0].message.contains("map_Kd without a file name"), "{warnings:?}");
     let commented = obj.replace("usemtl red", "usemtl red # the first").replace("a.mtl", "a.mtl # all of them");
-    let files = Files::one("a.obj", commented).and("a.mtl", "newmtl red\nKd 0.25\n");
+    let library = "newmtl red # ripe\nKd 0.25\nmap_Kd a.png # a picture\n";
+    let files = Files::one("a.obj", commented).and("a.mtl", library).and("a.png", picture());
     let (scene, warnings) = files.load("a.obj");
-    assert!(warnings.is_empty() && scene.materials[0].diffuse == Vec3::splat(0.25), "{warnings:?}");
+    let Material { diffuse, diffuse_texture, .. } = scene.materials[0];
+    assert!(warnings.is_empty() && diffuse == Vec3::splat(0.25) && diffuse_texture == Some(0), "{warnings:?}");
     for (library, words) in [(Some("# none\n"), "in no material library"), (None, "\"my red.mtl\" is missing")] {
         let files = Files::one("a.obj", obj.replace("a.mtl", "my red.mtl"));
         let files = if let Some(text) = library { files.and("my red.mtl", text) } else { files };

@@ -199,6 +199,15 @@ def test_arrays_of_the_caller_stay_the_callers(scene):
     assert other.cast_rays(np.float32([[-3, 0.5, 0.25, 1, 0, 0]]))["t_hit"].tolist() == [2]
 
 
+def test_a_pinholes_directions_may_have_any_length():
+    make = twincast.RaycastingScene.create_rays_pinhole
+    rays = make(90, [0, 0, 0], [0, 0, 4], [0, 1, 0], 4, 2)
+    for up in (1e200, 1e-170):
+        np.testing.assert_allclose(make(90, [0, 0, 0], [0, 0, 4], [0, up, 0], 4, 2), rays, atol=1e-6)
+    near = make(90, [0, 0, 0], [0, 0, 4e-110], [0, 1e90, 0], 4, 2)
+    np.testing.assert_allclose(near[..., 3:], rays[..., 3:], atol=1e-6)
+
+
 def test_rays_of_a_pinhole():
     rays = twincast.RaycastingScene.create_rays_pinhole(90, [0, 0, 0], [0, 0, 4], [0, 1, 0], 4, 2)
     assert rays.shape == (2, 4, 6) and rays.dtype == np.float32

@@ -197,7 +197,8 @@ def test_copies_are_of_the_same_class():
         vertices = np.float64([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
         faces = np.int64([[0, 1, 2]])
 
-    own = Own(Mesh(), 7)
+    own = Own(Mesh(), [7])
+    assert copy.copy(own).extra is own.extra and copy.deepcopy(own).extra is not own.extra
     for twin in (copy.copy(own), copy.deepcopy(own)):
-        assert type(twin) is Own and twin.extra == 7 and twin.mesh is own.mesh
+        assert type(twin) is Own and twin.extra == [7] and twin.mesh is own.mesh
         assert twin.intersects_first([[0.25, 0.25, 1]], [[0, 0, -1]]).tolist() == [0]

@@ -3,7 +3,7 @@
 use crate::io::Placeless;
 
 /// The type of one component.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Component {
     I8,
     U8,

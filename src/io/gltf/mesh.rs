@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accessor::View;
 use super::attributes::Attributes;
+use super::component::Component;
 use super::deform::{Deformation, Deformer};
 use super::document::Document;
 use super::material::Materials;
@@ -48,8 +48,8 @@ pub(super) struct Groups<'a> {
     placeless: usize,
     /// Primitives without texture coordinates that their material needs.
     bare: usize,
-    /// Primitives with colours beyond full strength.
-    bright: usize,
+    /// Primitives with colours in whole numbers that are not marked as shares.
+    unmarked: usize,
 }
 
 impl<'a> Groups<'a> {
@@ -64,7 +64,7 @@ impl<'a> Groups<'a> {
             flat: 0,
             placeless: 0,
             bare: 0,
-            bright: 0,
+            unmarked: 0,
         }
     }
 
@@ -151,9 +151,10 @@ impl<'a> Groups<'a> {
                 self.bare
             ));
         }
-        if self.bright > 0 {
-            let what = "colours of vertices above 1, which are cut: bytes have to be marked as normalized";
-            warn(format!("{} primitives have {what}", self.bright));
+        if self.unmarked > 0 {
+            let what =
+                "colours in whole numbers that are not marked as normalized, so that all from 1 on are full strength";
+            warn(format!("{} primitives have {what}", self.unmarked));
         }
         self.materials.finish(scene, warnings);
     }
@@ -202,17 +203,14 @@ impl<'a> Groups<'a> {
             Some(view) => {
                 let alpha = if view.components() == 4 { Vec4::ZERO } else { Vec4::W };
                 // With what displaces them they may leave the range of colours, which the specification cuts either way.
-                let is_bright = AtomicBool::new(false);
-                let color = |color| {
-                    let color = Vec4::from(color) + alpha;
-                    if color.max_element() > 1.0 {
-                        is_bright.store(true, Ordering::Relaxed);
-                    }
-                    color.clamp(Vec4::ZERO, Vec4::ONE)
-                };
-                let colors = Displacements::read(&attributes, targets, ("COLOR_0", &["VEC3", "VEC4"]), &view, color)?;
-                self.bright += usize::from(is_bright.into_inner());
-                colors
+                let accessor =
+                    primitive.attributes.get("COLOR_0").and_then(|&index| document.root.accessors.get(index));
+                let is_unmarked = accessor.is_some_and(|own| {
+                    Component::from_code(own.component_type) != Ok(Component::F32) && !own.normalized
+                });
+                self.unmarked += usize::from(is_unmarked);
+                let color = |color| (Vec4::from(color) + alpha).clamp(Vec4::ZERO, Vec4::ONE);
+                Displacements::read(&attributes, targets, ("COLOR_0", &["VEC3", "VEC4"]), &view, color)?
             }
             None => Vec::new(),
         };

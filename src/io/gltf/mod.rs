@@ -93,7 +93,7 @@ fn read(path: &Path, file: &Mapped<'_>, options: &LoadOptions, warnings: &mut Ve
         warnings.push(Warning::new(path, format!("byte {}", file.len() - parts.rest), message));
     }
     let root = schema::parse(parts.json).map_err(|e| {
-        let place = format!("line {}, column {}", e.line(), e.column());
+        let place = if e.line() > 0 { format!("line {}, column {}", e.line(), e.column()) } else { String::new() };
         // The place is in the library's own message too.
         let message = e.to_string();
         let short = quotes::plain(message.split(" at line ").next().unwrap_or_default());

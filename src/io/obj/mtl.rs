@@ -68,18 +68,15 @@ impl Library {
         if names.trim().is_empty() {
             return Ok(());
         }
-        let mut whole = texture::beside(obj, names);
         // A name may contain spaces and more; the format also lets several names stand in a line, and comments behind them.
-        let names = before_comment(names);
-        if !whole.is_file() {
-            whole = texture::beside(obj, names);
-        }
-        let files: Vec<PathBuf> = if whole.is_file() {
-            vec![whole]
-        } else {
-            let each: Vec<_> = names.split_whitespace().map(|name| texture::beside(obj, name)).collect();
-            if each.iter().any(|file| file.exists()) { each } else { vec![whole] }
-        };
+        let one = |names: &str| vec![texture::beside(obj, names)];
+        let each = |names: &str| names.split_whitespace().map(|name| texture::beside(obj, name)).collect::<Vec<_>>();
+        let are_there = |files: &[PathBuf]| files.iter().all(|file| file.is_file());
+        let plain = before_comment(names);
+        let ways = [one(names), each(names), one(plain), each(plain)];
+        let some = |files: &&Vec<PathBuf>| files.iter().any(|file| file.exists());
+        let found = ways.iter().find(|files| are_there(files)).or_else(|| [&ways[3]].into_iter().find(some));
+        let files = found.unwrap_or(&ways[2]).clone();
         for file in files {
             match Mapped::open(&file) {
                 Ok(bytes) => {
@@ -151,7 +148,11 @@ impl Library {
         // Transparent, mirrors.
         let mut first: [Option<(&Entry, usize)>; 2] = [None; 2];
         for name in names {
-            let entry = self.entries.get(&name).or_else(|| self.entries.get(before_comment(&name)));
+            let entry = self.entries.get(&name).or_else(|| {
+                let plain = before_comment(&name);
+                let is_same = |(other, _): &(&String, &Entry)| before_comment(other) == plain;
+                self.entries.get(plain).or_else(|| self.entries.iter().find(is_same).map(|(_, entry)| entry))
+            });
             let Some(entry) = entry else {
                 // Without a usemtl, or without any library, grey is what is asked for; the library's absence is told.
                 if !name.is_empty() && !self.files.is_empty() {
@@ -316,7 +317,10 @@ struct Textures {
 
 impl Textures {
     fn get(&mut self, library: &Path, map: &Map, warnings: &mut Vec<Warning>) -> Result<Option<u32>> {
-        let file = texture::beside(library, &map.file);
+        let mut file = texture::beside(library, &map.file);
+        if !file.is_file() {
+            file = texture::beside(library, before_comment(&map.file));
+        }
         let settings = [map.scale.x, map.scale.y, map.offset.x, map.offset.y].map(f32::to_bits);
         let key = (file, settings, map.clamp);
         if let Some(known) = self.known.get(&key) {

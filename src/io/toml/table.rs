@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 
 use ::toml::de::{DeTable, DeValue};
 
-use crate::io::suggest::suggestion;
+use crate::io::suggest::{is_slip, suggestion};
 use crate::io::text::quoted;
 use crate::math::{DVec3, Vec3};
 
@@ -61,14 +61,14 @@ impl<'t> Table<'t> {
         found.ok_or_else(|| self.misspelt(key).unwrap_or_else(lacks))
     }
 
-    /// That a key stands there which nobody has asked for so far, and which is nearly `key`.
+    /// That a key stands there which nobody has asked for so far, and which is `key` with a slip. Not as far from it as a [`suggestion`] may be: it may be asked for later, as
+    /// `apex_radius` after `base_radius`.
     fn misspelt(&self, key: &str) -> Option<Fault> {
         let mut others = self.entries.keys().filter(|other| !self.asked.contains(&other.get_ref().as_ref()));
         others.find_map(|other| {
             let word = other.get_ref().as_ref();
-            let near = suggestion(word, [key]);
-            let message = || format!("{} has no key {}{near}", self.name, quoted(word.as_bytes()));
-            (!near.is_empty()).then(|| Fault { at: other.span().start, message: message() })
+            let message = || format!("{} has no key {}; did you mean {key:?}?", self.name, quoted(word.as_bytes()));
+            is_slip(word, key).then(|| Fault { at: other.span().start, message: message() })
         })
     }
 
@@ -248,7 +248,9 @@ impl<'t> Value<'t> {
     pub(super) fn table(self, name: String) -> Read<Table<'t>> {
         match self.value {
             DeValue::Table(entries) => Ok(Table::new(entries, self.at, name)),
-            DeValue::Array(_) => Err(self.fault(format!("several tables [[{0}]] where one is; write [{0}]", self.key))),
+            DeValue::Array(items) if items.iter().all(|item| item.get_ref().is_table()) && !name.starts_with("[[") => {
+                Err(self.fault(format!("several tables [{name}] where there is one; write {name}")))
+            }
             _ => Err(self.unlike("a table")),
         }
     }

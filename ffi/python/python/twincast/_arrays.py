@@ -63,6 +63,8 @@ def indices(name: str, value: Any, columns: int = 3) -> np.ndarray:
     # An empty list has neither columns nor a type of its own.
     if array.shape in ((0,), (0, columns)) and array.dtype.kind in "Oiuf":
         return np.zeros((0, columns), dtype=np.uint32)
+    if array.size == 0 and array.dtype.kind == "f":
+        raise ValueError(f"{name} must have the shape (n, {columns}), not {array.shape}")
     if array.dtype.kind == "O":
         _check_objects(name, array, numbers.Integral, "integers")
     elif array.dtype.kind not in "iu":

@@ -19,11 +19,11 @@ def rays_looking_at(
     if not 0 < fov_deg < 180:
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
     center, eye, up = (_arrays.vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
-    for name, vector in [("center", center), ("eye", eye), ("up", up)]:
-        # Of what is longer, or shorter, a float does not hold the square.
-        if not (size := np.abs(vector).max()) <= 1e100 or name == "up" and 0 < size < 1e-100:
-            raise ValueError(f"{name} must have a length from 1e-100 to 1e100, not {vector.tolist()}")
-    ahead = center - eye
+    # float32, in which rays are, does not hold what lies farther away.
+    for name, vector in [("center", center), ("eye", eye)]:
+        if not np.abs(vector).max() <= 1e38:
+            raise ValueError(f"{name} must lie within 1e38, not at {vector.tolist()}")
+    ahead, up = (_to_size(vector) for vector in (center - eye, up))
     # Open3D's camera has x to the left and y up, so that its pictures are turned by half a turn; who is used to that turns them back.
     left = np.cross(up, ahead)
     if not np.linalg.norm(left) > 0:
@@ -35,6 +35,12 @@ def rays_looking_at(
     focal = width_px / 2 / math.tan(math.radians(fov_deg) / 2)
     intrinsic = np.array([[focal, 0, width_px / 2], [0, focal, height_px / 2], [0, 0, 1]])
     return rays_from_matrices(intrinsic, extrinsic, width_px, height_px)
+
+
+def _to_size(vector: np.ndarray) -> np.ndarray:
+    """The same direction, of a length whose square a float holds."""
+    size = np.abs(vector).max()
+    return vector / size if size > 0 else vector
 
 
 def rays_from_matrices(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -161,7 +162,10 @@ class RayMeshIntersector:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> RayMeshIntersector:
         # As trimesh's: the copy asks the same mesh.
-        return self.__copy__()
+        twin = memo[id(self)] = self.__copy__()
+        for name in twin.__dict__.keys() - {"mesh"}:
+            twin.__dict__[name] = copy.deepcopy(twin.__dict__[name], memo)
+        return twin
 
 
 def _rays(ray_origins: Any, ray_directions: Any) -> tuple[np.ndarray, np.ndarray]:

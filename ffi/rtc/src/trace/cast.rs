@@ -229,20 +229,18 @@ pub fn cast_others<const ANY: bool>(committed: &Committed, query: Query, target:
         return nearest.geometry;
     }
     let visitor = &mut |i| {
-        if let Some(placed) = only_placed.and_then(|placed| placed.get(i as usize)) {
-            if placed.mask & ray.mask != 0 {
-                enter::<ANY>(&query, &target, placed, &ray, &mut nearest);
-            }
-            return onwards(&target);
-        }
-        let item = committed.items[i as usize];
-        if let Some(ball) = committed.balls.get(i as usize) {
+        let index = i as usize;
+        // Where all are instances, what they are need not be looked up.
+        let item = if only_placed.is_some() { None } else { committed.items.get(index).copied() };
+        let placed = item.map_or(index, |item| item.placed as usize);
+        if let Some((ball, item)) = committed.balls.get(index).zip(item) {
             cast_point(committed, &query, &target, item, ball, &ray, &mut nearest);
-        } else if let Some(placed) = committed.placed.get(item.placed as usize) {
+        } else if let Some(placed) = committed.placed.get(placed) {
             if placed.mask & ray.mask != 0 {
                 enter::<ANY>(&query, &target, placed, &ray, &mut nearest);
             }
-        } else if let Some(record) = committed.record(item.geometry)
+        } else if let Some(item) = item
+            && let Some(record) = committed.record(item.geometry)
             && record.mask & ray.mask != 0
         {
             cast_item::<ANY>(committed, &query, &target, record, item, &ray, &mut nearest);

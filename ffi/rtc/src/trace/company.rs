@@ -7,7 +7,7 @@ use super::Query;
 use super::cast::{after, cast_others, enter, name_solid, within};
 use super::lanes::{Lanes, field};
 use super::offer::{Nearest, Target, hit_of};
-use super::packet::{named_at, only_triangles, tell};
+use super::packet::{only_triangles, tell};
 use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
 use crate::scene::{Committed, Placed};
 
@@ -66,9 +66,15 @@ pub fn closest(
     let mut company = Company::new(query, lanes, first, packet, asked);
     if let Some(solid) = &committed.solid {
         let seeing = company.seeing(asked, crowd.mask);
-        let triangles = Asked { packets: [packet], lanes: [seeing] };
-        solid.bvh.closest_packets(&triangles, |[hits]| tell(committed, query, lanes, first, hits));
-        company.look_again(seeing);
+        // Not seen afterwards, as where there are triangles alone: what then traces the ray anew would trace it through the instances, too.
+        let beyond = beyond_start(packet, committed.excludes_start);
+        let triangles = Asked { packets: [beyond.as_ref().unwrap_or(packet)], lanes: [seeing] };
+        solid.bvh.closest_packets(&triangles, |[hits]| {
+            tell(committed, query, lanes, first, hits);
+            for lane in each(hits.lanes) {
+                (company.tmax[lane], company.nearest[lane]) = (hits.t[lane], Nearest::of(hits.geometry[lane]));
+            }
+        });
     }
     company.visit::<false>(committed, crowd, asked);
 }
@@ -94,6 +100,11 @@ pub fn occluded(
     }
 }
 
+/// The rays from behind their beginnings, where triangles do not count there.
+fn beyond_start(packet: &Packet, excludes_start: bool) -> Option<Packet> {
+    excludes_start.then(|| Packet { tmin: packet.tmin.map(after), ..packet.clone() })
+}
+
 /// The lanes of a bit mask.
 fn each(lanes: u32) -> impl Iterator<Item = usize> {
     (0..RAYS).filter(move |lane| lanes >> lane & 1 != 0)
@@ -115,17 +126,6 @@ impl<'a, L: Lanes> Company<'a, L> {
             seeing |= u32::from(own & mask != 0) << lane;
         }
         seeing & lanes
-    }
-
-    /// Where rays end, and what they have hit, as the caller has it now.
-    fn look_again(&mut self, lanes: u32) {
-        for lane in each(lanes) {
-            let [tfar] = self.lanes.row(field::TFAR, self.first + lane).map(f32::from_bits);
-            if tfar != self.tmax[lane] {
-                self.tmax[lane] = tfar;
-                self.nearest[lane] = Nearest::of(named_at(self.lanes, self.first + lane));
-            }
-        }
     }
 
     /// Goes through the instances.
@@ -179,22 +179,22 @@ impl<'a, L: Lanes> Company<'a, L> {
         let Placed { to_scene, scene, geometry, primitive, .. } = placed;
         // SAFETY: scenes are not committed while rays are traced: the interface's rule.
         let Some(inner) = (unsafe { scene.committed() }) else { return };
-        let mut alone = seeing;
         if let Some((solid, mask)) = only_triangles(inner, self.query, ANY) {
             let seeing = self.seeing(seeing, mask);
             let packet = boxes.placed(self.packet, to_scene, &self.tmax);
-            alone = 0;
             if ANY {
                 self.occluded_by(solid, &packet, inner.excludes_start, seeing);
             } else {
-                let asked = Asked { packets: [&packet], lanes: [seeing] };
+                let beyond = beyond_start(&packet, inner.excludes_start);
+                let asked = Asked { packets: [beyond.as_ref().unwrap_or(&packet)], lanes: [seeing] };
                 within(self.query, *geometry, *primitive, || {
-                    solid.closest_packets(&asked, |[hits]| alone = self.take(inner, placed, hits));
+                    solid.closest_packets(&asked, |[hits]| self.take(inner, placed, hits));
                 });
             }
+            return;
         }
         let query = *self.query;
-        for lane in each(alone) {
+        for lane in each(seeing) {
             self.alone::<ANY>(lane, |target, nearest| enter::<ANY>(&query, target, placed, &target.ray(), nearest));
         }
     }
@@ -202,7 +202,7 @@ impl<'a, L: Lanes> Company<'a, L> {
     /// Has those rays end that triangles are in the way of: a bit for each.
     #[inline(always)]
     fn occluded_by(&mut self, solid: &Bvh, packet: &Packet, excludes_start: bool, seeing: u32) -> u32 {
-        let beyond = excludes_start.then(|| Packet { tmin: packet.tmin.map(after), ..packet.clone() });
+        let beyond = beyond_start(packet, excludes_start);
         let packet = beyond.as_ref().unwrap_or(packet);
         let [occluded] = solid.occluded_packets(&Asked { packets: [packet], lanes: [seeing] });
         for lane in each(occluded) {
@@ -212,18 +212,12 @@ impl<'a, L: Lanes> Company<'a, L> {
         occluded
     }
 
-    /// Takes hits in an instance, those that are nearer, or as near and lower. A bit for each ray that is to be traced by itself: one that was hit where it begins, and
-    /// that does not count.
+    /// Takes hits in an instance, those that are nearer, or as near and lower.
     #[inline(always)]
-    fn take(&mut self, inner: &Committed, placed: &Placed, hits: &PacketHits) -> u32 {
+    fn take(&mut self, inner: &Committed, placed: &Placed, hits: &PacketHits) {
         let own = Nearest { geometry: placed.geometry, primitive: placed.primitive };
-        let mut alone = 0;
         for lane in each(hits.lanes) {
             let t = hits.t[lane];
-            if inner.excludes_start && t == self.packet.tmin[lane] {
-                alone |= 1 << lane;
-                continue;
-            }
             if t == self.tmax[lane] && self.nearest[lane] <= own {
                 continue;
             }
@@ -234,7 +228,6 @@ impl<'a, L: Lanes> Company<'a, L> {
                 (self.tmax[lane], self.nearest[lane]) = (t, own);
             }
         }
-        alone
     }
 
     /// Has `work` trace a ray by itself, and told what is as near as where it ends.

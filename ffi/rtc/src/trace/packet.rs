@@ -11,7 +11,7 @@ use super::cast::{Sight, after, cast_one, name_solid, sight};
 use super::company::{self, Crowd};
 use super::lanes::{Lanes, field};
 use super::offer::{Target, hit_of};
-use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
+use crate::abi::{RTCRay, RTCRayHit};
 use crate::scene::Committed;
 
 /// Rays of a packet.
@@ -218,13 +218,6 @@ pub fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usi
     lanes.set_row(field::INSTANCE, first, [context.instance; RAYS]);
     #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
     lanes.set_row(field::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
-}
-
-/// The geometry that a ray has hit, or the instance that this is in.
-pub fn named_at(lanes: &impl Lanes, lane: usize) -> u32 {
-    let [geometry] = lanes.row(field::GEOMETRY, lane);
-    let [instance] = lanes.row(field::INSTANCE, lane);
-    if instance == INVALID_ID { geometry } else { instance }
 }
 
 /// A bit for each ray that was hit where it begins.

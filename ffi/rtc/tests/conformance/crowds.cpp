@@ -13,6 +13,29 @@ Vec place(float size) {
   return {uniform(-size, size), uniform(-size, size), uniform(0, 3)};
 }
 
+// Floors at whole heights, of which several are at one, by themselves and in instances: what is hit where rays end or begin, too.
+void stack(World& w, int flags) {
+  RTCScene scene = rtcNewScene(w.device);
+  rtcSetSceneFlags(scene, RTCSceneFlags(flags));
+  w.add(w.floor(0), scene);
+  rtcCommitScene(scene);
+  for (unsigned i = 0; i < 2 + below(6); i++) {
+    const float z = float(below(4));
+    if (below(2)) {
+      w.add(w.floor(z));
+      continue;
+    }
+    RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(g, scene);
+    const float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, z};
+    rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
+    rtcSetGeometryMask(g, ~0u);
+    w.add(g);
+  }
+  rtcReleaseScene(scene);
+  rtcCommitScene(w.scene);
+}
+
 RTCScene inner(World& w, int flags) {
   RTCScene scene = rtcNewScene(w.device);
   rtcSetSceneFlags(scene, RTCSceneFlags(flags));
@@ -66,7 +89,7 @@ TRACE(4) TRACE(8) TRACE(16)
 
 int differ, all;
 
-template <int N> void packet(RTCScene scene, bool coherent) {
+template <int N> void packet(RTCScene scene, bool coherent, bool stacked = false) {
   alignas(64) int valid[N];
   RTCRayHit single[N];
   alignas(64) typename Packet<N>::Hit packet;
@@ -77,6 +100,7 @@ template <int N> void packet(RTCScene scene, bool coherent) {
     valid[i] = below(8) ? -1 : 0;
     Vec o = eye, d = middle - eye + Vec{uniform(-.1f, .1f), uniform(-.1f, .1f), 0};
     if (parallel) o = Vec{float(int(eye.x)) + .25f + .001f * i, float(int(eye.y)) + .25f, -8}, d = {0, 0, 1};
+    if (stacked) o = {.25f + .001f * i, .25f, -8}, d = {0, 0, 1};
     if (!coherent) o = Vec{uniform(-5, 5), uniform(-5, 5), uniform(-5, 5)}, d = Vec{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
     // Embree wants none of these.
     if (is_ours() && below(50) == 0) d = {0, 0, 0};
@@ -122,8 +146,70 @@ template <int N> void packet(RTCScene scene, bool coherent) {
 
 }  // namespace
 
+// Callbacks within an instance that ask again, and count how often they are called: as often as by single rays.
+static int calls;
+static void ask_again() {
+  World w;
+  RTCScene inner = rtcNewScene(w.device), deep = rtcNewScene(w.device);
+  w.add(w.floor(3), deep);
+  rtcCommitScene(deep);
+  RTCGeometry g = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(g, 1);
+  rtcSetGeometryUserData(g, deep);
+  rtcSetGeometryBoundsFunction(g, [](const RTCBoundsFunctionArguments* a) { *a->bounds_o = {0, 0, 1, 0, 1, 1, 2, 0}; }, nullptr);
+  rtcSetGeometryIntersectFunction(g, [](const RTCIntersectFunctionNArguments* a) {
+    calls++;
+    RTCScene deep = (RTCScene)a->geometryUserPtr;
+    alignas(64) RTCRayHit8 p;
+    alignas(64) int valid[8];
+    std::memset(&p, 0, sizeof p);
+    for (int i = 0; i < 8; i++) {
+      valid[i] = -1;
+      p.ray.org_x[i] = p.ray.org_y[i] = .25f, p.ray.dir_z[i] = 1, p.ray.tfar[i] = INFINITY, p.ray.mask[i] = ~0u;
+      p.hit.geomID[i] = p.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    Query query;
+    trace(valid, deep, query, &p);
+    for (int i = 0; i < 8; i++) CHECK(p.hit.geomID[i] == 0 && p.ray.tfar[i] == 3);
+  });
+  rtcSetGeometryMask(g, ~0u);
+  w.add(g, inner);
+  rtcCommitScene(inner);
+  w.add(w.floor(0));
+  RTCGeometry placed = rtcNewGeometry(w.device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(placed, inner);
+  rtcSetGeometryMask(placed, ~0u);
+  w.add(placed);
+  rtcCommitScene(w.scene);
+  alignas(64) RTCRayHit8 p;
+  alignas(64) int valid[8];
+  std::memset(&p, 0, sizeof p);
+  int expected = 0;
+  calls = 0;
+  for (int i = 0; i < 8; i++) {
+    valid[i] = -1;
+    // On the floor.
+    p.ray.org_x[i] = p.ray.org_y[i] = .25f, p.ray.dir_z[i] = 1, p.ray.tfar[i] = INFINITY, p.ray.mask[i] = ~0u;
+    p.hit.geomID[i] = p.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    RTCRayHit r = make_ray({.25f, .25f, 0}, {0, 0, 1});
+    intersect(w.scene, r);
+  }
+  expected = calls, calls = 0;
+  Query query;
+  trace(valid, w.scene, query, &p);
+  if (is_ours()) CHECK(expected == 8 && calls == expected);
+  rtcReleaseScene(inner);
+  rtcReleaseScene(deep);
+}
+
 void crowds() {
+  ask_again();
   differ = all = 0;
+  for (int round = 0; round < 60; round++) {
+    World w(below(2) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    stack(w, below(2) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    for (int k = 0; k < 40; k++) packet<4>(w.scene, true, true), packet<8>(w.scene, true, true), packet<16>(w.scene, true, true);
+  }
   int hits = 0;
   for (int round = 0; round < 150; round++) {
     const int flags = below(2) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE;

@@ -17,7 +17,7 @@ pub(in crate::io::gltf) struct Material {
     pub(in crate::io::gltf) normal_texture: Option<TextureInfo>,
     pub(in crate::io::gltf) alpha_mode: Option<String>,
     pub(in crate::io::gltf) alpha_cutoff: Option<f32>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "super::plain_members")]
     pub(in crate::io::gltf) extensions: Extensions,
 }
 
@@ -51,7 +51,7 @@ pub(in crate::io::gltf) struct TextureInfo {
     pub(in crate::io::gltf) tex_coord: u32,
     /// Of a normal texture.
     pub(in crate::io::gltf) scale: Option<f32>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "super::plain_members")]
     pub(in crate::io::gltf) extensions: Extensions,
 }
 

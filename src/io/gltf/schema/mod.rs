@@ -23,9 +23,19 @@ pub(super) type Extensions = Map<String, Value>;
 pub(super) fn parse(json: &[u8]) -> serde_json::Result<Root> {
     serde_json::from_slice(json).or_else(|error| {
         // Whole numbers may be written as `3.0` or `5.126e3`, and of a key that is there twice the last counts: both are rare enough for a second look.
-        let plain = serde_json::from_slice(json).ok().and_then(|value| serde_json::from_value(plain(value)).ok());
-        plain.ok_or(error)
+        let Ok(value) = serde_json::from_slice(json) else { return Err(error) };
+        // The first error knows its place; the second is of what is wrong apart from how numbers are written.
+        let what =
+            |error: &serde_json::Error| error.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+        serde_json::from_value(plain(value))
+            .map_err(|second| if what(&second) == what(&error) { error } else { second })
     })
+}
+
+/// The members of an object, with whole numbers written as that.
+fn plain_members<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Extensions, D::Error> {
+    let members = Extensions::deserialize(deserializer)?;
+    Ok(members.into_iter().map(|(key, value)| (key, plain(value))).collect())
 }
 
 /// The same with whole numbers written as that.
@@ -50,7 +60,7 @@ pub(super) struct Root {
     pub(super) extensions_required: Vec<String>,
     #[serde(default)]
     pub(super) extensions_used: Vec<String>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "plain_members")]
     pub(super) extensions: Extensions,
     #[serde(default)]
     pub(super) scenes: Vec<Scene>,
@@ -108,7 +118,7 @@ pub(super) struct Node {
     pub(super) skin: Option<usize>,
     /// Of morph targets.
     pub(super) weights: Option<Vec<f32>>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "plain_members")]
     pub(super) extensions: Extensions,
 }
 
@@ -131,7 +141,7 @@ pub(super) struct Primitive {
     /// Accessors of displacements, by attribute.
     #[serde(default)]
     pub(super) targets: Vec<BTreeMap<String, usize>>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "plain_members")]
     pub(super) extensions: Extensions,
 }
 
@@ -175,7 +185,7 @@ pub(super) struct BufferView {
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
     pub(super) byte_stride: Option<u64>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "plain_members")]
     pub(super) extensions: Extensions,
 }
 
@@ -184,6 +194,6 @@ pub(super) struct BufferView {
 pub(super) struct Buffer {
     pub(super) uri: Option<String>,
     pub(super) byte_length: u64,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "plain_members")]
     pub(super) extensions: Extensions,
 }

@@ -105,7 +105,7 @@ pub(super) fn write(path: &Path, key: &Digest, arrays: &[&[u8]]) -> Result<u64> 
     let table: &[u8] = bytemuck::cast_slice(&table);
     let header = Header::new(key, arrays.len(), length);
     let header = Header { digest: header.digest(table), ..header };
-    output::write_atomically(path, |part| {
+    output::write_passing(path, |part| {
         // A pipe in the file's place would have to be written to directly, and wait for a reader.
         if part == path {
             return Err(Error::output(path, "is a device or a pipe; remove it"));

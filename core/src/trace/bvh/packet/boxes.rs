@@ -39,7 +39,7 @@ impl BoxTree {
     /// A packet where `place` takes it, in f64; its rays end at `tmax`.
     pub fn placed(&self, packet: &Packet, place: &DAffine3, tmax: &[f32; RAYS]) -> Packet {
         let mut placed = Packet { tmin: packet.tmin, time: packet.time, tmax: *tmax, ..Packet::NONE };
-        isa::dispatch(self.isa(), Place { packet, place, placed: &mut placed });
+        isa::dispatch(self.isa(), PlacePacket { packet, place, placed: &mut placed });
         placed
     }
 }
@@ -89,13 +89,13 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
     }
 }
 
-struct Place<'a> {
+struct PlacePacket<'a> {
     packet: &'a Packet,
     place: &'a DAffine3,
     placed: &'a mut Packet,
 }
 
-impl Kernel for Place<'_> {
+impl Kernel for PlacePacket<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -164,11 +164,11 @@ mod tests {
             let place = DAffine3::from_scale_rotation_translation(random.vector().as_dvec3(), turn, ahead.as_dvec3());
             let tmax = [random.unit(); RAYS];
             let placed = tree.placed(&packet, &place, &tmax);
-            for lane in 0..RAYS {
+            for (lane, tmax) in tmax.into_iter().enumerate() {
                 let (ray, moved) = (packet.ray(lane), placed.ray(lane));
                 assert_eq!(moved.origin, place.transform_point3(ray.origin.as_dvec3()).as_vec3());
                 assert_eq!(moved.direction, place.transform_vector3(ray.direction.as_dvec3()).as_vec3());
-                assert_eq!((moved.tmin, moved.tmax), (ray.tmin, tmax[lane]));
+                assert_eq!((moved.tmin, moved.tmax), (ray.tmin, tmax));
             }
         }
         assert!(together > 150, "{together}");
