@@ -107,8 +107,8 @@ fn slips_cost_no_more_than_what_they_are() {
     let library = "newmtl red # ripe\nKd 0.25\nmap_Kd a.png # a picture\n";
     let files = Files::one("a.obj", commented).and("a.mtl", library).and("a.png", picture());
     let (scene, warnings) = files.load("a.obj");
-    let Material { diffuse, diffuse_texture, .. } = scene.materials[0];
-    assert!(warnings.is_empty() && diffuse == Vec3::splat(0.25) && diffuse_texture == Some(0), "{warnings:?}");
+    let red = &scene.materials[0];
+    assert!(warnings.is_empty() && red.diffuse == Vec3::splat(0.25) && red.diffuse_texture == Some(0), "{warnings:?}");
     for (library, words) in [(Some("# none\n"), "in no material library"), (None, "\"my red.mtl\" is missing")] {
         let files = Files::one("a.obj", obj.replace("a.mtl", "my red.mtl"));
         let files = if let Some(text) = library { files.and("my red.mtl", text) } else { files };
