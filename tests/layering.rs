@@ -238,6 +238,27 @@ fn unsafe_stays_where_it_may_be() {
     }
 }
 
+/// What tells where things are tells of files and folders that are there.
+#[test]
+fn guides_name_what_is_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut named = 0;
+    for guide in ["core/src/shape/mod.rs", "docs/ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let text = fs::read_to_string(root.join(guide)).expect("a guide");
+        let quoted = text.split('`').skip(1).step_by(2);
+        let is_path = |word: &&str| {
+            let is_plain = word.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"/._-".contains(&byte));
+            let begins = ["core/", "src/", "ffi/", "tests/", "scripts/", "benches/"];
+            is_plain && begins.iter().any(|folder| word.starts_with(folder))
+        };
+        for path in quoted.filter(is_path) {
+            assert!(root.join(path).exists(), "{guide} names {path}");
+            named += 1;
+        }
+    }
+    assert!(named > 30, "{named}");
+}
+
 #[test]
 fn the_scan_itself_finds_what_it_should() {
     let exports = BTreeMap::from([("Renderer", "render"), ("Ray", "ray")]);
