@@ -269,7 +269,7 @@ fn faults_are_told_with_line_and_remedy() {
         ("[[sphere]]\nradius = 1\n", 1, "[[sphere]] lacks \"centre\""),
         ("[[fog]]\nabsorption = 1\n", 1, "several tables [[fog]] where there is one; write [fog]"),
         ("[[material.red]]\ncolor = 1\n", 1, "write [material.red]"),
-        ("[[camera]]\nlens = [0.1, 7]\n", 2, "a list of 2"),
+        ("[[camera]]\neye = [0, 0, 5]\nlook_at = [0, 0, 0]\nlens = [0.1, 7]\n", 4, "a list of 2"),
         ("[[cone]]\nbase = [0, 0, 0]\napex = [0, 1, 0]\napex_radius = 0.5\n", 1, "lacks \"base_radius\""),
         ("[[sphere]]\ncentre = [0, 0]\nradius = 1\n", 2, "a list of 2 where \"centre\" wants a list of 3 numbers"),
         ("[[sphere]]\ncentre = [0, 0, nan]\nradius = 1\n", 2, "\"nan\" where \"centre\" wants a finite number"),

@@ -1,7 +1,7 @@
 //! Several rays at a time among instances that stand still: as long as they go the same way, they go from one scene into the next together.
 
 use twincast_core::math::Vec3;
-use twincast_core::trace::bvh::{Asked, BoxTree, Bvh, Packet, PacketHits, Search};
+use twincast_core::trace::bvh::{Asked, BoxTree, Bvh, Packet, PacketHits};
 
 use super::Query;
 use super::cast::{after, cast_others, enter, name_solid, within};
@@ -130,16 +130,16 @@ impl<'a, L: Lanes> Company<'a, L> {
 
     /// Goes through the instances.
     fn visit<const ANY: bool>(&mut self, committed: &Committed, crowd: &Crowd<'_>, asked: u32) {
-        let packet = self.packet;
+        let packet = &Packet { tmax: self.tmax, ..self.packet.clone() };
         let Crowd { boxes, placed, .. } = *crowd;
-        let mut visitor = |i: u32, lanes: u32| {
+        let mut visitor = |i: u32, lanes: u32, limits: &mut [f32; RAYS]| {
             let placed = &placed[i as usize];
             let open = if ANY { self.open(lanes) } else { lanes };
             let seeing = self.seeing(open, placed.mask);
             if seeing != 0 {
                 self.enter::<ANY>(boxes, placed, seeing);
+                *limits = self.tmax;
             }
-            self.onwards(lanes)
         };
         let are_together = if ANY {
             boxes.visit_packet_any(packet, asked, &mut visitor)
@@ -166,20 +166,15 @@ impl<'a, L: Lanes> Company<'a, L> {
         open & lanes
     }
 
-    /// How far they still look, all together.
-    #[inline(always)]
-    fn onwards(&self, lanes: u32) -> Search {
-        let most = each(lanes).map(|lane| self.tmax[lane]).fold(f32::NEG_INFINITY, f32::max);
-        if most < 0.0 { Search::Break(()) } else { Search::Continue(most.next_up()) }
-    }
-
     /// Takes rays through an instance.
     #[inline(always)]
     fn enter<const ANY: bool>(&mut self, boxes: &BoxTree, placed: &Placed, seeing: u32) {
         let Placed { to_scene, scene, geometry, primitive, .. } = placed;
         // SAFETY: scenes are not committed while rays are traced: the interface's rule.
         let Some(inner) = (unsafe { scene.committed() }) else { return };
-        if let Some((solid, mask)) = only_triangles(inner, self.query, ANY) {
+        // One that comes alone is better off without a packet.
+        let triangles = only_triangles(inner, self.query, ANY).filter(|_| !seeing.is_power_of_two());
+        if let Some((solid, mask)) = triangles {
             let seeing = self.seeing(seeing, mask);
             let packet = boxes.placed(self.packet, to_scene, &self.tmax);
             if ANY {

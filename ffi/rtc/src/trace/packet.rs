@@ -3,11 +3,12 @@
 //! Among triangles of which each counts, they are asked together, eight or sixteen at a time, in the caller's own layout: rows of words are copied
 //! into a [`Packet`] and back. All else goes ray by ray, through a ray of our own: callbacks are given one ray at a time.
 
+use twincast_core::Ray;
 use twincast_core::math::Vec3;
 use twincast_core::trace::bvh::{Asked, Bvh, Packet, PacketHits};
 
 use super::Query;
-use super::cast::{Sight, after, cast_one, name_solid, sight};
+use super::cast::{Sight, after, cast_one, name_solid, native, sight};
 use super::company::{self, Crowd};
 use super::lanes::{Lanes, field};
 use super::offer::{Target, hit_of};
@@ -55,10 +56,16 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
         }
     }
 
-    /// Calls `among` with each packet, its first lane and a bit for each of its rays that is asked for, for what is not triangles alone.
-    fn each_company(&self, among: impl Fn(&Packet, usize, u32)) {
-        let starts = (0..self.lanes.count()).step_by(RAYS);
-        starts.for_each(|first| among(&self.packet_from(first, false), first, self.seeing(first, u32::MAX)));
+    /// Calls `among` with each packet, its first lane and a bit for each of its rays that is asked for, for what is not triangles alone; `alone` where that is one ray.
+    fn each_company(&self, alone: impl Fn(usize), among: impl Fn(&Packet, usize, u32)) {
+        for first in (0..self.lanes.count()).step_by(RAYS) {
+            let asked = self.seeing(first, u32::MAX);
+            match asked.count_ones() {
+                0 => {}
+                1 => alone(first + asked.trailing_zeros() as usize),
+                _ => among(&self.packet_from(first, false), first, asked),
+            }
+        }
     }
 
     /// Calls `alone` with each lane that is asked for.
@@ -94,10 +101,9 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     fn rest(&self, first: usize, excludes_start: bool) -> Packet {
         let mut packet = Packet::NONE;
         for lane in first..self.lanes.count() {
-            let mut ray = super::cast::native(&self.lanes.ray(lane));
-            if excludes_start {
-                ray.tmin = after(ray.tmin);
-            }
+            let RTCRay { tnear, .. } = self.lanes.ray(lane);
+            let tmin = if excludes_start { after(tnear) } else { tnear };
+            let ray = Ray { tmin, ..native(&self.lanes.ray(lane)) };
             packet.set(lane - first, &ray);
         }
         packet
@@ -168,7 +174,8 @@ pub fn intersect_lanes(
         };
         called.each_packet(triangles, two, one);
     } else if let Some(crowd) = Crowd::new(committed, query, false) {
-        called.each_company(|packet, first, asked| {
+        let alone = |lane| intersect_lane(committed, query, lanes, lane);
+        called.each_company(alone, |packet, first, asked| {
             company::closest(committed, &crowd, query, lanes, first, packet, asked);
         });
     } else {
@@ -295,7 +302,8 @@ pub fn occluded_lanes(
         };
         called.each_packet(triangles, two, one);
     } else if let Some(crowd) = Crowd::new(committed, query, true) {
-        called.each_company(|packet, first, asked| {
+        let alone = |lane| occluded_lane(committed, query, lanes, lane);
+        called.each_company(alone, |packet, first, asked| {
             company::occluded(committed, &crowd, query, lanes, first, packet, asked);
         });
     } else {

@@ -51,13 +51,13 @@ const _: () = assert!(ROUNDING < WIDENED + WIDENED_ALL);
 /// Directions longer than this have reciprocals that may vanish.
 const LONGEST: f32 = 1e30;
 
-/// Share of the scene that the rays of a beam may be apart.
-const WIDE: f32 = 1.0 / 16.0;
+/// Share of the scene that the rays of a beam among triangles may be apart.
+pub(super) const WIDE: f32 = 1.0 / 16.0;
 
 impl Beam {
-    /// Of rays of which each is valid; none where they go different ways.
+    /// Of rays of which each is valid; none where they go different ways. It is wide where they are more than the share `wide` of `bounds` apart.
     #[inline(always)]
-    pub fn new<S: Simd, const N: usize>(packets: &[&Packet; N], bounds: Aabb) -> Option<Self> {
+    pub fn new<S: Simd, const N: usize>(packets: &[&Packet; N], bounds: Aabb, wide: f32) -> Option<Self> {
         let (mut least, mut most) = (S::V8::splat(f32::INFINITY), S::V8::splat(f32::NEG_INFINITY));
         for packet in packets {
             // Each row a ray: the least and the most of all its numbers at once.
@@ -114,7 +114,7 @@ impl Beam {
         Some(Self {
             axes: axes(along),
             limit: tmax.next_up(),
-            is_wide: apart.less(splat(WIDE * extent)).bits() & 0b111 != 0b111,
+            is_wide: apart.less(splat(wide * extent)).bits() & 0b111 != 0b111,
             is_backward: [backward & 1 != 0, backward & 2 != 0, backward & 4 != 0],
             near_offset: zero.sub(near_origin.mul_add(least, tiny)).to_array(),
             far_offset: zero.sub(far_origin.mul_sub(most, tiny)).to_array(),
@@ -208,7 +208,9 @@ mod tests {
             }
             let mut packet = Packet::NONE;
             (0..Packet::RAYS).for_each(|lane| packet.set(lane, &ray));
-            let Some(beam) = Beam::new::<Portable, 1>(&[&packet], Tree::new(vec![node]).bounds()) else { continue };
+            let Some(beam) = Beam::new::<Portable, 1>(&[&packet], Tree::new(vec![node]).bounds(), WIDE) else {
+                continue;
+            };
             beams += 1;
             let (entered, _) = beam.enter::<Portable>(&node, beam.limit);
             assert!(entered.bits() & 1 == 1, "{ray:?} misses {bounds:?}");

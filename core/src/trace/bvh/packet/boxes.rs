@@ -2,34 +2,37 @@
 
 use std::marker::PhantomData;
 
+use super::beam::WIDE;
+use super::party::Party;
 use super::{Asked, Packet, RAYS, together};
 use crate::math::DAffine3;
-use crate::trace::bvh::alone::Search;
 use crate::trace::bvh::boxes::BoxTree;
 use crate::trace::bvh::levels::place::eight_times;
+use crate::trace::bvh::node::Child;
 use crate::trace::bvh::query::{Closest, Occluded, Query};
-use crate::trace::bvh::simd::Simd;
+use crate::trace::bvh::reject::woop::SLACK;
 use crate::trace::bvh::simd::isa::{self, Kernel};
-use crate::trace::bvh::walk::{self, Visit};
+use crate::trace::bvh::simd::{Array, Mask, Simd, Vector};
+use crate::trace::bvh::walk::stack::{Room, Stack, Waits};
+use crate::trace::bvh::walk::{Enter, Near, lowest};
+
+/// What visits boxes: it is told which, and by which rays they are entered, and sets how far each ray still looks.
+pub type Visitor<'a> = dyn FnMut(u32, u32, &mut [f32; RAYS]) + 'a;
 
 impl BoxTree {
-    /// [`BoxTree::visit`] of those rays of a packet that `lanes` has a bit for, as one: names boxes that any of them may enter, up to the t that `visitor` returns
-    /// last; one that is alone at once, by whoever is valid. Not where they go different ways, or boxes move: then none is named, and the answer is no.
-    pub fn visit_packet(&self, packet: &Packet, lanes: u32, visitor: &mut dyn FnMut(u32, u32) -> Search) -> bool {
+    /// [`BoxTree::visit`] of those rays of a packet that `lanes` has a bit for, as one: names boxes that they enter, with a bit for each that does, as long as `visitor` has any
+    /// look farther than below 0; one that is alone at once, by whoever is valid. Not where they go different ways, or boxes move: then none is named, and the answer is
+    /// no.
+    pub fn visit_packet(&self, packet: &Packet, lanes: u32, visitor: &mut Visitor<'_>) -> bool {
         self.visit_packet_as::<Closest>(packet, lanes, visitor)
     }
 
     /// The same for a visitor to whom it does not matter which are near.
-    pub fn visit_packet_any(&self, packet: &Packet, lanes: u32, visitor: &mut dyn FnMut(u32, u32) -> Search) -> bool {
+    pub fn visit_packet_any(&self, packet: &Packet, lanes: u32, visitor: &mut Visitor<'_>) -> bool {
         self.visit_packet_as::<Occluded>(packet, lanes, visitor)
     }
 
-    fn visit_packet_as<Q: Query>(
-        &self,
-        packet: &Packet,
-        lanes: u32,
-        visitor: &mut dyn FnMut(u32, u32) -> Search,
-    ) -> bool {
+    fn visit_packet_as<Q: Query>(&self, packet: &Packet, lanes: u32, visitor: &mut Visitor<'_>) -> bool {
         if self.is_empty() || self.moves() {
             return self.is_empty();
         }
@@ -48,8 +51,23 @@ struct VisitBoxes<'a, 'v, Q> {
     boxes: &'a BoxTree,
     packet: &'a Packet,
     lanes: u32,
-    visitor: &'a mut (dyn FnMut(u32, u32) -> Search + 'v),
+    visitor: &'a mut Visitor<'v>,
     query: PhantomData<Q>,
+}
+
+/// A child, and which rays enter it.
+#[derive(Clone, Copy)]
+struct Waiting {
+    near: f32,
+    child: Child,
+    lanes: u32,
+}
+
+impl Waits for Waiting {
+    #[inline(always)]
+    fn near(&self) -> f32 {
+        self.near
+    }
 }
 
 impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
@@ -58,35 +76,74 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { boxes, packet, lanes, visitor, .. } = self;
+        let mut limits = packet.tmax;
         if boxes.count() == 1 {
             // What is in it looks where rays go, too.
             let valid = packet.valid::<S>() & lanes;
             if valid != 0 {
-                _ = visitor(0, valid);
+                visitor(0, valid, &mut limits);
             }
             return true;
         }
+        let tree = boxes.tree();
         let mut own = None;
         let asked = Asked { packets: [packet], lanes: [lanes] };
-        let Some((asked, beam)) = together::<S, 1>(boxes.tree().bounds(), &asked, &mut own) else { return false };
-        let mut limit = beam.limit;
-        walk::single::<S, Q>(
-            boxes.tree(),
-            &beam,
-            limit,
-            #[inline(always)]
-            |leaf| {
-                for item in leaf.blocks() {
-                    match visitor(item, asked.lanes[0]) {
-                        Search::Continue(t) => limit = t,
-                        Search::Break(()) => return Visit::Stop,
-                    }
+        // Rays that are as far apart as boxes are enter different ones.
+        let wide = WIDE.min(1.0 / (boxes.count() as f32).cbrt());
+        let Some((asked, beam)) = together::<S, 1>(tree.bounds(), wide, &asked, &mut own) else { return false };
+        let valid = asked.lanes[0];
+        let party = Party::<Q, S::V8, 1>::new(&beam, &asked, tree.reach(), true);
+        let mut most = look::<S, Q>(&party, &limits, valid);
+        let mut room = Room::new();
+        let mut stack = Stack::new(&mut room);
+        stack.push(Waiting { near: 0.0, child: Child::ROOT, lanes: valid });
+        while let Some(Waiting { near, child, lanes }) = stack.pop() {
+            if near > most {
+                continue;
+            }
+            if child.is_leaf() {
+                for item in child.blocks() {
+                    visitor(item, lanes, &mut limits);
                 }
-                Visit::Until(limit)
-            },
-        );
+                most = look::<S, Q>(&party, &limits, valid);
+                if most < 0.0 {
+                    break;
+                }
+                continue;
+            }
+            let node = tree.node(child);
+            let (mask, near) = beam.enter::<S>(node, most);
+            let (near, mut open) = (Near(near.to_array()), mask.bits() & node.occupied());
+            let base = stack.len();
+            while open != 0 {
+                let (slot, others) = lowest(open);
+                open = others;
+                let child = node.child[slot];
+                let lanes = if child.is_leaf() { party.entering(node, slot)[0] & valid } else { valid };
+                if lanes != 0 {
+                    let waiting = Waiting { near: near.0[slot], child, lanes };
+                    if Q::ANY { stack.push(waiting) } else { stack.insert(base, waiting) }
+                }
+            }
+        }
         true
     }
+}
+
+/// Has rays look as far as these limits, and says how far that is at most, both rounded up; below 0 where none looks any farther.
+#[inline(always)]
+fn look<S: Simd, Q: Query>(party: &Party<'_, Q, S::V8, 1>, limits: &[f32; RAYS], valid: u32) -> f32 {
+    let wide = S::V8::load(limits).mul_add(S::V8::splat(1.0 + SLACK), S::V8::splat(f32::MIN_POSITIVE));
+    let wide = wide.to_array();
+    party.limit(0, wide);
+    let mut most = f32::NEG_INFINITY;
+    for (lane, wide) in wide.into_iter().enumerate() {
+        // Of what is below 0, a little more may not be.
+        if valid >> lane & 1 != 0 && limits[lane] >= 0.0 {
+            most = most.max(wide);
+        }
+    }
+    most
 }
 
 struct PlacePacket<'a> {
@@ -113,6 +170,7 @@ mod tests {
     use super::*;
     use crate::math::{Aabb, Random, Vec3};
     use crate::trace::bvh::Isa;
+    use crate::trace::bvh::alone::Search;
     use crate::trace::bvh::build::preset::Options;
 
     /// Every box that a ray enters by itself is named, with a bit for each ray that is asked for, and rays are placed as points and vectors are.
@@ -139,10 +197,7 @@ mod tests {
             }
             let lanes = if round % 7 == 0 { 0b1011_0110 } else { 0xff };
             let mut named = vec![0; count];
-            let mut visitor = |i: u32, lanes: u32| {
-                named[i as usize] |= lanes;
-                Search::Continue(f32::INFINITY)
-            };
+            let mut visitor = |i: u32, lanes: u32, _: &mut [f32; RAYS]| named[i as usize] |= lanes;
             let is_together = if round % 2 == 0 {
                 tree.visit_packet(&packet, lanes, &mut visitor)
             } else {

@@ -10,7 +10,7 @@
 //! - **Decisions**: what bounds leave no doubt about is noted, and computed at the end, four rays at a time; what they do is decided at once
 //!   ([`Doubts`]). So the bits are those of single rays.
 //!
-//! Boxes of which callers know what is in them are walked by the beam alone ([`BoxTree::visit_packet`](super::boxes::BoxTree::visit_packet)).
+//! Boxes of which callers know what is in them are walked by the beam as well, and each ray is asked at them ([`BoxTree::visit_packet`](super::boxes::BoxTree::visit_packet)).
 //!
 //! Rays that run both ways along an axis make no beam, and those that are far apart make a wide one, which would enter most of the tree: they walk
 //! alone. Asking each ray at each node, as a packet traversal does, would keep them together, but costs the others more.
@@ -33,7 +33,7 @@ use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 use alone::{ClosestAlone, OccludedAlone};
-use beam::Beam;
+use beam::{Beam, WIDE};
 use doubts::Doubts;
 use octet::Octet;
 use scratch::{Scratch, with_scratch};
@@ -239,7 +239,7 @@ impl<const N: usize> Kernel for ClosestPackets<'_, N> {
         let Self { bvh, asked, scratch } = self;
         let mut own = None;
         let bounds = bvh.fixed.triangles.tree().bounds();
-        if let Some((asked, beam)) = together::<S, N>(bounds, asked, &mut own) {
+        if let Some((asked, beam)) = together::<S, N>(bounds, WIDE, asked, &mut own) {
             let Scratch { found, hits } = scratch;
             let mut doubts = Doubts::new(found);
             let mut octets = [Octet::nothing(); N];
@@ -271,7 +271,7 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
         let Self { bvh, asked, scratch, occluded } = self;
         let mut own = None;
         let bounds = bvh.fixed.triangles.tree().bounds();
-        if let Some((asked, beam)) = together::<S, N>(bounds, asked, &mut own) {
+        if let Some((asked, beam)) = together::<S, N>(bounds, WIDE, asked, &mut own) {
             let mut doubts = Doubts::new(&mut scratch.found);
             let mut octets = [Octet::nothing(); N];
             way::trace::<S, Occluded, N>(bvh, &asked, &beam, &mut doubts, &mut octets);
@@ -286,10 +286,11 @@ impl<const N: usize> Kernel for OccludedPackets<'_, N> {
     }
 }
 
-/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or one too wide for what is within `bounds`.
+/// The packets, `own` ones if rays had to be left out, and their beam; none where rays make no beam, or are more than the share `wide` of `bounds` apart.
 #[inline(always)]
 fn together<'a, S: Simd, const N: usize>(
     bounds: Aabb,
+    wide: f32,
     asked: &Asked<'a, N>,
     own: &'a mut Option<[Packet; N]>,
 ) -> Option<(Asked<'a, N>, Beam)> {
@@ -299,7 +300,7 @@ fn together<'a, S: Simd, const N: usize>(
         all &= *valid;
     }
     let packets = if all == 0xff { asked.packets } else { own.insert(only::<S, N>(asked, &valid)?).each_ref() };
-    let beam = Beam::new::<S, N>(&packets, bounds)?;
+    let beam = Beam::new::<S, N>(&packets, bounds, wide)?;
     (!beam.is_wide).then_some((Asked { packets, lanes: valid }, beam))
 }
 

@@ -29,13 +29,13 @@ pub(super) struct Party<'a, Q, V: Vector, const N: usize> {
 }
 
 impl<'a, Q: Query, V: Vector + Array<RAYS>, const N: usize> Party<'a, Q, V, N> {
-    /// `reach` is the tree's.
+    /// `reach` is the tree's; `asks` whether rays are to be asked.
     #[inline(always)]
-    pub fn new(beam: &'a Beam, asked: &Asked<'_, N>, reach: Vec3) -> Self {
+    pub fn new(beam: &'a Beam, asked: &Asked<'_, N>, reach: Vec3, mut asks: bool) -> Self {
         let zero = V::splat(0.0);
         let nothing = Slabs { reciprocal: zero, near: zero, far: zero, is_negative: zero.less(zero) };
-        let (mut slabs, mut asks) = ([[nothing; 3]; N], Q::ANY);
-        if Q::ANY {
+        let mut slabs = [[nothing; 3]; N];
+        if asks {
             for ((slabs, packet), lanes) in slabs.iter_mut().zip(asked.packets).zip(asked.lanes) {
                 let ([x, y, z], [dx, dy, dz]) = (&packet.origin, &packet.direction);
                 let origin = [V::load(x), V::load(y), V::load(z)];
@@ -60,11 +60,20 @@ impl<'a, Q: Query, V: Vector + Array<RAYS>, const N: usize> Party<'a, Q, V, N> {
         }
     }
 
-    /// Whether a ray enters the box in that slot.
+    /// Rays of packet `number` look no farther than these.
     #[inline(always)]
-    fn enters(&self, node: &Node, slot: usize) -> bool {
-        let mut entering = 0;
-        for (slabs, limit) in self.slabs.iter().zip(&self.limits) {
+    pub fn limit(&self, number: usize, limits: [f32; RAYS]) {
+        self.limits[number].set(limits);
+    }
+
+    /// A bit for each ray of each packet that enters the box in that slot; all of them where they cannot be asked.
+    #[inline(always)]
+    pub fn entering(&self, node: &Node, slot: usize) -> [u32; N] {
+        let mut entering = [0xff; N];
+        if !self.asks {
+            return entering;
+        }
+        for ((entering, slabs), limit) in entering.iter_mut().zip(&self.slabs).zip(&self.limits) {
             let (mut near, mut far) = (V::splat(0.0), V::load(&limit.get()));
             for (axis, slabs) in slabs.iter().enumerate() {
                 let side = usize::from(self.beam.is_backward[axis]);
@@ -73,9 +82,9 @@ impl<'a, Q: Query, V: Vector + Array<RAYS>, const N: usize> Party<'a, Q, V, N> {
                 near = first.mul_add(slabs.reciprocal, slabs.near).max(near);
                 far = last.mul_add(slabs.reciprocal, slabs.far).min(far);
             }
-            entering |= near.at_most(far).bits();
+            *entering = near.at_most(far).bits();
         }
-        entering != 0
+        entering
     }
 }
 
@@ -94,7 +103,7 @@ impl<Q: Query, V: Vector + Array<RAYS>, const N: usize> Enter for Party<'_, Q, V
         while open != 0 {
             let slot = open.trailing_zeros() as usize % WIDTH;
             open &= open - 1;
-            if node.child[slot].is_leaf() && !self.enters(node, slot) {
+            if node.child[slot].is_leaf() && self.entering(node, slot) == [0; N] {
                 children &= !(1 << slot);
             }
         }

@@ -24,7 +24,7 @@ pub(super) fn trace<S: Simd, Q: Query, const N: usize>(
         octet.fill(asked.packets[number], asked.lanes[number], beam.axes);
     }
     let mut most = beam.limit;
-    let party = Party::<Q, S::V8, N>::new(beam, asked, triangles.tree().reach());
+    let party = Party::<Q, S::V8, N>::new(beam, asked, triangles.tree().reach(), Q::ANY);
     party.shorten(octets);
     walk::single::<S, Q>(
         triangles.tree(),

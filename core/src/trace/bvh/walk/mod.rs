@@ -32,7 +32,7 @@ impl Visit {
 
 /// Where children are entered: within one cache line, for it is stored whole and loaded one by one.
 #[repr(align(32))]
-struct Near([f32; WIDTH]);
+pub(super) struct Near(pub [f32; WIDTH]);
 
 /// What walks: a ray, or several that go the same way.
 pub(super) trait Enter {
@@ -75,7 +75,7 @@ impl Entered {
     /// The nearest of the children, of which there is at least one; all others go on the stack. Mostly one or two are entered: each number has its own branch,
     /// which is predicted better than the length of a loop.
     #[inline(always)]
-    fn open<Q: Query>(&self, stack: &mut Stack<'_>, node: &Node) -> Entry {
+    fn open<Q: Query>(&self, stack: &mut Stack<'_, Entry>, node: &Node) -> Entry {
         let (first, rest) = lowest(self.children);
         let mut next = self.entry(node, first);
         if rest == 0 {
@@ -156,6 +156,6 @@ pub(super) fn from_root<S: Simd, Q: Query>(
 
 /// The lowest bit's place, and the other bits.
 #[inline(always)]
-fn lowest(mask: u32) -> (usize, u32) {
+pub(super) fn lowest(mask: u32) -> (usize, u32) {
     (mask.trailing_zeros() as usize % WIDTH, mask & (mask - 1))
 }

@@ -9,6 +9,12 @@ use std::mem::MaybeUninit;
 use crate::trace::bvh::build::MAX_DEPTH;
 use crate::trace::bvh::node::{Child, WIDTH};
 
+/// What waits to be visited: a child, and what is known of it.
+pub(in crate::trace::bvh) trait Waits: Copy {
+    /// Where it is entered.
+    fn near(&self) -> f32;
+}
+
 /// A child to be visited.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
@@ -17,13 +23,20 @@ pub(super) struct Entry {
     pub child: Child,
 }
 
+impl Waits for Entry {
+    #[inline(always)]
+    fn near(&self) -> f32 {
+        self.near
+    }
+}
+
 /// Every level of the tree leaves at most seven siblings waiting.
 const ENTRIES: usize = MAX_DEPTH * (WIDTH - 1) + 1;
 
 /// Room for children waiting.
-pub(super) struct Room([MaybeUninit<Entry>; ENTRIES]);
+pub(in crate::trace::bvh) struct Room<E>([MaybeUninit<E>; ENTRIES]);
 
-impl Room {
+impl<E: Waits> Room<E> {
     /// Nothing is written, nothing can be read.
     #[inline(always)]
     pub const fn new() -> Self {
@@ -32,16 +45,16 @@ impl Room {
 }
 
 /// Children waiting, the one to be visited next on top. Apart from its room, so that the compiler keeps their number in a register.
-pub(super) struct Stack<'a> {
-    room: &'a mut Room,
+pub(in crate::trace::bvh) struct Stack<'a, E> {
+    room: &'a mut Room<E>,
     /// As many entries of the room are written, from the first on; never more than there are.
     len: usize,
 }
 
-impl<'a> Stack<'a> {
+impl<'a, E: Waits> Stack<'a, E> {
     /// Of none.
     #[inline(always)]
-    pub fn new(room: &'a mut Room) -> Self {
+    pub fn new(room: &'a mut Room<E>) -> Self {
         Self { room, len: 0 }
     }
 
@@ -56,7 +69,7 @@ impl<'a> Stack<'a> {
     /// # Panics
     /// If the tree is deeper than any is built.
     #[inline(always)]
-    pub fn push(&mut self, entry: Entry) {
+    pub fn push(&mut self, entry: E) {
         self.room.0[self.len].write(entry);
         self.len += 1;
     }
@@ -66,13 +79,13 @@ impl<'a> Stack<'a> {
     /// # Panics
     /// As [`Self::push`].
     #[inline(always)]
-    pub fn insert(&mut self, base: usize, entry: Entry) {
+    pub fn insert(&mut self, base: usize, entry: E) {
         let Room(room) = self.room;
         let mut at = self.len;
         while at > base {
             // SAFETY: `at` is at most `len`, below which all is written.
             let below = unsafe { room[at - 1].assume_init() };
-            if below.near >= entry.near {
+            if below.near() >= entry.near() {
                 break;
             }
             room[at].write(below);
@@ -84,7 +97,7 @@ impl<'a> Stack<'a> {
 
     /// Takes the one on top.
     #[inline(always)]
-    pub fn pop(&mut self) -> Option<Entry> {
+    pub fn pop(&mut self) -> Option<E> {
         self.len = self.len.checked_sub(1)?;
         // SAFETY: it was below `len`, which is never more than there are, and below which all is written.
         Some(unsafe { self.room.0.get_unchecked(self.len).assume_init() })
@@ -103,7 +116,7 @@ mod tests {
     }
 
     /// Where the entries are entered, and their numbers, from the top.
-    fn drain(stack: &mut Stack<'_>) -> Vec<(f32, u32)> {
+    fn drain(stack: &mut Stack<'_, Entry>) -> Vec<(f32, u32)> {
         std::iter::from_fn(|| stack.pop()).map(|Entry { near, child }| (near, child.first())).collect()
     }
 
@@ -137,7 +150,7 @@ mod tests {
     /// What [`Stack::pop`] relies on, for each way to put an entry there: on top, and below all or none of those that are.
     #[test]
     fn there_is_no_more_room_than_a_tree_needs() {
-        let ways: [fn(&mut Stack<'_>); 3] = [
+        let ways: [fn(&mut Stack<'_, Entry>); 3] = [
             |stack| stack.push(at(0.0, 0)),
             |stack| stack.insert(0, at(stack.len() as f32, 0)),
             |stack| stack.insert(stack.len(), at(0.0, 0)),
