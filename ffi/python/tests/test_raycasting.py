@@ -204,6 +204,7 @@ def test_a_pinholes_directions_may_have_any_length():
     rays = make(90, [0, 0, 0], [0, 0, 4], [0, 1, 0], 4, 2)
     for up in (1e200, 1e-170):
         np.testing.assert_allclose(make(90, [0, 0, 0], [0, 0, 4], [0, up, 0], 4, 2), rays, atol=1e-6)
+    np.testing.assert_allclose(make(90, [0, 0, -1e200], [0, 0, 4], [0, 1, 0], 4, 2), rays, atol=1e-6)
     near = make(90, [0, 0, 0], [0, 0, 4e-110], [0, 1e90, 0], 4, 2)
     np.testing.assert_allclose(near[..., 3:], rays[..., 3:], atol=1e-6)
 

@@ -19,10 +19,6 @@ def rays_looking_at(
     if not 0 < fov_deg < 180:
         raise ValueError(f"fov_deg must be between 0 and 180, not {fov_deg}")
     center, eye, up = (_arrays.vector(name, v) for name, v in [("center", center), ("eye", eye), ("up", up)])
-    # float32, in which rays are, does not hold what lies farther away.
-    for name, vector in [("center", center), ("eye", eye)]:
-        if not np.abs(vector).max() <= 1e38:
-            raise ValueError(f"{name} must lie within 1e38, not at {vector.tolist()}")
     ahead, up = (_to_size(vector) for vector in (center - eye, up))
     # Open3D's camera has x to the left and y up, so that its pictures are turned by half a turn; who is used to that turns them back.
     left = np.cross(up, ahead)
