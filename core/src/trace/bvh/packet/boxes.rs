@@ -89,7 +89,8 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
         let mut own = None;
         let asked = Asked { packets: [packet], lanes: [lanes] };
         // Rays that are nearly half as far apart as boxes in a row are enter different ones; and the fewer they are, the less they save each other.
-        let wide = WIDE.min(0.05 * lanes.count_ones() as f32 / (boxes.count() as f32).cbrt());
+        let share = lanes.count_ones() as f32 / RAYS as f32;
+        let wide = WIDE.min(0.4 * share * share / (boxes.count() as f32).cbrt());
         let Some((asked, beam)) = together::<S, 1>(tree.bounds(), wide, &asked, &mut own) else { return false };
         let valid = asked.lanes[0];
         let party = Party::<Q, S::V8, 1>::new(&beam, &asked, tree.reach(), true);
