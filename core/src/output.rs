@@ -180,9 +180,7 @@ impl Part {
         }
         fs::rename(&self.name, &self.place)
     }
-}
 
-impl Part {
     /// Waits until the disk has it: what follows a loss of power would be an empty file otherwise.
     fn sync(&self) -> io::Result<()> {
         match fs::OpenOptions::new().write(true).open(&self.name)?.sync_all() {

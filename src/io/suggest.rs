@@ -1,9 +1,12 @@
 //! What a word that is not known was probably meant to be.
 
+/// Bytes of a word that may be a misspelt one.
+const LONGEST: usize = 40;
+
 /// `; did you mean "..."?` for the known word that is nearest, nothing where none is near.
 pub(super) fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     // A name is not compared as a whole story: nothing that long is a misspelt keyword.
-    if word.len() > 40 {
+    if word.len() > LONGEST {
         return String::new();
     }
     let near = known.into_iter().map(|known| (distance(word, known), known));
@@ -15,7 +18,7 @@ pub(super) fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str
 
 /// Whether a word is a known one with a slip of a finger or two: not where it may well be another.
 pub(super) fn is_slip(word: &str, known: &str) -> bool {
-    word.len() <= 40 && distance(word, known) <= (known.len() / 3).min(2)
+    word.len() <= LONGEST && distance(word, known) <= (known.len() / 3).min(2)
 }
 
 /// Letters to insert, delete, replace or exchange with their neighbour to make one word of the other, in any case

@@ -75,7 +75,7 @@ impl Library {
         let plain = before_comment(names);
         let ways = [one(names), each(names), one(plain), each(plain)];
         let some = |files: &&Vec<PathBuf>| files.iter().any(|file| file.exists());
-        let found = ways.iter().find(|files| are_there(files)).or_else(|| [&ways[3]].into_iter().find(some));
+        let found = ways.iter().find(|files| are_there(files)).or_else(|| Some(&ways[3]).filter(some));
         let files = found.unwrap_or(&ways[2]).clone();
         for file in files {
             match Mapped::open(&file) {

@@ -7,7 +7,7 @@ use super::Query;
 use super::cast::{after, cast_others, enter, name_solid, within};
 use super::lanes::{Lanes, field};
 use super::offer::{Nearest, Target, hit_of};
-use super::packet::{only_triangles, tell};
+use super::packet::{any_alone, closest_alone, only_triangles, tell};
 use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
 use crate::scene::{Committed, Placed};
 
@@ -130,7 +130,9 @@ impl<'a, L: Lanes> Company<'a, L> {
 
     /// Goes through the instances.
     fn visit<const ANY: bool>(&mut self, committed: &Committed, crowd: &Crowd<'_>, asked: u32) {
-        let packet = &Packet { tmax: self.tmax, ..self.packet.clone() };
+        // Triangles may have shortened rays.
+        let shortened = committed.solid.is_some().then(|| Packet { tmax: self.tmax, ..self.packet.clone() });
+        let packet = shortened.as_ref().unwrap_or(self.packet);
         let Crowd { boxes, placed, .. } = *crowd;
         let mut visitor = |i: u32, lanes: u32, limits: &mut [f32; RAYS]| {
             let placed = &placed[i as usize];
@@ -225,26 +227,10 @@ impl<'a, L: Lanes> Company<'a, L> {
         }
     }
 
-    /// Has `work` trace a ray by itself, and told what is as near as where it ends.
+    /// Has `work` trace a ray by itself, told what is as near as where it ends.
     fn alone<const ANY: bool>(&mut self, lane: usize, work: impl FnOnce(&Target, &mut Nearest)) {
-        let at = self.first + lane;
-        let nearest = &mut self.nearest[lane];
-        if ANY {
-            let mut ray = self.lanes.ray(at);
-            // SAFETY: it is ours.
-            let target = unsafe { Target::any(&raw mut ray) };
-            work(&target, nearest);
-            self.tmax[lane] = target.tfar();
-            self.lanes.set_tfar(at, target.tfar());
-            return;
-        }
-        let mut own = RTCRayHit { ray: self.lanes.ray(at), hit: self.lanes.hit(at) };
-        let own = &raw mut own;
-        // SAFETY: it is ours, and used through this pointer alone.
-        let target = unsafe { Target::closest(own) };
-        work(&target, nearest);
-        self.tmax[lane] = target.tfar();
-        // SAFETY: as above.
-        self.lanes.set_hit(at, target.tfar(), unsafe { &(*own).hit });
+        let (at, nearest) = (self.first + lane, &mut self.nearest[lane]);
+        let work = |target: &Target| work(target, nearest);
+        self.tmax[lane] = if ANY { any_alone(self.lanes, at, work) } else { closest_alone(self.lanes, at, work) };
     }
 }

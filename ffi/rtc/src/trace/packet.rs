@@ -101,9 +101,9 @@ impl<L: Lanes, V: Fn(usize) -> bool> Called<'_, L, V> {
     fn rest(&self, first: usize, excludes_start: bool) -> Packet {
         let mut packet = Packet::NONE;
         for lane in first..self.lanes.count() {
-            let RTCRay { tnear, .. } = self.lanes.ray(lane);
-            let tmin = if excludes_start { after(tnear) } else { tnear };
-            let ray = Ray { tmin, ..native(&self.lanes.ray(lane)) };
+            let own = self.lanes.ray(lane);
+            let tmin = if excludes_start { after(own.tnear) } else { own.tnear };
+            let ray = Ray { tmin, ..native(&own) };
             packet.set(lane - first, &ray);
         }
         packet
@@ -186,14 +186,32 @@ pub fn intersect_lanes(
 /// The nearest hit of one ray.
 #[inline(always)]
 fn intersect_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane: usize) {
+    closest_alone(lanes, lane, |target| cast_one::<false>(committed, query, target));
+}
+
+/// Has `work` look for the nearest hit of a ray by itself, and writes what it finds; where the ray ends then.
+#[inline(always)]
+pub fn closest_alone(lanes: &impl Lanes, lane: usize, work: impl FnOnce(&Target)) -> f32 {
     // Together, as user geometry wants them.
     let mut own = RTCRayHit { ray: lanes.ray(lane), hit: lanes.hit(lane) };
     let own = &raw mut own;
     // SAFETY: it is ours, and used through this pointer alone.
     let target = unsafe { Target::closest(own) };
-    cast_one::<false>(committed, query, &target);
+    work(&target);
     // SAFETY: as above.
     lanes.set_hit(lane, target.tfar(), unsafe { &(*own).hit });
+    target.tfar()
+}
+
+/// The same for any hit.
+#[inline(always)]
+pub fn any_alone(lanes: &impl Lanes, lane: usize, work: impl FnOnce(&Target)) -> f32 {
+    let mut ray = lanes.ray(lane);
+    // SAFETY: it is ours.
+    let target = unsafe { Target::any(&raw mut ray) };
+    work(&target);
+    lanes.set_tfar(lane, target.tfar());
+    target.tfar()
 }
 
 /// Writes the hits of the rays from lane `first` on.
@@ -314,9 +332,5 @@ pub fn occluded_lanes(
 /// Whether one ray hits anything.
 #[inline(always)]
 fn occluded_lane(committed: &Committed, query: &Query, lanes: &impl Lanes, lane: usize) {
-    let mut ray = lanes.ray(lane);
-    // SAFETY: it is ours.
-    let target = unsafe { Target::any(&raw mut ray) };
-    cast_one::<true>(committed, query, &target);
-    lanes.set_tfar(lane, target.tfar());
+    any_alone(lanes, lane, |target| cast_one::<true>(committed, query, target));
 }
