@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use super::format::Format;
 use super::metadata::Placed;
 #[cfg(feature = "oiio")]
 use super::oiio as backend;
@@ -58,26 +59,19 @@ pub(super) struct Encoding {
 const MOST_HALF: f32 = 65504.0;
 
 /// What is written with and without OpenImageIO.
-pub(super) const COMMON: [&str; 4] = ["exr", "jpeg", "jpg", "png"];
+pub(super) const COMMON: [Format; 3] = [Format::OpenExr, Format::Jpeg, Format::Png];
 
-/// Formats that hold linear floating values. In all others samples are 8-bit sRGB.
-const EXR: [&str; 3] = ["exr", "sxr", "mxr"];
-const RADIANCE: [&str; 2] = ["hdr", "rgbe"];
-
-/// 8-bit formats that define alpha, and as straight. The others either have none, or leave open what it means to
-/// colours, and every reader guesses differently: there the image is laid over black.
-const WITH_ALPHA: [&str; 4] = ["png", "tif", "tiff", "tga"];
-
-const JPEG: [&str; 6] = ["jpg", "jpeg", "jpe", "jif", "jfif", "jfi"];
-
-/// The most pixels along a side that formats hold, by their suffixes: others hold all pictures that are rendered, or find out themselves.
+/// The most pixels along a side that a format holds. Those without a number hold all pictures that are rendered, or find out themselves.
 /// Checked here because some users of libjpeg end the process where its limit is exceeded.
-const LONGEST: [(&[&str], u32); 4] = [
-    (&JPEG, 65_500),
-    (&["webp"], 16_383),
-    (&["ico"], 256),
-    (&["bw", "gif", "iff", "int", "inta", "rgb", "rgba", "rla", "sgi", "tga", "tpic", "z"], 65_535),
-];
+fn longest_side(format: Format) -> Option<u32> {
+    match format {
+        Format::Jpeg => Some(65_500),
+        Format::WebP => Some(16_383),
+        Format::Ico => Some(256),
+        Format::Gif | Format::Iff | Format::Rla | Format::Sgi | Format::Targa => Some(65_535),
+        _ => None,
+    }
+}
 
 /// Most pixels in a file that is read: 4 GiB as [`Image`].
 const MOST_PIXELS: u64 = 1 << 28;
@@ -96,7 +90,7 @@ const PIXELS_PER_BYTE: u64 = 1 << 14;
 ///
 /// # Errors
 /// [`Error::Output`] for a suffix that this build does not write, and for whatever goes wrong with the file;
-/// [`Error::Usage`] for an image without pixels or with too few, and for tiles of size 0.
+/// [`Error::Usage`] for an image without pixels or with too few, for tiles of size 0, and for what [`Metadata::texts`] cannot be.
 pub fn write(path: &Path, image: &Image, metadata: &Metadata, options: &WriteOptions) -> Result<()> {
     write_channels(path, image, &[], metadata, options)
 }
@@ -127,21 +121,22 @@ pub(crate) fn write_beside(
     metadata: &Metadata,
     options: &WriteOptions,
 ) -> Result<()> {
-    let suffix = writable_suffix(path)?;
+    check_suffix(path)?;
+    image.check()?;
     let (width, height) = (image.width, image.height);
-    if width == 0 || height == 0 || image.pixels.len() as u64 != u64::from(width) * u64::from(height) {
-        let found = image.pixels.len();
-        return Err(Error::Usage(format!("an image of {width} x {height} pixels with {found} of them in memory")));
+    if width == 0 || height == 0 {
+        return Err(Error::Usage(format!("an image of {width} x {height} pixels")));
     }
+    metadata.check()?;
     if options.tile == 0 || options.tile > 1 << 16 {
         return Err(Error::Usage(format!("tiles of {0} x {0} pixels; 1 to 65536 is possible", options.tile)));
     }
     check_sides(path, [width, height])?;
-    if !channels.is_empty() && !EXR.contains(&suffix.as_str()) {
+    if !channels.is_empty() && !holds_channels(path) {
         return Err(Error::output(path, "only OpenEXR files (.exr) hold more channels than colours"));
     }
     channels::check(channels, image.pixels.len())?;
-    let encoding = encoding(&suffix, options, image);
+    let encoding = encoding(Format::of(path), options, image);
     let coding = (encoding, &options.response);
     files.write(path, |part| write_part(path, part, image, channels, coding, metadata));
     Ok(())
@@ -149,7 +144,7 @@ pub(crate) fn write_beside(
 
 /// Whether a file of this name holds channels beside the colours: the suffix is that of OpenEXR.
 pub fn holds_channels(path: &Path) -> bool {
-    EXR.contains(&suffix(path).as_str())
+    Format::of(path) == Some(Format::OpenExr)
 }
 
 /// Whether the format that the suffix says holds pictures of this width and height.
@@ -157,14 +152,16 @@ pub fn holds_channels(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Output`] where it does not.
 pub(crate) fn check_sides(path: &Path, [width, height]: [u32; 2]) -> Result<()> {
-    let suffix = suffix(path);
-    match LONGEST.iter().find(|(suffixes, _)| suffixes.contains(&suffix.as_str())) {
-        Some((_, most)) if width.max(height) > *most => Err(Error::output(
-            path,
-            format!(
-                "{width} x {height} pixels are too many for .{suffix}, which ends at {most}; choose another format"
-            ),
-        )),
+    match Format::of(path).and_then(longest_side) {
+        Some(most) if width.max(height) > most => {
+            let suffix = suffix(path);
+            Err(Error::output(
+                path,
+                format!(
+                    "{width} x {height} pixels are too many for .{suffix}, which ends at {most}; choose another format"
+                ),
+            ))
+        }
         _ => Ok(()),
     }
 }
@@ -179,7 +176,7 @@ pub(crate) fn prepare() -> Result<()> {
 
 /// Whether every build writes files of this suffix; of the others, OpenImageIO has to be asked.
 pub(crate) fn has_common_suffix(path: &Path) -> bool {
-    COMMON.contains(&suffix(path).as_str())
+    Format::of(path).is_some_and(|format| COMMON.contains(&format))
 }
 
 /// Checks, before a long render, that an image can be written to `path`: by writing a small one beside it.
@@ -188,12 +185,12 @@ pub(crate) fn has_common_suffix(path: &Path) -> bool {
 /// [`Error::Output`] for a suffix that this build does not write (it lists those that it does), for a folder that does
 /// not exist or takes no file, and for a path that is itself a folder.
 pub fn check_writable(path: &Path) -> Result<()> {
-    let suffix = writable_suffix(path)?;
+    check_suffix(path)?;
     let options = WriteOptions::default();
     output::check_writable(path)?;
     // Not smaller, for JPEG 2000's sake.
     let (image, metadata) = (Image::new(32, 32), Metadata::default());
-    let coding = (encoding(&suffix, &options, &image), &options.response);
+    let coding = (encoding(Format::of(path), &options, &image), &options.response);
     output::probe(path, |part| write_part(path, part, &image, &[], coding, &metadata))
 }
 
@@ -239,7 +236,7 @@ pub fn read_whole(path: &Path) -> Result<Image> {
 /// What [`read`] decodes.
 pub(super) fn read_samples(path: &Path) -> Result<Samples> {
     let bytes = file_size(path)?;
-    if JPEG.contains(&suffix(path).as_str()) {
+    if Format::of(path) == Some(Format::Jpeg) {
         let file = Mapped::open(path).map_err(|error| Error::input(path, "", system_message(&error)))?;
         if super::is_cut_short(&file) {
             return Err(Error::input(path, "", "is cut short"));
@@ -294,22 +291,26 @@ fn write_part(
 
 /// Whether the format that the suffix says holds light of any strength.
 pub(crate) fn keeps_radiance(path: &Path) -> bool {
-    let suffix = suffix(path);
-    EXR.contains(&suffix.as_str()) || RADIANCE.contains(&suffix.as_str())
+    matches!(Format::of(path), Some(Format::OpenExr | Format::Radiance))
 }
 
-fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
-    if EXR.contains(&suffix) {
-        // What is more would come back as infinite.
-        let is_held = |value: f32| !value.is_finite() || value.abs() <= MOST_HALF;
-        let fits = || image.pixels.iter().all(|pixel| pixel.to_array().into_iter().all(is_held));
-        let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
-        Encoding { kind, alpha: true, tile: options.tile, linear: true }
-    } else if RADIANCE.contains(&suffix) {
-        Encoding { kind: Type::Float, alpha: false, tile: 0, linear: true }
-    } else {
-        let linear = options.response.curve == Curve::Linear;
-        Encoding { kind: Type::U8, alpha: WITH_ALPHA.contains(&suffix), tile: 0, linear }
+/// What a file of this format holds: linear floating values in OpenEXR and Radiance, in all others 8-bit codes.
+fn encoding(format: Option<Format>, options: &WriteOptions, image: &Image) -> Encoding {
+    match format {
+        Some(Format::OpenExr) => {
+            // What is more would come back as infinite.
+            let is_held = |value: f32| !value.is_finite() || value.abs() <= MOST_HALF;
+            let fits = || image.pixels.iter().all(|pixel| pixel.to_array().into_iter().all(is_held));
+            let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
+            Encoding { kind, alpha: true, tile: options.tile, linear: true }
+        }
+        Some(Format::Radiance) => Encoding { kind: Type::Float, alpha: false, tile: 0, linear: true },
+        _ => {
+            // These define alpha, and as straight. The others either have none, or leave open what it means to
+            // colours, and every reader guesses differently: there the image is laid over black.
+            let alpha = matches!(format, Some(Format::Png | Format::Targa | Format::Tiff));
+            Encoding { kind: Type::U8, alpha, tile: 0, linear: options.response.curve == Curve::Linear }
+        }
     }
 }
 
@@ -318,16 +319,11 @@ fn encoding(suffix: &str, options: &WriteOptions, image: &Image) -> Encoding {
 /// # Errors
 /// [`Error::Output`] where it does not, and as [`prepare`].
 pub(crate) fn check_suffix(path: &Path) -> Result<()> {
-    writable_suffix(path).map(drop)
-}
-
-/// The suffix in lower case, if this build writes it.
-fn writable_suffix(path: &Path) -> Result<String> {
     let suffix = suffix(path);
     prepare()?;
     let known = backend::writable_suffixes().map_err(|message| Error::output(path, message))?;
     if known.contains(&suffix) {
-        return Ok(suffix);
+        return Ok(());
     }
     let found = if suffix.is_empty() { "no suffix".to_owned() } else { format!("unknown suffix .{suffix}") };
     let without = if cfg!(feature = "oiio") { "" } else { "; more with OpenImageIO (feature oiio)" };
@@ -376,15 +372,32 @@ mod tests {
     }
 
     #[test]
+    fn texts_that_files_cannot_hold_are_refused() {
+        let path = std::env::temp_dir().join("twincast-never-written.exr");
+        for (name, is_held) in
+            [("a/b", true), ("a", false), ("a\0/b", false), (&format!("a/{}", "b".repeat(254)), false)]
+        {
+            let metadata = Metadata { texts: vec![(name.to_owned(), "x".to_owned())], ..Metadata::default() };
+            assert_eq!(metadata.check().is_ok(), is_held, "{name:?}");
+            if !is_held {
+                let error = write(&path, &Image::new(2, 2), &metadata, &WriteOptions::default()).unwrap_err();
+                assert_eq!(error.exit_code(), 2, "{error}");
+                assert!(!path.exists());
+            }
+        }
+    }
+
+    #[test]
     fn suffixes_choose_the_encoding() {
         let options = WriteOptions { depth: Depth::Float, tile: 32, ..WriteOptions::default() };
         let of = |suffix| {
-            let e = encoding(suffix, &options, &Image::new(1, 1));
+            let e = encoding(Format::of_suffix(suffix), &options, &Image::new(1, 1));
             (e.kind, e.alpha, e.tile)
         };
         assert_eq!(of("exr"), (Type::Float, true, 32));
         assert_eq!(of("hdr"), (Type::Float, false, 0));
         assert_eq!(of("png"), (Type::U8, true, 0));
+        assert_eq!(of("dpx"), (Type::U8, false, 0));
         assert_eq!(of("jpg"), (Type::U8, false, 0));
     }
 
@@ -400,7 +413,7 @@ mod tests {
         for (red, light, kind) in cases {
             let mut image = Image::new(2, 1);
             (image.pixels[1].x, image.pixels[1].y) = (red, light);
-            assert_eq!(encoding("exr", &WriteOptions::default(), &image).kind, kind, "{light}");
+            assert_eq!(encoding(Some(Format::OpenExr), &WriteOptions::default(), &image).kind, kind, "{light}");
         }
     }
 }

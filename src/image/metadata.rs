@@ -1,5 +1,7 @@
 //! What a picture's file says about how it was made.
 
+use crate::error::{Error, Result};
+
 /// How a picture was made. In OpenEXR files each field is an attribute; other formats keep what they can.
 ///
 /// Matrices are written as the field does it, for row vectors: `[x y z 1] M`, translation in the last four elements.
@@ -21,7 +23,7 @@ pub struct Metadata {
     pub render_time_seconds: Option<f64>,
     /// Of which larger picture this is a part; none for a whole one. OpenEXR's data window in its display window.
     pub window: Option<Window>,
-    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`); in the order of the names when
+    /// Texts under names of their own, which have a slash in them (`cryptomatte/5e4b1a2/name`) and 255 bytes at most; in the order of the names when
     /// read. OpenEXR alone.
     pub texts: Vec<(String, String)>,
 }
@@ -66,6 +68,17 @@ impl Default for Metadata {
             window: None,
             texts: Vec::new(),
         }
+    }
+}
+
+impl Metadata {
+    /// Whether files can hold it.
+    pub(super) fn check(&self) -> Result<()> {
+        let texts = self.texts.iter().map(|(name, _)| name);
+        let is_wrong = |name: &&String| !is_text(name) || name.len() > 255 || name.contains('\0');
+        texts.clone().find(is_wrong).map_or(Ok(()), |name| {
+            Err(Error::Usage(format!("text {name:?}: names have a slash, and 255 bytes at most, none of which is 0")))
+        })
     }
 }
 

@@ -10,6 +10,7 @@
 mod channels;
 pub mod denoise;
 mod file;
+mod format;
 mod guarded;
 mod jpeg;
 #[cfg(any(feature = "oiio", feature = "oidn"))]

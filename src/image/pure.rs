@@ -10,6 +10,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use openexr::{AttributeValue, FlatSamples, Text};
 
 use super::file::{COMMON, Encoding};
+use super::format::Format;
 use super::metadata::{Metadata, Placed, Window, is_text, narrow, widen};
 use super::samples::{Alpha, Channels, Samples, Values};
 use super::{Channel, guarded, picture, pure_channels};
@@ -34,7 +35,7 @@ pub(super) fn prepare() -> crate::error::Result<()> {
 
 /// What is written; the same is read.
 pub(super) fn writable_suffixes() -> Result<Vec<String>> {
-    Ok(COMMON.map(str::to_owned).to_vec())
+    Ok(COMMON.iter().flat_map(|format| format.suffixes()).map(|&suffix| suffix.to_owned()).collect())
 }
 
 /// Writes a file.
@@ -62,7 +63,7 @@ fn write_bytes(path: &Path, samples: &Samples, bytes: &[u8]) -> Result<()> {
     let mut file = BufWriter::new(File::create(path).map_err(|e| e.to_string())?);
     let (width, height) = (samples.width, samples.height);
     let colour = if samples.channels.alpha.is_some() { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
-    let written = if path.extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("png")) {
+    let written = if Format::of(path) == Some(Format::Png) {
         PngEncoder::new(&mut file).write_image(bytes, width, height, colour)
     } else {
         JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).write_image(bytes, width, height, colour)

@@ -49,8 +49,9 @@ impl Reference {
     /// How far `image` is from it, once it is what such a file would hold: of codes, what the `response` makes of light.
     ///
     /// # Errors
-    /// [`Error::Check`](crate::Error::Check) where the sizes differ.
+    /// [`Error::Check`](crate::Error::Check) where the sizes differ, and those of [`Image::check`].
     pub fn difference(&self, image: &Image, response: &Response) -> Result<Difference> {
+        image.check()?;
         let held = |kind| through(image, kind, self.has_alpha, response).difference(&self.image);
         let difference = if self.is_radiance {
             let mut shared = through(image, Type::Float, self.has_alpha, response);

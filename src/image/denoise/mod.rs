@@ -102,8 +102,9 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`Error::Interrupted`] once `watch` says so; [`Error::Backend`] with the library's own words where it fails; and
-    /// [`Error::Usage`] for guides of another size.
+    /// [`Error::Usage`] for guides of another size, and as of [`Image::check`].
     pub fn denoise(&self, image: &Image, guides: &Guides, watch: Watch<'_>) -> Result<Image> {
+        image.check()?;
         let pixels = image.pixels.len();
         if guides.albedo.len() != pixels || guides.normal.len() != pixels {
             let (albedo, normal) = (guides.albedo.len(), guides.normal.len());

@@ -25,6 +25,7 @@ use exr::prelude::f16;
 use self::bridge::{Attributes, Input, Kind, Layout, Named, Result, Slice, Text};
 use self::shim::functions;
 use super::file::Encoding;
+use super::format::Format;
 use super::jpeg::{self, Plain};
 use super::metadata::{Metadata, Placed, Window, is_text, narrow, widen};
 use super::orientation::upright;
@@ -167,18 +168,19 @@ pub(super) fn read_channels(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>)
 pub(super) fn read(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
     match formats::of(path)? {
         // To the same bits, and libpng writes to where errors belong by itself.
-        formats::PNG => picture::read(path, check),
-        formats::JPEG => read_jpeg(path, check),
-        format => read_as(path, format, check),
+        (Format::Png, _) => picture::read(path, check),
+        (Format::Jpeg, name) => read_jpeg(path, name, check),
+        (Format::Radiance, name) => read_radiance(path, name, check),
+        (_, name) => read_as(path, name, check),
     }
 }
 
 /// Of a JPEG file the picture alone: what OpenImageIO makes of the words that cameras and programs leave beside it reads past their end where they are damaged.
-fn read_jpeg(path: &Path, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+fn read_jpeg(path: &Path, name: &str, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
     let file = Mapped::open(path).map_err(|error| error.to_string())?;
     let Plain { bytes, orientation } = jpeg::plain(&file).ok_or("a broken JPEG file: there is no picture in it")?;
-    let Some((_memory, place)) = in_memory(&bytes) else { return read_as(path, formats::JPEG, check) };
-    let samples = read_as(&place, formats::JPEG, check);
+    let Some((_memory, place)) = in_memory(&bytes) else { return read_as(path, name, check) };
+    let samples = read_as(&place, name, check);
     let samples = samples.map_err(|message| message.replace(&*place.to_string_lossy(), &path.to_string_lossy()))?;
     Ok(upright(samples, orientation))
 }
@@ -199,15 +201,20 @@ fn in_memory(_: &[u8]) -> Option<(std::fs::File, PathBuf)> {
     None
 }
 
-/// Reads a file by the reader of a format, which is told by its name or by a suffix of its files.
+/// A Radiance file, unless its lines are columns of the picture.
+fn read_radiance(path: &Path, name: &str, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
+    if functions()?.open(path, name)?.layout()?.orientation > 4 {
+        // Of such lines OpenImageIO takes two for each other.
+        return Err("its lines are columns of the picture (the line of its sizes begins with X); only those with rows are read, of which the line begins with -Y or +Y".to_owned());
+    }
+    read_as(path, name, check)
+}
+
+/// Reads a file by the reader of a format, which is told by OpenImageIO's name of it or by a suffix of its files.
 pub(super) fn read_as(path: &Path, format: &str, check: &dyn Fn(u64, u64) -> Result<()>) -> Result<Samples> {
     let mut input = functions()?.open(path, format)?;
     let layout = input.layout()?;
     check(layout.width.into(), layout.height.into())?;
-    if format == formats::RADIANCE && layout.orientation > 4 {
-        // Of such lines OpenImageIO takes two for each other.
-        return Err("its lines are columns of the picture (the line of its sizes begins with X); only those with rows are read, of which the line begins with -Y or +Y".to_owned());
-    }
     let alpha = layout.alpha.then_some(if layout.straight { Alpha::Straight } else { Alpha::Premultiplied });
     let channels = Channels { colour: layout.channels >= 3, alpha };
     let count = layout.width as usize * layout.height as usize * channels.count();
@@ -222,14 +229,14 @@ pub(super) fn read_as(path: &Path, format: &str, check: &dyn Fn(u64, u64) -> Res
 /// An OpenEXR file, opened.
 fn open_exr(path: &Path) -> Result<Input<'static>> {
     match formats::of(path) {
-        Ok(formats::OPENEXR) => functions()?.open(path, formats::OPENEXR),
+        Ok((Format::OpenExr, name)) => functions()?.open(path, name),
         _ => Err("not an OpenEXR file".to_owned()),
     }
 }
 
 /// Where a file's pixels lie in the picture that it holds a part of. None where it holds the whole, as every file that is not OpenEXR.
 pub(super) fn placed(path: &Path) -> Result<Option<Placed>> {
-    if formats::of(path)? != formats::OPENEXR {
+    if formats::of(path)?.0 != Format::OpenExr {
         return Ok(None);
     }
     let layout = open_exr(path)?.layout()?;

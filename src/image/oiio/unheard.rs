@@ -8,17 +8,15 @@ use std::io;
 use std::path::Path;
 
 use super::bridge::Result;
+use crate::image::format::Format;
 use crate::output::suffix;
 
-/// Suffixes of pictures that are written so.
-const UNHEARD: [&str; 22] = [
-    "avif", "bmp", "bw", "fits", "gif", "heic", "heics", "heif", "heifs", "hif", "int", "inta", "j2c", "j2k", "jp2",
-    "jpc", "rgb", "rgba", "sgi", "tga", "tpic", "webp",
-];
+const UNHEARD: [Format; 8] =
+    [Format::Bmp, Format::Fits, Format::Gif, Format::Heif, Format::Jpeg2000, Format::Sgi, Format::Targa, Format::WebP];
 
 /// Whether a file of this name is written so.
 pub(super) fn are_written_to(path: &Path) -> bool {
-    UNHEARD.contains(&suffix(path).as_str())
+    Format::of(path).is_some_and(|format| UNHEARD.contains(&format))
 }
 
 /// Has `write` make a file of a picture of this size, and holds it against that.
