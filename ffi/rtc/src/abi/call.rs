@@ -2,7 +2,7 @@
 
 use std::ffi::{c_int, c_void};
 
-use super::RTCBounds;
+use super::{InstanceId, RTCBounds};
 
 /// Which instance a ray is in, and in version 3 what goes with the query.
 #[cfg(feature = "v3")]
@@ -11,7 +11,7 @@ use super::RTCBounds;
 pub struct RTCContext {
     pub flags: u32,
     pub filter: RTCFilterFunctionN,
-    pub instance: u32,
+    pub instance: InstanceId,
 }
 
 /// Which instance a ray is in.
@@ -19,9 +19,7 @@ pub struct RTCContext {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct RTCContext {
-    pub instance: u32,
-    #[cfg(not(feature = "compact-ray-hit"))]
-    pub instance_primitive: u32,
+    pub instance: InstanceId,
 }
 
 /// What goes with a query; `F` is the callback of user geometry, if it is to be that of the query.

@@ -2,6 +2,8 @@
 
 use std::ffi::c_void;
 
+use super::InstanceId;
+
 /// A point, and how far to look around it.
 #[repr(C, align(16))]
 #[derive(Clone, Copy, Debug)]
@@ -20,9 +22,7 @@ pub struct RTCPointQueryContext {
     /// By columns.
     pub world_to_instance: [f32; 16],
     pub instance_to_world: [f32; 16],
-    pub instance: u32,
-    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    pub instance_primitive: u32,
+    pub instance: InstanceId,
     /// How many instances: 0 or 1.
     pub depth: u32,
 }

@@ -25,14 +25,51 @@ pub struct RTCHit {
     pub v: f32,
     pub primitive: u32,
     pub geometry: u32,
-    pub instance: u32,
-    /// Which of an instance array.
-    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    pub instance_primitive: u32,
+    pub instance: InstanceId,
 }
 
+/// An instance, and of an instance array which of its instances; outside of all where nothing is in one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InstanceId {
+    geometry: u32,
+    #[cfg(instance_primitives)]
+    primitive: u32,
+}
+
+impl InstanceId {
+    /// None.
+    pub const OUTSIDE: Self = Self::new(super::INVALID_ID, super::INVALID_ID);
+
+    /// Where there are no numbers within arrays, all of one array are alike.
+    pub const fn new(geometry: u32, _primitive: u32) -> Self {
+        Self {
+            geometry,
+            #[cfg(instance_primitives)]
+            primitive: _primitive,
+        }
+    }
+
+    /// Whether it is one. What callers leave in the number within arrays is nothing.
+    pub const fn is_inside(self) -> bool {
+        self.geometry != super::INVALID_ID
+    }
+
+    /// As words of a hit.
+    pub const fn words(self) -> [u32; INSTANCE_WORDS] {
+        [
+            self.geometry,
+            #[cfg(instance_primitives)]
+            self.primitive,
+        ]
+    }
+}
+
+/// Words of an instance's number.
+pub const INSTANCE_WORDS: usize = size_of::<InstanceId>() / 4;
+
 /// Words of a hit in structures of arrays.
-pub const HIT_WORDS: usize = if cfg!(all(feature = "v4", not(feature = "compact-ray-hit"))) { 9 } else { 8 };
+pub const HIT_WORDS: usize = 7 + INSTANCE_WORDS;
 
 /// Words of a ray in structures of arrays.
 pub const RAY_WORDS: usize = 12;
@@ -47,7 +84,7 @@ pub struct RTCRayHit {
 
 const _: () = {
     assert!(size_of::<RTCRay>() == 48 && std::mem::offset_of!(RTCRay, tfar) == 32);
-    assert!(size_of::<RTCRayHit>() == if HIT_WORDS == 9 { 96 } else { 80 });
+    assert!(size_of::<RTCRayHit>() == if cfg!(instance_primitives) { 96 } else { 80 });
     assert!(std::mem::offset_of!(RTCHit, instance) == 28);
 };
 
@@ -59,9 +96,7 @@ impl RTCHit {
         v: 0.0,
         primitive: super::INVALID_ID,
         geometry: super::INVALID_ID,
-        instance: super::INVALID_ID,
-        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-        instance_primitive: super::INVALID_ID,
+        instance: InstanceId::OUTSIDE,
     };
 }
 

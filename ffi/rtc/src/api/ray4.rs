@@ -20,11 +20,7 @@ unsafe fn ask<T>(
 ) {
     let ask = |scene: &Scene| {
         present(rays)?;
-        let mut own = RTCContext {
-            instance: INVALID_ID,
-            #[cfg(not(feature = "compact-ray-hit"))]
-            instance_primitive: INVALID_ID,
-        };
+        let mut own = RTCContext { instance: InstanceId::OUTSIDE };
         let mut query = Query { context: &raw mut own, filter: None, filters_all: false, user: None };
         // SAFETY: null or the caller's.
         if let Some(arguments) = unsafe { arguments.as_ref() } {
@@ -110,8 +106,7 @@ unsafe fn forward(
     call: *const RTCUserFunctionNArguments,
     scene: *const Scene,
     ray: *const RTCRay,
-    instance: u32,
-    instance_primitive: u32,
+    instance: InstanceId,
     any: bool,
 ) {
     let work = |scene: &Scene| {
@@ -124,7 +119,7 @@ unsafe fn forward(
         // SAFETY: the interface's rules.
         let (Some(committed), new) = (unsafe { (scene.committed(), ray.read()) }) else { return Ok(()) };
         let before = target.ray();
-        within(query, instance, instance_primitive, || {
+        within(query, instance, || {
             target.set_place(new.org, new.dir);
             target.set_span(new.tnear, new.time);
             // Of what was hit before the ray was sent on nothing is known.
@@ -153,7 +148,7 @@ macro_rules! forwards {
             instance: u32,
         ) {
             // SAFETY: the interface's rules.
-            unsafe { forward(call, scene, ray, instance, 0, $any) }
+            unsafe { forward(call, scene, ray, InstanceId::new(instance, 0), $any) }
         }
 
         /// Sends a ray on, into one of an array.
@@ -166,7 +161,7 @@ macro_rules! forwards {
             instance_primitive: u32,
         ) {
             // SAFETY: the interface's rules.
-            unsafe { forward(call, scene, ray, instance, instance_primitive, $any) }
+            unsafe { forward(call, scene, ray, InstanceId::new(instance, instance_primitive), $any) }
         }
     )*};
 }

@@ -6,7 +6,7 @@ use twincast_core::{Ray, TriangleMethod};
 
 use super::offer::{Nearest, Target};
 use super::{Query, round, user};
-use crate::abi::{INVALID_ID, RTCRay};
+use crate::abi::{INVALID_ID, InstanceId, RTCRay};
 use crate::geometry::{Ball, Named};
 use crate::scene::{Body, Committed, Item, Placed, Record, Scene};
 
@@ -348,7 +348,7 @@ fn enter_at<const ANY: bool>(
     nearest: &mut Nearest,
 ) {
     // SAFETY: the context is the caller's, which lives as long as the query and is this thread's, or our own.
-    if unsafe { (*query.context).instance } != INVALID_ID {
+    if unsafe { (*query.context).instance }.is_inside() {
         return;
     }
     // SAFETY: scenes are not committed while rays are traced: the interface's rule.
@@ -359,7 +359,7 @@ fn enter_at<const ANY: bool>(
     let before = if *nearest <= own { 0 } else { INVALID_ID };
     let tfar = target.tfar();
     let mut now = before;
-    within(query, own.geometry, own.primitive, || {
+    within(query, InstanceId::new(own.geometry, own.primitive), || {
         target.set_place(org.to_array(), dir.to_array());
         now = cast_inside::<ANY>(committed, query, target, before);
         target.set_place(ray.org, ray.dir);
@@ -370,24 +370,10 @@ fn enter_at<const ANY: bool>(
 }
 
 /// Runs `work` with the context naming an instance.
-pub fn within(query: &Query, instance: u32, _primitive: u32, work: impl FnOnce()) {
+pub fn within(query: &Query, instance: InstanceId, work: impl FnOnce()) {
     // SAFETY: as in `enter`; no reference is kept while `work` runs, which may give the context to callbacks.
-    let before = unsafe { query.context.read() };
-    // SAFETY: as above.
-    unsafe {
-        (*query.context).instance = instance;
-        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-        {
-            (*query.context).instance_primitive = _primitive;
-        }
-    }
+    let before = unsafe { std::mem::replace(&mut (*query.context).instance, instance) };
     work();
     // SAFETY: as above.
-    unsafe {
-        (*query.context).instance = before.instance;
-        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-        {
-            (*query.context).instance_primitive = before.instance_primitive;
-        }
-    }
+    unsafe { (*query.context).instance = before }
 }

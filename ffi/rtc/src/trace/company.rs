@@ -8,7 +8,7 @@ use super::cast::{after, cast_others, enter, name_solid, within};
 use super::lanes::{Lanes, field};
 use super::offer::{Nearest, Target, hit_of};
 use super::packet::{any_alone, closest_alone, only_triangles, tell};
-use crate::abi::{INVALID_ID, RTCRay, RTCRayHit};
+use crate::abi::{INVALID_ID, InstanceId, RTCRay, RTCRayHit};
 use crate::scene::{Committed, Placed};
 
 /// Rays of a packet.
@@ -30,7 +30,7 @@ impl<'a> Crowd<'a> {
         let heeded = &committed.heeded;
         let has_filter = if any { heeded.occluded_filter } else { heeded.intersect_filter };
         // SAFETY: the context is the caller's, which lives as long as the query, or our own.
-        let is_inside = unsafe { (*query.context).instance } != INVALID_ID;
+        let is_inside = unsafe { (*query.context).instance }.is_inside();
         if has_filter || query.filter.is_some() || is_inside || !committed.smaller.is_empty() {
             return None;
         }
@@ -184,7 +184,7 @@ impl<'a, L: Lanes> Company<'a, L> {
             } else {
                 let beyond = beyond_start(&packet, inner.excludes_start);
                 let asked = Asked { packets: [beyond.as_ref().unwrap_or(&packet)], lanes: [seeing] };
-                within(self.query, *geometry, *primitive, || {
+                within(self.query, InstanceId::new(*geometry, *primitive), || {
                     solid.closest_packets(&asked, |[hits]| self.take(inner, placed, hits));
                 });
             }

@@ -136,9 +136,8 @@ pub mod field {
     pub const V: usize = RAY_WORDS + offset_of!(RTCHit, v) / 4;
     pub const PRIMITIVE: usize = RAY_WORDS + offset_of!(RTCHit, primitive) / 4;
     pub const GEOMETRY: usize = RAY_WORDS + offset_of!(RTCHit, geometry) / 4;
+    /// The first of its words.
     pub const INSTANCE: usize = RAY_WORDS + offset_of!(RTCHit, instance) / 4;
-    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    pub const INSTANCE_PRIMITIVE: usize = RAY_WORDS + offset_of!(RTCHit, instance_primitive) / 4;
 }
 
 const _: () = {

@@ -218,7 +218,5 @@ pub fn hit_of(query: &Query, geometry: u32, named: &Named) -> RTCHit {
         primitive: named.primitive,
         geometry,
         instance: context.instance,
-        #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-        instance_primitive: context.instance_primitive,
     }
 }

@@ -240,9 +240,9 @@ pub fn tell(committed: &Committed, query: &Query, lanes: &impl Lanes, first: usi
     lanes.set_row(field::GEOMETRY, first, *geometry);
     // SAFETY: the context is the caller's, which lives as long as the query, or our own.
     let context = unsafe { query.context.read() };
-    lanes.set_row(field::INSTANCE, first, [context.instance; RAYS]);
-    #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-    lanes.set_row(field::INSTANCE_PRIMITIVE, first, [context.instance_primitive; RAYS]);
+    for (word, value) in context.instance.words().into_iter().enumerate() {
+        lanes.set_row(field::INSTANCE + word, first, [value; RAYS]);
+    }
 }
 
 /// A bit for each ray that was hit where it begins.

@@ -6,7 +6,7 @@ use twincast_core::math::{self, Affine3, DAffine3, Vec3};
 use twincast_core::trace::bvh::Search;
 
 use crate::abi::{
-    INVALID_ID, RTCPointQuery, RTCPointQueryContext, RTCPointQueryFunction, RTCPointQueryFunctionArguments,
+    InstanceId, RTCPointQuery, RTCPointQueryContext, RTCPointQueryFunction, RTCPointQueryFunctionArguments,
 };
 use crate::scene::{Body, Committed, Instance, Item, Record};
 
@@ -114,11 +114,7 @@ impl Search1 {
         unsafe {
             (*self.context).world_to_instance = matrix(&to_scene.as_affine3());
             (*self.context).instance_to_world = matrix(&to_world);
-            (*self.context).instance = item.geometry;
-            #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-            {
-                (*self.context).instance_primitive = item.primitive;
-            }
+            (*self.context).instance = InstanceId::new(item.geometry, item.primitive);
             (*self.context).depth = 1;
         }
         let changed = self.run(
@@ -133,11 +129,7 @@ impl Search1 {
         );
         // SAFETY: as above.
         unsafe {
-            (*self.context).instance = INVALID_ID;
-            #[cfg(all(feature = "v4", not(feature = "compact-ray-hit")))]
-            {
-                (*self.context).instance_primitive = INVALID_ID;
-            }
+            (*self.context).instance = InstanceId::OUTSIDE;
             (*self.context).depth = 0;
         }
         changed
