@@ -1,11 +1,12 @@
 //! Which accelerator: its flags, and what they go together with.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 
 use super::build::BuildArgs;
 use super::cache::CacheArgs;
-use super::common::by_name;
 use super::engine::BackendArg;
+use super::named::one_of;
 use crate::error::{Error, Result};
 use crate::scene::{Accel, Resolution, Search};
 use crate::shape::{SphereMethod, TriangleMethod};
@@ -14,8 +15,8 @@ use crate::trace::accel::{Methods, Options};
 #[derive(Clone, Debug, Args)]
 pub(super) struct AccelArgs {
     /// How the native engine searches the scene (default: as the scene asks, else bvh); never changes a picture
-    #[arg(long, value_enum)]
-    accel: Option<AccelArg>,
+    #[arg(long, value_name = "NAME", value_parser = accels())]
+    accel: Option<Accel>,
 
     #[command(flatten)]
     pub(super) options: AccelOptionArgs,
@@ -28,49 +29,27 @@ pub(super) struct AccelOptionArgs {
     #[arg(long, value_name = "N|XxYxZ", value_parser = parse_grid)]
     grid: Option<Resolution>,
 
-    /// How the classic accelerators meet triangles: exact, or a textbook's side-planes, same-side, areas,
-    /// moeller-trumbore or woop, to see what these miss
-    #[arg(long, value_name = "NAME", value_parser = parse_triangle_method)]
+    /// How the classic accelerators meet triangles: exactly, or as textbooks do, to see what these miss
+    #[arg(long, value_name = "NAME", value_parser = one_of(TriangleMethod::ALL, TriangleMethod::name, TriangleMethod::source))]
     triangle_method: Option<TriangleMethod>,
 
-    /// How the classic accelerators meet spheres: exact, or a textbook's algebraic, geometric or accurate
-    #[arg(long, value_name = "NAME", value_parser = parse_sphere_method)]
+    /// How the classic accelerators meet spheres: exactly, or as textbooks do
+    #[arg(long, value_name = "NAME", value_parser = one_of(SphereMethod::ALL, SphereMethod::name, SphereMethod::source))]
     sphere_method: Option<SphereMethod>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum AccelArg {
-    /// The eight-wide BVH
-    Bvh,
-    /// Every primitive for every ray
-    Brute,
-    /// A flat list of boxes, one a geometry
-    Groups,
-    /// A binary BVH
-    BinaryBvh,
-    /// A uniform grid, nested where it is crowded
-    Grid,
-    /// An octree
-    Octree,
-    /// A kd-tree
-    KdTree,
-    /// A BSP tree of general planes
-    Bsp,
-}
-
-impl AccelArg {
-    pub(super) const fn accel(self) -> Accel {
-        match self {
-            Self::Bvh => Accel::Bvh,
-            Self::Brute => Accel::Brute,
-            Self::Groups => Accel::Groups,
-            Self::BinaryBvh => Accel::Binary,
-            Self::Grid => Accel::Grid,
-            Self::Octree => Accel::Octree,
-            Self::KdTree => Accel::Kd,
-            Self::Bsp => Accel::Bsp,
-        }
-    }
+/// Reads the name of an accelerator.
+pub(super) fn accels() -> impl TypedValueParser<Value = Accel> {
+    one_of(Accel::ALL, Accel::name, |accel| match accel {
+        Accel::Bvh => "The eight-wide BVH",
+        Accel::Brute => "Every primitive for every ray",
+        Accel::Groups => "A flat list of boxes, one a geometry",
+        Accel::Binary => "A binary BVH",
+        Accel::Grid => "A uniform grid, nested where it is crowded",
+        Accel::Octree => "An octree",
+        Accel::Kd => "A kd-tree",
+        Accel::Bsp => "A BSP tree of general planes",
+    })
 }
 
 impl AccelOptionArgs {
@@ -142,7 +121,7 @@ impl AccelArgs {
         build: Option<&BuildArgs>,
         cache: &CacheArgs,
     ) -> Result<(Accel, Options)> {
-        let flag = self.accel.map(AccelArg::accel);
+        let flag = self.accel;
         if backend == BackendArg::Embree && flag.is_none() {
             // What a scene asks of the native engine does not concern Embree, but for what it would not see.
             self.options.choose(&[Accel::Bvh], Search::default())?;
@@ -173,14 +152,6 @@ impl AccelArgs {
             BackendArg::Native | BackendArg::Both => Ok((accel, options)),
         }
     }
-}
-
-fn parse_triangle_method(name: &str) -> std::result::Result<TriangleMethod, String> {
-    by_name(TriangleMethod::ALL, TriangleMethod::name, name)
-}
-
-fn parse_sphere_method(name: &str) -> std::result::Result<SphereMethod, String> {
-    by_name(SphereMethod::ALL, SphereMethod::name, name)
 }
 
 fn parse_grid(text: &str) -> std::result::Result<Resolution, String> {

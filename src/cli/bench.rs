@@ -2,16 +2,20 @@
 
 use std::path::PathBuf;
 
+use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
 
-use super::accel::{AccelArg, AccelOptionArgs};
-use super::common::{UpAxis, needs, parse_bytes};
+use super::accel::{AccelOptionArgs, accels};
+use super::common::{needs, parse_bytes, up_axes};
 use super::engine::BackendArg;
+use super::named::one_of;
 use super::scaling;
+use super::threads::parse_threads;
 use crate::error::Result;
-#[cfg(feature = "embree")]
-use crate::lab::bench::Kind;
-use crate::lab::bench::SIDE;
+use crate::io::UpAxis;
+use crate::lab::bench::{Kind, SIDE};
+use crate::trace::accel::Accel;
+use crate::trace::bvh::Isa;
 
 /// Measure builds and rays of native and Embree, in turn
 ///
@@ -36,18 +40,18 @@ pub(super) struct BenchArgs {
     scenes: Vec<String>,
 
     /// Axis of the files that points up
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "AXIS", value_parser = up_axes(), default_value = UpAxis::default().name())]
     up_axis: UpAxis,
 
     /// Kinds of rays
     #[arg(
         long,
         value_name = "KIND,...",
-        value_enum,
+        value_parser = kinds(),
         value_delimiter = ',',
-        default_value = "primary,diffuse,shadow,pixel"
+        default_values = Kind::ALL.map(Kind::name)
     )]
-    rays: Vec<RaysArg>,
+    rays: Vec<Kind>,
 
     /// Modes: native's default, native-fast, native-high, native-compact, native-fast-compact; Embree's fast, robust, compact, and high (quality,
     /// fast otherwise)
@@ -65,20 +69,20 @@ pub(super) struct BenchArgs {
     size: u32,
 
     /// Threads that build and trace; 0 is one for each core
-    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = super::render::parse_threads)]
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = parse_threads)]
     pub(super) threads: usize,
 
     /// Instructions that both engines may use at most (default: what the processor has)
-    #[arg(long, value_enum)]
-    isa: Option<IsaArg>,
+    #[arg(long, value_name = "ISA", value_parser = isas())]
+    isa: Option<Isa>,
 
     /// How often everything is measured; builds of small meshes are measured up to 41 times
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
 
     /// Other accelerators to measure beside these modes: brute, groups, bvh, binary-bvh, grid, octree, kd-tree, bsp
-    #[arg(long, value_name = "NAME,...", value_enum, value_delimiter = ',', hide_possible_values = true)]
-    accel: Vec<AccelArg>,
+    #[arg(long, value_name = "NAME,...", value_parser = accels(), value_delimiter = ',', hide_possible_values = true)]
+    accel: Vec<Accel>,
 
     #[command(flatten)]
     options: AccelOptionArgs,
@@ -112,40 +116,24 @@ fn parse_chart(name: &str) -> std::result::Result<PathBuf, String> {
     if is_svg { Ok(path) } else { Err("a chart is an SVG file: give a name that ends in .svg".to_owned()) }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum IsaArg {
-    /// What every processor has, as it is without AVX
-    Portable,
-    /// Vectors of 8
-    Avx2,
-    /// Vectors of 16
-    Avx512,
+fn isas() -> impl TypedValueParser<Value = Isa> {
+    one_of(Isa::ALL, Isa::name, |isa| match isa {
+        Isa::Portable => "What every processor has, as it is without AVX",
+        Isa::Avx2 => "Vectors of 8",
+        Isa::Avx512 => "Vectors of 16",
+    })
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum RaysArg {
-    /// From the camera
-    Primary,
-    /// From what the camera sees, in random directions
-    Diffuse,
-    /// From what the camera sees to a point light
-    Shadow,
-    /// From the camera, made from pixels within the time; all others are made before
-    Pixel,
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    one_of(Kind::ALL, Kind::name, |kind| match kind {
+        Kind::Primary => "From the camera",
+        Kind::Diffuse => "From what the camera sees, in random directions",
+        Kind::Shadow => "From what the camera sees to a point light",
+        Kind::Pixel => "From the camera, made from pixels within the time; all others are made before",
+    })
 }
 
-#[cfg(feature = "embree")]
-impl RaysArg {
-    const fn kind(self) -> Kind {
-        match self {
-            Self::Primary => Kind::Primary,
-            Self::Diffuse => Kind::Diffuse,
-            Self::Shadow => Kind::Shadow,
-            Self::Pixel => Kind::Pixel,
-        }
-    }
-}
-
+/// Native first, as they are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ModeArg {
     /// Native, as it renders
@@ -192,10 +180,10 @@ mod with_embree {
     use std::sync::{Arc, OnceLock};
     use std::time::Instant;
 
-    use serde::Serialize;
+    use clap::ValueEnum;
 
-    use super::{BenchArgs, IsaArg, ModeArg};
-    use crate::cli::{interrupt, outputs, progress, say, warn};
+    use super::{BenchArgs, ModeArg};
+    use crate::cli::{interrupt, outputs, progress, say, say_json, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
     use crate::scene::Search;
@@ -203,19 +191,6 @@ mod with_embree {
     use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
     use crate::trace::embree::{self, Embree, Instructions, Options, Quality};
-
-    /// Every mode, native first.
-    const MODES: [ModeArg; 9] = [
-        ModeArg::Default,
-        ModeArg::NativeFast,
-        ModeArg::NativeHigh,
-        ModeArg::NativeCompact,
-        ModeArg::NativeFastCompact,
-        ModeArg::Fast,
-        ModeArg::Robust,
-        ModeArg::Compact,
-        ModeArg::High,
-    ];
 
     pub(super) fn bench(args: &BenchArgs) -> Result<()> {
         let cancel = interrupt::install()?;
@@ -227,29 +202,28 @@ mod with_embree {
         };
         let (isa, instructions) = match args.isa {
             None => (Isa::detect(), Instructions::All),
-            Some(IsaArg::Portable) => (Isa::Portable, Instructions::Sse2),
-            Some(IsaArg::Avx2) => (Isa::Avx2, Instructions::Avx2),
-            Some(IsaArg::Avx512) => (Isa::Avx512, Instructions::All),
+            Some(Isa::Portable) => (Isa::Portable, Instructions::Sse2),
+            Some(Isa::Avx2) => (Isa::Avx2, Instructions::Avx2),
+            Some(Isa::Avx512) => (Isa::Avx512, Instructions::All),
         };
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let accels: Vec<Accel> = args.accel.iter().map(|accel| accel.accel()).collect();
-        let options = args.options.choose(&accels, Search::default())?;
-        let mut kinds: Vec<_> = args.rays.iter().map(|rays| rays.kind()).collect();
+        let options = args.options.choose(&args.accel, Search::default())?;
+        let mut kinds = args.rays.clone();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();
         // Before hours are spent on others.
         args.scenes.iter().try_for_each(|name| Subject::check(name))?;
         let mut reports = Vec::new();
         for name in &args.scenes {
-            let (subject, warnings) = interrupt::while_nothing_is_written(|| Subject::new(name, args.up_axis.axis()))?;
+            let (subject, warnings) = interrupt::while_nothing_is_written(|| Subject::new(name, args.up_axis))?;
             warn(&warnings);
             interrupt::check()?;
             let costs = Arc::default();
-            let modes = MODES.into_iter().filter(|mode| args.modes.contains(mode));
-            let modes = modes.map(|mode| contender(mode, threads, (isa, instructions), &costs));
-            let others = args.accel.iter().map(|accel| other(accel.accel(), &options));
+            let modes = ModeArg::value_variants().iter().filter(|mode| args.modes.contains(mode));
+            let modes = modes.map(|&mode| contender(mode, threads, (isa, instructions), &costs));
+            let others = args.accel.iter().map(|&accel| other(accel, &options));
             let contenders: Vec<_> = modes.chain(others).collect();
             let setup = Setup {
                 subject: &subject,
@@ -289,10 +263,6 @@ mod with_embree {
             format!("{}, instructions up to {most}", processor()),
             format!("Twincast {}, native: watertight and exact. Embree {embree}", env!("CARGO_PKG_VERSION")),
         ])
-    }
-
-    fn say_json(document: &impl Serialize) -> Result<()> {
-        say(serde_json::to_string(document).map_err(|error| Error::output("<stdout>", error.to_string()))?)
     }
 
     /// An engine as it is set up in `mode`, with native's instructions and Embree's.

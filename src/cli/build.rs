@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 
 use super::common::parse_bytes;
 use super::engine::BackendArg;
+use super::named::{AUTO, OrAuto, one_of_or_auto};
 use crate::error::{Error, Result};
 use crate::image;
 use crate::io;
@@ -23,53 +25,34 @@ const BYTES_A_CHANNEL: u64 = 10;
 #[derive(Clone, Debug, Args)]
 pub(super) struct BuildArgs {
     /// How well the native tree is built; never changes a picture
-    #[arg(long, value_enum, default_value_t)]
-    build: Build,
+    #[arg(long, value_name = "PRESET", value_parser = presets(), default_value = AUTO)]
+    build: OrAuto<Preset>,
 
     /// Most memory to hold, as in 1.6G or 500M (powers of 1024); what would not fit is refused before it is built, PLY and binary STL before they are read
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     max_memory: Option<u64>,
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Build {
-    /// As the number of rays and --max-memory suggest; -v tells
-    #[default]
-    Auto,
-    /// Soon ready, slower to trace
-    Fast,
-    /// In between
-    Default,
-    /// Slow to build, fastest to trace
-    High,
-    /// A fifth of the memory, slower to trace
-    Compact,
-    /// Soonest ready, in as little memory, slowest to trace
-    FastCompact,
-}
-
-impl Build {
-    fn wanted(self) -> Option<Preset> {
-        match self {
-            Self::Auto => None,
-            Self::Fast => Some(Preset::Fast),
-            Self::Default => Some(Preset::Default),
-            Self::High => Some(Preset::High),
-            Self::Compact => Some(Preset::Compact),
-            Self::FastCompact => Some(Preset::FastCompact),
-        }
-    }
+fn presets() -> impl TypedValueParser<Value = OrAuto<Preset>> {
+    one_of_or_auto(Preset::ALL, Preset::name, |preset| match preset {
+        None => "As the number of rays and --max-memory suggest; -v tells",
+        Some(Preset::Fast) => "Soon ready, slower to trace",
+        Some(Preset::Default) => "In between",
+        Some(Preset::High) => "Slow to build, fastest to trace",
+        Some(Preset::Compact) => "A fifth of the memory, slower to trace",
+        Some(Preset::FastCompact) => "Soonest ready, in as little memory, slowest to trace",
+    })
 }
 
 impl BuildArgs {
     /// Whether anything is asked of the native BVH.
     pub(super) fn is_given(&self) -> bool {
-        self.max_memory.is_some() || self.build.wanted().is_some()
+        self.max_memory.is_some() || self.build.0.is_some()
     }
 
     /// An error where nothing is built of what is asked for.
     pub(super) fn check(&self, backend: BackendArg) -> Result<()> {
-        if backend == BackendArg::Embree && self.build.wanted().is_some() {
+        if backend == BackendArg::Embree && self.build.0.is_some() {
             let problem = "--build is about native trees, of which --backend embree builds none; leave one of them out";
             return Err(Error::Usage(problem.to_owned()));
         }
@@ -116,7 +99,7 @@ impl BuildArgs {
             rays,
             held: process::held().unwrap_or(0).saturating_add(to_come).saturating_add(embree),
             max_memory: self.max_memory,
-            wanted: self.build.wanted(),
+            wanted: self.build.0,
         };
         let refuse = |backend, problem: NotEnoughMemory| Error::Backend { backend, message: problem.to_string() };
         if backend == BackendArg::Embree {

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 
-use super::render::parse_threads;
+use super::named::one_of;
+use super::threads::{parse_threads, pool};
 use super::{interrupt, outputs, progress, say};
 use crate::error::{Error, Result};
 use crate::image::{self, Metadata, WriteOptions};
@@ -31,11 +33,11 @@ pub(super) struct ChartArgs {
     #[arg(
         long,
         value_name = "NAME,...",
-        value_enum,
+        value_parser = charts(),
         value_delimiter = ',',
-        default_value = "triangles,engines,scales,samplers"
+        default_values = Chart::ALL.map(Chart::name)
     )]
-    charts: Vec<ChartArg>,
+    charts: Vec<Chart>,
 
     /// Threads of what is not timed by itself; 0 is one for each core
     #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = parse_threads)]
@@ -46,27 +48,13 @@ pub(super) struct ChartArgs {
     quiet: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ChartArg {
-    /// Ways to meet a triangle: time against leaks
-    Triangles,
-    /// Native and Embree in every mode: rays a second against wrong hits
-    Engines,
-    /// Where ways to meet a triangle fail, by size and distance
-    Scales,
-    /// Samplers, filters and adaptive sampling: time against error
-    Samplers,
-}
-
-impl ChartArg {
-    const fn chart(self) -> Chart {
-        match self {
-            Self::Triangles => Chart::Triangles,
-            Self::Engines => Chart::Engines,
-            Self::Scales => Chart::Scales,
-            Self::Samplers => Chart::Samplers,
-        }
-    }
+fn charts() -> impl TypedValueParser<Value = Chart> {
+    one_of(Chart::ALL, Chart::name, |chart| match chart {
+        Chart::Triangles => "Ways to meet a triangle: time against leaks",
+        Chart::Engines => "Native and Embree in every mode: rays a second against wrong hits",
+        Chart::Scales => "Where ways to meet a triangle fail, by size and distance",
+        Chart::Samplers => "Samplers, filters and adaptive sampling: time against error",
+    })
 }
 
 pub(super) fn run(args: &ChartArgs) -> Result<()> {
@@ -74,13 +62,12 @@ pub(super) fn run(args: &ChartArgs) -> Result<()> {
     let folder = &args.output;
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::output(folder, format!("the folder cannot be made ({error}); name another")))?;
-    let charts = Chart::ALL.into_iter().filter(|chart| args.charts.iter().any(|arg| arg.chart() == *chart));
+    let charts = Chart::ALL.into_iter().filter(|chart| args.charts.contains(chart));
     let charts: Vec<Chart> = charts.collect();
     let files = |chart: &Chart| [".svg", ".png", ".csv"].map(|suffix| folder.join(format!("{}{suffix}", chart.name())));
     let outputs: Vec<PathBuf> = charts.iter().flat_map(files).chain([folder.join("index.html")]).collect();
     outputs::check(&[], &outputs, [])?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    let pool = pool(args.threads)?;
     let bar = progress::spinner("measuring", args.quiet);
     let on_step = |what: &str| bar.set_message(what.to_owned());
     let figures = pool.install(|| {

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 
+use super::named::one_of;
 use super::{interrupt, progress};
 use crate::error::{Error, Result, Warning};
-use crate::io::{self, Animation, LoadOptions};
+use crate::io::{self, Animation, LoadOptions, Normals, Unit, UpAxis};
 use crate::math::DVec3;
 use crate::scene::LARGEST_SIDE;
 use crate::scene::Scene;
@@ -20,15 +22,15 @@ pub(crate) struct SceneArgs {
     pub(crate) scene: PathBuf,
 
     /// Axis of the file that points up
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "AXIS", value_parser = up_axes(), default_value = UpAxis::default().name())]
     up_axis: UpAxis,
 
     /// Length unit of the file
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "UNIT", value_parser = units(), default_value = Unit::default().name())]
     unit: Unit,
 
-    /// Shading normals: those of the file, flat everywhere, or smooth everywhere
-    #[arg(long, value_enum, default_value_t)]
+    /// Shading normals
+    #[arg(long, value_name = "KIND", value_parser = normals(), default_value = Normals::default().name())]
     normals: Normals,
 
     /// Seconds from the start of an animation, for the pose that things have then; glTF (default: the pose that the file stores; 0 with --animation)
@@ -49,38 +51,29 @@ pub(crate) struct SceneArgs {
     variant: Option<String>,
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(crate) enum UpAxis {
-    #[default]
-    Y,
-    Z,
+/// Reads the axis that points up.
+pub(super) fn up_axes() -> impl TypedValueParser<Value = UpAxis> {
+    one_of(UpAxis::ALL, UpAxis::name, |axis| match axis {
+        UpAxis::Y => "As in glTF and OBJ",
+        UpAxis::Z => "As in CAD and scans",
+    })
 }
 
-impl UpAxis {
-    /// As the loaders have it.
-    pub(crate) const fn axis(self) -> io::UpAxis {
-        match self {
-            Self::Y => io::UpAxis::Y,
-            Self::Z => io::UpAxis::Z,
-        }
-    }
+fn units() -> impl TypedValueParser<Value = Unit> {
+    one_of(Unit::ALL, Unit::name, |unit| match unit {
+        Unit::Metre => "Metres",
+        Unit::Centimetre => "Centimetres",
+        Unit::Millimetre => "Millimetres",
+        Unit::Inch => "Inches",
+    })
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Unit {
-    #[default]
-    M,
-    Cm,
-    Mm,
-    In,
-}
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Normals {
-    #[default]
-    File,
-    Flat,
-    Smooth,
+fn normals() -> impl TypedValueParser<Value = Normals> {
+    one_of(Normals::ALL, Normals::name, |normals| match normals {
+        Normals::File => "Those of the file; flat where it has none",
+        Normals::Flat => "Flat everywhere",
+        Normals::Smooth => "Smooth everywhere, computed",
+    })
 }
 
 /// An error where a flag is given, but not the one that it goes with. The parser of the command line says so itself unless that one
@@ -120,18 +113,9 @@ impl SceneArgs {
                 exposure: if has_shutter && is_animated { 1.0 / self.fps } else { 0.0 },
             },
             variant: self.variant.clone(),
-            up_axis: self.up_axis.axis(),
-            unit: match self.unit {
-                Unit::M => io::Unit::Metre,
-                Unit::Cm => io::Unit::Centimetre,
-                Unit::Mm => io::Unit::Millimetre,
-                Unit::In => io::Unit::Inch,
-            },
-            normals: match self.normals {
-                Normals::File => io::Normals::File,
-                Normals::Flat => io::Normals::Flat,
-                Normals::Smooth => io::Normals::Smooth,
-            },
+            up_axis: self.up_axis,
+            unit: self.unit,
+            normals: self.normals,
         }
     }
 }
@@ -152,16 +136,6 @@ impl FromStr for Size {
             .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
             .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, as in 1280x720"))
     }
-}
-
-/// That of `all` which has the name.
-pub(super) fn by_name<T: Copy, const N: usize>(
-    all: [T; N],
-    name_of: impl Fn(T) -> &'static str,
-    name: &str,
-) -> std::result::Result<T, String> {
-    let found = all.into_iter().find(|&one| name_of(one) == name);
-    found.ok_or_else(|| format!("expected one of {}", all.map(name_of).join(", ")))
 }
 
 /// A number of seconds, at least 0.
@@ -208,7 +182,6 @@ pub(crate) fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{Filter, Sampling};
 
     #[test]
     fn sizes() {
@@ -225,18 +198,6 @@ mod tests {
         for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,2,inf", "a,b,c"] {
             assert!(parse_vector(bad).is_err(), "{bad:?}");
         }
-    }
-
-    #[test]
-    fn names_are_read_back() {
-        for filter in Filter::ALL {
-            assert_eq!(by_name(Filter::ALL, Filter::name, filter.name()), Ok(filter));
-        }
-        for sampling in Sampling::ALL {
-            assert_eq!(by_name(Sampling::ALL, Sampling::name, sampling.name()), Ok(sampling));
-        }
-        let unknown = by_name(Filter::ALL, Filter::name, "lanczos").unwrap_err();
-        assert_eq!(unknown, "expected one of box, tent, gaussian, mitchell, blackman-harris");
     }
 
     #[test]

@@ -1,10 +1,8 @@
 //! `twincast compare`: both engines on the rays of a picture and on difficult ones, every difference judged.
 
-use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::accel::AccelArgs;
 use super::cache::CacheArgs;
@@ -12,8 +10,8 @@ use super::camera::CameraArgs;
 use super::common::{SceneArgs, Size, needs};
 use super::engine::BackendArg;
 use super::plan::PlanArgs;
-use super::{interrupt, say, warn};
-use crate::error::{Error, Result};
+use super::{interrupt, say_report, warn};
+use crate::error::Result;
 use crate::plan;
 use crate::render::Settings;
 use crate::scene::{Camera, MOST_SPP, Scene};
@@ -99,15 +97,6 @@ impl CompareArgs {
         let complete = self.plan.complete();
         Settings { width, height, max_depth, integrator: scene.request.integrator, seed: self.seed, complete, ..usual }
     }
-
-    /// Says what came of it, as was asked for.
-    fn print(&self, report: &(impl Serialize + Display)) -> Result<()> {
-        if self.json {
-            let document = serde_json::to_string(report);
-            return say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?);
-        }
-        say(report.to_string().trim_end())
-    }
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
@@ -183,7 +172,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
         written = outputs::put_in_place(files);
     }
     let report = &comparison.report;
-    args.print(report)?;
+    say_report(args.json, report)?;
     written.and_then(|()| report.check())
 }
 
@@ -215,6 +204,6 @@ fn compare_all(args: &CompareArgs) -> Result<()> {
         setup.run(Control { cancel: Some(cancel), on_tile: Some(&|done| bar.inc(done)), ..Control::default() });
     bar.finish_and_clear();
     let report = report?;
-    args.print(&report)?;
+    say_report(args.json, &report)?;
     report.check()
 }

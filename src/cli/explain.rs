@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::common::needs;
 use super::engine::BackendArg;
-use super::say;
+use super::{say, say_json};
 use crate::error::{Error, Result};
 use crate::render::{Explanation, HitTrail, LightTrail, RayTrail, Renderer, SampleTrail};
 use crate::trace::World;
@@ -80,10 +80,7 @@ impl ExplainArgs {
                 say(format_args!("{r} {g} {b} {a}"))
             }
             (true, false) => say(Told(&explanation)),
-            (true, true) => {
-                let text = serde_json::to_string_pretty(&explanation);
-                say(text.map_err(|error| Error::output("<stdout>", error.to_string()))?)
-            }
+            (true, true) => say_json(&explanation),
         }
     }
 }

@@ -3,8 +3,8 @@
 use clap::Args;
 
 use super::common::SceneArgs;
-use super::{say, warn};
-use crate::error::{Error, Result};
+use super::{say_report, warn};
+use crate::error::Result;
 use crate::lab::inspect::Inspection;
 
 /// Say what a scene holds, and what about it looks like a mistake
@@ -30,10 +30,5 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let (scene, warnings) = args.scene.load(false)?;
     warn(&warnings);
     let inspection = Inspection::new(&scene);
-    if args.json {
-        let document = serde_json::to_string(&inspection);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
-    } else {
-        say(inspection.to_string().trim_end())
-    }
+    say_report(args.json, &inspection)
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::named::one_of;
 use super::report::{counted, grouped};
 use super::{interrupt, say};
 use crate::error::{Error, Result};
@@ -23,9 +24,9 @@ Examples:
   twincast make terrain --size 4096 -o terrain.ply"
 )]
 pub(super) struct MakeArgs {
-    /// What to make; --list names all
-    #[arg(required_unless_present = "list")]
-    name: Option<String>,
+    /// What to make
+    #[arg(value_name = "NAME", value_parser = one_of(RECIPES, |recipe| recipe.name, |recipe| recipe.about), required_unless_present = "list")]
+    recipe: Option<Recipe>,
 
     /// How much of it; --list says what it counts
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -36,7 +37,7 @@ pub(super) struct MakeArgs {
     output: Option<PathBuf>,
 
     /// Name everything that can be made
-    #[arg(long, conflicts_with_all = ["name", "size", "output"])]
+    #[arg(long, conflicts_with_all = ["recipe", "size", "output"])]
     list: bool,
 
     /// Say nothing but errors
@@ -45,13 +46,10 @@ pub(super) struct MakeArgs {
 }
 
 pub(super) fn run(args: &MakeArgs) -> Result<()> {
-    let (Some(name), Some(output)) = (&args.name, &args.output) else {
+    let (Some(recipe), Some(output)) = (&args.recipe, &args.output) else {
         return say(list());
     };
-    let recipe = RECIPES.iter().find(|recipe| recipe.name == *name).ok_or_else(|| {
-        let names = RECIPES.map(|recipe| recipe.name).join(", ");
-        Error::Usage(format!("nothing is called {name:?}; there are {names}"))
-    })?;
+    let name = recipe.name;
     let size = args.size.unwrap_or(recipe.usual);
     if size > recipe.largest {
         let message = format!("--size {size}: {name} goes to {} ({})", recipe.largest, recipe.size);

@@ -1,4 +1,4 @@
-//! The command line: one file a subcommand.
+//! The command line: a file for each subcommand, for each group of flags that several of them take, and for what they need to do their work.
 //!
 //! Arguments go in, the library does the work, an exit code comes out. Completions and the manual are made from the
 //! same definition, [`Cli`]. The module is public for the binary and the tests; it is no part of the library's promise.
@@ -26,6 +26,7 @@ mod light;
 mod make;
 mod man;
 mod metadata;
+mod named;
 mod outputs;
 mod picture;
 mod plan;
@@ -38,13 +39,16 @@ mod scaling;
 mod signals;
 mod stress;
 mod summary;
+mod threads;
 mod trace;
 mod trial;
 
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
+use serde::Serialize;
 
 use crate::error::{Error, Result, Warning};
 
@@ -147,12 +151,22 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 }
 
 /// Prints on stdout. A reader that has gone away is no error.
-fn say(text: impl std::fmt::Display) -> Result<()> {
+fn say(text: impl Display) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(format!("{text}\n").as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::output("<stdout>", error.to_string())),
         _ => Ok(()),
     }
+}
+
+/// Prints one JSON document on stdout, in one line.
+fn say_json(document: &impl Serialize) -> Result<()> {
+    say(serde_json::to_string(document).map_err(|error| Error::output("<stdout>", error.to_string()))?)
+}
+
+/// Prints a report on stdout, as JSON or for people.
+fn say_report(json: bool, report: &(impl Serialize + Display)) -> Result<()> {
+    if json { say_json(report) } else { say(report.to_string().trim_end()) }
 }
 
 /// Prints warnings on stderr.
@@ -162,7 +176,7 @@ fn warn(warnings: &[Warning]) {
     }
 }
 
-fn complain(kind: &str, message: &dyn std::fmt::Display) {
+fn complain(kind: &str, message: &dyn Display) {
     // Nobody is left to be told that stderr is closed.
     let _ = writeln!(std::io::stderr(), "{kind}: {message}");
 }

@@ -1,8 +1,10 @@
 //! What picture to make: flags, and what the scene asks for.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 
-use super::common::{Size, by_name, parse_vector};
+use super::common::{Size, parse_vector};
+use super::named::{OrAuto, one_of, one_of_or_auto};
 use super::plan::PlanArgs;
 use crate::math::Vec3;
 use crate::render::{Adaptive, Crop, Filter, MOST_LIGHT_SAMPLES, Sampling, Settings, TileOrder};
@@ -33,10 +35,9 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
     max_spp: Option<u32>,
 
-    /// How far light is followed: ray-cast, whitted (mirrors and glass), path (all light), or auto, the cheapest that
-    /// shows everything (default: the scene's, else auto)
-    #[arg(long, value_name = "NAME", value_parser = parse_integrator)]
-    integrator: Option<Wish>,
+    /// How far light is followed (default: the scene's, else auto)
+    #[arg(long, value_name = "NAME", value_parser = integrators())]
+    integrator: Option<OrAuto<Integrator>>,
 
     /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for paths 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_DEPTH)))]
@@ -50,21 +51,21 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_LIGHT_SAMPLES)))]
     light_samples: u32,
 
-    /// How samples are spread: sobol, blue-noise, halton, stratified, grid or independent
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_sampling)]
+    /// How samples are spread
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = samplers())]
     sampler: Sampling,
 
-    /// How samples become a pixel: box, tent, gaussian, mitchell or blackman-harris
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = parse_filter)]
+    /// How samples become a pixel
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = filters())]
     filter: Filter,
 
     /// Rays that Embree traces together (default: 8, with --backend both 1); the native engine chooses by itself
-    #[arg(long, value_name = "N")]
-    packet: Option<Packet>,
+    #[arg(long, value_name = "N", value_parser = widths())]
+    packet: Option<Width>,
 
     /// Order of the tiles; never changes a picture
-    #[arg(long, value_enum, default_value_t)]
-    tile_order: Order,
+    #[arg(long, value_name = "ORDER", value_parser = tile_orders(), default_value = TileOrder::default().name())]
+    tile_order: TileOrder,
 
     /// Edge of the tiles that threads take, pixels: 4, 8, 16, 32 or 64; never changes a native picture
     #[arg(long, value_name = "N", default_value_t = Settings::default().tile)]
@@ -78,27 +79,57 @@ pub(super) struct PictureArgs {
     plan: PlanArgs,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Packet {
-    #[value(name = "1")]
-    One,
-    #[value(name = "4")]
-    Four,
-    #[value(name = "8")]
-    Eight,
-    #[value(name = "16")]
-    Sixteen,
+fn integrators() -> impl TypedValueParser<Value = OrAuto<Integrator>> {
+    one_of_or_auto(Integrator::ALL, Integrator::name, |integrator| match integrator {
+        None => "The cheapest that shows everything",
+        Some(Integrator::RayCast) => "From the lights to what the camera sees, and no farther",
+        Some(Integrator::Whitted) => "Mirrors and glass as well",
+        Some(Integrator::Path) => "All light, however often it was scattered",
+    })
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Order {
-    /// Row by row from the top
-    Scanline,
-    /// Along a curve from neighbour to neighbour
-    #[default]
-    Hilbert,
-    /// From the middle outwards
-    Spiral,
+fn samplers() -> impl TypedValueParser<Value = Sampling> {
+    one_of(Sampling::ALL, Sampling::name, |sampling| match sampling {
+        Sampling::Sobol => "Sobol's sequence, scrambled: the least noise for most pictures",
+        Sampling::BlueNoise => "The same along a curve over the pixels: what noise is left is spread evenly",
+        Sampling::Halton => "Halton's sequence, scrambled",
+        Sampling::Stratified => "One in each cell of a grid, rows and columns evenly filled",
+        Sampling::Grid => "The middles of a grid's cells: bands where others show noise",
+        Sampling::Independent => "Random numbers",
+    })
+}
+
+fn filters() -> impl TypedValueParser<Value = Filter> {
+    one_of(Filter::ALL, Filter::name, |filter| match filter {
+        Filter::Box => "The mean over the pixel",
+        Filter::Tent => "Weights that fall off to the next pixels' middles",
+        Filter::Gaussian => "Soft",
+        Filter::Mitchell => "Sharp, negative in parts",
+        Filter::BlackmanHarris => "Soft, with next to nothing from one frequency in another",
+    })
+}
+
+fn widths() -> impl TypedValueParser<Value = Width> {
+    let name = |width| match width {
+        Width::One => "1",
+        Width::Four => "4",
+        Width::Eight => "8",
+        Width::Sixteen => "16",
+    };
+    one_of(Width::ALL, name, |width| match width {
+        Width::One => "Each ray by itself",
+        Width::Four => "Packets of 4",
+        Width::Eight => "Packets of 8",
+        Width::Sixteen => "Packets of 16",
+    })
+}
+
+fn tile_orders() -> impl TypedValueParser<Value = TileOrder> {
+    one_of(TileOrder::ALL, TileOrder::name, |order| match order {
+        TileOrder::Scanline => "Row by row from the top",
+        TileOrder::Hilbert => "Along a curve from neighbour to neighbour",
+        TileOrder::Spiral => "From the middle outwards",
+    })
 }
 
 impl PictureArgs {
@@ -106,13 +137,7 @@ impl PictureArgs {
     pub(super) fn settings(&self, request: &Request, usual_width: Width) -> Settings {
         let asked = Settings::of_request(request);
         let (columns, rows) = self.size.map_or((asked.width, asked.height), |size| (size.width, size.height));
-        let width = match self.packet {
-            None => usual_width,
-            Some(Packet::One) => Width::One,
-            Some(Packet::Four) => Width::Four,
-            Some(Packet::Eight) => Width::Eight,
-            Some(Packet::Sixteen) => Width::Sixteen,
-        };
+        let width = self.packet.unwrap_or(usual_width);
         Settings {
             width: columns,
             height: rows,
@@ -121,14 +146,10 @@ impl PictureArgs {
             sampling: self.sampler,
             filter: self.filter,
             light_samples: self.light_samples,
-            integrator: self.integrator.map_or(asked.integrator, |Wish(integrator)| integrator),
+            integrator: self.integrator.map_or(asked.integrator, |OrAuto(integrator)| integrator),
             max_depth: self.max_depth.or(asked.max_depth),
             batch: Batch { width, coherent: true },
-            tile_order: match self.tile_order {
-                Order::Scanline => TileOrder::Scanline,
-                Order::Hilbert => TileOrder::Hilbert,
-                Order::Spiral => TileOrder::Spiral,
-            },
+            tile_order: self.tile_order,
             tile: self.tile_size,
             background: self.background,
             crop: self.crop,
@@ -141,18 +162,6 @@ impl PictureArgs {
 
 /// As many samples as a pixel has at most where nothing else is asked for.
 const USUAL_MOST_SPP: u32 = 1024;
-
-/// An integrator, or none for the one that is chosen.
-#[derive(Clone, Copy, Debug)]
-struct Wish(Option<Integrator>);
-
-fn parse_integrator(name: &str) -> std::result::Result<Wish, String> {
-    if name == "auto" {
-        return Ok(Wish(None));
-    }
-    let found = by_name(Integrator::ALL, Integrator::name, name).map(|integrator| Wish(Some(integrator)));
-    found.map_err(|expected| format!("{expected}, auto"))
-}
 
 /// `X,Y,WxH`.
 fn parse_crop(text: &str) -> std::result::Result<Crop, String> {
@@ -168,14 +177,6 @@ fn parse_crop(text: &str) -> std::result::Result<Crop, String> {
 fn parse_noise(text: &str) -> std::result::Result<f32, String> {
     let noise = text.parse().ok().filter(|noise: &f32| *noise > 0.0 && noise.is_finite());
     noise.ok_or_else(|| "expected a number above 0, as in 0.01".to_owned())
-}
-
-fn parse_sampling(name: &str) -> std::result::Result<Sampling, String> {
-    by_name(Sampling::ALL, Sampling::name, name)
-}
-
-fn parse_filter(name: &str) -> std::result::Result<Filter, String> {
-    by_name(Filter::ALL, Filter::name, name)
 }
 
 fn parse_color(text: &str) -> std::result::Result<Vec3, String> {

@@ -12,9 +12,9 @@ use super::common::SceneArgs;
 use super::engine::BackendArg;
 use super::light::LightArgs;
 use super::picture::PictureArgs;
-use super::render::parse_threads;
-use super::{interrupt, progress, say, warn};
-use crate::error::{Error, Result};
+use super::threads::{parse_threads, pool};
+use super::{interrupt, progress, say, say_json, warn};
+use crate::error::Result;
 use crate::lab::savings::{Saving, Setup, Table};
 use crate::plan::{self, Census, Complete, Plan, PlanReport, Reduction};
 use crate::render::Control;
@@ -139,8 +139,7 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
         Some(repeat) => {
             let aspect = f64::from(settings.width) / f64::from(settings.height);
             let (camera, _) = args.camera.choose(&scene, aspect)?;
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-            let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+            let pool = pool(args.threads)?;
             let renders = 2 * (u64::from(repeat) + 1) * (left_out.len() as u64 + 1);
             let bar = progress::bar(renders * pixels, "measuring", args.json);
             let on_tile = |pixels| bar.inc(pixels);
@@ -153,8 +152,7 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
         }
     };
     if args.json {
-        let document = serde_json::to_string(&Document { plan: &report, measured: measured.as_deref() });
-        return say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?);
+        return say_json(&Document { plan: &report, measured: measured.as_deref() });
     }
     say(report.to_string().trim_end())?;
     measured.map_or(Ok(()), |rows| say(Table(&rows).to_string().trim_end()))

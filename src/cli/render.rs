@@ -1,13 +1,12 @@
 //! `twincast render`: from a scene file to finished pictures.
 
 use std::iter;
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::Args;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 
 use super::accel::AccelArgs;
 use super::aov::AovArgs;
@@ -27,6 +26,7 @@ use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
 use super::response::{ResponseArgs, beyond_numbers, too_bright};
 use super::summary::Rendered;
+use super::threads::{parse_threads, pool};
 use super::trial::Trial;
 use super::{interrupt, outputs, say, warn};
 use crate::error::{Error, Result, Warning};
@@ -159,8 +159,7 @@ fn render(args: &RenderArgs) -> Result<()> {
         return Err(no_picture());
     }
     outputs::check_places(&args.output, &args.stats, &args.inputs())?;
-    let pool = ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    let pool = pool(args.threads)?;
     // Starting a thread takes the dynamic loader's lock, which is held as long as a library is being loaded: so all threads are started, and have what ends with them, before the trial loads any.
     pool.broadcast(|_| prepare_thread());
     let trial = Trial::start(args.output.clone(), cancel)?;
@@ -416,11 +415,4 @@ fn placed_triangles(scene: &Scene) -> u64 {
 fn parse_threshold(text: &str) -> std::result::Result<f64, String> {
     let limit = text.parse().ok().filter(|limit: &f64| *limit >= 0.0 && limit.is_finite());
     limit.ok_or_else(|| "expected a number, at least 0".to_owned())
-}
-
-/// As many as help, and some more; a thousand threads on two cores wait for each other for minutes.
-pub(super) fn parse_threads(text: &str) -> std::result::Result<usize, String> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let most = (4 * cores).max(256);
-    text.parse().ok().filter(|&n| n <= most).ok_or_else(|| format!("expected a number from 0 to {most}"))
 }

@@ -1,8 +1,9 @@
 //! What a camera makes of radiance where it becomes codes: flags, and what the scene asks for.
 
 use clap::Args;
+use clap::builder::TypedValueParser;
 
-use super::common::by_name;
+use super::named::one_of;
 use crate::image::{Curve, Image, MOST_STOPS, Response, TEMPERATURES};
 use crate::math::Vec4;
 use crate::render::Crop;
@@ -16,8 +17,8 @@ pub(super) struct ResponseArgs {
     #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true)]
     exposure: Option<f32>,
 
-    /// From light to what is shown: linear, srgb, filmic or aces (default: the scene's, else srgb)
-    #[arg(long, value_name = "NAME", value_parser = parse_curve)]
+    /// From light to what is shown (default: the scene's, else srgb)
+    #[arg(long, value_name = "NAME", value_parser = curves())]
     response: Option<Curve>,
 
     /// Colour temperature of the light that is to look white (default: the scene's, else colours as they are)
@@ -80,8 +81,13 @@ fn parse_stops(text: &str) -> Result<f32, String> {
     stops.ok_or_else(|| format!("expected stops from -{MOST_STOPS} to {MOST_STOPS}"))
 }
 
-fn parse_curve(name: &str) -> Result<Curve, String> {
-    by_name(Curve::ALL, Curve::name, name)
+fn curves() -> impl TypedValueParser<Value = Curve> {
+    one_of(Curve::ALL, Curve::name, |curve| match curve {
+        Curve::Linear => "Codes are the light itself",
+        Curve::Srgb => "As screens expect it, cut off at white",
+        Curve::Filmic => "With a toe and a shoulder like film's, then as srgb",
+        Curve::Aces => "As the Academy's reference rendering, then as srgb",
+    })
 }
 
 fn parse_kelvin(text: &str) -> Result<f32, String> {
@@ -142,6 +148,5 @@ mod tests {
         for bad in ["999", "25001", "warm", "nan"] {
             assert!(parse_kelvin(bad).is_err(), "{bad}");
         }
-        assert!(parse_curve("film").unwrap_err().contains("filmic, aces"));
     }
 }

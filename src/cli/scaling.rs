@@ -1,8 +1,9 @@
 //! `twincast bench --scaling`: time against the number of triangles, for every accelerator.
 
 use super::bench::BenchArgs;
-use super::{interrupt, outputs, progress, say};
-use crate::error::{Error, Result};
+use super::threads::pool;
+use super::{interrupt, outputs, progress, say_report};
+use crate::error::Result;
 use crate::lab::bench::{Scaling, processor, scaling_chart};
 use crate::memory::process;
 
@@ -17,8 +18,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let max_memory = args.max_memory.or_else(|| process::available().map(|bytes| bytes / 4 * 3));
     let scaling =
         Scaling { max: args.max.unwrap_or(MOST_TRIANGLES), max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|error| Error::Usage(format!("--threads {}: {error}", args.threads)))?;
+    let pool = pool(args.threads)?;
     let report = pool.install(|| scaling.run());
     bar.finish_and_clear();
     let report = report?;
@@ -27,10 +27,5 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         let notes = [format!("{}; builds on {threads} threads, rays on one", processor())];
         outputs::write_text(path, &scaling_chart(&report, &notes))?;
     }
-    if args.json {
-        let document = serde_json::to_string(&report);
-        say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?)
-    } else {
-        say(report.to_string().trim_end())
-    }
+    say_report(args.json, &report)
 }

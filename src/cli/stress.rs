@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use clap::builder::TypedValueParser;
 use serde::Serialize;
 
 use super::engine::BackendArg;
-use super::{interrupt, outputs, progress, say};
+use super::named::one_of;
+use super::{interrupt, outputs, progress, say, say_json, say_report};
 use crate::error::{Error, Result};
 use crate::lab::stress::{Case, Column, Found, Report, Search, Setup, catalogue, columns, file, heat_map};
 use crate::output::Together;
@@ -42,8 +44,8 @@ pub(super) struct StressArgs {
     backend: Option<BackendArg>,
 
     /// A column of the table; may be given again (default: all)
-    #[arg(long = "method", value_name = "NAME")]
-    methods: Vec<String>,
+    #[arg(long = "method", value_name = "NAME", value_parser = methods())]
+    methods: Vec<Column>,
 
     /// About how many rays a case
     #[arg(long, value_name = "N", default_value_t = Setup::RAYS as u64, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
@@ -74,6 +76,17 @@ pub(super) struct StressArgs {
     list: bool,
 }
 
+fn methods() -> impl TypedValueParser<Value = Column> {
+    one_of(columns(), Column::name, |column| match column {
+        Column::Native => "The native tracer, in every form",
+        Column::Accel(_) => "An accelerator, with the exact methods",
+        Column::Triangle(method) => method.source(),
+        Column::Sphere(method) => method.source(),
+        #[cfg(feature = "embree")]
+        Column::Embree(_) => "Embree, in packets of every width",
+    })
+}
+
 pub(super) fn run(args: &StressArgs) -> Result<()> {
     if args.list {
         return say(list().trim_end());
@@ -100,16 +113,11 @@ pub(super) fn run(args: &StressArgs) -> Result<()> {
 
 impl StressArgs {
     fn columns(&self) -> Result<Vec<Column>> {
-        let all = columns();
-        let mut chosen: Vec<Column> = Vec::new();
-        for name in &self.methods {
-            let names = || all.iter().map(|column| column.name()).collect::<Vec<_>>().join(", ");
-            let found = all.iter().find(|column| column.name() == name);
-            chosen.push(*found.ok_or_else(|| Error::Usage(format!("no method {name:?}; there are {}", names())))?);
-        }
-        if chosen.is_empty() {
-            chosen = if self.search.is_some() { vec![Column::Native] } else { all };
-        }
+        let mut chosen = match &self.methods[..] {
+            [] if self.search.is_some() => vec![Column::Native],
+            [] => columns(),
+            methods => methods.to_vec(),
+        };
         match self.backend {
             None | Some(BackendArg::Both) => {}
             Some(BackendArg::Native) => chosen.retain(|column| column.is_native()),
@@ -155,16 +163,13 @@ fn matrix(args: &StressArgs, columns: Vec<Column>, control: Control<'_>) -> Resu
     let report = setup.run(Control { on_tile: Some(&on_tile), ..control });
     bar.finish_and_clear();
     let report = report?;
-    if args.json {
-        say(document(&report)?)?
-    } else {
-        say(report.to_string().trim_end())?
-    }
+    say_report(args.json, &report)?;
     if let Some(folder) = &args.output {
         let mut files = Together::default();
-        for (name, text) in MATRIX.into_iter().zip([document(&report)?, heat_map(&report), failing(&report)]) {
-            outputs::write_beside(&mut files, &folder.join(name), &text);
-        }
+        let [document, map, commands] = MATRIX.map(|name| folder.join(name));
+        outputs::write_json(&mut files, &document, &report);
+        outputs::write_beside(&mut files, &map, &heat_map(&report));
+        outputs::write_beside(&mut files, &commands, &failing(&report));
         outputs::put_in_place(files)?;
     }
     report.check()
@@ -226,7 +231,7 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
     // What was found is told all the same where it cannot be written.
     let written = outputs::put_in_place(files);
     if args.json {
-        say(document(&findings)?)?;
+        say_json(&findings)?;
     } else {
         let mut text = format!("{rays} rays, seed {}: {} found", args.seed, findings.found.len());
         for Finding { who, fault, file } in &findings.found {
@@ -240,10 +245,6 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
         0 => interrupt::check(),
         _ => Err(Error::Check(format!("{wrong} of what was found must not be: a native tracer is wrong"))),
     }
-}
-
-fn document(value: &impl Serialize) -> Result<String> {
-    serde_json::to_string(value).map_err(|error| Error::output("<stdout>", error.to_string()))
 }
 
 fn list() -> String {

@@ -10,7 +10,7 @@ use super::accel::AccelArgs;
 use super::cache::CacheArgs;
 use super::common::SceneArgs;
 use super::engine::BackendArg;
-use super::{say, warn};
+use super::{say_report, warn};
 use crate::error::{Error, Result};
 use crate::lab::oracle::Id;
 use crate::lab::stress::{catalogue, file, hex};
@@ -121,11 +121,7 @@ pub(super) fn run(args: &TraceArgs) -> Result<()> {
     });
     let (centre, ray) = (world.centre.to_array(), hex::ray_to_hex(&args.ray));
     let said = Said { centre, ray, valid: args.ray.is_valid(), answers, exact };
-    if args.json {
-        let document = serde_json::to_string(&said);
-        return say(document.map_err(|error| Error::output("<stdout>", error.to_string()))?);
-    }
-    say(said.to_string().trim_end())
+    say_report(args.json, &said)
 }
 
 /// The world that is meant, and how its file wants to be searched.

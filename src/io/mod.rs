@@ -80,6 +80,19 @@ pub enum UpAxis {
     Z,
 }
 
+impl UpAxis {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Y, Self::Z];
+
+    /// As flags and scenes have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+}
+
 /// The length unit of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Unit {
@@ -94,6 +107,21 @@ pub enum Unit {
     Inch,
 }
 
+impl Unit {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Metre, Self::Centimetre, Self::Millimetre, Self::Inch];
+
+    /// As flags and scenes have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+            Self::Millimetre => "mm",
+            Self::Inch => "in",
+        }
+    }
+}
+
 /// Where shading normals come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Normals {
@@ -104,6 +132,20 @@ pub enum Normals {
     Flat,
     /// Smooth everywhere, computed.
     Smooth,
+}
+
+impl Normals {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::File, Self::Flat, Self::Smooth];
+
+    /// As flags and scenes have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::File => "file",
+            Self::Flat => "flat",
+            Self::Smooth => "smooth",
+        }
+    }
 }
 
 /// A result whose error is a message that has no file and no place yet.

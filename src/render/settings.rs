@@ -105,15 +105,28 @@ impl Crop {
 impl Settings {
     /// What a scene's file asks for, and what is usual where it says nothing.
     pub fn of_request(request: &Request) -> Self {
+        let &Request {
+            size,
+            spp,
+            seed,
+            integrator,
+            max_depth,
+            // No settings: where the picture goes, what a camera makes of it, and how the scene is searched.
+            output: _,
+            exposure: _,
+            white_balance: _,
+            response: _,
+            search: _,
+        } = request;
         let usual = Self::default();
-        let [width, height] = request.size.unwrap_or([usual.width, usual.height]);
+        let [width, height] = size.unwrap_or([usual.width, usual.height]);
         Self {
             width,
             height,
-            spp: request.spp.unwrap_or(usual.spp),
-            seed: request.seed.unwrap_or(usual.seed),
-            integrator: request.integrator,
-            max_depth: request.max_depth,
+            spp: spp.unwrap_or(usual.spp),
+            seed: seed.unwrap_or(usual.seed),
+            integrator,
+            max_depth,
             ..usual
         }
     }

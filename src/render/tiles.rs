@@ -21,6 +21,20 @@ pub enum TileOrder {
     Spiral,
 }
 
+impl TileOrder {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Scanline, Self::Hilbert, Self::Spiral];
+
+    /// As flags have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scanline => "scanline",
+            Self::Hilbert => "hilbert",
+            Self::Spiral => "spiral",
+        }
+    }
+}
+
 /// A rectangle of pixels, not empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Tile {

@@ -124,17 +124,9 @@ pub fn render_file<'py>(
     normals: &str,
 ) -> PyResult<(Picture<'py>, Vec<String>)> {
     let options = LoadOptions {
-        up_axis: by_name("up_axis", up_axis, [("y", UpAxis::Y), ("z", UpAxis::Z)])?,
-        unit: by_name(
-            "unit",
-            unit,
-            [("m", Unit::Metre), ("cm", Unit::Centimetre), ("mm", Unit::Millimetre), ("in", Unit::Inch)],
-        )?,
-        normals: by_name(
-            "normals",
-            normals,
-            [("file", Normals::File), ("flat", Normals::Flat), ("smooth", Normals::Smooth)],
-        )?,
+        up_axis: by_name("up_axis", up_axis, UpAxis::ALL.map(|axis| (axis.name(), axis)))?,
+        unit: by_name("unit", unit, Unit::ALL.map(|unit| (unit.name(), unit)))?,
+        normals: by_name("normals", normals, Normals::ALL.map(|kind| (kind.name(), kind)))?,
         ..LoadOptions::default()
     };
     let loaded = pool::run(py, wishes.threads, || io::load(&path, &options))?;

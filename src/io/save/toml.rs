@@ -175,14 +175,15 @@ fn render(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
 }
 
 fn write_camera(camera: &Camera, name: &str, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(name), list_f64(camera.eye))?;
-    let (at, up) = (camera.pose(0.0).target(1.0), camera.frame.y_axis);
+    let Camera { name: _, eye, frame, end, projection, shift, lens, distortion, shutter } = camera;
+    writeln!(out, "[[camera]]\nname = {}\neye = {}", quoted(name), list_f64(*eye))?;
+    let (at, up) = (camera.pose(0.0).target(1.0), frame.y_axis);
     writeln!(out, "look_at = {}\nup = {}", list_f64(at), list_f64(up))?;
-    if let Some(end) = camera.end {
+    if let Some(end) = end {
         writeln!(out, "eye_end = {}\nlook_at_end = {}", list_f64(end.eye), list_f64(end.target(1.0)))?;
         writeln!(out, "up_end = {}", list_f64(end.frame.y_axis))?;
     }
-    match camera.projection {
+    match projection {
         Projection::Perspective(Fov::Vertical(vertical)) => writeln!(out, "fov = {}", vertical.to_degrees())?,
         Projection::Perspective(Fov::Horizontal(horizontal)) => writeln!(out, "fov_x = {}", horizontal.to_degrees())?,
         Projection::Perspective(Fov::Both { horizontal, vertical }) => {
@@ -191,18 +192,18 @@ fn write_camera(camera: &Camera, name: &str, out: &mut dyn Write) -> io::Result<
         Projection::Orthographic(height) => writeln!(out, "projection = \"orthographic\"\nheight = {height}")?,
         Projection::Equirectangular => writeln!(out, "projection = \"equirectangular\"")?,
     }
-    if let Some(ThinLens { radius, focus, blades }) = camera.lens {
+    if let Some(ThinLens { radius, focus, blades }) = lens {
         writeln!(out, "lens = {{ radius = {radius}, focus = {focus}, blades = {blades} }}")?;
     }
-    if let Some(Distortion { k1, k2, k3, p1, p2 }) = camera.distortion {
+    if let Some(Distortion { k1, k2, k3, p1, p2 }) = distortion {
         writeln!(out, "distortion = [{k1}, {k2}, {k3}, {p1}, {p2}]")?;
     }
-    if camera.shutter != [0.0, 1.0] {
-        let [open, close] = camera.shutter;
+    if *shutter != [0.0, 1.0] {
+        let [open, close] = shutter;
         writeln!(out, "shutter = [{open}, {close}]")?;
     }
-    if camera.shift != DVec2::ZERO && camera.projection != Projection::Equirectangular {
-        writeln!(out, "shift = [{}, {}]", camera.shift.x, camera.shift.y)?;
+    if *shift != DVec2::ZERO && *projection != Projection::Equirectangular {
+        writeln!(out, "shift = [{}, {}]", shift.x, shift.y)?;
     }
     writeln!(out)
 }
@@ -275,26 +276,52 @@ fn write_material(material: &Material, name: &str, out: &mut dyn Write) -> io::R
 
 /// What a surface has on which light falls.
 fn write_lit(material: &Material, out: &mut dyn Write) -> io::Result<()> {
-    let Material { ambient, diffuse, specular, reflection, transmission, emission, shininess, ior, .. } = material;
+    // All are named, so that whoever adds one decides here what becomes of it.
+    let Material {
+        ambient,
+        diffuse,
+        specular,
+        shininess,
+        model,
+        reflection,
+        transmission,
+        ior,
+        interface,
+        absorption,
+        gloss,
+        emission,
+        // Of every surface.
+        name: _,
+        unlit: _,
+        energy_conserving: _,
+        alpha: _,
+        opacity: _,
+        // Scenes with textures are refused, and without these the rest says what a physical surface looks like.
+        diffuse_texture: _,
+        emission_texture: _,
+        normal_texture: _,
+        normal_scale: _,
+        physical: _,
+    } = material;
     writeln!(out, "ambient = {}\ndiffuse = {}", list(*ambient), list(*diffuse))?;
     writeln!(out, "specular = {}\nshininess = {shininess}", list(*specular))?;
-    let model = match material.model {
+    let model = match model {
         Specular::Phong => "phong",
         Specular::BlinnPhong => "blinn-phong",
     };
     writeln!(out, "model = \"{model}\"\nreflection = {}", list(*reflection))?;
     writeln!(out, "transmission = {}\nior = {ior}\nemission = {}", list(*transmission), list(*emission))?;
-    match material.interface {
+    match interface {
         Interface::Shares => {}
         Interface::Fresnel => writeln!(out, "type = \"glass\"")?,
         Interface::Thin => writeln!(out, "type = \"glass\"\nthin = true")?,
     }
-    let has_inside = *transmission != Vec3::ZERO && material.interface != Interface::Thin;
-    if let Some(Absorption { color, distance }) = material.absorption.filter(|_| has_inside) {
+    let has_inside = *transmission != Vec3::ZERO && *interface != Interface::Thin;
+    if let Some(Absorption { color, distance }) = absorption.filter(|_| has_inside) {
         writeln!(out, "attenuation_color = {}\nattenuation_distance = {distance}", list(color))?;
     }
     // Of what sends nothing on nothing is seen of it, and it is refused.
-    if let Some(gloss) = material.gloss.filter(|_| material.sends_on()) {
+    if let Some(gloss) = gloss.filter(|_| material.sends_on()) {
         writeln!(out, "gloss = {gloss}")?;
     }
     Ok(())

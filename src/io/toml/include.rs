@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::table::{Read, Table, Value};
+use super::table::{Read, Table};
 use crate::error::{Error, Result, Warning};
 use crate::io::{LoadOptions, Normals, Unit, UpAxis, format, load};
 use crate::math::DAffine3;
@@ -45,17 +45,11 @@ impl Include {
             let known: Vec<&str> = format::mesh_suffixes().collect();
             return Err(value.fault(format!("{name:?} is no mesh file; known are {}", known.join(", "))));
         }
-        let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];
-        let units = [("m", Unit::Metre), ("cm", Unit::Centimetre), ("mm", Unit::Millimetre), ("in", Unit::Inch)];
-        let kinds = [("file", Normals::File), ("flat", Normals::Flat), ("smooth", Normals::Smooth)];
-        fn choice<T: Copy + Default>(table: &mut Table<'_>, key: &'static str, choices: &[(&str, T)]) -> Read<T> {
-            Ok(table.optional(key, |value: Value<'_>| value.choice(choices))?.unwrap_or_default())
-        }
         Ok(Self {
             path,
-            up_axis: choice(table, "up_axis", &axes)?,
-            unit: choice(table, "unit", &units)?,
-            normals: choice(table, "normals", &kinds)?,
+            up_axis: table.optional("up_axis", |value| value.one_of(UpAxis::ALL, UpAxis::name))?.unwrap_or_default(),
+            unit: table.optional("unit", |value| value.one_of(Unit::ALL, Unit::name))?.unwrap_or_default(),
+            normals: table.optional("normals", |value| value.one_of(Normals::ALL, Normals::name))?.unwrap_or_default(),
             material,
         })
     }

@@ -71,8 +71,7 @@ impl Render {
                 let inside = TEMPERATURES.contains(&kelvin);
                 if inside { Ok(kelvin) } else { Err(value.unlike(&format!("kelvin from {first} to {last}"))) }
             })?,
-            response: table
-                .optional("response", |value| value.choice(&Curve::ALL.map(|curve| (curve.name(), curve))))?,
+            response: table.optional("response", |value| value.one_of(Curve::ALL, Curve::name))?,
             search: search(&mut table)?,
         };
         render.ambient = table.optional("ambient", |value| value.color())?.unwrap_or_default();
@@ -102,7 +101,7 @@ fn picture_name(value: Value<'_>) -> Read<String> {
 
 /// The keys of `[render]` that say how the scene is searched.
 fn search(table: &mut Table<'_>) -> Read<Search> {
-    let accel = table.optional("accel", |value| value.choice(&Accel::ALL.map(|accel| (accel.name(), accel))))?;
+    let accel = table.optional("accel", |value| value.one_of(Accel::ALL, Accel::name))?;
     let grid = table.optional("grid", |value| {
         let side = |value: Value<'_>| value.whole(1..=Resolution::MOST.into()).map(|side| side as u32);
         let sides =
@@ -116,13 +115,12 @@ fn search(table: &mut Table<'_>) -> Read<Search> {
     if grid.is_some() && accel != Some(Accel::Grid) {
         return Err(fault(table, "grid", "is the resolution of accel = \"grid\"; write that, too, or leave it out"));
     }
-    let triangles = TriangleMethod::ALL.map(|method| (method.name(), method));
-    let spheres = SphereMethod::ALL.map(|method| (method.name(), method));
     let search = Search {
         accel,
         grid,
-        triangle_method: table.optional("triangle_method", |value| value.choice(&triangles))?,
-        sphere_method: table.optional("sphere_method", |value| value.choice(&spheres))?,
+        triangle_method: table
+            .optional("triangle_method", |value| value.one_of(TriangleMethod::ALL, TriangleMethod::name))?,
+        sphere_method: table.optional("sphere_method", |value| value.one_of(SphereMethod::ALL, SphereMethod::name))?,
     };
     if search.asks_for_methods() && !accel.unwrap_or_default().has_methods() {
         let key = if search.triangle_method.is_some() { "triangle_method" } else { "sphere_method" };

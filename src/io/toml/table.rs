@@ -232,6 +232,11 @@ impl<'t> Value<'t> {
         })
     }
 
+    /// One of these, by its name.
+    pub(super) fn one_of<T: Copy, const N: usize>(self, all: [T; N], name: fn(T) -> &'static str) -> Read<T> {
+        self.choice(&all.map(|value| (name(value), value)))
+    }
+
     fn list(self) -> Option<impl Iterator<Item = Value<'t>>> {
         let key = self.key;
         let item =
