@@ -434,6 +434,50 @@ fn bundles() {
 }
 
 /// What overflows in f32 on the way is neither lost for it nor believed.
+/// Rays that run the same way, as an orthographic camera's and those towards the sun: through corners, edges and between, with ranges of all kinds and some
+/// that are not valid; near to each other, and far apart.
+#[test]
+fn parallel_rays() {
+    let mut hits = 0;
+    for (seed, mesh) in [(1, scenes::bumpy_sphere(24, 0.2, 5)), (2, scenes::soup(2000, 0.3, 5))] {
+        let mut random = Random::new(seed);
+        let corners = mesh.positions.clone();
+        let scene = scenes::of_mesh(mesh);
+        let directions =
+            [Vec3::NEG_Z, Vec3::new(0.0, 2.0, 0.0), Vec3::new(1.0, -0.5, 0.25), random.vec3(), random.vec3() * 1e-3];
+        let mut batches = Vec::new();
+        for (k, direction) in directions.into_iter().enumerate() {
+            let back = direction / direction.length() * 4.0;
+            let across = back.any_orthonormal_vector() * if k == 3 { 0.5 } else { 0.01 };
+            let along = back.cross(across) / 4.0;
+            // Tiles of 8 x 8 around corners, and what does not fill one.
+            let mut rays = Vec::new();
+            for _ in 0..12 {
+                let middle = corners[random.below(corners.len())] - back;
+                for i in 0..64 {
+                    let origin = middle + across * (i % 8 - 4) as f32 + along * (i / 8 - 4) as f32;
+                    rays.push(Ray::new(origin, direction));
+                }
+            }
+            rays.truncate(rays.len() - 21);
+            for ray in rays.iter_mut().step_by(7) {
+                let length = 4.0 / direction.length();
+                (ray.tmin, ray.tmax) = (length * random.unit(), length * (0.5 + random.unit()));
+                match random.below(6) {
+                    0 => ray.origin.x = f32::NAN,
+                    1 => (ray.tmin, ray.tmax) = (ray.tmax, ray.tmin),
+                    2 => ray.tmin = -1.0,
+                    _ => {}
+                }
+            }
+            batches.push(rays);
+        }
+        let world = World::new(&scene).expect("the scene is sound");
+        hits += assert_parity_of_batches(&world, &Brute::new(&world), &batches);
+    }
+    assert!(hits > 3000, "{hits} hits");
+}
+
 #[test]
 fn products_that_overflow() {
     let mesh = |triangles: &[[[f32; 3]; 3]]| {

@@ -16,6 +16,7 @@ mod image;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod io;
+mod kernels;
 mod layering;
 mod minray;
 mod motion;

@@ -142,16 +142,18 @@ impl Placement {
 
     /// A box around the object whose own box is `object`, in world coordinates, at all times; rounded outwards.
     pub fn bounds(&self, object: Aabb) -> Aabb {
-        self.bounds_of(object, |rows| object.extents(rows))
+        let [start, end] = self.ends_of(object, |rows| object.extents(rows));
+        start.union(end)
     }
 
-    /// The same, and tighter, of an object of which more is known: `extents` are at least the scalar products of any of its points with
+    /// Boxes around the object at time 0 and at time 1; at all times in between it is within the box between these. Tighter than by its own box alone, of an
+    /// object of which more is known: `extents` are at least the scalar products of any of its points with
     /// the rows of the given matrix, directions in the object's coordinates, and with the opposite ones.
     #[inline(always)]
-    pub fn bounds_of(&self, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> Aabb {
-        let Some(motion) = &self.motion else { return bounds_placed(&self.to_world, object, extents) };
+    pub fn ends_of(&self, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> [Aabb; 2] {
+        let Some(motion) = &self.motion else { return [bounds_placed(&self.to_world, object, extents); 2] };
         if object.is_empty() {
-            return Aabb::EMPTY;
+            return [Aabb::EMPTY; 2];
         }
         let start = self.to_world.as_daffine3();
         let reach = object.min.abs().max(object.max.abs()).as_dvec3();
@@ -160,11 +162,11 @@ impl Placement {
         let most = start.matrix3.abs().max_entries(&end.matrix3.abs());
         let rounding = most * reach + start.translation.abs().max(end.translation.abs());
         let slack = rounding * (1.01 * f64::from(UNIT_ROUNDOFF));
-        bounds_under(&start, reach, slack, &extents).union(bounds_under(&end, reach, slack, &extents))
+        [bounds_under(&start, reach, slack, &extents), bounds_under(&end, reach, slack, &extents)]
     }
 }
 
-/// The box in the world of an object that a transform places; `extents` are as of [`Placement::bounds_of`].
+/// The box in the world of an object that a transform places; `extents` are as of [`Placement::ends_of`].
 #[inline(always)]
 pub(super) fn bounds_placed(to_world: &Affine3, object: Aabb, extents: impl Fn(&DMat3) -> [DVec3; 2]) -> Aabb {
     if object.is_empty() {

@@ -96,6 +96,14 @@ impl World {
         (part, lookup.placement.map(|p| &self.placements[p as usize]))
     }
 
+    /// Whether it has been made of this scene, as far as that can be told without looking at each primitive.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        let group = |instance: &Instance| scene.groups.get(instance.group as usize);
+        let begins = |instance: &Instance| group(instance).map(|group| group.geometries.start);
+        let same = |(lookup, instance): (&Lookup, &Instance)| begins(instance) == Some(lookup.first_geometry);
+        self.lookup.len() == scene.instances.len() && self.lookup.iter().zip(&scene.instances).all(same)
+    }
+
     /// Triangles as stored: those of an object that is placed twice count once.
     pub fn stored_triangles(&self) -> u64 {
         let triangles = self.parts.iter().map(|part| match &part.primitives {

@@ -81,20 +81,33 @@ impl Kernel for Gather<'_> {
         bvh.unbounded.gather(ray, &mut gathered.shapes);
         let limit = limit(ray);
         if !bvh.moving.is_empty() {
-            bvh.moving.walk::<S, Closest>(&bvh.objects, ray, limit, |object, place| {
-                object.gather::<S>(ray, Some(place), gathered);
-                Visit::Until(limit)
-            });
+            bvh.moving.walk::<S, Closest>(
+                &bvh.objects,
+                ray,
+                limit,
+                #[inline(always)]
+                |object, place| {
+                    object.gather::<S>(ray, Some(place), gathered);
+                    Visit::Until(limit)
+                },
+            );
         }
         if bvh.placements.is_empty() {
             return;
         }
-        walk_over::<S, Closest>(bvh.placements.tree(), ray, bvh.placements.spread(), limit, |number| {
-            let place = bvh.placements.at(number);
-            let object = &bvh.objects[place.object as usize];
-            object.gather::<S>(ray, Some(place), gathered);
-            Visit::Until(limit)
-        });
+        walk_over::<S, Closest>(
+            bvh.placements.tree(),
+            ray,
+            bvh.placements.spread(),
+            limit,
+            #[inline(always)]
+            |number| {
+                let place = bvh.placements.at(number);
+                let object = &bvh.objects[place.object as usize];
+                object.gather::<S>(ray, Some(place), gathered);
+                Visit::Until(limit)
+            },
+        );
     }
 }
 
@@ -110,22 +123,34 @@ impl Level {
         let through = place.map(Place::through);
         let limit = limit(ray);
         if !self.triangles.tree().is_empty() {
-            let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
+            let (local, blur) = Place::local_or::<S>(place, ray);
             let slab = SlabRay::new::<S>(&local, self.triangles.tree().reach(), blur);
             let filter = Filter::new(&local, blur);
-            walk::single::<S, Closest>(self.triangles.tree(), &slab, limit, |leaf| {
-                self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
-                Visit::Until(limit)
-            });
+            walk::single::<S, Closest>(
+                self.triangles.tree(),
+                &slab,
+                limit,
+                #[inline(always)]
+                |leaf| {
+                    self.triangles.gather_leaf::<S>(leaf, ray, &filter, through, gathered);
+                    Visit::Until(limit)
+                },
+            );
         }
         // The rounding of the ray is part of what shapes are asked.
         let local = place.map_or(*ray, |place| place.object_ray(ray));
         if !self.shapes.tree().is_empty() && local.is_valid() {
             let slab = SlabRay::new::<S>(&local, self.shapes.tree().reach(), Blur::NONE);
-            walk::single::<S, Closest>(self.shapes.tree(), &slab, limit, |leaf| {
-                self.shapes.gather_leaf(leaf, &local, through, &mut gathered.shapes);
-                Visit::Until(limit)
-            });
+            walk::single::<S, Closest>(
+                self.shapes.tree(),
+                &slab,
+                limit,
+                #[inline(always)]
+                |leaf| {
+                    self.shapes.gather_leaf(leaf, &local, through, &mut gathered.shapes);
+                    Visit::Until(limit)
+                },
+            );
         }
     }
 }

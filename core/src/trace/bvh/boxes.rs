@@ -53,7 +53,7 @@ impl BoxTree {
     /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> (Self, Vec<u32>) {
         let kept = boxes.iter().enumerate().filter(|(_, bounds)| bounds.is_bounded());
-        Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), &options)
+        Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), Child::MOST, &options)
     }
 
     /// Over boxes that move, from where the first of each pair is at time 0 to where the second is at time 1, in straight lines. Rays before and after that
@@ -62,16 +62,20 @@ impl BoxTree {
     /// # Panics
     /// As [`BoxTree::build`] does.
     pub fn moving(boxes: &[[Aabb; 2]], options: Options<'_>) -> (Self, Vec<u32>) {
-        if boxes.iter().all(|[start, end]| start == end) {
-            let still: Vec<Aabb> = boxes.iter().map(|[start, _]| *start).collect();
-            return Self::build(&still, options);
-        }
+        Self::of_moving(boxes, Child::MOST, &options)
+    }
+
+    /// The same with no more than `most` boxes in a leaf.
+    pub(super) fn of_moving(boxes: &[[Aabb; 2]], most: u32, options: &Options<'_>) -> (Self, Vec<u32>) {
         // What is near halfway is together.
         let halfway =
             |[start, end]: &[Aabb; 2]| Aabb { min: start.min.midpoint(end.min), max: start.max.midpoint(end.max) };
         let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(Aabb::is_bounded));
         let (mut still, order) =
-            Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), &options);
+            Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), most, options);
+        if boxes.iter().all(|[start, end]| start == end) {
+            return (still, order);
+        }
         let tree = &mut still.tree;
         let mut end = Tree::new(tree.nodes().to_vec());
         for (k, tree) in [tree, &mut end].into_iter().enumerate() {
@@ -83,9 +87,9 @@ impl BoxTree {
         (Self { end: Some(end), ..still }, order)
     }
 
-    fn over(mut items: Vec<Record>, options: &Options<'_>) -> (Self, Vec<u32>) {
+    fn over(mut items: Vec<Record>, most: u32, options: &Options<'_>) -> (Self, Vec<u32>) {
         let isa = options.isa.demand();
-        let tree = build::build(&mut items, 1, Child::MOST, options);
+        let tree = build::build(&mut items, 1, most, options);
         (Self { tree, end: None, count: items.len(), isa }, items.iter().map(Record::primitive).collect())
     }
 
@@ -141,6 +145,51 @@ impl BoxTree {
         }
     }
 
+    /// A ray made ready for the boxes, which may be off by `blur`.
+    #[inline(always)]
+    pub(super) fn slab<S: Simd>(&self, ray: &Ray, blur: Blur) -> SlabRay {
+        let reach = self.end.iter().fold(self.tree.reach(), |reach, end| reach.max(end.reach()));
+        SlabRay::new::<S>(ray, reach, blur)
+    }
+
+    /// The same at its time, where any of them moves.
+    #[inline(always)]
+    pub(super) fn at_its_time(&self, slab: SlabRay, ray: &Ray) -> Option<MovingRay<'_>> {
+        // NaN stays NaN, with which every box is entered.
+        let time = ray.time.clamp(0.0, 1.0);
+        self.end.as_ref().map(|end| MovingRay { slab, start: self.tree.nodes(), end: end.nodes(), time })
+    }
+
+    /// Calls `visit` with each box that the ray enters, near ones mostly first; it says how far the ray still looks.
+    #[inline(always)]
+    pub(super) fn walk<S: Simd, Q: Query>(&self, ray: &Ray, blur: Blur, limit: f32, visit: impl FnMut(u32) -> Visit) {
+        let slab = self.slab::<S>(ray, blur);
+        match self.at_its_time(slab, ray) {
+            None => self.walk_as::<S, Q>(&slab, limit, visit),
+            Some(moving) => self.walk_as::<S, Q>(&moving, limit, visit),
+        }
+    }
+
+    #[inline(always)]
+    fn walk_as<S: Simd, Q: Query>(&self, ray: &impl Enter, limit: f32, mut visit: impl FnMut(u32) -> Visit) {
+        let mut after = Visit::Until(limit);
+        walk::single::<S, Q>(
+            &self.tree,
+            ray,
+            limit,
+            #[inline(always)]
+            |leaf| {
+                for item in leaf.blocks() {
+                    after = visit(item);
+                    if matches!(after, Visit::Stop) {
+                        break;
+                    }
+                }
+                after
+            },
+        );
+    }
+
     /// Names boxes that have a point in common with `bounds`, and some that are only near it: in the same leaves, or by a millionth of coordinates. What moves is
     /// at time 0.
     pub fn visit_overlapping(&self, bounds: &Aabb, visitor: &mut dyn FnMut(u32)) {
@@ -165,7 +214,7 @@ fn wider(ends: &[Aabb; 2]) -> [Aabb; 2] {
 }
 
 /// A ray among boxes that move.
-struct MovingRay<'a> {
+pub(super) struct MovingRay<'a> {
     slab: SlabRay,
     start: &'a [Node],
     end: &'a [Node],
@@ -233,38 +282,15 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { boxes: BoxTree { tree, end, .. }, ray, .. } = self;
-        let reach = end.iter().fold(tree.reach(), |reach, end| reach.max(end.reach()));
-        let slab = SlabRay::new::<S>(ray, reach, Blur::NONE);
-        match end {
-            None => self.walk::<S>(&slab),
-            Some(end) => {
-                // NaN stays NaN, with which every box is entered.
-                let time = ray.time.clamp(0.0, 1.0);
-                self.walk::<S>(&MovingRay { slab, start: tree.nodes(), end: end.nodes(), time });
-            }
-        }
-    }
-}
-
-impl<Q: Query> VisitBoxes<'_, '_, Q> {
-    #[inline(always)]
-    fn walk<S: Simd>(self, ray: &impl Enter) {
-        let Self { boxes, ray: Ray { tmax, .. }, visitor, .. } = self;
-        let mut limit = tmax.next_up();
-        walk::single::<S, Q>(
-            &boxes.tree,
+        let Self { boxes, ray, visitor, .. } = self;
+        boxes.walk::<S, Q>(
             ray,
-            limit,
+            Blur::NONE,
+            ray.tmax.next_up(),
             #[inline(always)]
-            |leaf| {
-                for item in leaf.blocks() {
-                    match visitor(item) {
-                        Search::Continue(t) => limit = t,
-                        Search::Break(()) => return Visit::Stop,
-                    }
-                }
-                Visit::Until(limit)
+            |item| match visitor(item) {
+                Search::Continue(t) => Visit::Until(t),
+                Search::Break(()) => Visit::Stop,
             },
         );
     }

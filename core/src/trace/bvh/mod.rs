@@ -212,11 +212,11 @@ impl Bvh {
             let costs = items.map(|item| objects[self.placements.at(item).object as usize]);
             costs.sum()
         });
-        let moving = self.moving.tree().cost(|items| {
+        let moving = self.moving.boxes().tree().cost(|items| {
             let costs = items.map(|item| objects[self.moving.at(item).object as usize]);
             costs.sum()
         });
-        let placed_bounds = self.placements.tree().bounds().union(self.moving.tree().bounds());
+        let placed_bounds = self.placements.tree().bounds().union(self.moving.boxes().tree().bounds());
         let whole = area(self.fixed.bounds().union(placed_bounds));
         if whole > 0.0 { (of(&self.fixed) + placed + moving) / whole } else { 0.0 }
     }

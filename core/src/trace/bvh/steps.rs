@@ -11,6 +11,7 @@ use super::reject::Blur;
 use super::reject::slab::SlabRay;
 use super::simd::{Mask, Portable};
 use super::tree::Tree;
+use super::walk::Enter;
 use crate::ray::Ray;
 use crate::trace::Tracer;
 
@@ -41,8 +42,13 @@ impl Bvh {
         for number in items(&mut steps, self.placements.tree(), &world, limit) {
             self.count_object(&mut steps, self.placements.at(number), ray, limit);
         }
-        let world = among_boxes::<Portable>(self.moving.tree(), ray, self.moving.spread());
-        for number in items(&mut steps, self.moving.tree(), &world, limit) {
+        let boxes = self.moving.boxes();
+        let world = boxes.slab::<Portable>(ray, self.moving.strayed(ray));
+        let moving = match boxes.at_its_time(world, ray) {
+            Some(moving) => items(&mut steps, boxes.tree(), &moving, limit),
+            None => items(&mut steps, boxes.tree(), &world, limit),
+        };
+        for number in moving {
             let placement = self.moving.at(number).at(ray.moment());
             let reach = self.objects[placement.object as usize].triangles.tree().reach();
             self.count_object(&mut steps, &Place::new(&placement, reach), ray, limit);
@@ -71,7 +77,7 @@ fn count_level(steps: &mut Steps, level: &Level, (ray, blur): (&Ray, Blur), for_
 }
 
 /// What is in the leaves that the ray enters up to `limit`; nodes on the way are counted.
-fn items(steps: &mut Steps, tree: &Tree, ray: &SlabRay, limit: f32) -> Vec<u32> {
+fn items(steps: &mut Steps, tree: &Tree, ray: &impl Enter, limit: f32) -> Vec<u32> {
     let mut found = Vec::new();
     let mut waiting = if tree.is_empty() { Vec::new() } else { vec![Child::ROOT] };
     while let Some(child) = waiting.pop() {

@@ -183,7 +183,7 @@ impl Precise {
         self.bounds
     }
 
-    /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers.
+    /// The tracer over the meshes as they are, if f32 holds them: for rays in f32 it gives the same answers, but for hits at a t that f32 does not hold.
     pub fn exact(&self) -> Option<&Bvh> {
         self.frame.is_identity().then_some(&self.bvh)
     }

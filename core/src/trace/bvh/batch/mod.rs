@@ -9,7 +9,8 @@ use self::arrivals::Arrivals;
 use super::alone::Doubted;
 use super::flight::{self, Flight, Objects};
 use super::levels::placements::walk_over;
-use super::query::{Closest, Query};
+use super::packet::{Asked, Packet};
+use super::query::{Closest, Query, SOMETHING};
 use super::simd::isa::{self, Kernel};
 use super::simd::{RAYS, Simd};
 use super::walk::Visit;
@@ -146,7 +147,10 @@ impl Bvh {
             let chunk = start..start + if in_bundles || !is_all { RAYS.min(left) } else { left };
             start = chunk.end;
             let (first, count) = (chunk.start, chunk.len());
-            let traced = if in_bundles {
+            // Without a common point no bundle is made of them.
+            let parallel =
+                S::FLIES && in_bundles && is_all && self.placements.is_empty() && are_parallel(&rays[chunk.clone()]);
+            let traced = if in_bundles && !parallel {
                 bundle::trace::<S, Q>(bundles, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
             } else {
                 0
@@ -158,7 +162,11 @@ impl Bvh {
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
                 let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut bundles.t);
-                Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
+                if parallel {
+                    self.trace_parallel::<Q>(rays, answers);
+                } else {
+                    Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
+                }
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -179,19 +187,73 @@ impl Bvh {
         }
     }
 
-    /// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.
-    #[cold]
+    /// Rays that run the same way among triangles, as those of an orthographic camera and those towards a distant light: two packets of eight at once, each
+    /// a beam where its rays are near to each other.
     #[inline(never)]
-    fn triangles_again<S: Simd>(&self, ray: &Ray) -> Nearest {
-        let mut nearest = Nearest::new(ray);
-        self.fixed.trace_triangles::<S, Closest>(ray, None, &mut nearest);
-        if self.placements.has_triangles() {
-            walk_over::<S, Closest>(self.placements.tree(), ray, &Spread::NONE, nearest.limit(), |number| {
-                let place = self.placements.at(number);
-                let level = &self.objects[place.object as usize];
-                level.trace_triangles::<S, Closest>(ray, Some(place), &mut nearest);
-                Visit::after::<Closest>(&nearest)
+    fn trace_parallel<Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+        let mut packets = [Packet::NONE; 2];
+        for (rays, answers) in rays.chunks(2 * Packet::RAYS).zip(answers.chunks_mut(2 * Packet::RAYS)) {
+            let mut lanes = [0; 2];
+            for (i, ray) in rays.iter().enumerate() {
+                let (packet, lane) = (i / Packet::RAYS, i % Packet::RAYS);
+                packets[packet].set(lane, ray);
+                // Packets take what is below 0 for 0, and such rays are not valid here.
+                lanes[packet] |= u32::from(ray.is_valid()) << lane;
+            }
+            let asked = Asked { packets: packets.each_ref(), lanes };
+            let place = |i: usize| (i / Packet::RAYS, i % Packet::RAYS);
+            if Q::ANY {
+                let occluded = self.occluded_packets(&asked);
+                for (i, answer) in answers.iter_mut().enumerate() {
+                    let (packet, lane) = place(i);
+                    *answer = Q::answer((occluded[packet] >> lane & 1 != 0).then_some(SOMETHING));
+                }
+                continue;
+            }
+            self.closest_packets(&asked, |hits| {
+                for (i, answer) in answers.iter_mut().enumerate() {
+                    let (packet, lane) = place(i);
+                    *answer = Q::answer(hits[packet].hit(lane));
+                }
             });
+        }
+    }
+}
+
+/// Whether all of these, as many as make it worth while, run the same way.
+#[inline(always)]
+fn are_parallel(rays: &[Ray]) -> bool {
+    rays.len() >= Packet::RAYS && rays.iter().all(|ray| ray.direction == rays[0].direction)
+}
+
+/// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.
+struct TrianglesAgain<'a> {
+    bvh: &'a Bvh,
+    ray: &'a Ray,
+}
+
+impl Kernel for TrianglesAgain<'_> {
+    type Output = Nearest;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Nearest {
+        let Self { bvh, ray } = self;
+        let mut nearest = Nearest::new(ray);
+        bvh.fixed.trace_triangles::<S, Closest>(ray, None, &mut nearest);
+        if bvh.placements.has_triangles() {
+            walk_over::<S, Closest>(
+                bvh.placements.tree(),
+                ray,
+                &Spread::NONE,
+                nearest.limit(),
+                #[inline(always)]
+                |number| {
+                    let place = bvh.placements.at(number);
+                    let level = &bvh.objects[place.object as usize];
+                    level.trace_triangles::<S, Closest>(ray, Some(place), &mut nearest);
+                    Visit::after::<Closest>(&nearest)
+                },
+            );
         }
         nearest
     }
@@ -291,7 +353,7 @@ impl<Q: Query> Kernel for Others<'_, Q> {
                 if !nearest.is_open() {
                     break;
                 }
-                nearest = bvh.triangles_again::<S>(ray);
+                nearest = S::apart(TrianglesAgain { bvh, ray });
             }
             *answer = Q::answer(nearest.hit());
         }

@@ -93,7 +93,7 @@ impl Level {
         if is_done || tree.is_empty() {
             return;
         }
-        let (local, blur) = place.map_or((*ray, Blur::NONE), |place| place.local::<S>(ray));
+        let (local, blur) = Place::local_or::<S>(place, ray);
         let through = place.map(Place::through);
         let (slab, filter) = (SlabRay::new::<S>(&local, tree.reach(), blur), Filter::new(&local, blur));
         walk::single::<S, Q>(

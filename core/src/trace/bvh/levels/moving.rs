@@ -1,25 +1,26 @@
-//! Objects that move: a tree of their own, over the boxes of all they pass through.
+//! Objects that move: a tree of their own, over boxes that are where they are at the ray's time.
 //!
 //! A ray comes here by itself, after everything that stands still, and each object that it enters is put where it stands at that time. So
-//! bundles and flights, in which rays of many times would have to part, know of no time, and scenes without motion pay nothing for it. Boxes that move
-//! with the time of the ray (Embree's way, and that of Grünschloss, Stich, Nawaz, Keller 2011, *MSBVH*) would be entered less
-//! often by rays among things that fly far; that would need a second kind of node.
+//! bundles and flights, in which rays of many times would have to part, know of no time, and scenes without motion pay nothing for it.
 
 use super::Level;
 use super::place::Place;
-use super::placements::{spread_over, tree_over, walk_over};
+use super::placements::{spread_over, strayed};
+use super::support::Outlines;
+use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 use crate::trace::Placement;
+use crate::trace::bvh::boxes::BoxTree;
 use crate::trace::bvh::build::preset::Options;
 use crate::trace::bvh::query::Query;
+use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::simd::Simd;
-use crate::trace::bvh::tree::Tree;
 use crate::trace::bvh::walk::Visit;
 use crate::trace::spread::Spread;
 
 /// Everything that moves.
 pub(in crate::trace::bvh) struct MovingTree {
-    tree: Tree,
+    boxes: BoxTree,
     /// In the order of the tree's leaves.
     placements: Vec<Placement>,
     spread: Spread,
@@ -28,22 +29,35 @@ pub(in crate::trace::bvh) struct MovingTree {
 impl MovingTree {
     /// Takes those that move. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
-        let (tree, order) = tree_over(placements, |placement| placement.motion.is_some(), objects, options);
-        let placements: Vec<Placement> = order.into_iter().map(|i| placements[i].clone()).collect();
-        Self { tree, spread: spread_over(&placements, objects), placements }
+        let moving = || placements.iter().filter(|placement| placement.motion.is_some());
+        let outlines = Outlines::new(objects, options.isa.demand(), moving());
+        // Nothing is left out because f32 does not hold where it is.
+        let held = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX);
+        let held = |bounds: Aabb| Aabb { min: held(bounds.min), max: held(bounds.max) };
+        let ends = |placement: &Placement| {
+            outlines.ends(placement).map(|bounds| if bounds.is_empty() { bounds } else { held(bounds) })
+        };
+        let boxes: Vec<[Aabb; 2]> = moving().map(ends).collect();
+        // One a leaf, for to enter an object costs many times what the test of its box does.
+        let (boxes, order) = BoxTree::of_moving(&boxes, 1, options);
+        let all: Vec<&Placement> = moving().collect();
+        let placements: Vec<Placement> = order.into_iter().map(|i| all[i as usize].clone()).collect();
+        Self { boxes, spread: spread_over(&placements, objects), placements }
     }
 
     pub fn is_empty(&self) -> bool {
         self.placements.is_empty()
     }
 
-    pub fn tree(&self) -> &Tree {
-        &self.tree
+    /// Whose leaves name them.
+    pub fn boxes(&self) -> &BoxTree {
+        &self.boxes
     }
 
-    /// As [`spread_over`] says.
-    pub fn spread(&self) -> &Spread {
-        &self.spread
+    /// How far a ray strays from where it is in the world, as [`spread_over`] says.
+    #[inline(always)]
+    pub fn strayed(&self, ray: &Ray) -> Blur {
+        strayed(ray, &self.spread)
     }
 
     /// The placement with that number, at time 0.
@@ -60,10 +74,9 @@ impl MovingTree {
         limit: f32,
         mut enter: impl FnMut(&Level, &Place) -> Visit,
     ) {
-        walk_over::<S, Q>(
-            &self.tree,
+        self.boxes.walk::<S, Q>(
             ray,
-            &self.spread,
+            self.strayed(ray),
             limit,
             #[inline(always)]
             |number| {
@@ -76,6 +89,6 @@ impl MovingTree {
 
     /// Memory it holds, in bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.bytes() + size_of_val(&self.placements[..])
+        self.boxes.bytes() + size_of_val(&self.placements[..])
     }
 }

@@ -108,6 +108,16 @@ impl Place {
         }
     }
 
+    /// `ray` in the coordinates of what stands here, or as it is. No closure for `map_or`: the compiler need not inline that, and then makes it for
+    /// processors without the instructions of `S`.
+    #[inline(always)]
+    pub fn local_or<S: Simd>(place: Option<&Self>, ray: &Ray) -> (Ray, Blur) {
+        match place {
+            Some(place) => place.local::<S>(ray),
+            None => (*ray, Blur::NONE),
+        }
+    }
+
     /// Eight rays, field by field as [`columns`](crate::trace::bvh::reject::ready::columns) has them, in the object's coordinates at the same t.
     #[inline(always)]
     pub fn eight<S: Simd>(&self, world: [S::V8; 8]) -> EightRays<S::V8> {

@@ -27,21 +27,16 @@ pub(in crate::trace::bvh) struct PlacementTree {
     spread: Spread,
 }
 
-/// A tree over those placements that `is_wanted`, and which each of them is, in the order of its leaves: one a leaf, for to enter an
+/// A tree over those that stand still, and which each of them is, in the order of its leaves: one a leaf, for to enter an
 /// object costs many times what the test of its box does.
-pub(super) fn tree_over(
-    placements: &[Placement],
-    is_wanted: impl Fn(&Placement) -> bool + Sync,
-    objects: &[Level],
-    options: &Options<'_>,
-) -> (Tree, Vec<usize>) {
-    let outlines =
-        Outlines::new(objects, options.isa.demand(), placements.iter().filter(|placement| is_wanted(placement)));
+fn tree_over(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> (Tree, Vec<usize>) {
+    let stands = |placement: &Placement| placement.motion.is_none();
+    let outlines = Outlines::new(objects, options.isa.demand(), placements.iter().filter(|it| stands(it)));
     let item = |(i, placement): (usize, &Placement)| {
         let bounds = outlines.around(placement);
         (!bounds.is_empty()).then_some(Record::new(&bounds, 0, i as u32))
     };
-    let wanted = placements.par_iter().enumerate().filter(|(_, placement)| is_wanted(placement));
+    let wanted = placements.par_iter().enumerate().filter(|(_, placement)| stands(placement));
     let mut items: Vec<Record> = wanted.filter_map(item).collect();
     let tree = build::build(&mut items, 1, 1, options);
     (tree, items.iter().map(|item| item.primitive() as usize).collect())
@@ -55,12 +50,17 @@ pub(super) fn spread_over<'a>(placements: impl IntoIterator<Item = &'a Placement
     })
 }
 
-/// A ray made ready for the boxes of what is placed, which strays by `spread`.
+/// How far off a ray may be among the boxes of what is placed, which strays by `spread`.
+#[inline(always)]
+pub(super) fn strayed(ray: &Ray, spread: &Spread) -> Blur {
+    // Rounded up.
+    Blur { origin: (spread.of(ray).max_element() * 1.01) as f32, ..Blur::NONE }
+}
+
+/// A ray made ready for these boxes.
 #[inline(always)]
 pub(in crate::trace::bvh) fn among_boxes<S: Simd>(tree: &Tree, ray: &Ray, spread: &Spread) -> SlabRay {
-    // Rounded up.
-    let origin = (spread.of(ray).max_element() * 1.01) as f32;
-    SlabRay::new::<S>(ray, tree.reach(), Blur { origin, ..Blur::NONE })
+    SlabRay::new::<S>(ray, tree.reach(), strayed(ray, spread))
 }
 
 /// Calls `enter` with the number of every placement whose box the ray enters, or may enter where it strays by `spread`; it says how far
@@ -95,7 +95,7 @@ pub(in crate::trace::bvh) const FIXED: u32 = u32::MAX;
 impl PlacementTree {
     /// Takes those that stand still. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
-        let (tree, order) = tree_over(placements, |placement| placement.motion.is_none(), objects, options);
+        let (tree, order) = tree_over(placements, objects, options);
         let place = |&i: &usize| {
             let triangles = &objects[placements[i].object as usize].triangles;
             Place::new(&placements[i], triangles.tree().reach()).with_grain(triangles.grain())

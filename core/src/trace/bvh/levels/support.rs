@@ -51,24 +51,30 @@ impl<'a> Outlines<'a> {
 
     /// The box around `placement`, at all times.
     pub fn around(&self, placement: &Placement) -> Aabb {
-        isa::dispatch_narrow(self.isa, Around { outlines: self, placement })
+        let [start, end] = self.ends(placement);
+        start.union(end)
+    }
+
+    /// The boxes around it at time 0 and at time 1, as [`Placement::ends_of`] says.
+    pub fn ends(&self, placement: &Placement) -> [Aabb; 2] {
+        isa::dispatch_narrow(self.isa, Ends { outlines: self, placement })
     }
 }
 
-/// [`Outlines::around`].
-struct Around<'a> {
+/// [`Outlines::ends`].
+struct Ends<'a> {
     outlines: &'a Outlines<'a>,
     placement: &'a Placement,
 }
 
-impl Kernel for Around<'_> {
-    type Output = Aabb;
+impl Kernel for Ends<'_> {
+    type Output = [Aabb; 2];
     #[inline(always)]
-    fn run<S: Simd>(self) -> Aabb {
+    fn run<S: Simd>(self) -> [Aabb; 2] {
         let Self { outlines: Outlines { objects, tables, visits, .. }, placement } = self;
         let level = &objects[placement.object as usize];
         let (bounds, table) = (level.bounds(), &tables[placement.object as usize]);
-        placement.bounds_of(
+        placement.ends_of(
             bounds,
             #[inline(always)]
             |rows| {
@@ -197,7 +203,7 @@ mod tests {
         let placement = &world.placements[0];
         assert!(placement.motion.is_some());
         let bvh = Bvh::build(&world);
-        let (object, bounds) = (bvh.objects[0].bounds(), bvh.moving.tree().bounds());
+        let (object, bounds) = (bvh.objects[0].bounds(), bvh.moving.boxes().bounds());
         for i in 0..=10_u8 {
             let to_world = placement.at(f32::from(i) / 10.0).to_world.as_daffine3();
             for position in mesh.positions.iter() {

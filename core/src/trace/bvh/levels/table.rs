@@ -78,12 +78,12 @@ impl Table {
         let length = two.max(az);
         let side = self.cells + 1;
         // Where its face's values begin.
-        let [first_x, first_y, first_z] = [0, 1, 2].map(|face| S::D4::splat((face * side * side) as f64));
-        let first = by_largest(first_x, first_y, first_z).to_array();
+        let face = (side * side) as f64;
+        let first = by_largest(S::D4::splat(0.0), S::D4::splat(face), S::D4::splat(2.0 * face)).to_array();
         // The way is so many times as long as one on the cube, which it runs along or against.
         let half = S::D4::splat(self.cells as f64 / 2.0);
         let scale = half.div(main);
-        let [at_p, at_q] = [p, q].map(|component| component.mul(scale).add(half).to_array());
+        let (at_p, at_q) = (p.mul(scale).add(half).to_array(), q.mul(scale).add(half).to_array());
         let (main, length) = (main.to_array(), length.to_array());
         let (mut along, mut against) = (DVec3::ZERO, DVec3::ZERO);
         for row in 0..3 {

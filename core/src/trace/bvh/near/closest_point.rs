@@ -119,7 +119,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(bvh: &'a Bvh, point: Vec3, max_distance: f32) -> Self {
-        let placed = bvh.placements.tree().bounds().union(bvh.moving.tree().bounds());
+        let placed = bvh.placements.tree().bounds().union(bvh.moving.boxes().tree().bounds());
         let bounds = bvh.fixed.triangles.tree().bounds().union(placed);
         let reach = bounds.min.abs().max(bounds.max.abs()).as_dvec3() + point.as_dvec3().abs();
         let slack = if bounds.is_empty() { 0.0 } else { reach.element_sum() * gamma64(32) };
@@ -182,7 +182,7 @@ impl<'a> Search<'a> {
     }
 
     fn tree(&self, level: Level) -> &'a Tree {
-        let upper = if level == Level::Moving { self.bvh.moving.tree() } else { self.bvh.placements.tree() };
+        let upper = if level == Level::Moving { self.bvh.moving.boxes().tree() } else { self.bvh.placements.tree() };
         self.triangles(level).map_or(upper, TriangleTree::tree)
     }
 

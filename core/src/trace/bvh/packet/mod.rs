@@ -31,7 +31,7 @@ use super::query::{Closest, Occluded};
 use super::simd::isa::{self, Kernel};
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{Aabb, Vec3};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use alone::{ClosestAlone, OccludedAlone};
 use beam::{Beam, WIDE};
 use doubts::Doubts;
@@ -171,6 +171,19 @@ impl PacketHits {
         geometry: [0; RAYS],
         instance: [0; RAYS],
     };
+
+    /// What the ray of a lane hits.
+    #[inline]
+    pub(super) fn hit(&self, lane: usize) -> Option<Hit> {
+        (self.lanes >> lane & 1 != 0).then(|| Hit {
+            t: self.t[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            primitive: self.primitive[lane],
+            geometry: self.geometry[lane],
+            instance: self.instance[lane],
+        })
+    }
 
     /// The hit of one ray.
     #[inline(always)]
