@@ -12,7 +12,7 @@
 use std::mem;
 
 use crate::math::{DVec2, DVec3, Vec3};
-use crate::plan::{HIGHEST_CHANCE, SAFE_DEPTH};
+use crate::plan::SAFE_DEPTH;
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
@@ -231,8 +231,9 @@ impl Renderer<'_> {
         let mut weight = path.weight * scattered.weight;
         let scale = path.scale * scattered.scale;
         if *depth >= SAFE_DEPTH {
-            // What radiance lost on its way into glass it gains on the way out.
-            let chance = (weight.max_element() / scale).min(HIGHEST_CHANCE);
+            // What radiance lost on its way into glass it gains on the way out. What has lost nothing goes on: to end it now and then would
+            // make what is left worth more than there is light.
+            let chance = (weight.max_element() / scale).min(1.0);
             if self.choice(vertex, Choice::End).x >= f64::from(chance) {
                 return None;
             }

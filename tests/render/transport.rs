@@ -534,3 +534,31 @@ fn absorption_is_scaled_with_the_scene() {
     scene.transform(&twincast::math::DAffine3::from_scale(DVec3::splat(0.25)));
     assert_eq!(scene.materials[0].absorption.map(|absorption| absorption.distance), Some(0.5));
 }
+
+/// Between mirrors that lose nothing no path shows more than there is, however often it was sent on: what Whitted's rays see, to rounding.
+#[test]
+fn mirrors_that_lose_nothing_show_what_there_is() {
+    let mirror = Material { reflection: Vec3::ONE, ..black() };
+    // A room with a slit along the ceiling, through which light comes in that most rays find after many mirrors only.
+    let wall =
+        |min: [f32; 3], max: [f32; 3]| (Shape::Cuboid(Cuboid::new(min.into(), max.into()).unwrap()), mirror.clone());
+    let mut scene = scene(vec![
+        wall([-2.0, -2.0, -2.0], [-1.0, 2.0, 2.0]),
+        wall([1.1, -2.0, -2.0], [2.0, 2.0, 2.0]),
+        wall([-1.0, -2.0, -2.0], [1.1, -1.0, 2.0]),
+        wall([-1.0, -1.0, -2.0], [1.1, 2.0, -1.2]),
+        wall([-1.0, -1.0, 1.3], [1.1, 2.0, 2.0]),
+        wall([-1.0, 1.0, -1.2], [0.9, 2.0, 1.3]),
+    ]);
+    scene.background = Some(Vec3::ONE);
+    let camera = Camera::look_at(DVec3::new(0.1, -0.2, 0.3), DVec3::new(-0.9, 0.4, -0.5), DVec3::Y, 1.0).unwrap();
+    let deep = Settings { max_depth: Some(200), ..paths(24, 4) };
+    let world = World::new(&scene).unwrap();
+    let native = &engines(&world)[0];
+    let whitted = Settings { integrator: Some(Integrator::Whitted), ..deep.clone() };
+    let [seen, expected] = [deep, whitted].map(|settings| render(&scene, &camera, &settings, native));
+    let found = mean(&expected).x;
+    assert!(found > 0.5 && found < 1.0, "{found}");
+    let difference = seen.difference(&expected).unwrap();
+    assert!(difference.max_abs < 1e-5, "{difference:?}");
+}

@@ -29,7 +29,7 @@ pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 pub use census::Census;
 pub use reduction::{Complete, Reduction};
 pub use report::PlanReport;
-pub use work::{HIGHEST_CHANCE, Rays, SAFE_DEPTH, Work};
+pub use work::{Rays, SAFE_DEPTH, Work};
 
 use crate::error::Result;
 use crate::math::Vec3;
