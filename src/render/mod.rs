@@ -129,10 +129,13 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`](crate::scene::LARGEST_SIDE), a camera that cannot be, and settings that do not go
     /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
-    /// what is not there. [`Error::Input`] where the camera is one of the scene's file.
+    /// what is not there; and for a world that is another scene's. [`Error::Input`] where the camera is one of the scene's file.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
         let Settings { width, height, spp, seed, sampling, filter, .. } = settings;
         settings.check()?;
+        if !world.is_of(scene) {
+            return Err(Error::Usage("the world is another scene's: make it of this one".to_owned()));
+        }
         let request = Request::new(&settings.aovs, scene)?;
         // Of what samples are spread over.
         let most = settings.adaptive.map_or(spp, |adaptive| adaptive.max_spp);
@@ -198,6 +201,9 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// [`Error::Interrupted`] once `control.cancel` is set, and
     /// [`Error::Memory`] for a picture that does not fit into memory.
+    ///
+    /// # Panics
+    /// Where the tracer was built for another world than [`Renderer::world`], and names what is not there.
     pub fn render<T: Tracer + ?Sized>(&self, tracer: &T, control: Control<'_>) -> Result<Image> {
         if self.settings.adaptive.is_some() {
             return Ok(self.rounds(tracer, control, None)?.0.image());

@@ -1,7 +1,7 @@
 //! Camera rays, against the three ways in which lectures derive them.
 
-use twincast::math::{DMat3, DVec2, DVec3};
-use twincast::scene::{Camera, Distortion, Fov, Pose, Projection, ThinLens};
+use twincast::math::{DMat3, DVec2, DVec3, Vec3};
+use twincast::scene::{Camera, Distortion, Fov, Geometry, Mesh, Pose, Projection, ThinLens};
 use twincast::{Error, Renderer, Scene, World};
 
 use super::settings;
@@ -25,6 +25,20 @@ const VIEWS: [(DVec3, DVec3, f64, [u32; 2]); 4] = [
     (DVec3::new(0.0, 9.0, 0.5), DVec3::ZERO, 5.0, [640, 360]),
     (DVec3::new(4.0, -3.0, 2.0), DVec3::new(4.5, 8.0, 2.0), 150.0, [10, 10]),
 ];
+
+#[test]
+fn the_world_is_to_be_the_scenes() {
+    let scene = Scene::from_geometries(
+        vec![Geometry::Mesh(Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]))],
+        vec![],
+    );
+    let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).unwrap();
+    let other = World::new(&Scene::default()).unwrap();
+    let error = Renderer::new(&scene, &other, camera.clone(), settings(4, 4, 1)).expect_err("another scene's");
+    assert!(error.to_string().contains("another scene's"), "{error}");
+    assert!(Renderer::new(&scene, &World::new(&scene).unwrap(), camera.clone(), settings(4, 4, 1)).is_ok());
+    assert!(Renderer::new(&scene, &World::placed(&scene).unwrap(), camera, settings(4, 4, 1)).is_ok());
+}
 
 #[test]
 fn axes_must_be_unit_vectors_at_right_angles() {

@@ -23,7 +23,7 @@ impl Image {
     /// Compares with an image of the same size.
     ///
     /// # Errors
-    /// [`Error::Check`] where the sizes differ.
+    /// [`Error::Check`] where the sizes differ, and those of [`Image::check`].
     pub fn difference(&self, other: &Self) -> Result<Difference> {
         self.check_size(other)?;
         let mut d =
@@ -50,7 +50,7 @@ impl Image {
     /// The absolute difference, channel by channel, as an opaque picture. Where only alpha differs it is gray.
     ///
     /// # Errors
-    /// [`Error::Check`] where the sizes differ.
+    /// [`Error::Check`] where the sizes differ, and those of [`Image::check`].
     pub fn difference_image(&self, other: &Self) -> Result<Self> {
         self.check_size(other)?;
         let pixel = |(&a, &b): (&Vec4, &Vec4)| {
@@ -62,6 +62,7 @@ impl Image {
     }
 
     fn check_size(&self, other: &Self) -> Result<()> {
+        self.check().and_then(|()| other.check())?;
         check_extents(self.extent(), other.extent())
     }
 

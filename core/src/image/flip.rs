@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::Image;
 use super::compare::{Extent, check_extents};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Vec4;
 
 /// Pixels in a degree of the field of view, for who sits 0.7 m before a screen 0.7 m wide with 3840 pixels, as the paper has it.
@@ -54,16 +54,27 @@ pub struct Seen {
 impl Image {
     /// The mean of LDR-FLIP over all pixels, 0 to 1, of this picture as the reference; alpha is left out.
     ///
-    /// `pixels_per_degree` says how large a pixel is seen, usually [`PIXELS_PER_DEGREE`].
+    /// `pixels_per_degree` says how large a pixel is seen, 1 to 1000, usually [`PIXELS_PER_DEGREE`].
     ///
     /// # Errors
-    /// [`Error::Check`](crate::Error::Check) where the sizes differ.
+    /// [`Error::Check`] where the sizes differ, and those of [`Image::seen`].
     pub fn mean_flip(&self, test: &Self, pixels_per_degree: f64) -> Result<f64> {
-        self.seen(pixels_per_degree).mean_flip(test)
+        self.seen(pixels_per_degree)?.mean_flip(test)
     }
 
     /// The picture as it is seen at this size.
-    pub fn seen(&self, pixels_per_degree: f64) -> Seen {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for other pixels a degree than from 1 to 1000, and those of [`Image::check`].
+    pub fn seen(&self, pixels_per_degree: f64) -> Result<Seen> {
+        if !(1.0..=1000.0).contains(&pixels_per_degree) {
+            return Err(Error::Usage(format!("{pixels_per_degree} pixels a degree; 1 to 1000 is possible")));
+        }
+        self.check()?;
+        Ok(self.seen_at(pixels_per_degree))
+    }
+
+    fn seen_at(&self, pixels_per_degree: f64) -> Seen {
         let opponent: Vec<Color> = self.pixels.iter().map(|pixel| opponent(xyz(displayed(*pixel)))).collect();
         let size = [self.width as usize, self.height as usize];
         let layer = |value: &dyn Fn(&Color) -> f64| Layer { size, values: opponent.iter().map(value).collect() };
@@ -83,10 +94,11 @@ impl Seen {
     /// [`Image::mean_flip`] of the picture that is seen.
     ///
     /// # Errors
-    /// [`Error::Check`](crate::Error::Check) where the sizes differ.
+    /// [`Error::Check`] where the sizes differ, and those of [`Image::check`].
     pub fn mean_flip(&self, test: &Image) -> Result<f64> {
+        test.check()?;
         check_extents(self.extent, test.extent())?;
-        let test = test.seen(self.pixels_per_degree);
+        let test = test.seen_at(self.pixels_per_degree);
         let largest = distance(&hunt([0.0, 1.0, 0.0]), &hunt([0.0, 0.0, 1.0])).powf(COLOR_EXPONENT);
         let colors = self.colors.iter().zip(&test.colors);
         let colors = colors.map(|(a, b)| bend(distance(a, b).powf(COLOR_EXPONENT), largest));
@@ -289,5 +301,21 @@ mod tests {
         let [bright, brighter] = [1.0, f32::INFINITY].map(|x| picture(4, 3, |_, _| [x, -1.0, f32::NAN]));
         assert_eq!(bright.mean_flip(&brighter, PIXELS_PER_DEGREE).unwrap(), 0.0);
         assert!(bright.mean_flip(&picture(3, 4, |_, _| [0.0; 3]), PIXELS_PER_DEGREE).is_err());
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_refused() {
+        let image = picture(4, 3, |x, y| [x as f32 / 4.0, y as f32 / 3.0, 0.5]);
+        for size in [1.0, 1000.0] {
+            assert_eq!(image.mean_flip(&image, size).unwrap(), 0.0, "{size}");
+        }
+        for size in [0.0, -1.0, 1e-3, f64::NAN, f64::INFINITY, 1e6] {
+            assert!(image.mean_flip(&image, size).is_err(), "{size}");
+        }
+        let short = Image { pixels: image.pixels[1..].to_vec(), ..image.clone() };
+        assert!(
+            short.mean_flip(&image, PIXELS_PER_DEGREE).is_err() && image.mean_flip(&short, PIXELS_PER_DEGREE).is_err()
+        );
+        assert!(short.difference(&short).is_err() && short.difference_image(&short).is_err());
     }
 }

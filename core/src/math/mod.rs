@@ -110,12 +110,14 @@ impl Aabb {
 
     /// The smallest box around `self` and `point`.
     #[inline]
+    #[must_use]
     pub fn include(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// The smallest box around both.
     #[inline]
+    #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
@@ -173,11 +175,13 @@ impl DAabb {
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// The smallest box around `self` and `point`.
+    #[must_use]
     pub fn include(self, point: DVec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// The smallest box around both.
+    #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }

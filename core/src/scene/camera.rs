@@ -177,7 +177,7 @@ impl Camera {
     /// A view of the whole of `bounds`, from the front, a little from the right and above; of something about a point, where there is no more to see.
     ///
     /// # Panics
-    /// For bounds that are not finite, and an aspect that is not above 0.
+    /// For bounds that reach beyond 1e150, and an aspect that is not between 1e-100 and 1e100: lengths and angles are then not finite, or 0.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
         let fov = USUAL_FOV.to_radians();
         let half = (fov / 2.0).min(libm::atan(libm::tan(fov / 2.0) * aspect));
@@ -186,7 +186,7 @@ impl Camera {
         let radius = if bounds.radius() > 0.0 { bounds.radius() } else { 1.0 }.max(least);
         let direction = DVec3::new(0.45, 0.35, 1.0).normalize();
         let eye = bounds.centre() + direction * (radius / libm::sin(half));
-        Self::look_at(eye, bounds.centre(), DVec3::Y, fov).expect("bounds are finite, and the aspect is above 0")
+        Self::look_at(eye, bounds.centre(), DVec3::Y, fov).expect("bounds and aspect are of this world")
     }
 
     /// Where it is at a time from 0 to 1.

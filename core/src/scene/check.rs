@@ -95,11 +95,24 @@ fn check_material(material: &Material, textures: usize) -> std::result::Result<(
         material.emission,
         Vec3::new(material.shininess, material.ior, material.gloss.unwrap_or(0.0)),
         Vec3::new(material.opacity, cutoff, 0.0),
-        material.absorption.map_or(Vec3::ZERO, |medium| medium.color / medium.distance),
+        material.absorption.map_or(Vec3::ZERO, |medium| medium.color),
     ];
     // A normal map may be turned inside out.
     if !values.into_iter().all(is_sound) || material.ior == 0.0 || !material.normal_scale.is_finite() {
         return Err("has values that are negative or not finite");
+    }
+    let physical = material.physical.as_ref().map_or([Vec3::ZERO; 4], |physical| physical.workflow.values());
+    if !physical.into_iter().all(is_sound) {
+        return Err("has physical values that are negative or not finite");
+    }
+    if material.opacity > 1.0 {
+        return Err("has an opacity above 1");
+    }
+    if material
+        .absorption
+        .is_some_and(|medium| medium.distance.is_nan() || medium.distance <= 0.0 || medium.color.max_element() > 1.0)
+    {
+        return Err("absorbs light over no distance, or lets more through than there is");
     }
     match material.textures().all(|texture| (texture as usize) < textures) {
         true => Ok(()),
@@ -229,7 +242,7 @@ fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {
 mod tests {
     use super::*;
     use crate::image::Image;
-    use crate::scene::{Material, Texture};
+    use crate::scene::{Absorption, Material, MetallicRoughness, Physical, PhysicalTextures, Texture, Workflow};
     use crate::shape::{Shape, Sphere};
 
     fn good() -> Scene {
@@ -241,7 +254,42 @@ mod tests {
     fn finds_every_fault() {
         assert_eq!(fault(&good()), Ok(()));
         type Breaks = fn(&mut Scene, &mut Mesh);
-        let faults: [(&str, Breaks); 24] = [
+        let physical = |change: fn(&mut MetallicRoughness)| {
+            let plain = MetallicRoughness {
+                base: Vec3::ONE,
+                metalness: 0.0,
+                roughness: 0.5,
+                ior: None,
+                specular: 1.0,
+                specular_color: Vec3::ONE,
+                transmission: 0.0,
+            };
+            let mut changed = plain;
+            change(&mut changed);
+            let made =
+                |it| Physical { workflow: Workflow::MetallicRoughness(it), textures: PhysicalTextures::default() };
+            let mut scene = good();
+            scene.materials[0].physical = Some(made(plain));
+            assert_eq!(fault(&scene), Ok(()));
+            scene.materials[0].physical = Some(made(changed));
+            fault(&scene).unwrap_err()
+        };
+        for change in [
+            (|it| it.roughness = f32::NAN) as fn(&mut MetallicRoughness),
+            |it| it.base.y = -1.0,
+            |it| it.transmission = -0.5,
+            |it| it.specular_color = Vec3::INFINITY,
+        ] {
+            assert!(physical(change).contains("physical values"));
+        }
+        let faults: [(&str, Breaks); 27] = [
+            ("opacity above 1", |scene, _| scene.materials[0].opacity = 2.0),
+            ("over no distance", |scene, _| {
+                scene.materials[0].absorption = Some(Absorption { color: Vec3::ONE, distance: -0.0 });
+            }),
+            ("more through than there is", |scene, _| {
+                scene.materials[0].absorption = Some(Absorption { color: Vec3::splat(2.0), distance: 1.0 });
+            }),
             ("sphere: the radius is -1", |scene, _| {
                 let shapes = vec![Shape::Sphere(Sphere { centre: Vec3::ZERO, radius: -1.0 })];
                 scene.geometries.push(Geometry::Shapes { shapes, material: 0 });

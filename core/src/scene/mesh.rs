@@ -82,7 +82,7 @@ impl Mesh {
     }
 
     /// A copy in the coordinates that `transform` leads to. It need not be invertible: what it presses flat is flat, and a normal along which it
-    /// presses is zero, which shades as flat.
+    /// presses is zero, which shades as flat. Where it mirrors, corners go round the other way, so that fronts stay fronts.
     pub fn placed(&self, transform: &DAffine3) -> Self {
         let positions: Vec<DVec3> =
             self.positions.par_iter().map(|&offset| transform.transform_point3(self.point(offset))).collect();
@@ -90,6 +90,9 @@ impl Mesh {
         let normals = self.normals.par_iter().map(|normal| (turn * normal.as_dvec3()).normalize_or_zero().as_vec3());
         let mut placed = Self { normals: normals.collect(), ..self.clone() };
         placed.set_positions(&positions);
+        if transform.matrix3.determinant() < 0.0 {
+            Arc::make_mut(&mut placed.triangles).par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+        }
         placed
     }
 
@@ -195,6 +198,25 @@ mod tests {
         let positions = (0..81).map(|i| (at(i % 9), at(i / 9))).map(|(x, y)| place(DVec3::new(x, y, height(x, y))));
         let corners = (0..64u32).map(|i| i % 8 + i / 8 * 9);
         (positions.collect(), corners.flat_map(|i| [[i, i + 1, i + 10], [i, i + 10, i + 9]]).collect())
+    }
+
+    /// A normal by the corners' order and one that is kept lie on one side, wherever the mesh is brought.
+    #[test]
+    fn a_mirrored_copy_has_its_front_outside() {
+        let (positions, triangles) = bump(|p| p);
+        let mut mesh = Mesh { triangles: Arc::new(triangles), ..Mesh::default() };
+        mesh.set_positions(&positions);
+        mesh.smooth_normals();
+        for scale in [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(-2.0, -1.0, -0.5), DVec3::new(-1.0, 3.0, -1.0)] {
+            let placed = mesh.placed(&DAffine3::from_scale(scale));
+            for corners in placed.triangles.iter() {
+                let [a, b, c] = corners.map(|i| placed.positions[i as usize]);
+                let normal = placed.normals[corners[0] as usize];
+                assert!((b - a).cross(c - a).dot(normal) > 0.0, "{scale} {corners:?}");
+            }
+        }
+        let flat = mesh.placed(&DAffine3::from_scale(DVec3::new(-1.0, 1.0, 0.0)));
+        assert_eq!(flat.triangles, mesh.triangles);
     }
 
     /// A triangle that no ray can hit neither bends normals nor takes from others' precision.

@@ -52,6 +52,29 @@ pub enum Workflow {
     SpecularGlossiness(SpecularGlossiness),
 }
 
+impl Workflow {
+    /// Every number of it; what is left over is 0.
+    pub(super) fn values(&self) -> [Vec3; 4] {
+        match *self {
+            Self::MetallicRoughness(MetallicRoughness {
+                base,
+                metalness,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+                transmission,
+            }) => {
+                let numbers = Vec3::new(metalness, roughness, ior.unwrap_or(0.0));
+                [base, numbers, specular_color, Vec3::new(specular, transmission, 0.0)]
+            }
+            Self::SpecularGlossiness(SpecularGlossiness { diffuse, specular, glossiness }) => {
+                [diffuse, specular, Vec3::splat(glossiness), Vec3::ZERO]
+            }
+        }
+    }
+}
+
 /// A base colour, and how much of a metal it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetallicRoughness {

@@ -36,6 +36,8 @@ fn between<P: Copy>(texture: &Texture, pixels: &[P], uv: Vec2, decode: impl Fn(P
     if pixels.is_empty() || !st.is_finite() {
         return Vec4::ONE;
     }
+    // What is farther away than that would not be finite as texels are counted.
+    let st = st.clamp(Vec2::splat(-1e30), Vec2::splat(1e30));
     // Texel centres lie at half-integers; the first row is at the top, v = 1.
     let x = st.x * texture.width as f32;
     let y = (1.0 - st.y) * texture.height as f32;
@@ -103,6 +105,21 @@ mod tests {
             // sRGB 188 is close to half the light, as everybody's table says.
             assert!((grey.x - 0.502_886_5).abs() < 1e-6, "{grey}");
             assert_eq!(grey.w, 0.2);
+        }
+    }
+
+    #[test]
+    fn coordinates_of_any_size_give_a_colour() {
+        for filter in [Filter::Nearest, Filter::Linear] {
+            for wrap in [Wrap::Clamp, Wrap::Repeat, Wrap::Mirror] {
+                for far in [1e20, 2e38, f32::MAX] {
+                    for uv in [Vec2::new(far, 0.3), Vec2::new(-far, far), Vec2::splat(-far)] {
+                        let color = sample(&checker(wrap, filter), uv);
+                        let is_mixed = color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
+                        assert!(is_mixed, "{filter:?} {wrap:?} {uv}: {color}");
+                    }
+                }
+            }
         }
     }
 

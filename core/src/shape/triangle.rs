@@ -318,10 +318,15 @@ pub(crate) const T_PRECISION: f64 = 1.0 / (1 << 27) as f64;
 #[cold]
 #[inline(never)]
 fn intersect_exactly(origin: DVec3, direction: DVec3, corners: &impl Corners) -> Option<TriangleHit> {
+    let in_f64 = corners.in_f64();
+    // Without an area nothing hits it, and files hold thousands that are a point.
+    if in_f64.is_some_and(|[a, b, c]| a == b || b == c || c == a) {
+        return None;
+    }
     count_decision();
     #[cfg(test)]
     tests::EXACT.with(|count| count.set(count.get() + 1));
-    match exactly::Seen::in_integers(origin, direction, [corners.in_f64()]) {
+    match exactly::Seen::in_integers(origin, direction, [in_f64]) {
         Some(seen) => seen.hit(),
         None => exactly::Seen::in_expansions(origin, direction, corners).hit(),
     }

@@ -228,7 +228,7 @@ fn scene() -> Scene {
 
 impl Reference {
     fn new(image: Image, error: f64) -> Self {
-        Self { seen: image.seen(PIXELS_PER_DEGREE), image, error }
+        Self { seen: image.seen(PIXELS_PER_DEGREE).expect("a picture that was rendered"), image, error }
     }
 
     /// Of the colours of a picture.
