@@ -37,6 +37,7 @@ fn assert_parity_of_batches(world: &World, brute: &Brute, batches: &[Vec<Ray>]) 
         let mut bvh = Bvh::build_with(world, Options { preset, isa, progress: None });
         let ways = [
             (Travel::Auto, false),
+            (Travel::Auto, true),
             (Travel::Alone, false),
             (Travel::Alone, true),
             (Travel::InFlight, false),
@@ -433,7 +434,6 @@ fn bundles() {
     }
 }
 
-/// What overflows in f32 on the way is neither lost for it nor believed.
 /// Rays that run the same way, as an orthographic camera's and those towards the sun: through corners, edges and between, with ranges of all kinds and some
 /// that are not valid; near to each other, and far apart.
 #[test]
@@ -478,6 +478,7 @@ fn parallel_rays() {
     assert!(hits > 3000, "{hits} hits");
 }
 
+/// What overflows in f32 on the way is neither lost for it nor believed.
 #[test]
 fn products_that_overflow() {
     let mesh = |triangles: &[[[f32; 3]; 3]]| {

@@ -41,6 +41,12 @@ fn help_names_every_command_and_flag() {
             if is_chosen && !["camera", "animation", "variant", "aov"].contains(&argument.get_id().as_str()) {
                 assert!(!argument.get_possible_values().is_empty(), "{name} {argument}");
             }
+            // What is all of it unless some is asked for.
+            if ["rays", "modes", "charts"].contains(&argument.get_id().as_str()) {
+                let all = argument.get_possible_values();
+                let all: Vec<_> = all.iter().map(|value| value.get_name()).collect();
+                assert_eq!(argument.get_default_values(), [all.join(",").as_str()], "{name} {argument}");
+            }
         }
     }
 }

@@ -49,7 +49,7 @@ pub(super) struct BenchArgs {
         value_name = "KIND,...",
         value_parser = kinds(),
         value_delimiter = ',',
-        default_values = Kind::ALL.map(Kind::name)
+        default_value = "primary,diffuse,shadow,pixel"
     )]
     rays: Vec<Kind>,
 

@@ -35,7 +35,7 @@ pub(super) struct ChartArgs {
         value_name = "NAME,...",
         value_parser = charts(),
         value_delimiter = ',',
-        default_values = Chart::ALL.map(Chart::name)
+        default_value = "triangles,engines,scales,samplers"
     )]
     charts: Vec<Chart>,
 

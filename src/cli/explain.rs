@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::common::needs;
 use super::engine::BackendArg;
-use super::{say, say_json};
+use super::say;
 use crate::error::{Error, Result};
 use crate::render::{Explanation, HitTrail, LightTrail, RayTrail, Renderer, SampleTrail};
 use crate::trace::World;
@@ -80,7 +80,11 @@ impl ExplainArgs {
                 say(format_args!("{r} {g} {b} {a}"))
             }
             (true, false) => say(Told(&explanation)),
-            (true, true) => say_json(&explanation),
+            // Many fields within others: for people, too.
+            (true, true) => {
+                let text = serde_json::to_string_pretty(&explanation);
+                say(text.map_err(|error| Error::output("<stdout>", error.to_string()))?)
+            }
         }
     }
 }

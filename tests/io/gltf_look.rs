@@ -50,6 +50,20 @@ fn only(material: Value) -> Material {
     square(material).files().scene("a.gltf").materials[0].clone()
 }
 
+/// Exporters write a little more than 1, and what is more than all there is all there.
+#[test]
+fn more_than_opaque_is_opaque() {
+    for alpha in [1.000_000_1, 2.0] {
+        let both = [
+            json!({"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, alpha]}, "alphaMode": "BLEND"}),
+            json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.5, 0.5, 0.5, alpha]}}}),
+        ];
+        for material in both {
+            assert_eq!(only(material).opacity, 1.0);
+        }
+    }
+}
+
 /// A colour at all vertices is the same as in the material, whatever the material makes of it: matte, metal, glass.
 #[test]
 fn colours_of_vertices_multiply_the_base_colour() {

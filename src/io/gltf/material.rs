@@ -183,7 +183,7 @@ impl<'a> Materials<'a> {
         sets: &mut Sets,
         pointer: &str,
     ) -> Result<Surface> {
-        let [r, g, b, opacity] = source.base_color_factor;
+        let [r, g, b, alpha] = source.base_color_factor;
         let (specular, transmission) = (&extensions.specular, &extensions.transmission);
         let mut texture = |info: &Option<schema::TextureInfo>, place: &str| {
             self.textures.get(info.as_ref(), sets, &format!("{pointer}/{place}"))
@@ -209,7 +209,7 @@ impl<'a> Materials<'a> {
             specular_color: specular.specular_color_factor.into(),
             transmission: transmission.transmission_factor,
         };
-        Ok(self.surface(Workflow::MetallicRoughness(values), textures, color_texture, opacity))
+        Ok(self.surface(Workflow::MetallicRoughness(values), textures, color_texture, alpha))
     }
 
     fn specular_glossiness(
@@ -219,7 +219,7 @@ impl<'a> Materials<'a> {
         pointer: &str,
     ) -> Result<Surface> {
         let pointer = format!("{pointer}/extensions/KHR_materials_pbrSpecularGlossiness");
-        let [r, g, b, opacity] = source.diffuse_factor;
+        let [r, g, b, alpha] = source.diffuse_factor;
         let color = self.textures.get(source.diffuse_texture.as_ref(), sets, &format!("{pointer}/diffuseTexture"))?;
         let both = source.specular_glossiness_texture.as_ref();
         let both = self.textures.get(both, sets, &format!("{pointer}/specularGlossinessTexture"))?;
@@ -229,7 +229,7 @@ impl<'a> Materials<'a> {
             glossiness: source.glossiness_factor,
         };
         let textures = PhysicalTextures { specular: both, specular_color: both, ..PhysicalTextures::default() };
-        Ok(self.surface(Workflow::SpecularGlossiness(values), textures, color, opacity))
+        Ok(self.surface(Workflow::SpecularGlossiness(values), textures, color, alpha))
     }
 
     fn surface(
@@ -237,7 +237,7 @@ impl<'a> Materials<'a> {
         workflow: Workflow,
         textures: PhysicalTextures,
         color_texture: Option<u32>,
-        opacity: f32,
+        alpha: f32,
     ) -> Surface {
         // Metalness is in blue, roughness in green.
         let metallic_roughness = self.textures.mean_number(textures.metallic_roughness);
@@ -256,7 +256,8 @@ impl<'a> Materials<'a> {
             color_texture,
             is_colored: false,
             mean_color,
-            opacity,
+            // Exporters round, and more than all of it is not there.
+            opacity: alpha.min(1.0),
         }
     }
 }

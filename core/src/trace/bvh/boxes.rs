@@ -68,8 +68,11 @@ impl BoxTree {
     /// The same with no more than `most` boxes in a leaf.
     pub(super) fn of_moving(boxes: &[[Aabb; 2]], most: u32, options: &Options<'_>) -> (Self, Vec<u32>) {
         // What is near halfway is together.
-        let halfway =
-            |[start, end]: &[Aabb; 2]| Aabb { min: start.min.midpoint(end.min), max: start.max.midpoint(end.max) };
+        let between = |a: Vec3, b: Vec3| a * 0.5 + b * 0.5;
+        let halfway = |[start, end]: &[Aabb; 2]| match start == end {
+            true => *start,
+            false => Aabb { min: between(start.min, end.min), max: between(start.max, end.max) },
+        };
         let kept = boxes.iter().enumerate().filter(|(_, ends)| ends.iter().all(Aabb::is_bounded));
         let (mut still, order) =
             Self::over(kept.map(|(i, ends)| Record::new(&halfway(ends), 0, i as u32)).collect(), most, options);

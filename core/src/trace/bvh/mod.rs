@@ -18,10 +18,10 @@
 //!
 //! | how rays travel | |
 //! | --- | --- |
-//! | `batch/` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle (`arrivals`) |
+//! | `batch/` | many rays, as bundles, in packets where they run the same way, in flight or alone; what is computed of those that made no bundle (`arrivals`) |
 //! | `bundle/` | 64 rays that start, or end, in one point, at once |
 //! | `flight/` | single rays, several of them in turn; which of them take a step (`set`); where what they need next lies in memory (`addresses`) |
-//! | `packet/` | eight or sixteen rays of a caller's that go the same way, at once |
+//! | `packet/` | eight or sixteen rays that go the same way, at once |
 //! | `alone/` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `walk/` | one ray by itself, from the root to the leaves, through any tree; what waits meanwhile (`stack`) |
 //!
@@ -200,7 +200,7 @@ impl Bvh {
     /// [`Bvh::BLOCK`] triangles: the sum over nodes of [`Bvh::NODE_COST`] times their area, and over leaves of their area times the
     /// blocks (or shapes) in them, divided by the area of the whole (Goldsmith, Salmon 1987, *Automatic creation of object hierarchies for ray
     /// tracing*; MacDonald, Booth 1990, *Heuristics for ray tracing using space subdivision*). A placed object costs as
-    /// much as its own tree, by the area of its box in the world. 0 for an empty scene.
+    /// much as its own tree, by the area of its box in the world; what moves counts where it is at time 0. 0 for an empty scene.
     pub fn sah_cost(&self) -> f64 {
         let of = |level: &Level| {
             let tests = |items: Range<u32>| items.len() as f64;

@@ -18,7 +18,7 @@ use crate::trace::bvh::walk::{self, Visit};
 /// How rays travel that make no bundle. Hits do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Travel {
-    /// By how many there are.
+    /// By how many there are; in packets where they run the same way.
     #[default]
     Auto,
     /// Several of them in turn, however few; but without AVX one after the other.

@@ -1,4 +1,4 @@
-//! Many rays: among triangles in bundles where they are bundles, else in flight or alone, and hits computed several at a time; then one
+//! Many rays: among triangles in bundles where they are bundles, in packets where they run the same way, else in flight or alone, and hits computed several at a time; then one
 //! by one among everything else, of which there is little.
 
 pub(super) mod arrivals;
@@ -14,7 +14,7 @@ use super::query::{Closest, Query, SOMETHING};
 use super::simd::isa::{self, Kernel};
 use super::simd::{RAYS, Simd};
 use super::walk::Visit;
-use super::{Bvh, bundle};
+use super::{Bvh, Travel, bundle};
 use crate::ray::Ray;
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
@@ -148,8 +148,12 @@ impl Bvh {
             start = chunk.end;
             let (first, count) = (chunk.start, chunk.len());
             // Without a common point no bundle is made of them.
-            let parallel =
-                S::FLIES && in_bundles && is_all && self.placements.is_empty() && are_parallel(&rays[chunk.clone()]);
+            let parallel = S::FLIES
+                && self.travel == Travel::Auto
+                && in_bundles
+                && is_all
+                && self.placements.is_empty()
+                && are_parallel(&rays[chunk.clone()]);
             let traced = if in_bundles && !parallel {
                 bundle::trace::<S, Q>(bundles, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
             } else {

@@ -1,4 +1,4 @@
-//! Eight or sixteen rays of a caller's that go the same way: they walk as one, and meet triangles eight at a time.
+//! Eight or sixteen rays that go the same way: they walk as one, and meet triangles eight at a time.
 //!
 //! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a bundle of 64
 //! ([`super::bundle`]), whose making takes longer than eight rays do. So as little as possible is made ready:
