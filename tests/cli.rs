@@ -673,7 +673,7 @@ fn scenes_are_made_by_rule() {
     let output = twincast(&["render", &path("a.nff"), "--size", "20x10", "-q", "-o", &path("a.png")]);
     assert!(output.status.success(), "{output:?}");
     for (args, words) in [
-        (["make", "spherflake", "-o", &path("b.nff"), "-q"], "there are sphereflake, tetra"),
+        (["make", "spherflake", "-o", &path("b.nff"), "-q"], "possible values: sphereflake, tetra"),
         (["make", "sphereflake", "-o", &path("b.ply"), "-q"], "PLY holds triangles, and this scene has a sphere"),
         (["make", "tetra", "-o", &path("b.obj"), "-q"], "scenes are written as .nff, .ply, .toml"),
         (["make", "tetra", "-o", &path("b.nff"), "--size=13"], "--size 13: tetra goes to 12"),
