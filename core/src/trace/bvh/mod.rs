@@ -30,7 +30,7 @@
 //! | `all_hits` | all crossings of a ray, in order, each of them once |
 //! | `near/` | the triangles that may be nearest to points, eight boxes and eight discs at a time; the nearest point of all triangles (`closest_point`) |
 //! | `certain` | for scenes in f64, traced a little off: what is hit all the same, and what may be |
-//! | `boxes` | a tree over boxes of the caller's |
+//! | `boxes`, `visits` | a tree over boxes, which may move; what callers ask of one over theirs |
 //! | `steps` | what a ray cannot but look at, counted |
 //!
 //! Trees for triangles, shapes and placed objects, still and moving, and not one with mixed leaves: each leaf loop knows its kind, and a
@@ -66,6 +66,7 @@ mod removal;
 mod simd;
 mod steps;
 mod tree;
+mod visits;
 mod walk;
 
 pub use alone::{Search, SingleRay, Travel, TriangleFound};
