@@ -4,11 +4,11 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// One of these, by its name, with words on each for the help.
 pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
-    all: impl Into<Vec<T>>,
-    name: fn(T) -> &'static str,
-    words: fn(T) -> &'static str,
+    all: impl IntoIterator<Item = T>,
+    name: impl Fn(T) -> &'static str + Clone + Send + Sync + 'static,
+    words: impl Fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let all = all.into();
+    let all: Vec<T> = all.into_iter().collect();
     let offered = all.iter().map(|&value| PossibleValue::new(name(value)).help(words(value)));
     PossibleValuesParser::new(offered).map(move |asked| {
         let named = all.iter().find(|&&value| name(value) == asked);
@@ -29,10 +29,8 @@ pub(super) fn one_of_or_auto<T: Copy + Send + Sync + 'static, const N: usize>(
     name: fn(T) -> &'static str,
     words: fn(Option<T>) -> &'static str,
 ) -> impl TypedValueParser<Value = OrAuto<T>> {
-    let auto = PossibleValue::new(AUTO).help(words(None));
-    let each = all.map(|value| PossibleValue::new(name(value)).help(words(Some(value))));
-    PossibleValuesParser::new([auto].into_iter().chain(each))
-        .map(move |asked| OrAuto(all.into_iter().find(|&value| name(value) == asked)))
+    let all = [None].into_iter().chain(all.map(Some));
+    one_of(all, move |value| value.map_or(AUTO, name), words).map(OrAuto)
 }
 
 #[cfg(test)]

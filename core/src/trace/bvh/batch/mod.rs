@@ -198,14 +198,14 @@ impl Bvh {
         let mut packets = [Packet::NONE; 2];
         for (rays, answers) in rays.chunks(2 * Packet::RAYS).zip(answers.chunks_mut(2 * Packet::RAYS)) {
             let mut lanes = [0; 2];
+            let place = |i: usize| (i / Packet::RAYS, i % Packet::RAYS);
             for (i, ray) in rays.iter().enumerate() {
-                let (packet, lane) = (i / Packet::RAYS, i % Packet::RAYS);
+                let (packet, lane) = place(i);
                 packets[packet].set(lane, ray);
                 // Packets take what is below 0 for 0, and such rays are not valid here.
                 lanes[packet] |= u32::from(ray.is_valid()) << lane;
             }
             let asked = Asked { packets: packets.each_ref(), lanes };
-            let place = |i: usize| (i / Packet::RAYS, i % Packet::RAYS);
             if Q::ANY {
                 let occluded = self.occluded_packets(&asked);
                 for (i, answer) in answers.iter_mut().enumerate() {

@@ -3,6 +3,8 @@
 //! A ray comes here by itself, after everything that stands still, and each object that it enters is put where it stands at that time. So
 //! bundles and flights, in which rays of many times would have to part, know of no time, and scenes without motion pay nothing for it.
 
+use rayon::prelude::*;
+
 use super::Level;
 use super::place::Place;
 use super::placements::{spread_over, strayed};
@@ -29,19 +31,15 @@ pub(in crate::trace::bvh) struct MovingTree {
 impl MovingTree {
     /// Takes those that move. `objects` are what is placed.
     pub fn build(placements: &[Placement], objects: &[Level], options: &Options<'_>) -> Self {
-        let moving = || placements.iter().filter(|placement| placement.motion.is_some());
-        let outlines = Outlines::new(objects, options.isa.demand(), moving());
-        // Nothing is left out because f32 does not hold where it is.
+        let moving: Vec<&Placement> = placements.iter().filter(|placement| placement.motion.is_some()).collect();
+        let outlines = Outlines::new(objects, options.isa.demand(), moving.iter().copied());
+        // Nothing is left out because f32 does not hold where it is; what is empty stays so.
         let held = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX);
         let held = |bounds: Aabb| Aabb { min: held(bounds.min), max: held(bounds.max) };
-        let ends = |placement: &Placement| {
-            outlines.ends(placement).map(|bounds| if bounds.is_empty() { bounds } else { held(bounds) })
-        };
-        let boxes: Vec<[Aabb; 2]> = moving().map(ends).collect();
+        let boxes: Vec<[Aabb; 2]> = moving.par_iter().map(|placement| outlines.ends(placement).map(held)).collect();
         // One a leaf, for to enter an object costs many times what the test of its box does.
         let (boxes, order) = BoxTree::of_moving(&boxes, 1, options);
-        let all: Vec<&Placement> = moving().collect();
-        let placements: Vec<Placement> = order.into_iter().map(|i| all[i as usize].clone()).collect();
+        let placements: Vec<Placement> = order.into_iter().map(|i| moving[i as usize].clone()).collect();
         Self { boxes, spread: spread_over(&placements, objects), placements }
     }
 
