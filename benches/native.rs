@@ -19,6 +19,9 @@ fn world(mesh: Mesh) -> World {
     World::new(&Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()])).expect("a plain mesh")
 }
 
+/// Of rays made before the clock starts.
+const KINDS: [Kind; 5] = [Kind::Primary, Kind::Diffuse, Kind::Shadow, Kind::Orthographic, Kind::Sun];
+
 /// The exact test, by brute force: each ray meets each triangle.
 fn triangles(c: &mut Criterion) {
     let (world, rays) = (world(terrain(16)), across(64));
@@ -83,7 +86,7 @@ fn rays(c: &mut Criterion) {
     let (subject, _) = Subject::new("terrain300", UpAxis::Y).expect("made by rule");
     let mut bvh = Bvh::build(&subject.world);
     let mut group = c.benchmark_group("rays");
-    for set in subject.view.rays(&subject.world, &bvh, &[Kind::Primary, Kind::Diffuse, Kind::Shadow], 256) {
+    for set in subject.view.rays(&subject.world, &bvh, &KINDS, 256) {
         group.throughput(Throughput::Elements(set.rays.len() as u64));
         let (mut hits, mut occluded) = (vec![None; set.rays.len()], vec![false; set.rays.len()]);
         let ways = [
@@ -97,9 +100,10 @@ fn rays(c: &mut Criterion) {
             if width != Width::One && !batch.coherent {
                 continue;
             }
-            group.bench_function(format!("{} {name}", set.kind.name()), |b| match set.kind {
-                Kind::Shadow => b.iter(|| bvh.occluded_batch(black_box(&set.rays), &mut occluded, batch)),
-                Kind::Primary | Kind::Diffuse | Kind::Pixel => {
+            group.bench_function(format!("{} {name}", set.kind.name()), |b| {
+                if set.kind.is_shadow() {
+                    b.iter(|| bvh.occluded_batch(black_box(&set.rays), &mut occluded, batch));
+                } else {
                     b.iter(|| bvh.closest_batch(black_box(&set.rays), &mut hits, batch));
                 }
             });

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use twincast::io::UpAxis;
-use twincast::lab::bench::{Built, Contender, Kind, SIDE, Setup, Subject};
+use twincast::lab::bench::{Built, Contender, Kind, RaySet, SIDE, Setup, Subject};
+use twincast::math::Vec3;
 use twincast::trace::bvh::{Bvh, Isa, Options};
 use twincast::{Batch, Error, Hit, Ray, Tracer, World};
 
@@ -13,11 +14,11 @@ use twincast::{Batch, Error, Hit, Ray, Tracer, World};
 fn hits(subject: &Subject) -> [usize; 3] {
     let bvh = Bvh::build(&subject.world);
     let sets = subject.view.rays(&subject.world, &bvh, &Kind::ALL, SIDE);
-    assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL[..3], "the prepared ones");
+    assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL[..5], "the prepared ones");
     let counts: Vec<usize> = sets
         .iter()
         .map(|set| {
-            if set.kind == Kind::Shadow {
+            if set.kind.is_shadow() {
                 let mut occluded = vec![false; set.rays.len()];
                 bvh.occluded_batch(&set.rays, &mut occluded, Batch::default());
                 return occluded.iter().filter(|occluded| **occluded).count();
@@ -47,6 +48,32 @@ fn assert_hits(subject: &Subject, embree_ref: [usize; 3]) {
 fn the_rays_on_a_terrain_are_those_of_embree_ref() {
     let (subject, _) = Subject::new("terrain300", UpAxis::Y).unwrap();
     assert_hits(&subject, [716_788, 336_739, 297_638]);
+}
+
+#[test]
+fn rays_of_a_direction_are_where_those_of_a_point_are() {
+    let (subject, _) = Subject::new("terrain20", UpAxis::Y).unwrap();
+    let bvh = Bvh::build(&subject.world);
+    let kinds = [Kind::Primary, Kind::Shadow, Kind::Orthographic, Kind::Sun];
+    let sets = subject.view.rays(&subject.world, &bvh, &kinds, 64);
+    let [primary, shadow, orthographic, sun] = <[RaySet; 4]>::try_from(sets).ok().unwrap().map(|set| set.rays);
+    assert_eq!((primary.len(), orthographic.len(), shadow.len()), (4096, 4096, sun.len()));
+    for (near, far) in primary.iter().zip(&orthographic) {
+        // They start in a plane across, through the camera, and cross in another one.
+        let way = orthographic[0].direction;
+        assert_eq!(far.direction, way);
+        assert!((far.origin - near.origin).dot(way).abs() < 1e-5, "{near:?}, {far:?}");
+        let crossing = (far.origin + way - near.origin).normalize();
+        assert!(crossing.distance(near.direction) < 1e-5, "{near:?}, {far:?}");
+    }
+    // Both look at the centre, where the camera is as far away as a direction is long.
+    let middle = orthographic.iter().map(|ray| ray.origin).sum::<Vec3>() / 4096.0;
+    assert!(middle.distance(primary[0].origin) < 1e-4, "{middle}");
+    for (near, far) in shadow.iter().zip(&sun) {
+        assert_eq!((far.direction, far.origin), (sun[0].direction, near.origin));
+        // From everywhere but the centre the light is beside the sun.
+        assert!(far.direction.normalize().dot(near.direction.normalize()) > 0.9, "{near:?}, {far:?}");
+    }
 }
 
 #[test]
@@ -159,7 +186,7 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
         assert_eq!(builds[1]["mtris_per_s"]["median"], 0.0016, "800 in half a second");
         assert_eq!(builds[2]["bytes_per_triangle"], 10.0);
         let traversal = json["traversal"].as_array().unwrap();
-        assert_eq!(traversal.len(), 3 * 3 * 4);
+        assert_eq!(traversal.len(), 3 * 3 * Kind::ALL.len());
         for row in traversal {
             let mut keys: Vec<_> = row.as_object().unwrap().keys().map(String::as_str).collect();
             keys.sort_unstable();
@@ -172,13 +199,13 @@ fn a_report_has_a_row_for_everything_and_the_steps_it_promised() {
         let ratios = json["ratios"].as_array().unwrap();
         assert_eq!(
             ratios.iter().map(|ratio| &ratio["kind"]).collect::<Vec<_>>(),
-            ["primary", "diffuse", "shadow", "pixel"]
+            ["primary", "diffuse", "shadow", "orthographic", "sun", "pixel"]
         );
         assert!(ratios.iter().all(|r| r["over_embree_robust"].is_number() && r["over_embree_fast"].is_number()));
         assert_eq!((&json["isa"], &json["size"], &json["repeat"]), (&"any".into(), &32.into(), &2.into()));
         assert!(json["processor"].is_string() && json.as_object().unwrap().len() == 11, "and nothing else: {json}");
         let answers = json["answers"].as_array().unwrap();
-        assert_eq!(answers.len(), 4);
+        assert_eq!(answers.len(), Kind::ALL.len());
         for (answers, row) in answers.iter().zip(traversal.iter().step_by(9)) {
             assert_eq!((&answers["kind"], &answers["agree"]), (&row["kind"], &row["rays"]));
         }

@@ -1,7 +1,7 @@
 //! Every way through the native tracer gives the answers of brute force, to the bit.
 
-use twincast::math::{DVec3, Vec3};
-use twincast::scene::{Mesh, Scene};
+use twincast::math::{DAffine3, DVec3, Vec3};
+use twincast::scene::{Geometry, Group, Instance, Mesh, Scene};
 use twincast::trace::brute::Brute;
 use twincast::trace::bvh::{Bvh, Isa, Options, Preset, Travel};
 use twincast::{Batch, Hit, Ray, Tracer, Width, World};
@@ -446,22 +446,25 @@ fn parallel_rays() {
         let directions =
             [Vec3::NEG_Z, Vec3::new(0.0, 2.0, 0.0), Vec3::new(1.0, -0.5, 0.25), random.vec3(), random.vec3() * 1e-3];
         let mut batches = Vec::new();
-        for (k, direction) in directions.into_iter().enumerate() {
-            let back = direction / direction.length() * 4.0;
-            let across = back.any_orthonormal_vector() * if k == 3 { 0.5 } else { 0.01 };
-            let along = back.cross(across) / 4.0;
-            // Tiles of 8 x 8 around corners, and what does not fill one.
+        // From so far away, too, that what f32 leaves between them is as wide as what it leaves open.
+        for (k, (direction, far)) in directions.into_iter().flat_map(|way| [(way, 4.0), (way, 4e3)]).enumerate() {
+            let way = direction.normalize();
+            let (back, apart) = (way * far, if k % 2 == 1 { 1e-4 } else { [0.01, 0.01, 0.01, 0.5, 0.01][k / 2] });
+            let across = way.any_orthonormal_vector() * apart;
+            let along = way.cross(across);
+            // Tiles of 8 x 8 around corners, lines through one corner as well as f32 can tell, and what does not fill a bundle.
             let mut rays = Vec::new();
-            for _ in 0..12 {
+            for tile in 0..16 {
                 let middle = corners[random.below(corners.len())] - back;
                 for i in 0..64 {
-                    let origin = middle + across * (i % 8 - 4) as f32 + along * (i / 8 - 4) as f32;
-                    rays.push(Ray::new(origin, direction));
+                    let tiled = across * (i % 8 - 4) as f32 + along * (i / 8 - 4) as f32;
+                    let offset = if tile % 2 == 0 { tiled } else { back * (i as f32 / 97.0) };
+                    rays.push(Ray::new(middle + offset, direction));
                 }
             }
             rays.truncate(rays.len() - 21);
             for ray in rays.iter_mut().step_by(7) {
-                let length = 4.0 / direction.length();
+                let length = far / direction.length();
                 (ray.tmin, ray.tmax) = (length * random.unit(), length * (0.5 + random.unit()));
                 match random.below(6) {
                     0 => ray.origin.x = f32::NAN,
@@ -476,6 +479,87 @@ fn parallel_rays() {
         hits += assert_parity_of_batches(&world, &Brute::new(&world), &batches);
     }
     assert!(hits > 3000, "{hits} hits");
+}
+
+/// What orthographic cameras see, and what of it the sun shines on: in tiles, from near and far, along axes, nearly along them and across, at all sizes, among placed objects and shapes.
+#[test]
+fn parallel_bundles() {
+    let floor = Mesh::new(
+        vec![Vec3::new(-9.0, -1.0, -9.0), Vec3::new(9.0, -1.0, -9.0), Vec3::new(0.0, -1.0, 9.0)],
+        vec![[0, 1, 2]],
+    );
+    let meshes = [scenes::soup(3000, 0.1, 3), scenes::soup(300, 2.0, 4), scenes::bumpy_sphere(40, 0.2, 5), floor];
+    let sized = [1e-12, 3e8].map(|size| {
+        let mesh = scenes::bumpy_sphere(12, 0.2, 6);
+        Mesh::new(mesh.positions.iter().map(|&p| p * size).collect(), mesh.triangles.to_vec())
+    });
+    // Fixed triangles between placed objects.
+    let mut mixed = scenes::instanced(5);
+    let fixed = scenes::soup(400, 0.5, 9);
+    let positions = fixed.positions.iter().map(|&p| p * 3.0).collect();
+    mixed.geometries.push(Geometry::Mesh(Mesh::new(positions, fixed.triangles.to_vec())));
+    mixed.groups.push(Group { name: String::new(), geometries: 3..4 });
+    mixed.instances.push(Instance { group: 3, transform: DAffine3::IDENTITY, ..mixed.instances[0].clone() });
+    let scenes = meshes.into_iter().chain(sized).map(scenes::of_mesh).chain([mixed]);
+    for (i, scene) in scenes.enumerate() {
+        let world = World::new(&scene).expect("sound");
+        let brute = Brute::new(&world);
+        let mut random = Random::new(i as u64);
+        let (mut views, mut shadows) = (Vec::new(), Vec::new());
+        let size = [1.0, 1.0, 1.0, 1.0, 1e-12, 3e8, 1.0][i];
+        let ways = [
+            Vec3::new(-0.0, -1.0, 0.0),
+            Vec3::new(1e-20, 1.0, -1e-9),
+            Vec3::new(1e-3, -4e-5, -0.7),
+            Vec3::new(0.6, -0.6, 0.6),
+            random.vec3(),
+            random.vec3() * 1e4,
+        ];
+        for (view, way) in ways.into_iter().enumerate() {
+            let (away, spread) =
+                ([3.0, 0.2, 3000.0, 3.0, 30.0, 2.5][view] * size, [0.02, 0.05, 0.02, 1e-4, 0.02, 0.02][view] * size);
+            let across = way.any_orthonormal_vector() * spread;
+            let down = way.cross(across) / way.length() + across * 0.1;
+            let eye = random.vec3() * 0.2 * size - way / way.length() * away - across * 20.0 - down * 20.0;
+            // Origins in a plane that is not quite across, or as far ahead of each other as the scene is large.
+            let stagger = if view % 2 == 1 { size } else { 0.0 };
+            let pixel = |k: usize| {
+                let (x, y) = ((k % 8 + k / 64 % 6 * 8) as f32, (k % 64 / 8 + k / 384 * 8) as f32);
+                let ahead = 0.3 * spread * x + stagger * (k * 5 % 7) as f32 / 7.0;
+                eye + across * x + down * y + way / way.length() * ahead
+            };
+            let rays: Vec<Ray> = (0..1152).map(|k| Ray::new(pixel(k), way)).collect();
+            let sun = random.vec3() * [1.0, 1e-3, 1.0, 1e5, 1.0, 1.0][view];
+            let lit = rays.iter().filter_map(|ray| Some((ray, brute.closest(ray)?)));
+            let shadow = |(ray, hit): (&Ray, Hit)| {
+                // Before the surface, on it as well as f32 can tell, and behind it.
+                let share = [1.0 - 1e-4, 1.0, 1.0 + 1e-6][random.below(3)];
+                let ray = Ray::new(ray.origin + ray.direction * (hit.t * share), sun);
+                if random.below(9) == 0 { Ray { tmax: size / sun.length(), ..ray } } else { ray }
+            };
+            shadows.push(lit.map(shadow).collect());
+            views.push(rays);
+        }
+        let [seen, shaded] = [views, shadows].map(|batches| assert_parity_of_batches(&world, &brute, &batches));
+        assert!(seen > 1200 && (shaded > 120 || i == 3), "scene {i}: {seen}, {shaded}");
+    }
+}
+
+/// A t beyond all numbers is no hit: of rays that start in one point, or run the same way.
+#[test]
+fn a_t_that_overflows_is_no_hit() {
+    let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.0) * 1e8);
+    let world = World::new(&scenes::of_mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2]]))).expect("sound");
+    let way = Vec3::new(1e-33, 2e-33, -1e-29);
+    for (height, expected) in [(1e10, 0), (1e9, 64)] {
+        let at = |i: u8| Vec3::new(f32::from(i % 8), f32::from(i / 8), 0.0);
+        let from = Vec3::new(1e6, 1e6, height);
+        let side_by_side: Vec<Ray> = (0..64).map(|i| Ray::new(from + at(i) * 1e4, way)).collect();
+        let fan: Vec<Ray> = (0..64).map(|i| Ray::new(from, way + at(i) * (1e-4 * way.length()))).collect();
+        for rays in [side_by_side, fan] {
+            assert_eq!(assert_parity_of_batches(&world, &Brute::new(&world), &[rays]), expected, "from {height:e}");
+        }
+    }
 }
 
 /// What overflows in f32 on the way is neither lost for it nor believed.

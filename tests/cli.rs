@@ -633,7 +633,7 @@ fn a_benchmark_prints_a_table_or_one_document() {
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
     assert_eq!((&document[0]["triangles"], &document[1]["triangles"]), (&800.into(), &4142.into()));
     for report in document.as_array().expect("one of each scene") {
-        assert_eq!(report["traversal"].as_array().map(Vec::len), Some(2 * 3 * 4), "engines, widths, kinds");
+        assert_eq!(report["traversal"].as_array().map(Vec::len), Some(2 * 3 * 6), "engines, widths, kinds");
         assert!(report["ratios"][2]["over_embree_robust"].as_f64().is_some_and(|ratio| ratio > 0.0), "{report}");
         assert!(report["ratios"][2]["over_embree_fast"].is_null(), "{report}");
         let cost = |engine: usize| report["builds"][engine]["sah_cost"].as_f64().expect("a cost");

@@ -49,7 +49,7 @@ pub(super) struct BenchArgs {
         value_name = "KIND,...",
         value_parser = kinds(),
         value_delimiter = ',',
-        default_value = "primary,diffuse,shadow,pixel"
+        default_value = "primary,diffuse,shadow,orthographic,sun,pixel"
     )]
     rays: Vec<Kind>,
 
@@ -64,7 +64,7 @@ pub(super) struct BenchArgs {
     )]
     modes: Vec<ModeArg>,
 
-    /// Camera rays to a side, in whole tiles of 8 x 8; every other ray starts where they hit
+    /// Camera rays to a side, in whole tiles of 8 x 8; diffuse and shadow rays start where they hit
     #[arg(long, value_name = "N", default_value_t = SIDE as u32, value_parser = clap::value_parser!(u32).range(4..=16_384))]
     size: u32,
 
@@ -129,6 +129,8 @@ fn kinds() -> impl TypedValueParser<Value = Kind> {
         Kind::Primary => "From the camera",
         Kind::Diffuse => "From what the camera sees, in random directions",
         Kind::Shadow => "From what the camera sees to a point light",
+        Kind::Orthographic => "From an orthographic camera",
+        Kind::Sun => "From what the camera sees to a distant light",
         Kind::Pixel => "From the camera, made from pixels within the time; all others are made before",
     })
 }

@@ -75,17 +75,36 @@ const SAMPLES: usize = 16;
 /// Neighbours point alike where the cosine between them is at least this: that of 5 degrees.
 const ALIKE: f32 = 0.996;
 
+/// Neighbours start alike where they are no farther apart than this share of what rays from here and there are.
+const NEAR: f32 = 0.05;
+
 impl Batch {
-    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points, and points alike.
+    /// For rays of which nobody says how they lie: coherent where a sample of neighbours starts from the same points and points alike, as a camera's rays; or points
+    /// the same way and starts alike, as an orthographic camera's and those towards the sun.
     #[must_use]
     pub fn of(rays: &[Ray]) -> Self {
         let every = (rays.len() / SAMPLES).max(2);
-        let are_alike = |pair: &[Ray]| {
+        let samples = || rays.chunks_exact(every);
+        // The next but one as well, for rays may come in twos.
+        let are_mostly = |alike: &dyn Fn(&[Ray]) -> bool| {
+            let count = samples().filter(|some| some.windows(2).take(2).all(alike)).count();
+            count > 0 && 4 * count >= 3 * (rays.len() / every)
+        };
+        let from_one_point = |pair: &[Ray]| {
             let (a, b) = (pair[0].direction, pair[1].direction);
             pair[0].origin == pair[1].origin && a.dot(b) >= ALIKE * a.length() * b.length()
         };
-        let alike = rays.chunks_exact(every).filter(|some| are_alike(some)).count();
-        Self { coherent: alike > 0 && 4 * alike >= 3 * (rays.len() / every), ..Self::default() }
+        let same_way = |pair: &[Ray]| pair[0].direction == pair[1].direction;
+        let coherent = are_mostly(&from_one_point)
+            || are_mostly(&same_way) && {
+                // By the golden section, so that it is not the same place of another row; in the middle of all, so that a ray far off does not count.
+                let other = |some: &[Ray]| some[every * 618 / 1000].origin.distance(some[0].origin);
+                let mut apart: Vec<f32> = samples().map(other).collect();
+                apart.sort_unstable_by(f32::total_cmp);
+                let near = NEAR * apart[apart.len() / 2];
+                are_mostly(&|pair| same_way(pair) && pair[0].origin.distance(pair[1].origin) <= near)
+            };
+        Self { coherent, ..Self::default() }
     }
 }
 
@@ -129,8 +148,20 @@ mod tests {
         let coherent = |rays: Vec<Ray>| Batch::of(&rays).coherent;
         assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way)).collect()));
         assert!(coherent(grid().map(|way| Ray::new(Vec3::ONE, way * 1e-3)).collect()));
-        // From other points, to all sides, and too few to have neighbours.
-        assert!(!coherent(grid().map(|at| Ray::new(at, Vec3::Z)).collect()));
+        // Side by side, in pictures of all widths; here and there, by twos as well, and though one is far off; and each its own way.
+        let rows = |wide: usize| (0..4096).map(move |i| Vec3::new((i % wide) as f32, (i / wide) as f32, 0.0));
+        for wide in [32, 60, 64, 100, 256, 1000, 1024] {
+            assert!(coherent(rows(wide).map(|at| Ray::new(at, Vec3::Z)).collect()), "{wide}");
+        }
+        let scattered = |i: usize| Vec3::new((i * 37 % 64) as f32, (i * 53 % 67) as f32, 0.0);
+        for twos in [1, 2] {
+            let mut rays: Vec<Ray> = (0..4096).map(|i| Ray::new(scattered(i / twos), Vec3::Z)).collect();
+            assert!(!coherent(rays.clone()));
+            rays[512].origin.x = 1e6;
+            assert!(!coherent(rays));
+        }
+        assert!(!coherent(grid().map(|at| Ray::new(at, at)).collect()));
+        // To all sides, and too few to have neighbours.
         assert!(!coherent((0..4096).map(|i| Ray::new(Vec3::ONE, Vec3::AXES[i * i % 3])).collect()));
         assert!(!coherent(vec![Ray::new(Vec3::ONE, Vec3::Z)]));
         assert!(!coherent(Vec::new()));

@@ -26,17 +26,14 @@ impl Room {
 
     /// Traces up to [`CHUNK`] rays and counts the hits.
     pub fn chunk(&mut self, kind: Kind, rays: &[Ray], tracer: &dyn Tracer, batch: Batch) -> u64 {
-        let count = match kind {
-            Kind::Primary | Kind::Pixel | Kind::Diffuse => {
-                let hits = &mut self.hits[..rays.len()];
-                tracer.closest_batch(rays, hits, batch);
-                black_box(&*hits).iter().filter(|hit| hit.is_some()).count()
-            }
-            Kind::Shadow => {
-                let occluded = &mut self.occluded[..rays.len()];
-                tracer.occluded_batch(rays, occluded, batch);
-                black_box(&*occluded).iter().filter(|occluded| **occluded).count()
-            }
+        let count = if kind.is_shadow() {
+            let occluded = &mut self.occluded[..rays.len()];
+            tracer.occluded_batch(rays, occluded, batch);
+            black_box(&*occluded).iter().filter(|occluded| **occluded).count()
+        } else {
+            let hits = &mut self.hits[..rays.len()];
+            tracer.closest_batch(rays, hits, batch);
+            black_box(&*hits).iter().filter(|hit| hit.is_some()).count()
         };
         count as u64
     }
@@ -53,18 +50,15 @@ impl Answers {
     /// Asks in the chunks that are timed.
     pub fn of(set: &RaySet, tracer: &dyn Tracer, batch: Batch) -> Self {
         let rays = set.rays.par_chunks(CHUNK);
-        match set.kind {
-            Kind::Primary | Kind::Pixel | Kind::Diffuse => {
-                let mut hits = vec![None; set.rays.len()];
-                rays.zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| tracer.closest_batch(rays, hits, batch));
-                Self::Closest(hits)
-            }
-            Kind::Shadow => {
-                let mut occluded = vec![false; set.rays.len()];
-                let chunks = rays.zip(occluded.par_chunks_mut(CHUNK));
-                chunks.for_each(|(rays, occluded)| tracer.occluded_batch(rays, occluded, batch));
-                Self::Occluded(occluded)
-            }
+        if set.kind.is_shadow() {
+            let mut occluded = vec![false; set.rays.len()];
+            let chunks = rays.zip(occluded.par_chunks_mut(CHUNK));
+            chunks.for_each(|(rays, occluded)| tracer.occluded_batch(rays, occluded, batch));
+            Self::Occluded(occluded)
+        } else {
+            let mut hits = vec![None; set.rays.len()];
+            rays.zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| tracer.closest_batch(rays, hits, batch));
+            Self::Closest(hits)
         }
     }
 

@@ -170,6 +170,8 @@ fn title(kind: Kind) -> &'static str {
         Kind::Primary => "camera rays",
         Kind::Diffuse => "diffuse rays",
         Kind::Shadow => "shadow rays",
+        Kind::Orthographic => "orthographic camera",
+        Kind::Sun => "shadow rays, sun",
         Kind::Pixel => "pixel to hit",
     }
 }

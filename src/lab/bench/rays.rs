@@ -3,7 +3,7 @@
 //! 1024 x 1024 camera rays in blocks of 4 x 4, so that 8 or 16 neighbours make a packet; the blocks in tiles of 8 x 8 as
 //! a renderer would have them, not in rows across the picture, which is all the same to a packet. From each point they hit one
 //! diffuse ray, cosine-distributed about the normal, and one shadow ray towards a point light. Rays are made before any
-//! clock starts.
+//! clock starts. Two more kinds, which `embree_ref` lacks, have a direction in common: those of an orthographic camera in the same place, and those towards a sun in the point light's direction.
 
 use serde::Serialize;
 
@@ -34,13 +34,17 @@ pub enum Kind {
     Diffuse,
     /// From a surface to the light; whether anything is hit, not what.
     Shadow,
+    /// From an orthographic camera, as large as the other where it looks.
+    Orthographic,
+    /// From a surface that the camera sees to a distant light; whether anything is hit, not what.
+    Sun,
     /// From the camera, made from pixels within the time that is measured; all others are made before.
     Pixel,
 }
 
 impl Kind {
     /// All of them, in the order of the reports.
-    pub const ALL: [Self; 4] = [Self::Primary, Self::Diffuse, Self::Shadow, Self::Pixel];
+    pub const ALL: [Self; 6] = [Self::Primary, Self::Diffuse, Self::Shadow, Self::Orthographic, Self::Sun, Self::Pixel];
 
     /// As in the reports.
     pub const fn name(self) -> &'static str {
@@ -48,7 +52,17 @@ impl Kind {
             Self::Primary => "primary",
             Self::Diffuse => "diffuse",
             Self::Shadow => "shadow",
+            Self::Orthographic => "orthographic",
+            Self::Sun => "sun",
             Self::Pixel => "pixel",
+        }
+    }
+
+    /// Whether it is asked if anything is hit, and not what.
+    pub const fn is_shadow(self) -> bool {
+        match self {
+            Self::Shadow | Self::Sun => true,
+            Self::Primary | Self::Diffuse | Self::Orthographic | Self::Pixel => false,
         }
     }
 
@@ -118,15 +132,17 @@ impl View {
     }
 
     /// Rays of each kind of `kinds` but [`Kind::Pixel`], made of `side` x `side` camera rays, whole tiles; `tracer` finds
-    /// where the others start.
+    /// where those from surfaces start.
     pub fn rays(&self, world: &World, tracer: &dyn Tracer, kinds: &[Kind], side: usize) -> Vec<RaySet> {
         let side = side.next_multiple_of(TILE);
         let mut primary = self.primary(side);
-        let (mut diffuse, mut shadow) = (Vec::new(), Vec::new());
-        if kinds.contains(&Kind::Diffuse) || kinds.contains(&Kind::Shadow) {
+        let orthographic = if kinds.contains(&Kind::Orthographic) { self.orthographic(&primary) } else { Vec::new() };
+        let (mut diffuse, mut shadow, mut sun) = (Vec::new(), Vec::new(), Vec::new());
+        if kinds.iter().any(|kind| matches!(kind, Kind::Diffuse | Kind::Shadow | Kind::Sun)) {
             let mut hits = vec![None; primary.len()];
             tracer.closest_batch(&primary, &mut hits, Kind::Primary.batch(Width::One));
-            let light = self.centre + self.frame(Vec3::new(2.0, 3.0, 1.0)) * self.radius;
+            let to_light = self.frame(Vec3::new(2.0, 3.0, 1.0));
+            let light = self.centre + to_light * self.radius;
             let mut random = Xorshift(12345);
             // In the order of `embree_ref`, for the sake of the random numbers.
             for (i, (ray, hit)) in primary.iter().zip(&hits).enumerate() {
@@ -138,12 +154,24 @@ impl View {
                 let place = place_in_tiles(i, side);
                 diffuse.push((place, Ray { tmax: FAR, ..Ray::new(point, direction) }));
                 shadow.push((place, Ray { tmax: 0.999, ..Ray::new(point, light - point) }));
+                sun.push((place, Ray { tmax: FAR, ..Ray::new(point, to_light) }));
             }
         }
-        primary = in_order(primary.into_iter().enumerate().map(|(i, ray)| (place_in_tiles(i, side), ray)).collect());
-        let mut sets = [Some(primary), Some(in_order(diffuse)), Some(in_order(shadow)), None];
-        let set = |&kind: &Kind| sets[kind as usize].take().map(|rays| RaySet { kind, rays });
+        let in_tiles = |rays: Vec<Ray>| {
+            in_order(rays.into_iter().enumerate().map(|(i, ray)| (place_in_tiles(i, side), ray)).collect())
+        };
+        primary = in_tiles(primary);
+        let [diffuse, shadow, sun] = [diffuse, shadow, sun].map(in_order);
+        let mut sets = [primary, diffuse, shadow, in_tiles(orthographic), sun].map(Some);
+        let set = |&kind: &Kind| sets.get_mut(kind as usize)?.take().map(|rays| RaySet { kind, rays });
         kinds.iter().filter_map(set).collect()
+    }
+
+    /// Through the same points of the plane across the camera's way at the centre, from a plane through the eye.
+    fn orthographic(&self, primary: &[Ray]) -> Vec<Ray> {
+        let way = -self.eye;
+        let at_centre = |ray: &Ray| ray.direction * (way.length_squared() / ray.direction.dot(way));
+        primary.iter().map(|ray| Ray { origin: ray.origin + at_centre(ray) - way, direction: way, ..*ray }).collect()
     }
 
     /// Block by block, the blocks in rows across the picture.

@@ -218,9 +218,10 @@ impl Setup<'_> {
                     // There and back, so that nobody is always the first.
                     let i = if turn % 2 == 0 { k } else { tracers.len() - 1 - k };
                     let start = Instant::now();
-                    let count = match set.kind {
-                        Kind::Pixel => pixels.pass(&*tracers[i], width),
-                        Kind::Primary | Kind::Diffuse | Kind::Shadow => self.pass(set, &*tracers[i], width),
+                    let count = if set.kind == Kind::Pixel {
+                        pixels.pass(&*tracers[i], width)
+                    } else {
+                        self.pass(set, &*tracers[i], width)
                     };
                     turns[i][w].push(set.rays.len() as f64 / start.elapsed().as_secs_f64().max(1e-9) / 1e6);
                     if count != hits[i][w] {

@@ -18,10 +18,10 @@
 //!
 //! | how rays travel | |
 //! | --- | --- |
-//! | `batch/` | many rays, as bundles, in packets where they run the same way, in flight or alone; what is computed of those that made no bundle (`arrivals`) |
-//! | `bundle/` | 64 rays that start, or end, in one point, at once |
+//! | `batch/` | many rays, as bundles, in flight or alone; what is computed of those that made no bundle (`arrivals`) |
+//! | `bundle/` | 64 rays that start, or end, in one point, or run the same way, at once |
 //! | `flight/` | single rays, several of them in turn; which of them take a step (`set`); where what they need next lies in memory (`addresses`) |
-//! | `packet/` | eight or sixteen rays that go the same way, at once |
+//! | `packet/` | eight or sixteen rays of a caller's that go the same way, at once |
 //! | `alone/` | one ray at a time: a few of them, or one with the normal of what it hits, or with a visitor that says what counts |
 //! | `walk/` | one ray by itself, from the root to the leaves, through any tree; what waits meanwhile (`stack`) |
 //!

@@ -1,5 +1,5 @@
-//! Many rays: among triangles in bundles where they are bundles, in packets where they run the same way, else in flight or alone, and hits computed several at a time; then one
-//! by one among everything else, of which there is little.
+//! Many rays: among triangles in bundles where they are bundles, else in flight or alone, and hits computed several at a time; then one by one among
+//! everything else, of which there is little.
 
 pub(super) mod arrivals;
 
@@ -9,12 +9,11 @@ use self::arrivals::Arrivals;
 use super::alone::Doubted;
 use super::flight::{self, Flight, Objects};
 use super::levels::placements::walk_over;
-use super::packet::{Asked, Packet};
-use super::query::{Closest, Query, SOMETHING};
+use super::query::{Closest, Query};
 use super::simd::isa::{self, Kernel};
 use super::simd::{RAYS, Simd};
 use super::walk::Visit;
-use super::{Bvh, Travel, bundle};
+use super::{Bvh, bundle};
 use crate::ray::Ray;
 use crate::trace::Batch;
 use crate::trace::nearest::Nearest;
@@ -147,14 +146,7 @@ impl Bvh {
             let chunk = start..start + if in_bundles || !is_all { RAYS.min(left) } else { left };
             start = chunk.end;
             let (first, count) = (chunk.start, chunk.len());
-            // Without a common point no bundle is made of them.
-            let parallel = S::FLIES
-                && self.travel == Travel::Auto
-                && in_bundles
-                && is_all
-                && self.placements.is_empty()
-                && are_parallel(&rays[chunk.clone()]);
-            let traced = if in_bundles && !parallel {
+            let traced = if in_bundles {
                 bundle::trace::<S, Q>(bundles, self, first, &rays[chunk.clone()], &mut answers[chunk.clone()])
             } else {
                 0
@@ -166,11 +158,7 @@ impl Bvh {
                 let end = if in_bundles { from + (open >> from).trailing_ones() as usize } else { count };
                 let run = first + from..first + end;
                 let (rays, answers, t) = (&rays[run.clone()], &mut answers[run], &mut bundles.t);
-                if parallel {
-                    self.trace_parallel::<Q>(rays, answers);
-                } else {
-                    Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
-                }
+                Unbundled::<Q> { bvh: self, singles, first: from, rays, answers, t }.trace::<S>();
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
@@ -190,44 +178,6 @@ impl Bvh {
             in_bundles &= !Q::ANY || bundles.entered <= MOST_PLACES;
         }
     }
-
-    /// Rays that run the same way among triangles, as those of an orthographic camera and those towards a distant light: two packets of eight at once, each
-    /// a beam where its rays are near to each other.
-    #[inline(never)]
-    fn trace_parallel<Q: Query>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        let mut packets = [Packet::NONE; 2];
-        for (rays, answers) in rays.chunks(2 * Packet::RAYS).zip(answers.chunks_mut(2 * Packet::RAYS)) {
-            let mut lanes = [0; 2];
-            let place = |i: usize| (i / Packet::RAYS, i % Packet::RAYS);
-            for (i, ray) in rays.iter().enumerate() {
-                let (packet, lane) = place(i);
-                packets[packet].set(lane, ray);
-                // Packets take what is below 0 for 0, and such rays are not valid here.
-                lanes[packet] |= u32::from(ray.is_valid()) << lane;
-            }
-            let asked = Asked { packets: packets.each_ref(), lanes };
-            if Q::ANY {
-                let occluded = self.occluded_packets(&asked);
-                for (i, answer) in answers.iter_mut().enumerate() {
-                    let (packet, lane) = place(i);
-                    *answer = Q::answer((occluded[packet] >> lane & 1 != 0).then_some(SOMETHING));
-                }
-                continue;
-            }
-            self.closest_packets(&asked, |hits| {
-                for (i, answer) in answers.iter_mut().enumerate() {
-                    let (packet, lane) = place(i);
-                    *answer = Q::answer(hits[packet].hit(lane));
-                }
-            });
-        }
-    }
-}
-
-/// Whether all of these, as many as make it worth while, run the same way.
-#[inline(always)]
-fn are_parallel(rays: &[Ray]) -> bool {
-    rays.len() >= Packet::RAYS && rays.iter().all(|ray| ray.direction == rays[0].direction)
 }
 
 /// The nearest triangle that stands still, for one ray all by itself, and what its t follows from.

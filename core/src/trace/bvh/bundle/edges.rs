@@ -27,14 +27,17 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes, size};
 /// Numbers of a block of triangles; the sign is such that the bundle sees each from its front (slope > 0).
 pub(super) struct Edges {
     /// On the bundle's axes, the third turned forward: the scalar product with (p, q, 1) is the edge function, and with
-    /// the fourth, the triangle's own normal, the slope.
+    /// the fourth, the triangle's own normal, the slope; in a parallel bundle t'.
     pub normals: [[[f32; LANES]; 3]; 4],
-    /// t' times the slope, for the least and the most that t' may be in view of all rounding.
+    /// t' times the slope, for the least and the most that t' may be in view of all rounding; of a parallel bundle, what is added to t' instead.
     pub near_height: [f32; LANES],
     pub far_height: [f32; LANES],
     pub edge_error: [f32; LANES],
     /// The first corner relative to the bundle's origin, on the same axes as the normals.
     pub corner: [[f32; LANES]; 3],
+    /// Of a parallel bundle: the third component of the triangle's normal, of such a length that a unit along the rays adds 1; the other two are those of the fourth normal, with
+    /// signs changed.
+    pub facing: [f32; LANES],
     /// Error of a corner relative to a ray's own origin, and of a normal's component.
     pub corner_error: [f32; LANES],
     pub normal_error: [f32; LANES],
@@ -120,6 +123,7 @@ impl Edges {
             far_height: height.add(height.mul(error)).to_array(),
             edge_error: edge_error.to_array(),
             corner: [a[0].to_array(), a[1].to_array(), a[2].to_array()],
+            facing: [0.0; LANES],
             corner_error: far.mul_add(splat(2.0 * u), splat(2.0 * bundle.blur)).to_array(),
             normal_error: square.mul(splat(24.0 * u)).to_array(),
             is_vague: two_sided | !tame.bits(),
@@ -132,7 +136,7 @@ impl Edges {
 
 /// A corner of each triangle, on the given axes.
 #[inline(always)]
-fn corner<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], k: usize, axes: [usize; 3]) -> [S::V8; 3] {
+pub(super) fn corner<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], k: usize, axes: [usize; 3]) -> [S::V8; 3] {
     let [x, y, z] = axes;
     [S::V8::load(&corners[x][k]), S::V8::load(&corners[y][k]), S::V8::load(&corners[z][k])]
 }
@@ -144,18 +148,18 @@ fn turned<V: Vector>(n: [V; 3], forward: V) -> [V; 3] {
 }
 
 #[inline(always)]
-fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
+pub(super) fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[0].sub(q[0]), p[1].sub(q[1]), p[2].sub(q[2])]
 }
 
 #[inline(always)]
-fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
+pub(super) fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[1].mul_sub(q[2], p[2].mul(q[1])), p[2].mul_sub(q[0], p[0].mul(q[2])), p[0].mul_sub(q[1], p[1].mul(q[0]))]
 }
 
 /// The least and the largest scalar product with a direction of the bundle.
 #[inline(always)]
-fn ends<S: Simd>(n: &[S::V8; 3], bundle: &Bundle) -> (S::V8, S::V8) {
+pub(super) fn ends<S: Simd>(n: &[S::V8; 3], bundle: &Bundle) -> (S::V8, S::V8) {
     let splat = S::V8::splat;
     let ([p, q, r], [low_p, low_q], [high_p, high_q]) = (*n, bundle.low, bundle.high);
     let (a, b) = (p.mul(splat(low_p)), p.mul(splat(high_p)));

@@ -1,4 +1,4 @@
-//! Where a bundle sees triangles: rectangles of slopes, by which most rays are told apart from small triangles.
+//! Where a bundle sees triangles: rectangles of slopes (in a parallel bundle, of where rays are), by which most rays are told apart from small triangles.
 //!
 //! A triangle of the size of a pixel concerns one ray or two of a bundle's 64. The rectangle around the slopes of its corners,
 //! held against those of eight rows of eight rays, says which, at the price of one group's edge functions.
@@ -17,8 +17,8 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes};
 
 /// Rectangles of slopes around eight triangles.
 pub(super) struct Footprints {
-    low: [[f32; LANES]; 2],
-    high: [[f32; LANES]; 2],
+    pub low: [[f32; LANES]; 2],
+    pub high: [[f32; LANES]; 2],
 }
 
 impl Footprints {

@@ -1,5 +1,8 @@
 //! What the rays of a bundle have hit so far: for the most part only noted, and computed at the end, four at a time.
 
+use std::marker::PhantomData;
+
+use super::pencil::Pencil;
 use super::rays::Bundle;
 use crate::math::Vec3;
 use crate::ray::Ray;
@@ -75,7 +78,7 @@ impl BundleFound {
 }
 
 /// Computes what is noted, and answers for the first `count` rays; `bundle` is theirs in the world.
-pub(super) struct Finish<'a, Q: Query> {
+pub(super) struct Finish<'a, Q: Query, P> {
     pub bvh: &'a Bvh,
     pub found: &'a BundleFound,
     pub bundle: &'a Bundle,
@@ -83,16 +86,17 @@ pub(super) struct Finish<'a, Q: Query> {
     pub count: usize,
     pub answers: &'a mut [Q::Answer; RAYS],
     pub t: &'a mut [f64; RAYS],
+    pub pencil: PhantomData<P>,
 }
 
-impl<Q: Query> Kernel for Finish<'_, Q> {
+impl<Q: Query, P: Pencil> Kernel for Finish<'_, Q, P> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, found, bundle, rays, count, answers, t } = self;
+        let Self { bvh, found, bundle, rays, count, answers, t, pencil } = self;
         // Neighbours mostly hit the same triangle.
-        let mut shared: Option<Shared<S::D4>> = None;
+        let (mut shared, mut seen): (Option<Shared<_>>, Option<Shared<_>>) = (None, None);
         let has_placements = bvh.placements.has_triangles();
         let mut mixed = 0;
         for chunk in 0..count.div_ceil(4) {
@@ -104,12 +108,23 @@ impl<Q: Query> Kernel for Finish<'_, Q> {
             let id = ids[0];
             if *ids == [id; 4] && (!has_placements || *places == [FIXED; 4]) {
                 if id != NONE {
-                    let shared = match &shared {
-                        Some(shared) if shared.id == id => shared,
-                        _ => shared
-                            .insert(bvh.fixed.triangles.shared::<S>(splat::<S>(Vec3::from_array(bundle.origin)), id)),
+                    let triangles = &bvh.fixed.triangles;
+                    let hits = if P::IS_PARALLEL {
+                        let shared = match &shared {
+                            Some(shared) if shared.id == id => shared,
+                            _ => shared.insert(triangles.shared::<S>(id)),
+                        };
+                        shared.hits(&four::<S, P>(bundle, rays, chunk))
+                    } else {
+                        let seen = match &seen {
+                            Some(seen) if seen.id == id => seen,
+                            _ => {
+                                seen.insert(triangles.shared::<S>(id).from(splat::<S>(Vec3::from_array(bundle.origin))))
+                            }
+                        };
+                        seen.along(directions::<S>(bundle, chunk))
                     };
-                    answer::<Q>(&shared.hits(directions::<S>(bundle, chunk)), t, answers);
+                    answer::<Q>(&hits, t, answers);
                     continue;
                 }
                 if found.computed >> (4 * chunk) & 0b1111 == 0 {
@@ -120,13 +135,13 @@ impl<Q: Query> Kernel for Finish<'_, Q> {
             mixed |= 1 << chunk;
         }
         if mixed != 0 {
-            S::apart(Mixed::<Q> { bvh, found, bundle, rays, chunks: mixed, answers, t });
+            S::apart(Mixed::<Q, P> { bvh, found, bundle, rays, chunks: mixed, answers, t, pencil });
         }
     }
 }
 
 /// Fours of neighbours in a bundle that have not all hit the same fixed triangle, a bit each.
-struct Mixed<'a, Q: Query> {
+struct Mixed<'a, Q: Query, P> {
     bvh: &'a Bvh,
     found: &'a BundleFound,
     bundle: &'a Bundle,
@@ -134,14 +149,15 @@ struct Mixed<'a, Q: Query> {
     chunks: u32,
     answers: &'a mut [Q::Answer; RAYS],
     t: &'a mut [f64; RAYS],
+    pencil: PhantomData<P>,
 }
 
-impl<Q: Query> Kernel for Mixed<'_, Q> {
+impl<Q: Query, P: Pencil> Kernel for Mixed<'_, Q, P> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { bvh, found, bundle, rays, mut chunks, answers, t } = self;
+        let Self { bvh, found, bundle, rays, mut chunks, answers, t, .. } = self;
         while chunks != 0 {
             let chunk = chunks.trailing_zeros() as usize % (RAYS / 4);
             chunks &= chunks - 1;
@@ -154,12 +170,12 @@ impl<Q: Query> Kernel for Mixed<'_, Q> {
                 let all = noted == 0b1111;
                 let known = if all { *ids } else { repeated(ids, noted) };
                 // Those of rays that have hit nothing, or what was computed, are replaced below.
-                answer::<Q>(&bvh.fixed.triangles.hits::<S>(&four::<S>(bundle, chunk), known), t, answers);
+                answer::<Q>(&bvh.fixed.triangles.hits::<S>(&four::<S, P>(bundle, rays, chunk), known), t, answers);
                 if all {
                     continue;
                 }
             } else if noted != 0 {
-                answer_some::<S, Q>(bvh, bundle, rays, chunk, ids, places, t, answers);
+                answer_some::<S, Q, P>(bvh, bundle, rays, chunk, ids, places, t, answers);
             }
             for lane in (0..4).filter(|lane| noted >> lane & 1 == 0) {
                 let ray = 4 * chunk + lane;
@@ -190,7 +206,7 @@ fn answer<Q: Query>(hits: &FourHits, t: &mut [f64; 4], answers: &mut [Q::Answer;
 /// [`woop`](crate::trace::bvh::reject::woop) shows it.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "four lanes of everything")]
-fn answer_some<S: Simd, Q: Query>(
+fn answer_some<S: Simd, Q: Query, P: Pencil>(
     bvh: &Bvh,
     bundle: &Bundle,
     rays: &[Ray; RAYS],
@@ -200,7 +216,7 @@ fn answer_some<S: Simd, Q: Query>(
     t: &mut [f64; 4],
     answers: &mut [Q::Answer; 4],
 ) {
-    let four = four::<S>(bundle, chunk);
+    let four = four::<S, P>(bundle, rays, chunk);
     let (mut fixed, mut placed) = (0, 0);
     for lane in 0..4 {
         let bit = u32::from(ids[lane] != NONE) << lane;
@@ -243,7 +259,10 @@ fn repeated(values: &[u32; 4], lanes: u32) -> [u32; 4] {
 
 /// The rays of a chunk, as they were given.
 #[inline(always)]
-fn four<S: Simd>(bundle: &Bundle, chunk: usize) -> Rays<S::D4> {
+fn four<S: Simd, P: Pencil>(bundle: &Bundle, rays: &[Ray; RAYS], chunk: usize) -> Rays<S::D4> {
+    if P::IS_PARALLEL {
+        return Rays::new::<S>(rays.as_chunks::<4>().0[chunk].each_ref());
+    }
     Rays { origin: splat::<S>(Vec3::from_array(bundle.origin)), direction: directions::<S>(bundle, chunk) }
 }
 

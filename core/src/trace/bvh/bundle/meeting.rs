@@ -1,14 +1,14 @@
 //! A bundle meets a block of eight triangles: pairs of a triangle and a group of rays, one after the other in one loop without branches.
 //!
-//! Which rows of rays may see which triangles is told for all of them at once, by [`Footprints`]. A loop over the triangles, in it one over each one's
+//! Which rows of rays may see which triangles is told for all of them at once, by [`Footprints`](super::footprint::Footprints). A loop over the triangles, in it one over each one's
 //! groups, in it a branch for a group that misses and another for one that hits, was ended or taken nobody could tell when: what such a branch has let
 //! begin in vain is known late, and took as long as all that was computed. Now whatever a pair may need is computed of every pair, but for triangles
 //! of which a bundle sees both sides. A hit without doubt is noted in place; what is left in doubt is kept in a row, and decided when all pairs are
 //! through.
 
 use super::edges::Edges;
-use super::footprint::Footprints;
 use super::found::DONE;
+use super::pencil::Pencil;
 use super::rays::{Bundle, TINY};
 use super::rows;
 use super::walk::Walk;
@@ -19,14 +19,14 @@ use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::bvh::simd::{Group, Mask, Simd, Vector, axes};
 
 /// Block `index` of a leaf that rays of these rows enter, before `most`.
-pub(super) struct Meeting<'a, 'b, Q> {
-    pub walk: &'a mut Walk<'b, Q>,
+pub(super) struct Meeting<'a, 'b, Q, P> {
+    pub walk: &'a mut Walk<'b, Q, P>,
     pub index: u32,
     pub rows: u32,
     pub most: f32,
 }
 
-impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
+impl<Q: Query, P: Pencil> Kernel for Meeting<'_, '_, Q, P> {
     /// Whether a limit has changed.
     type Output = bool;
 
@@ -35,9 +35,9 @@ impl<Q: Query> Kernel for Meeting<'_, '_, Q> {
         let Self { walk, index, rows, most } = self;
         let (tree, bundle, mut scratch) = (walk.tree, walk.bundle, None);
         let block = tree.block::<S>(index, &mut scratch);
-        let Some((lanes, edges)) = Edges::new::<S>(block, bundle, most) else { return false };
+        let Some((lanes, edges)) = P::edges::<S>(block, bundle, most) else { return false };
         // A byte for each triangle, in it a bit for each row.
-        let seen = Footprints::new::<S>(&block.corners, bundle).rows::<S>(&bundle.rows);
+        let seen = P::footprints::<S>(&block.corners, bundle).rows::<S>(&bundle.rows);
         let wanted = (u64::from(rows & 0xff) * 0x0101_0101_0101_0101) & rows::bytes(lanes);
         let seen = seen & wanted;
         let vague = seen & rows::bytes(edges.is_vague);
@@ -99,7 +99,7 @@ impl Pair {
     #[inline(always)]
     fn along<S: Simd>(self, edges: &Edges, k: usize, bundle: &Bundle) -> S::Wide {
         let (p, q) =
-            (S::Wide::at(&bundle.slope[0], self.group::<S>()), S::Wide::at(&bundle.slope[1], self.group::<S>()));
+            (S::Wide::at(&bundle.across[0], self.group::<S>()), S::Wide::at(&bundle.across[1], self.group::<S>()));
         let [x, y, z] = self.normal::<S>(edges, k);
         p.mul_add(x, q.mul_add(y, z))
     }
@@ -121,7 +121,7 @@ struct Doubt {
 /// Of eight triangles and eight groups.
 const MOST_PAIRS: usize = 64;
 
-impl<Q: Query> Walk<'_, Q> {
+impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
     /// Triangles of the block whose first is `first`, whose fronts all rays see; true where a limit has changed.
     #[inline(always)]
     fn meet<S: Simd>(&mut self, edges: &Edges, first: u32, pairs: Pairs) -> bool {
@@ -135,9 +135,7 @@ impl<Q: Query> Walk<'_, Q> {
             let [u, v, w] = pair.sides::<S>(edges, bundle);
             let (least, bound) = (u.min(v).min(w), splat(edges.edge_error[lane]));
             let inside = zero.sub(bound).at_most(least);
-            let inverse = splat(1.0).div(pair.along::<S>(edges, 3, bundle));
-            let low = splat(edges.near_height[lane]).mul(inverse);
-            let high = splat(edges.far_height[lane]).mul(inverse);
+            let [low, high] = P::depths(edges, lane, pair.along::<S>(edges, 3, bundle));
             let (limit, before) = (S::Wide::at(&found.limit, group), S::Wide::at(&found.sure, group));
             let in_range = high.less(before).and(S::Wide::at(&bundle.begin, group).less(low));
             let sure = bound.less(least).and(in_range);
@@ -161,7 +159,7 @@ impl<Q: Query> Walk<'_, Q> {
         let mut changed = hit.bits() != 0;
         for &Doubt { pair, open } in &doubts[..count.min(MOST_PAIRS)] {
             let mut open = open.into();
-            if self.bundle.is_turned {
+            if P::IS_PARALLEL || self.bundle.is_turned {
                 open &= !self.behind_starts::<S>(edges, pair);
             }
             if !Q::ANY {
@@ -207,17 +205,27 @@ impl<Q: Query> Walk<'_, Q> {
         S::Wide::splat(edges.edge_error[pair.lane()]).less(u.min(v).min(w)).bits()
     }
 
-    /// A bit for each ray of a turned bundle that starts beyond the triangle's plane.
+    /// A bit for each ray with an origin of its own, as those of turned and of parallel bundles, that starts beyond the triangle's plane.
     #[inline(always)]
     fn behind_starts<S: Simd>(&self, edges: &Edges, pair: Pair) -> u32 {
         let (splat, lane, group) = (S::Wide::splat, pair.lane(), pair.group::<S>());
-        let [p, q, along] = axes(self.bundle.axis);
-        let direction = &self.bundle.direction;
-        // The bundle's direction is the given one, turned round.
-        let x = splat(edges.corner[0][lane]).add(S::Wide::at(&direction[p], group));
-        let y = splat(edges.corner[1][lane]).add(S::Wide::at(&direction[q], group));
-        let z = S::Wide::at(&direction[along], group).mul_add(splat(self.bundle.forward), splat(edges.corner[2][lane]));
+        let corner = [splat(edges.corner[0][lane]), splat(edges.corner[1][lane]), splat(edges.corner[2][lane])];
         let n = pair.normal::<S>(edges, 3);
+        let ([x, y, z], n) = if P::IS_PARALLEL {
+            let [a, b, c] = &self.bundle.start;
+            let start = [S::Wide::at(a, group), S::Wide::at(b, group), S::Wide::at(c, group)];
+            // Turned so that the product is more than 0 where the plane lies behind.
+            let back = [corner[0].sub(start[0]), corner[1].sub(start[1]), start[2].sub(corner[2])];
+            (back, [n[0], n[1], splat(edges.facing[lane])])
+        } else {
+            let [p, q, along] = axes(self.bundle.axis);
+            let direction = &self.bundle.direction;
+            // The bundle's direction is the given one, turned round.
+            let x = corner[0].add(S::Wide::at(&direction[p], group));
+            let y = corner[1].add(S::Wide::at(&direction[q], group));
+            let z = S::Wide::at(&direction[along], group).mul_add(splat(self.bundle.forward), corner[2]);
+            ([x, y, z], n)
+        };
         let side = x.mul(n[0]).add(y.mul(n[1])).add(z.mul(n[2]));
         let size = x.abs().add(y.abs()).add(z.abs());
         let steep = n[0].abs().add(n[1].abs()).add(n[2].abs());

@@ -1,5 +1,7 @@
-//! A bundle of up to 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a point
-//! light.
+//! A bundle of up to 64 rays against a tree at once: the fastest way for camera rays, and for shadow rays of a light.
+//!
+//! Its rays have a point in common, or a direction ([`pencil`]). What follows is of those with a point, and so is what each file says; [`parallel`] says what is otherwise
+//! with a direction.
 //!
 //! - **Nodes**: eight boxes are tested against the rectangle of all slopes, an interval test that rejects for all rays
 //!   (Wald, Boulos, Shirley 2007, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*). What
@@ -12,7 +14,7 @@
 //!   noted; where they do, it is decided by [`triangle::intersect`](crate::shape::triangle::intersect). In the end t, u
 //!   and v of what was noted are computed four rays at a time
 //!   ([`TriangleTree::hits`](super::levels::triangles::TriangleTree::hits)), with the bits that a single ray would get.
-//! - **Placed objects**: a bundle is one in their coordinates, too. It is brought there when it comes to a placement, and
+//! - **Placed objects**: a bundle with a point in common is one in their coordinates, too. It is brought there when it comes to a placement, and
 //!   goes on as in the world. Where it crosses an octant there, which in the world would divide it, its rays go on one by one ([`alone`]).
 //!   Shadow rays, and those that are much farther apart than triangles are wide, wait there for those of other bundles instead, and fly
 //!   ([`super::flight`]).
@@ -23,6 +25,8 @@ mod footprint;
 mod found;
 mod meeting;
 mod octants;
+mod parallel;
+mod pencil;
 mod placed;
 mod range;
 mod rays;
@@ -40,10 +44,13 @@ use super::flight::Visitors;
 use super::levels::placements::FIXED;
 use super::node::WIDTH;
 use super::query::{Query, SOMETHING};
+use super::simd::isa::Kernel;
 use super::simd::{RAYS, Simd};
 use crate::ray::Ray;
 use found::{BundleFound, Finish};
 use octants::{Octants, Part};
+use parallel::{FillParallel, Parallel, may_be_parallel};
+use pencil::{Central, Pencil};
 use placed::Tour;
 use range::Range;
 use rays::{Bundle, Fill, Fit};
@@ -91,7 +98,7 @@ impl Scratch {
     }
 }
 
-/// Traces up to 64 rays that start in one point (or, for any hit, that end in one) through all triangles, into `answers` of
+/// Traces up to 64 rays that start in one point (or, for any hit, that end in one), or run the same way, through all triangles, into `answers` of
 /// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
 /// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.visitors`, among whom ray 0 is called `first`.
 #[inline(always)]
@@ -127,11 +134,22 @@ pub(super) fn trace<S: Simd, Q: Query>(
                 (&part.rays, part.count, answers, t)
             }
         };
-        let fit =
-            S::apart(Fill::<Q> { bundle: &mut one.bundle, rays: group, range: &mut one.range, query: PhantomData });
+        let (bundle, range) = (&mut one.bundle, &mut one.range);
+        let is_parallel = may_be_parallel(group);
+        let fit = if is_parallel {
+            S::apart(FillParallel { bundle, rays: group, range })
+        } else {
+            S::apart(Fill::<Q> { bundle, rays: group, range, query: PhantomData })
+        };
         let before = visitors.len();
-        let is_traced =
-            fit == Fit::Whole && one.trace::<S, Q>(bvh, group, count, group_answers, group_t, entered, visitors);
+        let those = Members { rays: group, count };
+        let is_traced = fit == Fit::Whole
+            && if is_parallel {
+                let (answers, t) = (group_answers, group_t);
+                S::apart(OfParallel::<Q> { one, bvh, rays: those, answers, t, entered, visitors })
+            } else {
+                one.trace::<S, Q, Central>(bvh, &those, group_answers, group_t, entered, visitors)
+            };
         // Until here their bits are of the part, if there is one.
         for some in &mut visitors[before..] {
             some.first = first;
@@ -155,23 +173,47 @@ pub(super) fn trace<S: Simd, Q: Query>(
     }
 }
 
-impl One {
-    /// Traces the bundle, which is made of `rays`; the first `count` of them matter. False, and nothing done, where it is
-    /// too steep for a tree.
-    #[expect(clippy::too_many_arguments, reason = "rays, and all that is told of them")]
+/// Rays of a bundle, of which the first `count` matter.
+struct Members<'a> {
+    rays: &'a [Ray; RAYS],
+    count: usize,
+}
+
+/// A parallel bundle traced, in a function of its own: bundles with a common point are what the kernel is for.
+struct OfParallel<'a, Q: Query> {
+    one: &'a mut One,
+    bvh: &'a Bvh,
+    rays: Members<'a>,
+    answers: &'a mut [Q::Answer; RAYS],
+    t: &'a mut [f64; RAYS],
+    entered: &'a mut u32,
+    visitors: &'a mut Vec<Visitors>,
+}
+
+impl<Q: Query> Kernel for OfParallel<'_, Q> {
+    type Output = bool;
+
     #[inline(always)]
-    fn trace<S: Simd, Q: Query>(
+    fn run<S: Simd>(self) -> bool {
+        let Self { one, bvh, rays, answers, t, entered, visitors } = self;
+        one.trace::<S, Q, Parallel>(bvh, &rays, answers, t, entered, visitors)
+    }
+}
+
+impl One {
+    /// Traces the bundle, which is made of these rays; the first `count` of them matter. False, and nothing done, where it is too steep for a tree.
+    #[inline(always)]
+    fn trace<S: Simd, Q: Query, P: Pencil>(
         &mut self,
         bvh: &Bvh,
-        rays: &[Ray; RAYS],
-        count: usize,
+        &Members { rays, count }: &Members<'_>,
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
         entered: &mut u32,
         visitors: &mut Vec<Visitors>,
     ) -> bool {
         let Self { upper, stack, bundle, local, range, found } = self;
-        let Some(mut tour) = Tour::new(bvh, bundle, count, upper) else { return false };
+        let Some(mut tour) = Tour::<P>::new(bvh, bundle, count, upper) else { return false };
         found.start();
         while let Some((place, seeing, near)) = tour.next::<S>(range) {
             let (tree, _) = bvh.triangles_at(place);
@@ -182,15 +224,18 @@ impl One {
             if Q::ANY && seeing == 0 {
                 continue;
             }
-            if Q::ANY && place != FIXED && bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count) {
+            let is_apart =
+                |place: u32| P::IS_PARALLEL || bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count);
+            if Q::ANY && place != FIXED && is_apart(place) {
                 visitors.push(Visitors { place, first: 0, rays: seeing });
                 continue;
             }
             *entered += u32::from(place != FIXED);
-            let is_bundle = place == FIXED || local.place::<S>(bundle, bvh.placements.at(place), range);
+            let is_bundle =
+                place == FIXED || !P::IS_PARALLEL && local.place::<S>(bundle, bvh.placements.at(place), range);
             let bundle = if place == FIXED { &*bundle } else { &*local };
             let reach = tree.tree().reach();
-            let Some(slab) = bundle.slab(reach).filter(|_| is_bundle) else {
+            let Some(slab) = (if is_bundle { P::slab(bundle, reach) } else { None }) else {
                 if Q::ANY {
                     visitors.push(Visitors { place, first: 0, rays: seeing });
                 } else {
@@ -198,12 +243,12 @@ impl One {
                 }
                 continue;
             };
-            let way = Way::new(bundle, slab, count);
-            let few = few(bundle, reach);
-            let walk = Walk { bvh, place, tree, rays, bundle, found, few, query: PhantomData::<Q> };
+            let way = Way::<P>::new(bundle, slab, count);
+            let few = few::<P>(bundle, reach);
+            let walk = Walk { bvh, place, tree, rays, bundle, found, few, query: PhantomData::<(Q, P)> };
             walk.run::<S>(stack, way, seeing);
             if Q::ANY || tour.has_placements() {
-                range.shorten::<S>(bundle, &found.sure, &found.limit);
+                range.shorten::<S, P>(bundle, &found.sure, &found.limit);
             }
         }
         if Q::ANY {
@@ -211,7 +256,8 @@ impl One {
                 *answer = Q::answer((*limit < 0.0).then_some(SOMETHING));
             }
         } else {
-            S::apart(Finish::<Q> { bvh, found, bundle, rays, count, answers, t });
+            let pencil = PhantomData::<P>;
+            S::apart(Finish::<Q, P> { bvh, found, bundle, rays, count, answers, t, pencil });
         }
         true
     }

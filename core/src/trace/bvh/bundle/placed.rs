@@ -1,6 +1,7 @@
 //! A bundle among placed objects: it goes through the tree of placements as through any other, and from each of them on
-//! in the object's coordinates.
+//! in the object's coordinates, one with a common direction ray by ray.
 
+use super::pencil::Pencil;
 use super::range::Range;
 use super::rays::Bundle;
 use super::way::{Entry, Goal, Way};
@@ -33,26 +34,26 @@ impl Goal for Places<'_> {
 
 /// The way of a bundle from place to place: first to the fixed triangles, then to placements in the order in which it enters
 /// their boxes, as long as these are near enough.
-pub(super) struct Tour<'a> {
+pub(super) struct Tour<'a, P> {
     places: Places<'a>,
     /// None where there are no placements.
-    way: Option<Way<'a>>,
+    way: Option<Way<'a, P>>,
     stack: &'a mut [Entry],
     len: usize,
     visits_fixed: bool,
 }
 
-impl<'a> Tour<'a> {
+impl<'a, P: Pencil> Tour<'a, P> {
     /// None where the bundle is too steep for one of the trees.
     #[inline(always)]
     pub fn new(bvh: &'a Bvh, bundle: &'a Bundle, count: usize, stack: &'a mut [Entry]) -> Option<Self> {
         let (fixed, placements) = (bvh.fixed.triangles.tree(), &bvh.placements);
         let visits_fixed = !fixed.is_empty();
-        if visits_fixed && bundle.slab(fixed.reach()).is_none() {
+        if visits_fixed && P::slab(bundle, fixed.reach()).is_none() {
             return None;
         }
         let way = if placements.has_triangles() {
-            Some(Way::new(bundle, bundle.slab(placements.reach())?, count))
+            Some(Way::new(bundle, P::slab(bundle, placements.reach())?, count))
         } else {
             None
         };
@@ -73,7 +74,7 @@ impl<'a> Tour<'a> {
             return Some((FIXED, !0, 0.0));
         }
         let way = self.way.as_mut()?;
-        way.bundle.limit_of::<S>(range, &mut self.places.limit);
+        way.bundle.limit_of::<S, P>(range, &mut self.places.limit);
         way.measure::<S>(&self.places.limit);
         let leaf = way.next_leaf::<S>(&self.places, self.stack, &mut self.len)?;
         Some((leaf.child.first(), leaf.rays, leaf.near))

@@ -1,5 +1,6 @@
 //! How far the rays of a bundle still look, in a unit that they share in all systems of coordinates: t.
 
+use super::pencil::Pencil;
 use super::rays::{Bundle, SLACK, TINY};
 use crate::trace::bvh::simd::{Group, Mask, PerRay, RAYS, Simd, Vector};
 
@@ -42,7 +43,7 @@ impl Range {
 
     /// Takes what has become less in t' since `bundle` was made ready.
     #[inline(always)]
-    pub fn shorten<S: Simd>(&mut self, bundle: &Bundle, sure: &PerRay, limit: &PerRay) {
+    pub fn shorten<S: Simd, P: Pencil>(&mut self, bundle: &Bundle, sure: &PerRay, limit: &PerRay) {
         let splat = S::Wide::splat;
         for group in 0..RAYS / S::Wide::LANES {
             let (least, most) = (S::Wide::at(sure, group), S::Wide::at(limit, group));
@@ -50,6 +51,13 @@ impl Range {
             if is_less.bits() != 0 {
                 let shrink = splat(1.0).div(S::Wide::at(&bundle.depth, group));
                 let (old_sure, old_limit) = (S::Wide::at(&self.sure, group), S::Wide::at(&self.limit, group));
+                let (mut least, mut most) = (least, most);
+                if P::IS_PARALLEL {
+                    // The slack of both is more than the difference rounds, for neither is much less than where the ray starts.
+                    let start = S::Wide::at(&bundle.start[2], group);
+                    least = least.mul_add(splat(1.0 - SLACK), splat(-TINY)).sub(start);
+                    most = most.mul_add(splat(1.0 + SLACK), splat(TINY)).sub(start);
+                }
                 let least = least.mul(shrink).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(old_sure);
                 let most = most.mul(shrink).mul_add(splat(1.0 + SLACK), splat(TINY)).min(old_limit);
                 least.put_where(is_less, &mut self.sure.0, group);

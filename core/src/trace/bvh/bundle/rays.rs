@@ -1,4 +1,4 @@
-//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common.
+//! Up to 64 rays that share an origin, or that end in one point: made ready for tests in common. (Those that share a direction: [`super::parallel`].)
 //!
 //! **Projection.** All rays run the same way along one axis, the bundle's; a ray is its slopes (p, q) against it, and t
 //! is measured along it: t' = t |d|, d being the direction's component. Box and triangle tests then take two products
@@ -15,6 +15,7 @@
 
 use std::marker::PhantomData;
 
+use super::pencil::Pencil;
 use super::range::Range;
 use super::rows::Rows;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -28,7 +29,7 @@ use crate::trace::bvh::simd::isa::Kernel;
 use crate::trace::bvh::simd::{Array, Group, Mask, PerRay, RAYS, Simd, Vector, axes};
 
 /// How many rays ahead of those of a bundle others are fetched.
-const AHEAD: usize = 3 * RAYS;
+pub(super) const AHEAD: usize = 3 * RAYS;
 
 /// The rays of a bundle, component by component.
 pub(super) struct Bundle {
@@ -40,21 +41,23 @@ pub(super) struct Bundle {
     pub axis: usize,
     /// 1 or -1: which way they run along it.
     pub forward: f32,
-    /// Directions, as given.
+    /// Directions, as given; but for rays that run the same way.
     pub direction: [PerRay; 3],
     /// The axis' component of each direction, without its sign: t' of t = 1.
     pub depth: PerRay,
     /// The least of them.
-    least_depth: f32,
-    /// Directions on the other two axes over `depth`, the smallest and largest of them, and the largest magnitude (or 1).
-    pub slope: [PerRay; 2],
+    pub least_depth: f32,
+    /// Where a ray crosses a plane across the axis ([`Pencil`](super::pencil::Pencil)), the smallest and largest of that. Of rays with a common origin their slopes, directions on
+    /// the other two axes over `depth`.
+    pub across: [PerRay; 2],
     pub low: [f32; 2],
     pub high: [f32; 2],
+    /// The largest magnitude of a slope, or 1.
     pub largest: f32,
-    /// The least and the largest slopes of each row of eight rays.
+    /// The least and the largest of each row of eight rays.
     pub rows: Rows,
-    /// 1 / slope.
-    pub reciprocal: [PerRay; 2],
+    /// What slabs are held against: 1 / slope, or of rays that run the same way `across` / slope.
+    pub slabs: [PerRay; 2],
     /// Least and most that t' may be; rounded inwards, so that what lies between is within the range for sure.
     pub begin: PerRay,
     pub end: PerRay,
@@ -63,6 +66,10 @@ pub(super) struct Bundle {
     pub first: f32,
     /// Whether t runs from the common end back to the rays' own origins.
     pub is_turned: bool,
+    /// Of rays that run the same way: their slopes.
+    pub common: [f32; 2],
+    /// And their own origins, relative to `origin`: on the two axes across, and along, no less than 0.
+    pub start: [PerRay; 3],
 }
 
 /// How rays make a bundle.
@@ -70,7 +77,7 @@ pub(super) struct Bundle {
 pub(super) enum Fit {
     /// All of them make one.
     Whole,
-    /// They have a point in common, but some are not valid or run into another octant.
+    /// They have a point or a direction in common, but some are not valid or run into another octant.
     Parts,
     /// They have nothing in common.
     None,
@@ -119,17 +126,19 @@ impl Bundle {
             direction: [PerRay::ZERO; 3],
             depth: PerRay::ZERO,
             least_depth: 0.0,
-            slope: [PerRay::ZERO; 2],
+            across: [PerRay::ZERO; 2],
             low: [0.0; 2],
             high: [0.0; 2],
             largest: 1.0,
             rows: Rows::NONE,
-            reciprocal: [PerRay::ZERO; 2],
+            slabs: [PerRay::ZERO; 2],
             begin: PerRay::ZERO,
             end: PerRay::ZERO,
             limit: PerRay::ZERO,
             first: 0.0,
             is_turned: false,
+            common: [0.0; 2],
+            start: [PerRay::ZERO; 3],
         }
     }
 
@@ -216,10 +225,11 @@ impl Bundle {
 
     /// The most t' that is wanted of each ray.
     #[inline(always)]
-    pub fn limit_of<S: Simd>(&self, range: &Range, limit: &mut PerRay) {
+    pub fn limit_of<S: Simd, P: Pencil>(&self, range: &Range, limit: &mut PerRay) {
         for group in 0..RAYS / S::Wide::LANES {
             let (most, depth) = (S::Wide::at(&range.limit, group), S::Wide::at(&self.depth, group));
-            most.mul(depth).mul_add(S::Wide::splat(1.0 + SLACK), S::Wide::splat(TINY)).put(limit, group);
+            let most = self.beyond_start::<S, P>(most.mul(depth), group);
+            most.mul_add(S::Wide::splat(1.0 + SLACK), S::Wide::splat(TINY)).put(limit, group);
         }
     }
 
@@ -242,8 +252,8 @@ impl Bundle {
             let shrink = splat(1.0).div(depth).mul(sign);
             for (i, axis) in [p, q].into_iter().enumerate() {
                 let slope = S::Wide::at(&self.direction[axis], group).mul(shrink);
-                slope.put(&mut self.slope[i], group);
-                splat(1.0).div(slope).put(&mut self.reciprocal[i], group);
+                slope.put(&mut self.across[i], group);
+                splat(1.0).div(slope).put(&mut self.slabs[i], group);
                 (low[i], high[i]) = (slope.min(low[i]), slope.max(high[i]));
             }
             let (begin, start) = (S::Wide::at(&range.begin, group), S::Wide::at(&range.start, group));
@@ -263,11 +273,23 @@ impl Bundle {
         (self.forward, self.least_depth) = if low[2] > 0.0 { (1.0, low[2]) } else { (-1.0, -high[2]) };
         (self.low, self.high) = ([low[0], low[1]], [high[0], high[1]]);
         self.largest = high[0].max(-low[0]).max(high[1].max(-low[1])).max(1.0);
-        self.rows = Rows::new::<S>(&self.slope);
+        self.rows = Rows::new::<S>(&self.across);
         // NaN and infinity, too: a direction whose smallest component vanishes against the others. In an object's coordinates
         // a depth may be infinite, which leaves no slope.
         let is_small = high[2].max(-low[2]) < HUGE;
         if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
+    }
+
+    /// What is so far from where each ray of a group starts, from the bundle's origin.
+    #[inline(always)]
+    pub fn beyond_start<S: Simd, P: Pencil>(&self, far: S::Wide, group: usize) -> S::Wide {
+        if P::IS_PARALLEL { far.add(S::Wide::at(&self.start[2], group)) } else { far }
+    }
+
+    /// How far from the bundle's origin a ray starts, along the axis.
+    #[inline(always)]
+    pub fn start_of<P: Pencil>(&self, ray: usize) -> f32 {
+        if P::IS_PARALLEL { self.start[2].0[ray] } else { 0.0 }
     }
 
     /// The area across the bundle's axis that belongs to each of `count` rays, at t'.
@@ -279,10 +301,14 @@ impl Bundle {
 
     /// Whether products of three lengths, as of corners and edges, may leave f32 in a tree that reaches that far.
     #[inline(always)]
-    pub fn may_overflow(&self, reach: Vec3) -> bool {
+    pub fn may_overflow<P: Pencil>(&self, reach: Vec3) -> bool {
         // Components of a normal are two products of edges, which are at most twice as long as corners are far; its scalar product
-        // with a corner or a direction is three: 24, and rounding.
+        // with a corner or a direction is three: 24, and rounding. Shadows are twice as large, and their rays' points may be as far away as corners.
         let far = (Vec3::from_array(self.origin).abs() + reach).max_element();
+        if P::IS_PARALLEL {
+            let far = far + self.widest();
+            return 256.0 * far * far * far >= HUGE;
+        }
         let most = far.max(self.largest);
         32.0 * most * far * far >= HUGE
     }
@@ -294,6 +320,6 @@ fn splat<S: Simd>(p: Vec3) -> [S::V8; 3] {
 }
 
 #[inline(always)]
-fn store<S: Simd>(values: &mut PerRay, i: usize, lanes: S::V8) {
+pub(super) fn store<S: Simd>(values: &mut PerRay, i: usize, lanes: S::V8) {
     values.0.as_chunks_mut().0[i] = lanes.to_array();
 }

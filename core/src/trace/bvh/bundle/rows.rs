@@ -5,7 +5,7 @@ use crate::trace::bvh::simd::{Array, PerRay, RAYS, Simd, Vector};
 /// Rows of a bundle: eight rays each.
 pub(super) const ROWS: usize = RAYS / 8;
 
-/// For each row of a bundle, the least and the largest slope on two axes.
+/// For each row of a bundle, the least and the largest of where rays are across, on two axes.
 pub(super) struct Rows {
     pub low: [[f32; ROWS]; 2],
     pub high: [[f32; ROWS]; 2],
@@ -18,10 +18,10 @@ impl Rows {
     };
 
     #[inline(always)]
-    pub fn new<S: Simd>(slope: &[PerRay; 2]) -> Self {
+    pub fn new<S: Simd>(across: &[PerRay; 2]) -> Self {
         let mut rows = Self::NONE;
-        for (i, slope) in slope.iter().enumerate() {
-            let columns = columns::<S>(slope);
+        for (i, across) in across.iter().enumerate() {
+            let columns = columns::<S>(across);
             let [a, b, c, d, e, f, g, h] = columns;
             let low = a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h)));
             let high = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)));

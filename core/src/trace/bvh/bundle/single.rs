@@ -3,7 +3,7 @@
 //! Where triangles are smaller than pixels, eight of them concern a ray or two each, and to make their edges ready for 64 rays
 //! ([`Edges`](super::edges::Edges)) costs more than all the tests that follow. A ray's own test ([`Sides`]) shears the
 //! corners by the ray's slopes, which are at hand, from the origin that all share. Of turned rays, which share their end, it takes
-//! the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody could tell on which side.
+//! the ray's own origin instead: it lies on a surface as a rule, and from the far end nobody could tell on which side. So it does of parallel rays.
 //!
 //! **Edge functions.** Slopes are off by as much as a single ray's shear in the world, and in an object's coordinates by 2 u of
 //! themselves and u / 4 besides (u = 2^-24; [`Bundle`]). The bounds of [`Sides`] hold for any shear k, but that an origin that is
@@ -15,6 +15,7 @@
 //! with its products and sums, by 12 u N D; a corner relative to the origin by u and b, and the height by 10 u N times that, and b N.
 
 use super::found::DONE;
+use super::pencil::Pencil;
 use super::rays::{Bundle, SLACK, TINY};
 use super::walk::Walk;
 use super::way::Entry;
@@ -81,36 +82,36 @@ fn planes_of<V: Vector + Array<LANES>>(block: &Block, [x, y, z]: [usize; 3]) -> 
     Planes::new([along(&corners[x]), along(&corners[y]), along(&corners[z])])
 }
 
-impl<Q: Query> Walk<'_, Q> {
+impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
     /// Tests the blocks of a leaf ray by ray; true where a limit has changed.
     #[inline(always)]
     pub(super) fn visit_one_by_one<S: Simd>(&mut self, leaf: Entry) -> bool {
         let mut changed = false;
         let bundle = self.bundle;
         let (axes, blur) = (axes(bundle.axis), self.blur());
-        let is_turned = Q::ANY && bundle.is_turned;
+        let apart = P::IS_PARALLEL || Q::ANY && bundle.is_turned;
         for index in leaf.child.blocks() {
             let mut scratch = None;
             let block = self.tree.block::<S>(index, &mut scratch);
-            let mut seen = Seen::new(block, axes, self.start(leaf.rays.trailing_zeros() as usize % RAYS, is_turned));
+            let mut seen = Seen::new(block, axes, self.start(leaf.rays.trailing_zeros() as usize % RAYS, apart));
             // Made when a ray first asks; they serve every origin.
             let mut planes = None;
             let mut rays = leaf.rays;
             while rays != 0 {
                 let ray = rays.trailing_zeros() as usize % RAYS;
-                if is_turned && rays != leaf.rays {
+                if apart && rays != leaf.rays {
                     seen = Seen::new(block, axes, self.own_origin(ray));
                 }
                 rays &= rays - 1;
                 if self.found.limit.0[ray] < leaf.near {
                     continue;
                 }
-                let (sides, lanes) = sides::<S>(&seen, block, bundle, ray, blur);
+                let (sides, lanes) = sides::<S, P>(&seen, block, bundle, ray, blur);
                 if lanes == 0 {
                     continue;
                 }
-                let range = if is_turned { self.own_range(ray) } else { self.range(ray) };
-                let met = if self.place == FIXED {
+                let range = if apart { self.own_range(ray) } else { self.range(ray) };
+                let met = if P::IS_PARALLEL || self.place == FIXED {
                     meet_between_corners::<S>(&sides, lanes, &seen, &mut planes, block, bundle, &range)
                 } else {
                     let planes = planes.get_or_insert_with(
@@ -133,6 +134,7 @@ impl<Q: Query> Walk<'_, Q> {
     fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Judged<S::V8>, range: &Range) -> bool {
         let &Judged { lanes: mut open, sure, low, high } = met;
         let sure = sure.and(S::V8::splat(range.begin).at_most(low));
+        let (low, high) = if P::IS_PARALLEL && !Q::ANY { self.in_bundle::<S>(ray, low, high) } else { (low, high) };
         if Q::ANY && sure.and(high.less(S::V8::splat(range.sure))).bits() & open != 0 {
             (self.found.sure.0[ray], self.found.limit.0[ray]) = (DONE, DONE);
             return true;
@@ -159,6 +161,15 @@ impl<Q: Query> Walk<'_, Q> {
         changed
     }
 
+    /// What lies between these t' from a parallel ray's own origin, as the bundle counts it.
+    #[inline(always)]
+    fn in_bundle<S: Simd>(&self, ray: usize, low: S::V8, high: S::V8) -> (S::V8, S::V8) {
+        let (splat, start) = (S::V8::splat, self.bundle.start_of::<P>(ray));
+        let low = low.add(splat(start)).mul_add(splat(1.0 - SLACK), splat(-TINY));
+        let high = high.add(splat(start)).mul_add(splat(1.0 + SLACK), splat(TINY));
+        (low, high)
+    }
+
     /// Of a ray that starts where the bundle does.
     #[inline(always)]
     fn range(&self, ray: usize) -> Range {
@@ -166,30 +177,35 @@ impl<Q: Query> Walk<'_, Q> {
         Range { first: bundle.first, begin: bundle.begin.0[ray], sure: found.sure.0[ray], limit: found.limit.0[ray] }
     }
 
-    /// Of a turned ray, from its own origin.
+    /// Of a ray that is looked at from its own origin.
     #[inline(always)]
     fn own_range(&self, ray: usize) -> Range {
-        let depth = self.bundle.depth.0[ray];
-        let (tmin, tmax) = (self.rays[ray].tmin * depth, self.rays[ray].tmax * depth);
-        Range {
+        let Self { bundle, found, .. } = self;
+        let (depth, tmin, tmax) = (bundle.depth.0[ray], self.rays[ray].tmin, self.rays[ray].tmax);
+        let mut range = Range {
             // Not a little below 0, whose products are slow.
-            first: (tmin * (1.0 - SLACK) - TINY).max(0.0),
-            begin: tmin * (1.0 + SLACK) + TINY,
-            sure: tmax * (1.0 - SLACK) - TINY,
-            limit: tmax * (1.0 + SLACK) + TINY,
+            first: (tmin * depth * (1.0 - SLACK) - TINY).max(0.0),
+            begin: tmin * depth * (1.0 + SLACK) + TINY,
+            // A t that overflows is no hit.
+            sure: tmax.min(f32::MAX) * depth * (1.0 - SLACK) - TINY,
+            limit: tmax * depth * (1.0 + SLACK) + TINY,
+        };
+        if P::IS_PARALLEL && !Q::ANY {
+            range.limit = range.limit.min(found.limit.0[ray] * (1.0 + SLACK) - bundle.start_of::<P>(ray) + TINY);
         }
+        range
     }
 
-    /// Where a ray starts, as far as its bundle's way tells: turned rays are looked at from their own origins.
+    /// Where a ray starts, as far as its bundle's way tells: some are looked at from their own origins.
     #[inline(always)]
-    fn start(&self, ray: usize, is_turned: bool) -> [f32; 3] {
-        if is_turned { self.own_origin(ray) } else { self.bundle.origin }
+    fn start(&self, ray: usize, apart: bool) -> [f32; 3] {
+        if apart { self.own_origin(ray) } else { self.bundle.origin }
     }
 
-    /// Where a turned ray starts.
+    /// Where a ray of a turned or a parallel bundle starts.
     #[inline(always)]
     fn own_origin(&self, ray: usize) -> [f32; 3] {
-        if self.place == FIXED {
+        if P::IS_PARALLEL || self.place == FIXED {
             return self.rays[ray].origin.to_array();
         }
         let ([x, y, z], [dx, dy, dz]) = (self.bundle.origin, &self.bundle.direction);
@@ -201,7 +217,7 @@ impl<Q: Query> Walk<'_, Q> {
     /// blur, which has room for the rounding of both already.
     #[inline(always)]
     fn blur(&self) -> Blur {
-        if self.place == FIXED {
+        if P::IS_PARALLEL || self.place == FIXED {
             return Blur::NONE;
         }
         let Bundle { blur, largest, is_turned, .. } = *self.bundle;
@@ -212,9 +228,15 @@ impl<Q: Query> Walk<'_, Q> {
 
 /// A ray's edge functions, and a bit for every triangle that these leave.
 #[inline(always)]
-fn sides<S: Simd>(seen: &Seen<S::V8>, block: &Block, bundle: &Bundle, ray: usize, blur: Blur) -> (Sides<S::V8>, u32) {
+fn sides<S: Simd, P: Pencil>(
+    seen: &Seen<S::V8>,
+    block: &Block,
+    bundle: &Bundle,
+    ray: usize,
+    blur: Blur,
+) -> (Sides<S::V8>, u32) {
     let splat = S::V8::splat;
-    let (p, q) = (bundle.slope[0].0[ray], bundle.slope[1].0[ray]);
+    let [p, q] = if P::IS_PARALLEL { bundle.common } else { [bundle.across[0].0[ray], bundle.across[1].0[ray]] };
     let (sx, sy) = (splat(-bundle.forward * p), splat(-bundle.forward * q));
     let Seen { x, y, z } = seen;
     let sheared = Sheared {
@@ -282,7 +304,7 @@ fn meet_planes<S: Simd>(
     let Planes { normal: [nx, ny, nz], size: [sx, sy, sz] } = planes;
     // A turned bundle runs against its rays.
     let way = if bundle.is_turned { -1.0 } else { 1.0 };
-    let (p, q) = (splat(way * bundle.slope[0].0[ray]), splat(way * bundle.slope[1].0[ray]));
+    let (p, q) = (splat(way * bundle.across[0].0[ray]), splat(way * bundle.across[1].0[ray]));
     let slope = p.mul_add(*nx, q.mul_add(*ny, nz.mul(splat(way * bundle.forward))));
     let slope_error = sx.add(*sy).add(*sz).mul(splat(16.0 * UNIT_ROUNDOFF * bundle.largest));
     // t' = -height / slope. Turned so that it is positive where the slope is.

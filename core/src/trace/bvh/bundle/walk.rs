@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 
 use super::found::{BundleFound, DONE};
 use super::meeting::Meeting;
+use super::pencil::Pencil;
 use super::rays::{Bundle, SLACK, TINY};
 use super::rows;
 use super::way::{Entry, Goal, Way};
@@ -12,6 +13,7 @@ use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::hits::coplanar::Spot;
+use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::node::Child;
 use crate::trace::bvh::query::Query;
@@ -23,12 +25,12 @@ const FEW: u32 = 8;
 
 /// [`FEW`] in a tree that reaches that far. [`Edges`](super::edges::Edges) must not overflow; where they might, every ray is by itself.
 #[inline(always)]
-pub(super) fn few(bundle: &Bundle, reach: Vec3) -> u32 {
-    if bundle.may_overflow(reach) { RAYS as u32 } else { FEW }
+pub(super) fn few<P: Pencil>(bundle: &Bundle, reach: Vec3) -> u32 {
+    if bundle.may_overflow::<P>(reach) { RAYS as u32 } else { FEW }
 }
 
 /// A bundle on its way through a tree of triangles.
-pub(super) struct Walk<'a, Q> {
+pub(super) struct Walk<'a, Q, P> {
     pub bvh: &'a Bvh,
     /// Of the triangles.
     pub place: u32,
@@ -40,10 +42,10 @@ pub(super) struct Walk<'a, Q> {
     pub found: &'a mut BundleFound,
     /// As [`few`] says.
     pub few: u32,
-    pub query: PhantomData<Q>,
+    pub query: PhantomData<(Q, P)>,
 }
 
-impl<Q> Goal for Walk<'_, Q> {
+impl<Q, P> Goal for Walk<'_, Q, P> {
     #[inline(always)]
     fn tree(&self) -> &Tree {
         self.tree.tree()
@@ -58,9 +60,10 @@ impl<Q> Goal for Walk<'_, Q> {
     }
 }
 
-impl<Q: Query> Walk<'_, Q> {
+impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
     #[inline(always)]
-    pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_>, rays: u64) {
+    pub fn run<S: Simd>(mut self, stack: &mut [Entry], mut way: Way<'_, P>, rays: u64) {
+        debug_assert!(!P::IS_PARALLEL || self.place == FIXED, "parallel rays go through placed objects one by one");
         self.found.enter(self.bundle, way.wanted);
         way.measure::<S>(&self.found.limit);
         stack[0] = Entry::root(rays & way.wanted);
@@ -129,8 +132,9 @@ impl<Q: Query> Walk<'_, Q> {
             return true;
         }
         let depth = bundle.depth.0[ray];
-        found.sure.0[ray] = hit.t.next_down() * depth * (1.0 - SLACK) - TINY;
-        found.limit.0[ray] = found.nearest[ray].limit() * depth * (1.0 + SLACK) + TINY;
+        let start = bundle.start_of::<P>(ray);
+        found.sure.0[ray] = (hit.t.next_down() * depth + start) * (1.0 - SLACK) - TINY;
+        found.limit.0[ray] = (found.nearest[ray].limit() * depth + start) * (1.0 + SLACK) + TINY;
         found.nearest[ray].limit() < before
     }
 }

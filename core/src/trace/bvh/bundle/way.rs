@@ -4,7 +4,9 @@
 //! instructions and more time (docs/PERFORMANCE.md).
 
 use std::hint::select_unpredictable;
+use std::marker::PhantomData;
 
+use super::pencil::Pencil;
 use super::rays::Bundle;
 use super::slab::{Boxes, BundleSlab};
 use crate::trace::bvh::node::{Child, WIDTH};
@@ -41,21 +43,22 @@ pub(super) trait Goal {
 }
 
 /// Children that wait to be visited, the nearest on top, and the bundle's way to them.
-pub(super) struct Way<'a> {
+pub(super) struct Way<'a, P> {
     pub bundle: &'a Bundle,
     pub slab: BundleSlab,
     /// A bit for every ray that matters.
     pub wanted: u64,
     /// The largest limit of all rays.
     pub most: f32,
+    pub pencil: PhantomData<P>,
 }
 
-impl<'a> Way<'a> {
+impl<'a, P: Pencil> Way<'a, P> {
     /// Of the first `count` rays of the bundle.
     #[inline(always)]
     pub fn new(bundle: &'a Bundle, slab: BundleSlab, count: usize) -> Self {
         let wanted = !0 >> (RAYS - count.clamp(1, RAYS));
-        Self { bundle, slab, wanted, most: 0.0 }
+        Self { bundle, slab, wanted, most: 0.0, pencil: PhantomData }
     }
 
     #[inline(always)]
@@ -81,12 +84,12 @@ impl<'a> Way<'a> {
                 return Some(next);
             }
             let node = tree.node(next.child);
-            let boxes = self.slab.boxes::<S>(node, self.bundle.first);
+            let boxes = self.slab.boxes::<S, P>(node, self.bundle.first);
             let (mask, near, known) = if next.rays.count_ones() as usize <= ONE_BY_ONE {
                 let (mask, near, rays) = self.enter_one_by_one::<S>(goal.limit(), &boxes, next.rays);
                 (mask, near, Some(rays))
             } else {
-                let (mask, near) = self.slab.enter::<S>(&boxes, self.most);
+                let (mask, near) = self.slab.enter::<S, P>(&boxes, self.most);
                 (mask, near, None)
             };
             let (mut nears, mut children) = ([0; WIDTH], [Child::NONE; WIDTH]);
@@ -118,7 +121,7 @@ impl<'a> Way<'a> {
         mut rays: u64,
     ) -> (<S::V8 as Vector>::Mask, S::V8, OneByOne) {
         let splat = S::V8::splat;
-        let [p, q] = &self.bundle.reciprocal;
+        let [p, q] = &self.bundle.slabs;
         let [px, qx, zx] = &boxes.near;
         let [py, qy, zy] = &boxes.far;
         let (mut all, mut near) = (splat(0.0).less(splat(0.0)), splat(f32::INFINITY));
@@ -130,8 +133,8 @@ impl<'a> Way<'a> {
             entering.ray[k] = rays & rays.wrapping_neg();
             rays &= rays.wrapping_sub(1);
             let (p, q) = (splat(p.0[ray]), splat(q.0[ray]));
-            let first = S::V8::load(px).mul(p).max(S::V8::load(qx).mul(q)).max(S::V8::load(zx));
-            let last = S::V8::load(py).mul(p).min(S::V8::load(qy).mul(q));
+            let first = P::meet(S::V8::load(px), p).max(P::meet(S::V8::load(qx), q)).max(S::V8::load(zx));
+            let last = P::meet(S::V8::load(py), p).min(P::meet(S::V8::load(qy), q));
             let last = last.min(S::V8::load(zy).min(splat(limit.0[ray])));
             let enter = first.at_most(last);
             (all, near) = (all.or(enter), near.min(first));
@@ -146,12 +149,12 @@ impl<'a> Way<'a> {
         let splat = S::Wide::splat;
         let near = [splat(boxes.near[0][slot]), splat(boxes.near[1][slot]), splat(boxes.near[2][slot])];
         let far = [splat(boxes.far[0][slot]), splat(boxes.far[1][slot]), splat(boxes.far[2][slot])];
-        let [p, q] = &self.bundle.reciprocal;
+        let [p, q] = &self.bundle.slabs;
         let mut entering = 0;
         for group in 0..RAYS / S::Wide::LANES {
             let (p, q, limit) = (S::Wide::at(p, group), S::Wide::at(q, group), S::Wide::at(limit, group));
-            let first = near[0].mul(p).max(near[1].mul(q)).max(near[2]);
-            let last = far[0].mul(p).min(far[1].mul(q)).min(far[2].min(limit));
+            let first = P::meet(near[0], p).max(P::meet(near[1], q)).max(near[2]);
+            let last = P::meet(far[0], p).min(P::meet(far[1], q)).min(far[2].min(limit));
             entering |= u64::from(first.at_most(last).bits()) << (S::Wide::LANES * group);
         }
         entering & rays

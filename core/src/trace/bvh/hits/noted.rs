@@ -94,33 +94,55 @@ impl TriangleTree {
         FourHits { quad, primitive, geometry, instance }
     }
 
-    /// A triangle that rays hit for sure which all start in `origin`; `id` is as in [`Self::offer_one`].
+    /// A triangle that several rays hit for sure; `id` is as in [`Self::offer_one`].
     #[inline(always)]
-    pub fn shared<S: Simd>(&self, origin: [S::D4; 3], id: u32) -> Shared<S::D4> {
+    pub fn shared<S: Simd>(&self, id: u32) -> Shared<[[S::D4; 3]; 3]> {
         let mut scratch = None;
         let triangle = self.leaves().lane(id, &mut scratch);
         let [a, b, c] = triangle.block.triangle(triangle.lane);
-        let corners = [splat::<S>(a), splat::<S>(b), splat::<S>(c)];
         let (part, primitive) = triangle.number();
-        Shared { id, seen: Seen::new(origin, corners), primitive, part: self.part(part) }
+        let triangle = [splat::<S>(a), splat::<S>(b), splat::<S>(c)];
+        Shared { id, triangle, primitive, part: self.part(part) }
     }
 }
 
-/// A triangle that is hit by several rays from one origin: what the rays have in common is computed once.
-pub(in crate::trace::bvh) struct Shared<D> {
+/// A triangle that is hit by several rays: what they have in common is looked up once, and computed once. It is known by its corners, or as seen from one origin.
+pub(in crate::trace::bvh) struct Shared<T> {
     /// The triangle's.
     pub id: u32,
-    seen: Seen<D>,
+    triangle: T,
     primitive: u32,
     part: PartId,
 }
 
-impl<D: Doubles> Shared<D> {
+impl<D: Doubles> Shared<[[D; 3]; 3]> {
+    /// For rays that all start there.
+    #[inline(always)]
+    pub fn from(self, origin: [D; 3]) -> Shared<Seen<D>> {
+        let Self { id, triangle, primitive, part } = self;
+        Shared { id, triangle: Seen::new(origin, triangle), primitive, part }
+    }
+
     /// As [`TriangleTree::hits`].
     #[inline(always)]
-    pub fn hits(&self, direction: [D; 3]) -> FourHits {
+    pub fn hits(&self, rays: &Rays<D>) -> FourHits {
+        self.hits_of(&Quad::new(rays.origin, rays.direction, self.triangle))
+    }
+}
+
+impl<D: Doubles> Shared<Seen<D>> {
+    /// As [`TriangleTree::hits`].
+    #[inline(always)]
+    pub fn along(&self, direction: [D; 3]) -> FourHits {
+        self.hits_of(&self.triangle.along(direction))
+    }
+}
+
+impl<T> Shared<T> {
+    #[inline(always)]
+    fn hits_of<D: Doubles>(&self, quad: &Quad<D>) -> FourHits {
         FourHits {
-            quad: self.seen.along(direction).hits(),
+            quad: quad.hits(),
             primitive: [self.primitive; 4],
             geometry: [self.part.geometry; 4],
             instance: [self.part.instance; 4],

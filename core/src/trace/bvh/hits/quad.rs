@@ -7,7 +7,7 @@ use crate::trace::bvh::simd::doubles::{cross, dot, minus, size};
 use crate::trace::bvh::simd::{Array, Doubles};
 
 /// Four triangles, or one for all four, as seen from the origins of four rays: what a ray's direction makes the numbers of a hit with.
-pub(super) struct Seen<D> {
+pub(in crate::trace::bvh) struct Seen<D> {
     /// Opposite to the second and third corner.
     sides: [[D; 3]; 2],
     normal: [D; 3],

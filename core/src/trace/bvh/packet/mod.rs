@@ -1,4 +1,4 @@
-//! Eight or sixteen rays that go the same way: they walk as one, and meet triangles eight at a time.
+//! Eight or sixteen rays of a caller's that go the same way: they walk as one, and meet triangles eight at a time.
 //!
 //! Interfaces that hand over packets (Embree's C functions) do so for speed, and have not enough rays at once for a bundle of 64
 //! ([`super::bundle`]), whose making takes longer than eight rays do. So as little as possible is made ready:
@@ -31,7 +31,7 @@ use super::query::{Closest, Occluded};
 use super::simd::isa::{self, Kernel};
 use super::simd::{Array, Mask, Simd, Vector, size};
 use crate::math::{Aabb, Vec3};
-use crate::ray::{Hit, Ray};
+use crate::ray::Ray;
 use alone::{ClosestAlone, OccludedAlone};
 use beam::{Beam, WIDE};
 use doubts::Doubts;
@@ -171,19 +171,6 @@ impl PacketHits {
         geometry: [0; RAYS],
         instance: [0; RAYS],
     };
-
-    /// What the ray of a lane hits.
-    #[inline]
-    pub(super) fn hit(&self, lane: usize) -> Option<Hit> {
-        (self.lanes >> lane & 1 != 0).then(|| Hit {
-            t: self.t[lane],
-            u: self.u[lane],
-            v: self.v[lane],
-            primitive: self.primitive[lane],
-            geometry: self.geometry[lane],
-            instance: self.instance[lane],
-        })
-    }
 
     /// The hit of one ray.
     #[inline(always)]
