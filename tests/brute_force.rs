@@ -493,13 +493,15 @@ fn parallel_bundles() {
         let mesh = scenes::bumpy_sphere(12, 0.2, 6);
         Mesh::new(mesh.positions.iter().map(|&p| p * size).collect(), mesh.triangles.to_vec())
     });
-    // Fixed triangles between placed objects.
+    // Fixed triangles among those of placed objects, so that either may be in front.
     let mut mixed = scenes::instanced(5);
-    let fixed = scenes::soup(400, 0.5, 9);
-    let positions = fixed.positions.iter().map(|&p| p * 3.0).collect();
-    mixed.geometries.push(Geometry::Mesh(Mesh::new(positions, fixed.triangles.to_vec())));
-    mixed.groups.push(Group { name: String::new(), geometries: 3..4 });
-    mixed.instances.push(Instance { group: 3, transform: DAffine3::IDENTITY, ..mixed.instances[0].clone() });
+    for (geometry, size, copies) in [(3, 0.4, 1), (4, 0.3, 6)] {
+        mixed.geometries.push(Geometry::Mesh(scenes::soup(300, size, 9 + geometry as u64)));
+        mixed.groups.push(Group { name: String::new(), geometries: geometry..geometry + 1 });
+        let turned = |i: u8| DAffine3::from_rotation_y(f64::from(i));
+        let of = |i| Instance { group: geometry, transform: turned(i), ..mixed.instances[0].clone() };
+        mixed.instances.extend((0..copies).map(of).collect::<Vec<_>>());
+    }
     let scenes = meshes.into_iter().chain(sized).map(scenes::of_mesh).chain([mixed]);
     for (i, scene) in scenes.enumerate() {
         let world = World::new(&scene).expect("sound");
