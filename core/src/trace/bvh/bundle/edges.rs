@@ -49,20 +49,9 @@ impl Edges {
     /// Also a bit for every triangle that some ray of the bundle may hit before `most`; none if there is none.
     #[inline(always)]
     pub fn new<S: Simd>(block: &Block, bundle: &Bundle, most: f32) -> Option<(u32, Self)> {
-        let corners = &block.corners;
         let splat = S::V8::splat;
-        // On the bundle's axes from here on: they turn in a cycle, so a cross product is what it was.
-        let axes = axes(bundle.axis);
-        let [p, q, along] = axes;
-        let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
-        let (pa, pb, pc) =
-            (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
-        let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
-        let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
-        let n = cross(eb, ec);
-        let height = a[0].mul(n[0]).add(a[1].mul(n[1])).add(a[2].mul(n[2]));
-        let far = size(a).max(size(b)).max(size(c));
-        let long = size(ea).max(size(eb)).max(size(ec));
+        let Corners { relative: [a, b, c], opposite: [ea, eb, ec], normal: n, height, far, long } =
+            Corners::new::<S>(block, bundle);
 
         let u = UNIT_ROUNDOFF;
         let tiny = splat(1e-36);
@@ -132,7 +121,49 @@ impl Edges {
     }
 }
 
+/// The corners of eight triangles as a bundle sees them.
+pub(super) struct Corners<V> {
+    /// To its origin, on its axes; these turn in a cycle, so that a cross product is what it was.
+    pub relative: [[V; 3]; 3],
+    /// The edges that are opposite to them.
+    pub opposite: [[V; 3]; 3],
+    pub normal: [V; 3],
+    /// The scalar product of a corner with the normal.
+    pub height: V,
+    /// The largest components of a corner and of an edge.
+    pub far: V,
+    pub long: V,
+}
+
+impl<V: Vector> Corners<V> {
+    #[inline(always)]
+    pub fn new<S: Simd<V8 = V>>(block: &Block, bundle: &Bundle) -> Self {
+        let (corners, axes) = (&block.corners, axes(bundle.axis));
+        let origin = origin::<S>(bundle);
+        let (pa, pb, pc) =
+            (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
+        let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
+        let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
+        let n = cross(eb, ec);
+        Self {
+            relative: [a, b, c],
+            opposite: [ea, eb, ec],
+            normal: n,
+            height: a[0].mul(n[0]).add(a[1].mul(n[1])).add(a[2].mul(n[2])),
+            far: size(a).max(size(b)).max(size(c)),
+            long: size(ea).max(size(eb)).max(size(ec)),
+        }
+    }
+}
+
 // Functions, not closures: these are inlined into the kernel of the instruction set without fail.
+
+/// A bundle's origin, on its axes.
+#[inline(always)]
+pub(super) fn origin<S: Simd>(bundle: &Bundle) -> [S::V8; 3] {
+    let [p, q, along] = axes(bundle.axis);
+    [S::V8::splat(bundle.origin[p]), S::V8::splat(bundle.origin[q]), S::V8::splat(bundle.origin[along])]
+}
 
 /// A corner of each triangle, on the given axes.
 #[inline(always)]
@@ -153,7 +184,7 @@ pub(super) fn minus<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
 }
 
 #[inline(always)]
-pub(super) fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
+fn cross<V: Vector>(p: [V; 3], q: [V; 3]) -> [V; 3] {
     [p[1].mul_sub(q[2], p[2].mul(q[1])), p[2].mul_sub(q[0], p[0].mul(q[2])), p[0].mul_sub(q[1], p[1].mul(q[0]))]
 }
 

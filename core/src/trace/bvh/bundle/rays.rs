@@ -15,7 +15,7 @@
 
 use std::marker::PhantomData;
 
-use super::pencil::Pencil;
+use super::pencil::{Central, Pencil};
 use super::range::Range;
 use super::rows::Rows;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -256,12 +256,7 @@ impl Bundle {
                 splat(1.0).div(slope).put(&mut self.slabs[i], group);
                 (low[i], high[i]) = (slope.min(low[i]), slope.max(high[i]));
             }
-            let (begin, start) = (S::Wide::at(&range.begin, group), S::Wide::at(&range.start, group));
-            let (end, limit) = (S::Wide::at(&range.sure, group), S::Wide::at(&range.limit, group));
-            begin.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.begin, group);
-            end.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).put(&mut self.end, group);
-            limit.mul(depth).mul_add(splat(1.0 + SLACK), splat(TINY)).put(&mut self.limit, group);
-            first = start.mul(depth).mul_add(splat(1.0 - SLACK), splat(-TINY)).min(first);
+            first = self.bound::<S, Central>(range, group).min(first);
         }
         self.first = first.smallest().max(0.0);
         let low = [low[0].smallest(), low[1].smallest(), low[2].smallest()];
@@ -280,7 +275,23 @@ impl Bundle {
         if is_small && self.largest <= STEEPEST { Fit::Whole } else { Fit::None }
     }
 
-    /// What is so far from where each ray of a group starts, from the bundle's origin.
+    /// Sets which t' of a group are of interest, by `depth`, and tells the least of them, rounded outwards.
+    #[inline(always)]
+    pub fn bound<S: Simd, P: Pencil>(&mut self, range: &Range, group: usize) -> S::Wide {
+        let splat = S::Wide::splat;
+        let (up, down, tiny, less) = (splat(1.0 + SLACK), splat(1.0 - SLACK), splat(TINY), splat(-TINY));
+        let depth = S::Wide::at(&self.depth, group);
+        let begin = self.beyond_start::<S, P>(S::Wide::at(&range.begin, group).mul(depth), group);
+        let end = self.beyond_start::<S, P>(S::Wide::at(&range.sure, group).mul(depth), group);
+        let limit = self.beyond_start::<S, P>(S::Wide::at(&range.limit, group).mul(depth), group);
+        let first = self.beyond_start::<S, P>(S::Wide::at(&range.start, group).mul(depth), group);
+        begin.mul_add(up, tiny).put(&mut self.begin, group);
+        end.mul_add(down, less).put(&mut self.end, group);
+        limit.mul_add(up, tiny).put(&mut self.limit, group);
+        first.mul_add(down, less)
+    }
+
+    /// What is so far from where each ray of a group starts, from the bundle's origin. Neither of both is below 0, so that the sum is not less precise than they are.
     #[inline(always)]
     pub fn beyond_start<S: Simd, P: Pencil>(&self, far: S::Wide, group: usize) -> S::Wide {
         if P::IS_PARALLEL { far.add(S::Wide::at(&self.start[2], group)) } else { far }

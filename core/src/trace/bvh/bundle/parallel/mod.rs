@@ -10,7 +10,6 @@
 //! **Boxes.** A ray meets x = c at c / k - p / k. In lengths, 1 / k, product and difference round p by 4 u R; what they round c by is that of a bundle with a point
 //! in common. A slope next to zero is taken for 2^-40, for which boxes are wider by 2^-39 of how far rays go in the tree.
 //!
-//!
 //! **Placed objects.** In the tree of placements they are a bundle; from there on each goes by itself, for in an object's coordinates each of their origins would be
 //! off in its own way. Shadow rays wait there for those of other bundles, and fly.
 //!
@@ -22,7 +21,7 @@ use super::edges::Edges;
 use super::footprint::Footprints;
 use super::pencil::Pencil;
 use super::range::Range;
-use super::rays::{AHEAD, Bundle, Fit, SLACK, TINY, store};
+use super::rays::{AHEAD, Bundle, Fit, store};
 use super::rows::Rows;
 use super::slab::BundleSlab;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
@@ -44,7 +43,7 @@ const LEAST_SLOPE: f32 = 1.0 / (1_u64 << 40) as f32;
 const SHORTEST: f32 = 1e-30;
 
 /// Nor do directions that are longer: a t next to 0 is rounded by half of the least number there is, and in t' that is so many times as much, which has to be nothing beside
-/// [`TINY`].
+/// [`TINY`](super::rays::TINY).
 const LONGEST: f32 = 1e8;
 
 /// Whether rays may have a direction in common, and no point.
@@ -148,14 +147,7 @@ impl Bundle {
                 (low[i], high[i]) = (across.min(low[i]), across.max(high[i]));
             }
             depth.put(&mut self.depth, group);
-            let (begin, start) = (S::Wide::at(&range.begin, group), S::Wide::at(&range.start, group));
-            let (end, limit) = (S::Wide::at(&range.sure, group), S::Wide::at(&range.limit, group));
-            // Neither is below 0, so that the sum is not less precise than they are.
-            let (outwards, inwards, tiny, less) = (splat(1.0 + SLACK), splat(1.0 - SLACK), splat(TINY), splat(-TINY));
-            begin.mul(depth).add(z).mul_add(outwards, tiny).put(&mut self.begin, group);
-            end.mul(depth).add(z).mul_add(inwards, less).put(&mut self.end, group);
-            limit.mul(depth).add(z).mul_add(outwards, tiny).put(&mut self.limit, group);
-            first = start.mul(depth).add(z).mul_add(inwards, less).min(first);
+            first = self.bound::<S, Parallel>(range, group).min(first);
         }
         self.first = first.smallest().max(0.0);
         (self.low, self.high) = ([low[0].smallest(), low[1].smallest()], [high[0].largest(), high[1].largest()]);

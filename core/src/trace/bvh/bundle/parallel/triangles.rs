@@ -19,7 +19,7 @@
 
 use crate::math::UNIT_ROUNDOFF;
 use crate::trace::bvh::block::{Block, LANES};
-use crate::trace::bvh::bundle::edges::{Edges, corner, cross, ends, minus};
+use crate::trace::bvh::bundle::edges::{Corners, Edges, corner, ends, minus, origin};
 use crate::trace::bvh::bundle::footprint::Footprints;
 use crate::trace::bvh::bundle::rays::Bundle;
 use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes, size};
@@ -27,18 +27,9 @@ use crate::trace::bvh::simd::{Array, Mask, Simd, Vector, axes, size};
 /// The edges of a block's triangles, as [`Pencil::edges`].
 #[inline(always)]
 pub(super) fn edges<S: Simd>(block: &Block, bundle: &Bundle, most: f32) -> Option<(u32, Edges)> {
-    let corners = &block.corners;
     let splat = S::V8::splat;
-    let axes = axes(bundle.axis);
-    let [p, q, along] = axes;
-    let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
-    let (pa, pb, pc) = (corner::<S>(corners, 0, axes), corner::<S>(corners, 1, axes), corner::<S>(corners, 2, axes));
-    let (a, b, c) = (minus(pa, origin), minus(pb, origin), minus(pc, origin));
-    let (ea, eb, ec) = (minus(pc, pb), minus(pa, pc), minus(pb, pa));
-    let n = cross(eb, ec);
-    let height = a[0].mul(n[0]).add(a[1].mul(n[1])).add(a[2].mul(n[2]));
-    let far = size(a).max(size(b)).max(size(c));
-    let long = size(ea).max(size(eb)).max(size(ec));
+    let Corners { relative: [a, b, c], opposite: [ea, eb, ec], normal: n, height, far, long } =
+        Corners::new::<S>(block, bundle);
 
     let shear = shear_of::<S>(bundle);
     let (sa, sb, sc) = (shadow(a, shear), shadow(b, shear), shadow(c, shear));
@@ -109,13 +100,12 @@ pub(super) fn edges<S: Simd>(block: &Block, bundle: &Bundle, most: f32) -> Optio
 #[inline(always)]
 pub(super) fn footprints<S: Simd>(corners: &[[[f32; LANES]; 3]; 3], bundle: &Bundle) -> Footprints {
     let splat = S::V8::splat;
-    let [p, q, along] = axes(bundle.axis);
-    let origin = [splat(bundle.origin[p]), splat(bundle.origin[q]), splat(bundle.origin[along])];
+    let (axes, origin) = (axes(bundle.axis), origin::<S>(bundle));
     let shear = shear_of::<S>(bundle);
     let (mut least, mut most) = ([splat(f32::INFINITY); 2], [splat(f32::NEG_INFINITY); 2]);
     let mut far = splat(0.0);
     for k in 0..3 {
-        let corner = minus(corner::<S>(corners, k, [p, q, along]), origin);
+        let corner = minus(corner::<S>(corners, k, axes), origin);
         far = size(corner).max(far);
         let shadow = shadow(corner, shear);
         for i in 0..2 {
