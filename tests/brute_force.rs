@@ -564,6 +564,27 @@ fn a_t_that_overflows_is_no_hit() {
     }
 }
 
+/// What lies behind a ray by a t that rounds to -0 is no hit, and ahead of it by one that rounds to 0 is one: alone, of one point, side by side.
+#[test]
+fn a_t_that_vanishes_keeps_its_side() {
+    let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    let scene = scenes::of_mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2]]));
+    let world = World::placed(&scene).expect("sound");
+    for long in [1e19, 1e20, 1e24, 1e30] {
+        for (height, expected) in [(-1e-26, 0), (1e-26, 64), (-1e-30, 0), (1e-30, 64), (0.0, 64)] {
+            let at = |i: u8| Vec3::new(f32::from(i % 8), f32::from(i / 8), 0.0) / 16.0;
+            let (from, way) = (Vec3::new(0.0, 0.0, height), Vec3::new(0.1, 0.2, -1.0) * long);
+            let side_by_side: Vec<Ray> = (0..64).map(|i| Ray::new(from + at(i), way)).collect();
+            let fan: Vec<Ray> = (0..64).map(|i| Ray::new(from, way + at(i) * long)).collect();
+            for rays in [side_by_side, fan] {
+                assert_eq!(assert_parity(&scene, &rays), expected, "alone, from {height:e}, length {long:e}");
+                let hits = assert_parity_of_batches(&world, &Brute::new(&world), &[rays]);
+                assert_eq!(hits, expected, "from {height:e}, length {long:e}");
+            }
+        }
+    }
+}
+
 /// What overflows in f32 on the way is neither lost for it nor believed.
 #[test]
 fn products_that_overflow() {

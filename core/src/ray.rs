@@ -2,7 +2,7 @@
 
 use crate::math::Vec3;
 
-/// A half-line with a valid range. A hit counts for `tmin <= t <= tmax`.
+/// A half-line with a valid range. A hit counts if it is not behind the origin, and for `tmin <= t <= tmax`, t being rounded to f32.
 ///
 /// In memory in the order of the fields, so that what a tree is asked for, the first eight f32, is loaded as two vectors of four.
 #[repr(C)]
@@ -43,6 +43,14 @@ impl Ray {
             && self.direction.abs().max_element() >= f32::MIN_POSITIVE
             && self.tmin >= 0.0
             && self.tmin <= self.tmax
+    }
+
+    /// Whether a hit at `t` counts: not behind the origin, however little, and within the range once it is rounded to f32.
+    #[inline]
+    pub(crate) fn reaches(&self, t: f64) -> bool {
+        let rounded = t as f32;
+        // Behind by less than f32 can tell would round to -0, which is no less than 0.
+        t >= 0.0 && self.tmin <= rounded && rounded <= self.tmax && rounded.is_finite()
     }
 }
 

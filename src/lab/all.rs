@@ -127,9 +127,7 @@ impl Setup<'_> {
         let mut expected: Vec<Answer> = Vec::new();
         let mut rows = Vec::new();
         for entrant in Entrant::all() {
-            if control.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed)) {
-                return Err(Error::Interrupted);
-            }
+            control.check()?;
             let is_exact = entrant.is_exact(self.options);
             let start = Instant::now();
             let built = entrant.build(world, self.options)?;

@@ -117,11 +117,8 @@ impl<A: Tracer, B: Tracer> Setup<'_, A, B> {
 /// [`Error::Interrupted`] once `control.cancel` is set.
 pub fn shoot<T: Tracer>(tracer: &T, world: &World, count: u64, seed: u64, control: Control<'_>) -> Result<()> {
     let Some(aim) = Aim::new(world) else { return Ok(()) };
-    let cancelled = || control.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed));
     (0..count).into_par_iter().try_for_each(|index| {
-        if cancelled() {
-            return Err(Error::Interrupted);
-        }
+        control.check()?;
         match aim.ray(seed, index) {
             Query::Closest(ray) => _ = tracer.closest(&ray),
             Query::Occluded(ray) => _ = tracer.occluded(&ray),

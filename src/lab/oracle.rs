@@ -136,7 +136,7 @@ impl Meeting {
         };
         Self {
             touches,
-            in_range: (ray.tmin..=ray.tmax).contains(&rounded),
+            in_range: t.to_f64() >= 0.0 && (ray.tmin..=ray.tmax).contains(&rounded),
             at_range_end: near(ray.tmin) || near(ray.tmax),
             t,
         }

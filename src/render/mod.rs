@@ -9,6 +9,7 @@ mod aov;
 mod camera;
 mod canvas;
 mod checkpoint;
+mod control;
 mod counted;
 mod explain;
 mod film;
@@ -29,12 +30,13 @@ mod whitted;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 pub use adaptive::Adaptive;
 pub use aov::{Aov, Expression};
 pub use checkpoint::Checkpoint;
 pub(crate) use checkpoint::is_checkpoint;
+pub use control::Control;
 pub use counted::Counted;
 pub use explain::{Explanation, HitTrail, LightTrail, RayTrail, SampleTrail};
 pub use filter::Filter;
@@ -63,17 +65,6 @@ use wavefront::Buffers;
 
 /// The most samples that are balanced between where the filter is positive and where it is negative: of more, chance has them nearly so, and to count them takes longer.
 const MOST_BALANCED: u32 = 64;
-
-/// How a running render is watched and stopped.
-#[derive(Clone, Copy, Default)]
-pub struct Control<'a> {
-    /// Set to stop: the render then returns [`Error::Interrupted`].
-    pub cancel: Option<&'a AtomicBool>,
-    /// Called after each tile, from any thread, with the number of its pixels.
-    pub on_tile: Option<&'a (dyn Fn(u64) + Sync)>,
-    /// Called with each tile's pixels, from any thread.
-    pub on_pixels: Option<&'a (dyn Fn(Finished) + Sync)>,
-}
 
 /// A scene, a camera and settings, ready to be traced by any engine.
 pub struct Renderer<'a> {
@@ -208,11 +199,10 @@ impl<'a> Renderer<'a> {
         if self.settings.adaptive.is_some() {
             return Ok(self.rounds(tracer, control, None)?.0.image());
         }
-        let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let window = self.window();
         let film = Film::new(window.width, window.height)?;
         self.each_tile(|tile, buffers| {
-            if cancelled() {
+            if control.is_cancelled() {
                 return ControlFlow::Break(());
             }
             let pixels = self.tile(tracer, tile, buffers);
@@ -226,7 +216,8 @@ impl<'a> Renderer<'a> {
             }
             ControlFlow::Continue(())
         });
-        if cancelled() { Err(Error::Interrupted) } else { Ok(film.into_image()) }
+        control.check()?;
+        Ok(film.into_image())
     }
 
     /// How many camera rays of the whole picture hit something. The same loop as [`Renderer::render`] on the same pool, from pixels

@@ -4,7 +4,6 @@
 //! what is known of its pixels. A plain render has none of this: each tile is finished at once, and what a picture holds is its pixels alone.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -64,10 +63,9 @@ impl Renderer<'_> {
             let samples = pixels * u64::from(self.settings.spp);
             return Ok(Picture { image, channels: Vec::new(), texts: Vec::new(), samples, camera_rays: samples });
         }
-        let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         // First, so that nothing is lost that took long.
         let mut channels =
-            self.request.as_ref().map(|request| self.geometry(tracer, request, cancelled)).unwrap_or_default();
+            self.request.as_ref().map(|request| self.geometry(tracer, request, control)).unwrap_or_default();
         let middle_rays = if channels.is_empty() { 0 } else { pixels };
         let (canvas, added) = self.rounds(tracer, control, checkpoint)?;
         let (image, samples) = (canvas.image(), canvas.samples());
@@ -93,7 +91,6 @@ impl Renderer<'_> {
         control: Control<'_>,
         checkpoint: Option<&Checkpoint<'_>>,
     ) -> Result<(Canvas, u64)> {
-        let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         let adaptive = self.settings.adaptive;
         let canvas = Canvas::new(self.window(), adaptive.is_some(), self.request.as_ref())?;
         let (canvas, mut done, keeper) = match checkpoint {
@@ -109,7 +106,7 @@ impl Renderer<'_> {
             if let Some(error) = error.take() {
                 return Err(error);
             }
-            if cancelled() {
+            if control.is_cancelled() {
                 if let Some(keeper) = keeper {
                     keeper.write(canvas, done)?;
                 }
@@ -167,7 +164,7 @@ impl Renderer<'_> {
         let request = self.request.as_ref();
         let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
         self.each_tile(|tile, buffers| {
-            if control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
+            if control.is_cancelled() {
                 return ControlFlow::Break(());
             }
             if request.is_some() {

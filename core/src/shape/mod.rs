@@ -83,12 +83,6 @@ pub struct ShapeHit {
     pub uv: Vec2,
 }
 
-/// Whether t, rounded, lies within the ray's range.
-pub(crate) fn is_within(t: f64, ray: &Ray) -> bool {
-    let t = t as f32;
-    ray.tmin <= t && t <= ray.tmax && t.is_finite()
-}
-
 /// Why numbers make no shape, and what would.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -235,7 +229,7 @@ impl Shape {
     #[doc(hidden)]
     pub fn crossings(&self, ray: &Ray) -> impl Iterator<Item = f64> + use<> {
         let ray = *ray;
-        self.roots(&ray).into_iter().flatten().filter(move |&t| is_within(t, &ray))
+        self.roots(&ray).into_iter().flatten().filter(move |&t| ray.reaches(t))
     }
 
     /// The hit at a known `t`.

@@ -173,14 +173,12 @@ impl Corners for Placed<'_> {
     }
 }
 
-/// The intersection, if `tmin <= t <= tmax` for t rounded to f32.
+/// The intersection, if it is not behind the origin and `tmin <= t <= tmax` for t rounded to f32.
 ///
 /// A function of the ray's line and the corners alone: whoever calls it, in whatever order, gets the same bits.
 #[inline]
 pub fn intersect<Co: Corners>(ray: &Ray, corners: &Co) -> Option<TriangleHit> {
-    let hit = intersect_line(ray.origin.as_dvec3(), ray.direction.as_dvec3(), corners)?;
-    let t = hit.t as f32;
-    (ray.tmin <= t && t <= ray.tmax && t.is_finite()).then_some(hit)
+    intersect_line(ray.origin.as_dvec3(), ray.direction.as_dvec3(), corners).filter(|hit| ray.reaches(hit.t))
 }
 
 /// The intersection with the line from `origin` along `d`, at any t. Whether there is one is exact for these f64, too.

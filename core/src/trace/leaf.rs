@@ -5,7 +5,7 @@ use super::nearest::Nearest;
 use crate::ray::{Hit, Ray};
 use crate::shape::distance::Distance;
 use crate::shape::triangle::{self, Corners};
-use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod, is_within};
+use crate::shape::{Shape, ShapeHit, SphereMethod, TriangleMethod};
 
 /// How primitives are met: exactly, or by a textbook's method where there are several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,7 +100,7 @@ impl Methods {
             Shape::Sphere(sphere) if self.sphere != SphereMethod::Exact => {
                 let of_shape = local.unwrap_or(ray);
                 let mut roots = self.sphere.roots(of_shape, sphere).into_iter().flatten();
-                if let Some(t) = roots.find(|&t| is_within(t, of_shape)) {
+                if let Some(t) = roots.find(|&t| of_shape.reaches(t)) {
                     offer_crossing(nearest, ray, local, shape, t, id);
                 }
             }

@@ -1,6 +1,6 @@
 //! The measurement: build in turn, compare, trace in turn.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use super::report::{BuildRow, Ratio, Report, Spread, TraversalRow, Verdict};
 use super::subject::Subject;
 use crate::error::{Error, Result};
 use crate::lab::{Class, Paired};
+use crate::render::Control;
 use crate::trace::{Tracer, Width, World};
 
 /// The widths that are measured.
@@ -269,7 +270,6 @@ impl Setup<'_> {
         if let Some(on_step) = self.on_step {
             on_step();
         }
-        let cancelled = self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
-        if cancelled { Err(Error::Interrupted) } else { Ok(()) }
+        Control::stopping(self.cancel).check()
     }
 }

@@ -9,17 +9,18 @@
 //! A grid is as good as its resolution: a second series traces one scene with grids from too coarse to too fine.
 
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::lab::Entrant;
 use crate::math::{Random, Vec3};
 use crate::memory::{self, process};
 use crate::ray::Ray;
+use crate::render::Control;
 use crate::scene::{self, Geometry, Material, Mesh, Scene};
 use crate::trace::accel::{Accel, Options, Resolution};
 use crate::trace::{Tracer, World};
@@ -158,7 +159,7 @@ impl Scaling<'_> {
     /// Measures all families, accelerators and numbers in turn, then the grids.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] once `cancel` is set, and those of Embree.
+    /// [`Error::Interrupted`](crate::Error::Interrupted) once `cancel` is set, and those of Embree.
     pub fn run(&self) -> Result<ScalingReport> {
         let mut report = ScalingReport::default();
         for family in Family::ALL {
@@ -239,8 +240,7 @@ impl Scaling<'_> {
         if let Some(on_step) = self.on_step {
             on_step(what);
         }
-        let cancelled = self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
-        if cancelled { Err(Error::Interrupted) } else { Ok(()) }
+        Control::stopping(self.cancel).check()
     }
 }
 

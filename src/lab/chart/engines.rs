@@ -154,8 +154,7 @@ fn measure(
         setup.step("engines: times")?;
         for ((engine, width), rates) in ways.iter().zip(&mut rates) {
             let start = Instant::now();
-            renderers[*width]
-                .render(&*engines[*engine].tracer, Control { cancel: setup.cancel, ..Control::default() })?;
+            renderers[*width].render(&*engines[*engine].tracer, setup.control())?;
             if turn > 0 {
                 rates.push(traced as f64 / start.elapsed().as_secs_f64().max(1e-9) / 1e6);
             }

@@ -26,14 +26,15 @@ mod scales;
 mod scatter;
 mod triangles;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 pub use page::page;
 
 use super::bench::processor;
 use super::drawing::Drawing;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::Image;
+use crate::render::Control;
 
 /// Pixels of a picture for each unit of a drawing.
 const SCALE: f64 = 2.0;
@@ -106,7 +107,7 @@ impl Chart {
     /// Measures and draws.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] once it is to stop, and those of engines and renders.
+    /// [`Error::Interrupted`](crate::Error::Interrupted) once it is to stop, and those of engines and renders.
     pub fn make(self, setup: &Setup<'_>) -> Result<Figure> {
         match self {
             Self::Triangles => triangles::figure(setup),
@@ -123,11 +124,13 @@ impl Setup<'_> {
         if self.quick { quick } else { thorough }
     }
 
+    fn control(&self) -> Control<'_> {
+        Control::stopping(self.cancel)
+    }
+
     /// Says what comes next.
     fn step(&self, what: &str) -> Result<()> {
-        if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            return Err(Error::Interrupted);
-        }
+        self.control().check()?;
         if let Some(on_step) = self.on_step {
             on_step(what);
         }

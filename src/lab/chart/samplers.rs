@@ -77,7 +77,7 @@ pub(super) fn figure(setup: &Setup<'_>) -> Result<Figure> {
     let scene = scene();
     let world = World::new(&scene)?;
     let (bvh, camera) = (Bvh::build(&world), scene.cameras[0].clone());
-    let control = Control { cancel: setup.cancel, ..Control::default() };
+    let control = setup.control();
     let stage = Stage { scene: &scene, world: &world, bvh: &bvh, camera: &camera, control };
     let (width, height) = setup.pick((64, 48), (160, 120));
     let (reference_spp, turns) = (setup.pick(1024, 8192), setup.pick(5, 15));

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -11,7 +10,7 @@ use super::expected::expected;
 use super::report::{Cell, Replay, Report, Row};
 use super::verdict::{Fault, Gate, Tally, Verdict};
 use super::{Case, Column, Probe, hex};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::lab::tree::{Exact, Oracle};
 use crate::ray::{Hit, Ray};
 use crate::render::Control;
@@ -54,7 +53,7 @@ impl Setup {
     /// Runs it all; `control.on_tile` hears of every case.
     ///
     /// # Errors
-    /// [`Error::Interrupted`], and those of Embree.
+    /// [`Error::Interrupted`](crate::Error::Interrupted), and those of Embree.
     pub fn run(&self, control: Control<'_>) -> Result<Report> {
         let mut rows = Vec::new();
         let is_recorded = self.rays == Self::RAYS && self.seed == Self::SEED && !self.in_turns;
@@ -94,9 +93,7 @@ impl Setup {
                 label => format!("case:{}/{label}", row.name),
             };
             for (column, forms) in self.columns.iter().zip(&mut forms) {
-                if control.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                    return Err(Error::Interrupted);
-                }
+                control.check()?;
                 if !column.applies(&probe.world) {
                     continue;
                 }

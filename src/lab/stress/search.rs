@@ -5,7 +5,6 @@
 //! to ask and fail where the numbers are hard, fail on no fewer rays than before. So the search climbs towards the edge
 //! of f32, and the subjects are asked there. Without the climb, uniform rays find next to nothing.
 
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::run::answers;
@@ -74,7 +73,7 @@ impl Search {
             asked >= self.most
                 || found.len() >= self.enough
                 || self.time.is_some_and(|time| start.elapsed() >= time)
-                || control.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
+                || control.is_cancelled()
         };
         while !is_over(asked, &found) {
             let candidate = best.changed(&mut random);

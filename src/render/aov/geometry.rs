@@ -10,8 +10,8 @@ use super::{Aov, Request};
 use crate::image::Channel;
 use crate::math::DVec2;
 use crate::ray::{Hit, Ray};
-use crate::render::Renderer;
 use crate::render::tiles::Tile;
+use crate::render::{Control, Renderer};
 use crate::trace::Tracer;
 
 /// Where it is, in the order of [`Renderer::place_of`]; the value where nothing is hit.
@@ -38,12 +38,12 @@ struct Planes {
 }
 
 impl Renderer<'_> {
-    /// The channels that were asked for; not whole once `cancelled` says so.
+    /// The channels that were asked for; not whole once `control` is cancelled.
     pub(in crate::render) fn geometry<T: Tracer + ?Sized>(
         &self,
         tracer: &T,
         request: &Request,
-        cancelled: impl Fn() -> bool + Sync,
+        control: Control<'_>,
     ) -> Vec<Channel> {
         let pixels = self.window().len();
         let places = PLACES.iter().enumerate().filter(|(_, (aov, ..))| request.wants(aov));
@@ -58,7 +58,7 @@ impl Renderer<'_> {
         let wants_places = !planes.places.is_empty();
         let planes = Mutex::new(planes);
         self.each_tile(|tile, _| {
-            if cancelled() {
+            if control.is_cancelled() {
                 return ControlFlow::Break(());
             }
             let mut rays: Vec<Ray> = tile.pixels().map(|(x, y)| self.middle_ray(x, y)).collect();
