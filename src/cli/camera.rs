@@ -141,7 +141,7 @@ impl CameraArgs {
             let found = scene.cameras.iter().find(|camera| camera.name == *name);
             if found.is_none() && image::holds_channels(Path::new(name)) {
                 let path = Path::new(name);
-                let camera = super::metadata::camera(&image::read_metadata(path)?);
+                let camera = image::read_metadata(path)?.camera();
                 let camera = camera.ok_or_else(|| Error::input(path, "", "does not tell of a camera"))?;
                 return Ok((camera, format!("that of the picture {name}")));
             }

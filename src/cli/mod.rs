@@ -25,7 +25,6 @@ mod leave;
 mod light;
 mod make;
 mod man;
-mod metadata;
 mod named;
 mod outputs;
 mod picture;

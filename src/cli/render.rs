@@ -21,7 +21,6 @@ use super::engine::{BackendArg, Job, Outcome, Pass};
 use super::explain::ExplainArgs;
 use super::frames::{self, FrameArgs};
 use super::light::LightArgs;
-use super::metadata::metadata;
 use super::picture::PictureArgs;
 use super::report::{EngineStats, Stats};
 use super::response::{ResponseArgs, beyond_numbers, too_bright};
@@ -327,7 +326,8 @@ impl RenderArgs {
         let metadata = Metadata {
             samples_per_pixel: Some(mean_spp.round() as u32),
             texts: picture.texts.clone(),
-            ..metadata(&asked.camera, &asked.settings, pass.render_seconds)
+            render_time_seconds: Some(pass.render_seconds),
+            ..Metadata::of_camera(&asked.camera, &asked.settings)
         };
         let response = self.response.choose(&asked.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };

@@ -18,6 +18,7 @@ mod finished;
 mod fog;
 mod identity;
 mod media;
+mod metadata;
 mod path;
 mod rounds;
 pub(crate) mod sampler;
