@@ -35,7 +35,7 @@ Examples:
   twincast bench --scaling --max 10000000 --chart scaling.svg")]
 pub(super) struct BenchArgs {
     /// Scene files, or scenes made by rule: terrainN (2 N^2 triangles), architecture (or architectureN: N storeys), instances (or instancesN: N
-    /// placements of one mesh)
+    /// placements of one mesh). All but terrains get a floor, two triangles that count
     #[arg(value_name = "SCENE", default_value = "terrain1000")]
     scenes: Vec<String>,
 
@@ -249,6 +249,9 @@ mod with_embree {
         }
         if let Some(path) = &args.chart {
             outputs::write_text(path, &chart(&reports, &notes(isa)?))?;
+            if !args.json {
+                say(format_args!("wrote {}", path.display()))?;
+            }
         }
         match &reports[..] {
             _ if !args.json => Ok(()),

@@ -25,7 +25,7 @@ pub(super) struct ChartArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 
-    /// Fewer rays, samples and turns: under two minutes
+    /// Fewer rays, samples and turns: a minute or two
     #[arg(long)]
     quick: bool,
 

@@ -134,7 +134,7 @@ fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     };
     let seconds = digits.parse().ok().zip(factor).map(|(number, factor): (f64, f64)| number * factor);
     let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    time.ok_or_else(|| "expected a time as in 90s, 5m or 1h".to_owned())
+    time.ok_or_else(|| "expected a time as in 90s, 5m or 1h; a bare number is seconds".to_owned())
 }
 
 #[cfg(test)]

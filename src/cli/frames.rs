@@ -40,10 +40,11 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
         let message = format!("--frames: {path} would hold every frame in turn; put %04d into its name");
         return Err(Error::Usage(message));
     }
-    let mut failed = 0;
+    let (mut failed, mut left_out) = (0, 0);
     for number in first..=last {
         let frame = frame(args, number);
         if args.frames.skip_existing && frame.output.iter().chain(&frame.stats).all(|path| path.is_file()) {
+            left_out += 1;
             continue;
         }
         if !args.quiet {
@@ -58,6 +59,13 @@ pub(super) fn run(args: &RenderArgs, render: impl Fn(&RenderArgs) -> Result<()>)
             rendered => rendered?,
         }
         interrupt::check()?;
+    }
+    if left_out > 0 && !args.quiet {
+        say(format_args!(
+            "{:<8}  {left_out} of {} frames were there and are left as they are",
+            "kept",
+            last - first + 1
+        ))?;
     }
     match failed {
         0 => Ok(()),

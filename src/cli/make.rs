@@ -66,7 +66,7 @@ pub(super) fn run(args: &MakeArgs) -> Result<()> {
     say(format_args!(
         "{name} of size {size}: {} in {}\nwrote {}",
         counted(count, "primitive", "primitives"),
-        counted(scene.instances.len() as u64, "placement", "placements"),
+        counted(scene.instances.len() as u64, "instance", "instances"),
         output.display()
     ))
 }

@@ -18,8 +18,9 @@ pub(super) struct ManArgs {
 
 pub(super) fn run(args: &ManArgs) -> Result<()> {
     if let Some(folder) = &args.out {
-        return clap_mangen::generate_to(Cli::command(), folder)
-            .map_err(|error| Error::output(folder, format!("manual pages could not be written: {error}")));
+        clap_mangen::generate_to(Cli::command(), folder)
+            .map_err(|error| Error::output(folder, format!("manual pages could not be written: {error}")))?;
+        return say(format_args!("wrote {} and a page for each command", folder.join("twincast.1").display()));
     }
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command())

@@ -81,10 +81,12 @@ pub(super) struct PictureArgs {
 
 fn integrators() -> impl TypedValueParser<Value = OrAuto<Integrator>> {
     one_of_or_auto(Integrator::ALL, Integrator::name, |integrator| match integrator {
-        None => "The cheapest that shows everything",
+        None => {
+            "Paths where nothing but what glows, or is behind everything, lights the scene; else the cheapest of the others that shows all there is"
+        }
         Some(Integrator::RayCast) => "From the lights to what the camera sees, and no farther",
         Some(Integrator::Whitted) => "Mirrors and glass as well",
-        Some(Integrator::Path) => "All light, however often it was scattered",
+        Some(Integrator::Path) => "All light, however often it was scattered, and that of surfaces that glow",
     })
 }
 

@@ -38,6 +38,9 @@ impl Rendered<'_> {
             }
         }
         summary.line("camera", self.camera);
+        if self.renderer.plan().idle_emitters {
+            summary.line("note", "what glows lights nothing else here; with --integrator path it does");
+        }
         let [width, height] = self.stats.size;
         let samples = match self.stats.mean_spp {
             mean if mean == f64::from(self.stats.spp) => counted(u64::from(self.stats.spp), "sample", "samples"),

@@ -16,6 +16,23 @@ pub(super) fn suggestion<'a>(word: &str, known: impl IntoIterator<Item = &'a str
     near.map(|(_, known)| format!("; did you mean {known:?}?")).unwrap_or_default()
 }
 
+/// The same; and where none is near, all there are, if they are few: names that `table` gives, as in `[material.NAME]`.
+pub(super) fn suggestion_or_all<'a>(word: &str, known: impl IntoIterator<Item = &'a str>, table: &str) -> String {
+    const FEW: usize = 12;
+    let mut known: Vec<&str> = known.into_iter().collect();
+    let near = suggestion(word, known.iter().copied());
+    if !near.is_empty() {
+        return near;
+    }
+    known.sort_unstable();
+    let names: Vec<String> = known.iter().take(FEW).map(|name| format!("{name:?}")).collect();
+    let more = if known.len() > FEW { " ..." } else { "" };
+    match names[..] {
+        [] => format!("; there is no {table} in this file"),
+        _ => format!("; there are {}{more}", names.join(", ")),
+    }
+}
+
 /// Whether a word is a known one with a slip of a finger or two: not where it may well be another.
 pub(super) fn is_slip(word: &str, known: &str) -> bool {
     word.len() <= LONGEST && distance(word, known) <= (known.len() / 3).min(2)
@@ -57,6 +74,10 @@ mod tests {
         assert_eq!(suggestion("specluar", known), "; did you mean \"specular\"?");
         assert_eq!(suggestion("tree", known), "");
         assert_eq!(suggestion("zzz", known), "");
+        assert_eq!(suggestion_or_all("sizw", known, "[a.NAME]"), "; did you mean \"size\"?");
+        let all = "; there are \"diffuse\", \"size\", \"specular\", \"tri\"";
+        assert_eq!(suggestion_or_all("zzz", known, "[a.NAME]"), all);
+        assert_eq!(suggestion_or_all("zzz", [], "[a.NAME]"), "; there is no [a.NAME] in this file");
         assert_eq!(suggestion(&"x".repeat(1 << 20), known), "");
     }
 }

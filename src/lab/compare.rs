@@ -184,8 +184,11 @@ impl fmt::Display for Report {
         row("differing", self.image.differing, &of(self.image.differing, self.image.pixels))?;
         row("unexplained", self.image.unexplained, "")?;
         writeln!(f, "  {:<20}{:>12}", "max difference", self.image.max_abs)?;
+        if !self.differences.is_empty() {
+            writeln!(f, "  some of the rays that differ, each with what `twincast trace` takes to say more of it:")?;
+        }
         for difference in &self.differences {
-            writeln!(f, "{difference}")?;
+            writeln!(f, "  {difference}")?;
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ mod drawing;
 mod entrants;
 pub mod exact;
 pub(crate) mod exact_shapes;
+pub mod hex;
 pub mod inspect;
 pub mod oracle;
 mod paired;

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use super::classify::{Answers, Class, classify_closest, classify_named, classify_occluded, starts_on, ulps};
-use crate::math::Vec3;
+use super::hex;
 use crate::ray::{Hit, Ray};
 use crate::trace::{Batch, Tracer, World};
 
@@ -171,7 +171,7 @@ pub enum Asked {
     },
 }
 
-/// A ray on which the engines differ. Its `Display` is Rust that can be pasted into a test.
+/// A ray on which the engines differ. Its `Display` is what it was judged to be, what was answered, and the ray as `twincast trace --ray` takes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// What it was judged to be.
@@ -184,9 +184,9 @@ pub struct Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "// {}: ", self.class.name())?;
+        write!(f, "{}: ", self.class.name())?;
         let answer = |hit: Option<Hit>| match hit {
-            Some(h) => format!("{:?} at {:?}", h.id(), h.t),
+            Some(Hit { t, primitive, geometry, instance, .. }) => format!("{instance}/{geometry}/{primitive} at {t}"),
             None => "miss".to_owned(),
         };
         match self.asked {
@@ -195,19 +195,15 @@ impl fmt::Display for Difference {
                 if let Some(brute) = brute {
                     write!(f, ", brute {}", answer(brute))?;
                 }
-                writeln!(f)?;
             }
-            Asked::Occluded { native, embree } => writeln!(f, "occluded? native {native}, embree {embree}")?,
+            Asked::Occluded { native, embree } => {
+                let word = |occluded| if occluded { "occluded" } else { "free" };
+                write!(f, "native {}, embree {}", word(native), word(embree))?;
+            }
         }
-        let bits = |x: f32| format!("f32::from_bits({:#010x})", x.to_bits());
-        let vector = |v: Vec3| format!("Vec3::new({}, {}, {})", bits(v.x), bits(v.y), bits(v.z));
-        let Ray { origin, direction, tmin, tmax, time } = self.ray;
-        writeln!(f, "Ray {{")?;
-        writeln!(f, "    origin: {}, // {origin}", vector(origin))?;
-        writeln!(f, "    direction: {}, // {direction}", vector(direction))?;
-        writeln!(f, "    tmin: {}, // {tmin:?}", bits(tmin))?;
-        writeln!(f, "    tmax: {}, // {tmax:?}", bits(tmax))?;
-        writeln!(f, "    time: {}, // {time:?}", bits(time))?;
-        write!(f, "}}")
+        if self.ray.time != 0.0 {
+            write!(f, ", at time {}", self.ray.time)?;
+        }
+        write!(f, "; --ray {}", hex::ray_to_hex(&self.ray))
     }
 }

@@ -98,6 +98,8 @@ pub struct Plan {
     pub integrator: Integrator,
     /// Why that far, in words.
     pub why: &'static str,
+    /// Whether something glows that lights nothing else: only paths find that light, and nobody has said how far light is to be followed.
+    pub idle_emitters: bool,
     /// How often rays may be sent on; 0 where nothing does.
     pub depth: u32,
     /// Mirrored and refracted rays are not followed whose shares come to no more than this for a sample, all together: [`FAINT`] by what is brightest, or 0.
@@ -154,7 +156,7 @@ impl Plan {
         };
         let extended = casting.iter().filter(|&&i| scene.lights[i].is_extended()).count();
         let around = usize::from(census.environment && lighting != Lighting::None);
-        let glowing = usize::from(integrator == Integrator::Path && census.materials.glowing > 0 && case.has_bodies());
+        let glowing = usize::from(integrator == Integrator::Path && case.has_bodies());
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
@@ -162,6 +164,7 @@ impl Plan {
             ambient,
             integrator,
             why,
+            idle_emitters: case.has_idle_emitters(integrator),
             depth,
             faint: if has(Reduction::Faint) { 0.0 } else { FAINT / census.brightest },
             alpha: census.materials.alpha > 0 || has(Reduction::Alpha),
@@ -221,11 +224,20 @@ impl Case<'_> {
         self.background().is_some_and(|color| color != Vec3::ZERO)
     }
 
-    /// Whether anything glows that light comes from.
+    /// Whether anything glows that light comes from, and is no light's body.
     fn has_bodies(&self) -> bool {
         let Self { scene, world, census, .. } = self;
+        if census.materials.glowing == 0 {
+            return false;
+        }
         let source = |&i: &usize| LightSource::new(&scene.lights[i], world.centre);
         has_emitters(scene, world, &census.lights.bright.iter().map(source).collect::<Vec<_>>())
+    }
+
+    /// Whether what glows would light something if paths were traced, which is left to whoever asks for them.
+    fn has_idle_emitters(&self, integrator: Integrator) -> bool {
+        let is_chosen = self.wishes.integrator.is_none() && integrator != Integrator::Path;
+        is_chosen && self.census.materials.lit > 0 && self.has_bodies()
     }
 
     /// How far light is followed, and why.
@@ -413,14 +425,18 @@ mod tests {
         assert_eq!(of(&dark), Integrator::RayCast);
         dark.materials[0].emission = Vec3::ONE;
         assert_eq!((of(&dark), plan(&dark).depth), (Integrator::Path, USUAL_PATH_DEPTH));
+        assert!(!plan(&dark).idle_emitters);
         dark.ambient = Vec3::ONE;
         assert_eq!(of(&dark), Integrator::RayCast, "ambient light lights it too");
+        assert!(plan(&dark).idle_emitters && plan(&dark).to_string().contains("glows"), "{}", plan(&dark));
+        assert!(!plan(&lit).idle_emitters, "nothing glows");
         dark.lights.clear();
         assert_eq!(plan(&dark).lighting, Lighting::Headlight);
         for integrator in Integrator::ALL {
             let wishes = Wishes { integrator: Some(integrator), max_depth: Some(7), ..Wishes::default() };
             let plan = wished(&lit, &wishes);
             assert_eq!(plan.integrator, integrator);
+            assert!(!wished(&dark, &wishes).idle_emitters, "it was asked for");
             assert_eq!(plan.depth, if integrator == Integrator::RayCast { 0 } else { 7 });
         }
         let wishes = Wishes { integrator: Some(Integrator::Path), ..Wishes::default() };

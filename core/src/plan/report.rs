@@ -25,6 +25,8 @@ pub struct PlanReport {
     pub integrator: &'static str,
     /// Why that far.
     pub why: &'static str,
+    /// As of [`Plan`].
+    pub idle_emitters: bool,
     /// How often rays are sent on.
     pub depth: u32,
     /// Lights that are asked, the one that the viewer carries among them.
@@ -93,6 +95,7 @@ impl PlanReport {
             },
             integrator: plan.integrator.name(),
             why: plan.why,
+            idle_emitters: plan.idle_emitters,
             depth: plan.depth,
             lights,
             shadows: plan.shadows(),

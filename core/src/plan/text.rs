@@ -25,6 +25,9 @@ impl fmt::Display for Plan {
         for part in self.parts() {
             write!(f, ", {part}")?;
         }
+        if self.idle_emitters {
+            write!(f, ", what glows lights nothing else (that takes paths)")?;
+        }
         if self.depth > 0 {
             match self.integrator {
                 Integrator::RayCast | Integrator::Whitted => {

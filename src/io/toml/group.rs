@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::include::Placed;
 use super::table::{Fault, Read, Table, Value};
-use crate::io::suggest::suggestion;
+use crate::io::suggest::suggestion_or_all;
 use crate::math::{self, DAffine3, DMat3, DVec3, can_place};
 use crate::scene::{Instance, Scene};
 
@@ -147,7 +147,7 @@ impl Groups<'_> {
 
     fn find(&self, name: &str, at: usize) -> Read<(&str, &Body)> {
         self.named.get_key_value(name).map(|(name, body)| (*name, body)).ok_or_else(|| {
-            let near = suggestion(name, self.named.keys().copied());
+            let near = suggestion_or_all(name, self.named.keys().copied(), "[group.NAME]");
             Fault { at, message: format!("no [group.{name}]{near}") }
         })
     }
@@ -163,9 +163,9 @@ impl Groups<'_> {
         for child in &body.children {
             let (name, place) = (joined(path, &child.name), place.of(&child.place));
             if !can_place(&place.start) || place.end.is_some_and(|end| !can_place(&end)) {
-                let message = format!(
-                    "{name:?} has a transform that nothing undoes; no scale may be 0, nor beyond what f32 holds"
-                );
+                let what = if child.name.is_empty() { "this".to_owned() } else { format!("{name:?}") };
+                let message =
+                    format!("{what} has a transform that nothing undoes; no scale may be 0, nor beyond what f32 holds");
                 return Err(Fault { at: child.at, message });
             }
             match &child.target {

@@ -225,6 +225,9 @@ fn area(shape: AreaShape, table: &mut Table<'_>) -> Read<Light> {
 fn place(table: &mut Table<'_>) -> Read<(DVec3, Attenuation, f64)> {
     let position = table.need("position")?.vector()?;
     let attenuation = table.optional("attenuation", |value| {
+        if !value.is_list() {
+            return Err(value.unlike("three numbers [c0, c1, c2], of 1 / (c0 + c1 d + c2 d^2)"));
+        }
         let [constant, linear, quadratic] = value.color()?.to_array();
         let is_zero = constant + linear + quadratic == 0.0;
         if is_zero {

@@ -31,7 +31,7 @@ use self::pieces::Cut;
 use self::primitives::{SINGLES, Singles};
 use self::table::{Fault, Read, Table, Value};
 use super::parts::{Sorted, add_group};
-use super::suggest::suggestion;
+use super::suggest::suggestion_or_all;
 use super::texture;
 use crate::error::{Error, Result, Warning, one_line};
 use crate::math::Vec3;
@@ -320,7 +320,7 @@ impl Reader<'_> {
     fn named_material(&self, name: &str, at: usize) -> Read<u32> {
         let found = self.materials.get(name).copied();
         found.ok_or_else(|| {
-            let near = suggestion(name, self.materials.keys().map(String::as_str));
+            let near = suggestion_or_all(name, self.materials.keys().map(String::as_str), "[material.NAME]");
             Fault { at, message: format!("no [material.{name}]{near}") }
         })
     }

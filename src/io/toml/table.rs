@@ -140,16 +140,7 @@ impl<'t> Value<'t> {
 
     /// Something else was expected.
     pub(super) fn unlike(self, expected: &str) -> Fault {
-        let found = match self.value {
-            DeValue::String(text) => quoted(text.as_bytes()),
-            DeValue::Integer(number) => quoted(number.as_str().as_bytes()),
-            DeValue::Float(number) => quoted(number.as_str().as_bytes()),
-            DeValue::Boolean(flag) => flag.to_string(),
-            DeValue::Datetime(_) => "a date".to_owned(),
-            DeValue::Array(items) => format!("a list of {}", items.len()),
-            DeValue::Table(_) => "a table".to_owned(),
-        };
-        self.fault(format!("{found} where {:?} wants {expected}", self.key))
+        self.fault(format!("{} where {:?} wants {expected}", shown(self.value), self.key))
     }
 
     /// A finite number.
@@ -263,4 +254,36 @@ impl<'t> Value<'t> {
     pub(super) fn is_list(self) -> bool {
         self.value.is_array()
     }
+}
+
+/// A value as messages show it: what is a text and what is a number can be told apart, and of a list that is short what is in it is seen.
+fn shown(value: &DeValue<'_>) -> String {
+    const SHORT: usize = 5;
+    match value {
+        DeValue::String(text) => format!("the text {}", quoted(text.as_bytes())),
+        DeValue::Integer(number) => shortened(number.as_str()),
+        DeValue::Float(number) => shortened(number.as_str()),
+        DeValue::Boolean(flag) => flag.to_string(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(items) if items.len() <= SHORT && !items.iter().any(|item| item.get_ref().is_table()) => {
+            let items: Vec<String> = items.iter().map(|item| within(item.get_ref())).collect();
+            format!("[{}]", items.join(", "))
+        }
+        DeValue::Array(items) => format!("a list of {}", items.len()),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}
+
+/// The same of what is in a list.
+fn within(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => quoted(text.as_bytes()),
+        DeValue::Array(_) => "[...]".to_owned(),
+        other => shown(other),
+    }
+}
+
+/// A number, of which no more than some digits are shown.
+fn shortened(number: &str) -> String {
+    quoted(number.as_bytes()).trim_matches('"').to_owned()
 }

@@ -8,8 +8,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Probe, hex};
+use super::Probe;
 use crate::error::{Error, Result, system_message};
+use crate::lab::hex;
 use crate::lab::oracle::{self, Body};
 use crate::math::{DVec3, Vec3};
 use crate::memory::Mapped;

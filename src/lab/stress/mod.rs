@@ -8,7 +8,7 @@
 //! | `expected` | what is known to fail where, held in both directions |
 //! | `run`, `report`, `heat` | the matrix of all that, as a table, JSON and a picture |
 //! | `search` | a random search for cases that are in no catalogue |
-//! | `file`, `hex` | a case in a file, to the bit |
+//! | `file` | a case in a file, to the bit |
 //!
 //! A case is a few worlds in f32, as tracers hold them, and rays in their coordinates; nothing is read, moved or rounded in
 //! between. The [`Oracle`](super::tree::Oracle) answers each ray once, and every subject is held against that. Pictures
@@ -17,7 +17,6 @@
 mod expected;
 pub mod file;
 mod heat;
-pub mod hex;
 mod placed;
 mod quadrics;
 mod ranges;
