@@ -11,7 +11,7 @@ static COUNTING: Counting = Counting;
 
 thread_local! {
     static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
+    static MAX: Cell<isize> = const { Cell::new(0) };
     static BEGIN: Cell<isize> = const { Cell::new(0) };
 }
 
@@ -19,7 +19,7 @@ fn add(bytes: isize) {
     // Threads that are ending have no counters any more, and need none.
     let _ = HELD.try_with(|held| {
         held.set(held.get() + bytes);
-        let _ = MOST.try_with(|most| most.set(most.get().max(held.get())));
+        let _ = MAX.try_with(|most| most.set(most.get().max(held.get())));
     });
 }
 
@@ -56,14 +56,14 @@ unsafe impl GlobalAlloc for Counting {
 /// Starts to measure on this thread.
 pub fn start() {
     HELD.with(|held| {
-        MOST.with(|most| most.set(held.get()));
+        MAX.with(|most| most.set(held.get()));
         BEGIN.with(|begin| begin.set(held.get()));
     });
 }
 
 /// The most bytes that this thread has held at a time since [`start`], above what it held then.
 pub fn most() -> usize {
-    MOST.with(Cell::get).saturating_sub(BEGIN.with(Cell::get)).max(0) as usize
+    MAX.with(Cell::get).saturating_sub(BEGIN.with(Cell::get)).max(0) as usize
 }
 
 #[test]

@@ -20,7 +20,7 @@ const FILES: usize = 24_000;
 /// The longest that one file may take.
 const LONGEST: Duration = Duration::from_secs(5);
 /// The most memory that one file may take.
-const MOST_BYTES: usize = 1 << 30;
+const MAX_BYTES: usize = 1 << 30;
 
 /// A good file: the suffix it is loaded by, and its bytes.
 struct Seed {
@@ -202,7 +202,7 @@ fn run(path: &Path, normals: Normals) -> Outcome {
     match result {
         Err(_) => Outcome::Failed("a panic".into()),
         _ if time > LONGEST => Outcome::Slow,
-        _ if bytes > MOST_BYTES => Outcome::Failed(format!("it took {bytes} bytes")),
+        _ if bytes > MAX_BYTES => Outcome::Failed(format!("it took {bytes} bytes")),
         Ok(outcome) => outcome,
     }
 }

@@ -202,9 +202,9 @@ impl Drop for Part {
 #[doc(hidden)]
 pub fn through_links(path: &Path) -> PathBuf {
     // As many as Linux follows.
-    const MOST: usize = 40;
+    const MAX: usize = 40;
     let mut place = path.to_owned();
-    for _ in 0..MOST {
+    for _ in 0..MAX {
         let Ok(target) = fs::read_link(&place) else { break };
         place = place.parent().map_or(target.clone(), |folder| folder.join(&target));
     }

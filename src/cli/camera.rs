@@ -8,7 +8,7 @@ use super::common::{finite_list, parse_vector};
 use crate::error::{Error, Result};
 use crate::image;
 use crate::math::{DAabb, DVec2, DVec3};
-use crate::scene::{Camera, Distortion, Fov, Pose, Projection, Scene, ThinLens, USUAL_FOV};
+use crate::scene::{Camera, DEFAULT_FOV, Distortion, Fov, Pose, Projection, Scene, ThinLens};
 
 /// Where to look from: a camera of the file by name, or flags. Without either, the file's first camera, else a view of
 /// everything.
@@ -181,7 +181,7 @@ impl CameraArgs {
         let target = self.look_at.unwrap_or_else(|| bounds.centre());
         let up = self.up.unwrap_or(DVec3::Y);
         let fov = match (self.fov_x, self.fov) {
-            (None, vertical) => Fov::Vertical(vertical.unwrap_or(USUAL_FOV).to_radians()),
+            (None, vertical) => Fov::Vertical(vertical.unwrap_or(DEFAULT_FOV).to_radians()),
             (Some(horizontal), None) => Fov::Horizontal(horizontal.to_radians()),
             (Some(horizontal), Some(vertical)) => {
                 Fov::Both { horizontal: horizontal.to_radians(), vertical: vertical.to_radians() }

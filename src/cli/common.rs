@@ -11,7 +11,7 @@ use super::{interrupt, progress};
 use crate::error::{Error, Result, Warning};
 use crate::io::{self, Animation, LoadOptions, Normals, Unit, UpAxis};
 use crate::math::DVec3;
-use crate::scene::LARGEST_SIDE;
+use crate::scene::MAX_SIDE;
 use crate::scene::Scene;
 
 /// A scene file and how to read it.
@@ -131,10 +131,10 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let side = |text: &str| text.parse().ok().filter(|side| (1..=LARGEST_SIDE).contains(side));
+        let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
         text.split_once(['x', 'X'])
             .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
-            .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {LARGEST_SIDE}, as in 1280x720"))
+            .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {MAX_SIDE}, as in 1280x720"))
     }
 }
 

@@ -14,7 +14,7 @@ use super::{interrupt, say_report, warn};
 use crate::error::Result;
 use crate::plan;
 use crate::render::Settings;
-use crate::scene::{Camera, MOST_SPP, Scene};
+use crate::scene::{Camera, MAX_SPP, Scene};
 
 /// Compare native with Embree on every ray of a picture and on difficult rays
 ///
@@ -38,7 +38,7 @@ pub(super) struct CompareArgs {
     size: Size,
 
     /// Samples a pixel; 1 is the pixel's centre
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
     spp: u32,
 
     #[command(flatten)]

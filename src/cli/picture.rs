@@ -7,8 +7,8 @@ use super::common::{Size, parse_vector};
 use super::named::{OrAuto, one_of, one_of_or_auto};
 use super::plan::PlanArgs;
 use crate::math::Vec3;
-use crate::render::{Adaptive, Crop, Filter, MOST_LIGHT_SAMPLES, Sampling, Settings, TileOrder};
-use crate::scene::{Integrator, MOST_DEPTH, MOST_SPP, Request};
+use crate::render::{Adaptive, Crop, Filter, MAX_LIGHT_SAMPLES, Sampling, Settings, TileOrder};
+use crate::scene::{Integrator, MAX_DEPTH, MAX_SPP, Request};
 use crate::trace::{Batch, Width};
 
 /// Everything about a picture but its camera.
@@ -23,7 +23,7 @@ pub(super) struct PictureArgs {
     crop: Option<Crop>,
 
     /// Samples a pixel; 1 is the pixel's centre (default: the scene's, else 4)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
     spp: Option<u32>,
 
     /// Take samples where they are needed: until the error of the pixels that are noisy is this, root mean square, as a screen shows it, 1
@@ -32,7 +32,7 @@ pub(super) struct PictureArgs {
     noise: Option<f32>,
 
     /// The most samples of a pixel, with --noise (default: 1024)
-    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
+    #[arg(long, value_name = "N", requires = "noise", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SPP)))]
     max_spp: Option<u32>,
 
     /// How far light is followed (default: the scene's, else auto)
@@ -40,7 +40,7 @@ pub(super) struct PictureArgs {
     integrator: Option<OrAuto<Integrator>>,
 
     /// How often a ray may be sent on; what it would see after that is black (default: the scene's, else 5, for paths 64)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MOST_DEPTH)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_DEPTH)))]
     max_depth: Option<u32>,
 
     /// Chooses among equally good sample patterns (default: the scene's, else 0)
@@ -48,7 +48,7 @@ pub(super) struct PictureArgs {
     seed: Option<u64>,
 
     /// Shadow rays to each light with a surface, where a ray hits; paths ask one light
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_LIGHT_SAMPLES)))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LIGHT_SAMPLES)))]
     light_samples: u32,
 
     /// How samples are spread
@@ -156,14 +156,14 @@ impl PictureArgs {
             background: self.background,
             crop: self.crop,
             aovs: Vec::new(),
-            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp.unwrap_or(USUAL_MOST_SPP) }),
+            adaptive: self.noise.map(|noise| Adaptive { noise, max_spp: self.max_spp.unwrap_or(DEFAULT_MAX_SPP) }),
             complete: self.plan.complete(),
         }
     }
 }
 
 /// As many samples as a pixel has at most where nothing else is asked for.
-const USUAL_MOST_SPP: u32 = 1024;
+const DEFAULT_MAX_SPP: u32 = 1024;
 
 /// `X,Y,WxH`.
 fn parse_crop(text: &str) -> std::result::Result<Crop, String> {

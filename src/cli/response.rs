@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::TypedValueParser;
 
 use super::named::one_of;
-use crate::image::{Curve, Image, MOST_STOPS, Response, TEMPERATURES};
+use crate::image::{Curve, Image, MAX_STOPS, Response, TEMPERATURES};
 use crate::math::Vec4;
 use crate::render::Crop;
 use crate::scene::Request;
@@ -57,7 +57,7 @@ pub(super) fn too_bright(image: &Image, response: &Response) -> Option<String> {
     // Large pictures are not copied for nothing.
     let median = *light().collect::<Vec<f32>>().select_nth_unstable_by(count / 2, f32::total_cmp).1;
     let share = (100.0 * white as f64 / count as f64).round();
-    let exposure = (response.exposure - (median.log2() + 1.0).ceil()).max(-MOST_STOPS);
+    let exposure = (response.exposure - (median.log2() + 1.0).ceil()).max(-MAX_STOPS);
     let message = "is brighter than white and cut off (OpenEXR and Radiance keep it)";
     Some(format!("{share} % of what is seen {message}; --exposure {exposure} would show it"))
 }
@@ -77,8 +77,8 @@ pub(super) fn beyond_numbers(image: &Image, window: &Crop) -> Option<String> {
 }
 
 fn parse_stops(text: &str) -> Result<f32, String> {
-    let stops = text.parse().ok().filter(|stops: &f32| stops.abs() <= MOST_STOPS);
-    stops.ok_or_else(|| format!("expected stops from -{MOST_STOPS} to {MOST_STOPS}"))
+    let stops = text.parse().ok().filter(|stops: &f32| stops.abs() <= MAX_STOPS);
+    stops.ok_or_else(|| format!("expected stops from -{MAX_STOPS} to {MAX_STOPS}"))
 }
 
 fn curves() -> impl TypedValueParser<Value = Curve> {

@@ -8,7 +8,7 @@ use crate::lab::bench::{Scaling, processor, scaling_chart};
 use crate::memory::process;
 
 /// As far as it goes where nothing else is asked for.
-const MOST_TRIANGLES: u64 = 1_000_000;
+const MAX_TRIANGLES: u64 = 1_000_000;
 
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let cancel = interrupt::install()?;
@@ -17,7 +17,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let on_step = |what: &str| bar.set_message(what.to_owned());
     let max_memory = args.max_memory.or_else(|| process::available().map(|bytes| bytes / 4 * 3));
     let scaling =
-        Scaling { max: args.max.unwrap_or(MOST_TRIANGLES), max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
+        Scaling { max: args.max.unwrap_or(MAX_TRIANGLES), max_memory, cancel: Some(cancel), on_step: Some(&on_step) };
     let pool = pool(args.threads)?;
     let report = pool.install(|| scaling.run());
     bar.finish_and_clear();

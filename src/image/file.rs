@@ -56,7 +56,7 @@ pub(super) struct Encoding {
 }
 
 /// The largest finite number of binary16.
-const MOST_HALF: f32 = 65504.0;
+const MAX_HALF: f32 = 65504.0;
 
 /// What is written with and without OpenImageIO.
 pub(super) const COMMON: [Format; 3] = [Format::OpenExr, Format::Jpeg, Format::Png];
@@ -74,7 +74,7 @@ fn longest_side(format: Format) -> Option<u32> {
 }
 
 /// Most pixels in a file that is read: 4 GiB as [`Image`].
-const MOST_PIXELS: u64 = 1 << 28;
+const MAX_PIXELS: u64 = 1 << 28;
 
 /// A file that claims more pixels than this must have [`PIXELS_PER_BYTE`] to show for them.
 const UNSUSPICIOUS_PIXELS: u64 = 1 << 24;
@@ -299,7 +299,7 @@ fn encoding(format: Option<Format>, options: &WriteOptions, image: &Image) -> En
     match format {
         Some(Format::OpenExr) => {
             // What is more would come back as infinite.
-            let is_held = |value: f32| !value.is_finite() || value.abs() <= MOST_HALF;
+            let is_held = |value: f32| !value.is_finite() || value.abs() <= MAX_HALF;
             let fits = || image.pixels.iter().all(|pixel| pixel.to_array().into_iter().all(is_held));
             let kind = if options.depth == Depth::Half && fits() { Type::Half } else { Type::Float };
             Encoding { kind, alpha: true, tile: options.tile, linear: true }
@@ -348,8 +348,8 @@ fn check_size(width: u64, height: u64, bytes: u64) -> std::result::Result<(), St
         return Err(format!("{claim}; there must be at least one"));
     }
     match width.checked_mul(height) {
-        Some(n) if n > MOST_PIXELS => Err(format!("{claim}; at most {MOST_PIXELS} are read")),
-        None => Err(format!("{claim}; at most {MOST_PIXELS} are read")),
+        Some(n) if n > MAX_PIXELS => Err(format!("{claim}; at most {MAX_PIXELS} are read")),
+        None => Err(format!("{claim}; at most {MAX_PIXELS} are read")),
         Some(n) if n > UNSUSPICIOUS_PIXELS && n / PIXELS_PER_BYTE > bytes => {
             Err(format!("{claim}, but has only {bytes} bytes; it is cut short or broken"))
         }

@@ -30,7 +30,7 @@ mod reference;
 mod samples;
 
 #[doc(inline)]
-pub use twincast_core::image::{Curve, Developer, Difference, Image, MOST_STOPS, Response, TEMPERATURES, flip, srgb};
+pub use twincast_core::image::{Curve, Developer, Difference, Image, MAX_STOPS, Response, TEMPERATURES, flip, srgb};
 
 pub use channels::{Channel, Channels, Plane};
 pub use file::{

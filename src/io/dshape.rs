@@ -13,7 +13,7 @@ use std::slice;
 use std::sync::Arc;
 
 use super::Placeless;
-use crate::math::{DAabb, DMat3, DVec3, LARGEST_COORDINATE, Vec3};
+use crate::math::{DAabb, DMat3, DVec3, MAX_COORDINATE, Vec3};
 use crate::scene::choose_origin;
 use crate::shape::{Cone, Cuboid, Cylinder, Disk, Ellipsoid, Plane, Polygon, Shape, Sphere};
 
@@ -83,9 +83,9 @@ impl DShape {
     /// What does not depend on where it stands is left to [`Shape::check`].
     fn check_numbers(&self) -> Placeless<()> {
         // Written so that NaN is refused, which transforms can give.
-        let is_near_enough = |p: &&DVec3| p.abs().max_element() <= LARGEST_COORDINATE.into() && !p.is_nan();
+        let is_near_enough = |p: &&DVec3| p.abs().max_element() <= MAX_COORDINATE.into() && !p.is_nan();
         if let Some(point) = self.points().iter().find(|p| !is_near_enough(p)) {
-            return Err(format!("the point {point} is too far away; coordinates may be up to {LARGEST_COORDINATE:e}"));
+            return Err(format!("the point {point} is too far away; coordinates may be up to {MAX_COORDINATE:e}"));
         }
         match self {
             Self::Sphere { radius, .. } | Self::Disk { radius, .. } => check_radius(*radius),
@@ -206,11 +206,11 @@ impl DShape {
 fn check_radius(radius: f64) -> Placeless<()> {
     // That of the shape is f32.
     let rounded = radius as f32;
-    if rounded > 0.0 && rounded <= LARGEST_COORDINATE {
+    if rounded > 0.0 && rounded <= MAX_COORDINATE {
         return Ok(());
     }
     let also = if radius > 0.0 && rounded == 0.0 { ", in f32 too" } else { "" };
-    Err(format!("the radius is {radius:?}; it must be above 0 and at most {LARGEST_COORDINATE:e}{also}"))
+    Err(format!("the radius is {radius:?}; it must be above 0 and at most {MAX_COORDINATE:e}{also}"))
 }
 
 fn check_ends([base, apex]: &[DVec3; 2]) -> Placeless<()> {

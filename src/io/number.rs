@@ -69,7 +69,7 @@ impl Decimal {
             _ => (digits, 0),
         };
         length += fraction;
-        if !(1..=MOST_DIGITS).contains(&(whole + fraction)) {
+        if !(1..=MAX_DIGITS).contains(&(whole + fraction)) {
             return None;
         }
         let mut exponent = -(fraction as isize);
@@ -88,7 +88,7 @@ impl Decimal {
 }
 
 /// So many fit into 64 bits, whatever they are.
-const MOST_DIGITS: usize = 19;
+const MAX_DIGITS: usize = 19;
 
 /// The length of a sign that a text may begin with.
 #[inline]

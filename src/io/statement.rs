@@ -8,7 +8,7 @@ use std::iter;
 use super::Placeless;
 use super::text::{Lines, Words, number, quoted, without_mark};
 use crate::math::{DVec3, Vec3};
-use crate::scene::{LARGEST_SIDE, MOST_DEPTH};
+use crate::scene::{MAX_DEPTH, MAX_SIDE};
 
 /// One line with something on it.
 pub(super) struct Statement<'a> {
@@ -95,15 +95,15 @@ impl<'a> Statement<'a> {
     /// Width and height of a picture.
     pub(super) fn picture_size(&mut self) -> Placeless<[u32; 2]> {
         let size = [self.whole()?, self.whole()?];
-        let fits = size.iter().all(|side| (1..=LARGEST_SIDE).contains(side));
+        let fits = size.iter().all(|side| (1..=MAX_SIDE).contains(side));
         let [width, height] = size;
-        if fits { Ok(size) } else { Err(format!("{width} x {height} pixels; each side may be 1 to {LARGEST_SIDE}")) }
+        if fits { Ok(size) } else { Err(format!("{width} x {height} pixels; each side may be 1 to {MAX_SIDE}")) }
     }
 
     /// How often a ray may be sent on.
     pub(super) fn depth(&mut self) -> Placeless<u32> {
         let depth = self.whole()?;
-        if depth <= MOST_DEPTH { Ok(depth) } else { Err(format!("a depth of {depth}; at most {MOST_DEPTH}")) }
+        if depth <= MAX_DEPTH { Ok(depth) } else { Err(format!("a depth of {depth}; at most {MAX_DEPTH}")) }
     }
 
     /// An angle of view in degrees.

@@ -19,7 +19,7 @@ use crate::scene::{Geometry, Material, Mesh, Scene};
 const HEADER: usize = 84;
 const FACET: usize = 50;
 /// Corners are numbered in 32 bits.
-const MOST_FACETS: u64 = u32::MAX as u64 / 3;
+const MAX_FACETS: u64 = u32::MAX as u64 / 3;
 /// Bytes of a text until the file is told that they have been read.
 const TELL: usize = 1 << 21;
 
@@ -73,11 +73,11 @@ fn binary(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) -> Result
         let message = format!("promises {count} triangles of {FACET} bytes, but the file has room for {there}");
         return Err(Error::input(path, "byte 80", message));
     }
-    if count > MOST_FACETS {
+    if count > MAX_FACETS {
         return Err(Error::input(
             path,
             "byte 80",
-            format!("holds {count} triangles, more than {MOST_FACETS}; divide the file"),
+            format!("holds {count} triangles, more than {MAX_FACETS}; divide the file"),
         ));
     }
     let (facets, rest) = bytes[HEADER..].split_at(count as usize * FACET);

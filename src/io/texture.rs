@@ -16,9 +16,9 @@ use crate::scene::{Pixels, Texture};
 /// Longest side, in pixels.
 const LONGEST_SIDE: u32 = 16_384;
 /// Most pixels of one texture.
-const MOST_PIXELS: u64 = 1 << 26;
+const MAX_PIXELS: u64 = 1 << 26;
 /// Most memory the decoder may use besides the pixels.
-const MOST_MEMORY: u64 = 1 << 29;
+const MAX_MEMORY: u64 = 1 << 29;
 
 /// Of the memory that could be had, the share that pictures may take: what is rendered wants some, too.
 const SHARE: f64 = 0.75;
@@ -120,8 +120,8 @@ fn read(bytes: &[u8], name: &str) -> std::result::Result<Texture, Refusal> {
     let sizing = sizing.into_decoder()?;
     let ((width, height), color) = (sizing.dimensions(), sizing.color_type());
     let pixels = u64::from(width) * u64::from(height);
-    if width.max(height) > LONGEST_SIDE || pixels > MOST_PIXELS {
-        let most = format!("at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all are read");
+    if width.max(height) > LONGEST_SIDE || pixels > MAX_PIXELS {
+        let most = format!("at most {LONGEST_SIDE} a side and {MAX_PIXELS} in all are read");
         return Err(format!("claims {width} x {height} pixels; {most}").into());
     }
     if is_cut_short(bytes) {
@@ -167,7 +167,7 @@ fn limits() -> Limits {
     let mut limits = Limits::default();
     limits.max_image_width = Some(LONGEST_SIDE);
     limits.max_image_height = Some(LONGEST_SIDE);
-    limits.max_alloc = Some(MOST_MEMORY);
+    limits.max_alloc = Some(MAX_MEMORY);
     limits
 }
 

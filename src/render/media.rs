@@ -12,18 +12,18 @@ use super::Renderer;
 use super::wavefront::Path;
 
 /// How many bodies a path is known to be inside of; of more, those that it entered first are forgotten.
-const MOST: usize = 4;
+const MAX: usize = 4;
 
 /// The materials of the bodies that a path has entered and not left, the last one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Media([u32; MOST]);
+pub(super) struct Media([u32; MAX]);
 
 /// No body.
 const NONE: u32 = u32::MAX;
 
 impl Media {
     /// Inside of nothing.
-    pub const OUTSIDE: Self = Self([NONE; MOST]);
+    pub const OUTSIDE: Self = Self([NONE; MAX]);
 
     #[inline]
     pub fn is_outside(&self) -> bool {
@@ -46,7 +46,7 @@ impl Media {
     fn leave(mut self, material: u32) -> Self {
         let at = self.0.iter().position(|&known| known == material).unwrap_or(0);
         self.0.copy_within(at + 1.., at);
-        self.0[MOST - 1] = NONE;
+        self.0[MAX - 1] = NONE;
         self
     }
 }

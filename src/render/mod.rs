@@ -44,8 +44,8 @@ pub use filter::Filter;
 pub use finished::Finished;
 pub use rounds::Picture;
 pub use sampler::Sampling;
-pub use settings::{Crop, MOST_LIGHT_SAMPLES, Settings};
-pub use tiles::{LARGEST_TILE, TileOrder};
+pub use settings::{Crop, MAX_LIGHT_SAMPLES, Settings};
+pub use tiles::{MAX_TILE, TileOrder};
 
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -65,7 +65,7 @@ use tiles::{Tile, tiles};
 use wavefront::Buffers;
 
 /// The most samples that are balanced between where the filter is positive and where it is negative: of more, chance has them nearly so, and to count them takes longer.
-const MOST_BALANCED: u32 = 64;
+const MAX_BALANCED: u32 = 64;
 
 /// A scene, a camera and settings, ready to be traced by any engine.
 pub struct Renderer<'a> {
@@ -119,7 +119,7 @@ impl<'a> Renderer<'a> {
     /// Plans the render.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`LARGEST_SIDE`](crate::scene::LARGEST_SIDE), a camera that cannot be, and settings that do not go
+    /// [`Error::Usage`] for a size or a sample count of 0, a side above [`MAX_SIDE`](crate::scene::MAX_SIDE), a camera that cannot be, and settings that do not go
     /// together: a sampler of a whole grid with adaptive sampling or paths, adaptive sampling of a part of the picture, channels that need
     /// what is not there; and for a world that is another scene's. [`Error::Input`] where the camera is one of the scene's file.
     pub fn new(scene: &'a Scene, world: &'a World, camera: Camera, settings: Settings) -> Result<Self> {
@@ -269,7 +269,7 @@ impl<'a> Renderer<'a> {
     /// which then are [`adaptive`]'s sixteen at least, each counts 1 or -1.
     fn balance(&self, pixel: &Pattern) -> Balance {
         let Settings { spp, adaptive, .. } = self.settings;
-        if adaptive.is_some() || spp > MOST_BALANCED {
+        if adaptive.is_some() || spp > MAX_BALANCED {
             return Balance::SIGNS;
         }
         let negative = (0..spp).filter(|&sample| self.place(pixel, sample).1).count() as u32;

@@ -12,7 +12,7 @@
 use std::mem;
 
 use crate::math::{DVec2, DVec3, Vec3};
-use crate::plan::SAFE_DEPTH;
+use crate::plan::ROULETTE_MIN_DEPTH;
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
@@ -230,7 +230,7 @@ impl Renderer<'_> {
         let scattered = lobes.sample(choice, self.choice(vertex, Choice::Direction))?;
         let mut weight = path.weight * scattered.weight;
         let scale = path.scale * scattered.scale;
-        if *depth >= SAFE_DEPTH {
+        if *depth >= ROULETTE_MIN_DEPTH {
             // What radiance lost on its way into glass it gains on the way out. What has lost nothing goes on: to end it now and then would
             // make what is left worth more than there is light.
             let chance = (weight.max_element() / scale).min(1.0);

@@ -1,15 +1,15 @@
 //! What picture to make.
 
-use super::tiles::USUAL_TILE;
-use super::{Adaptive, Aov, Filter, LARGEST_TILE, Sampling, TileOrder};
+use super::tiles::DEFAULT_TILE;
+use super::{Adaptive, Aov, Filter, MAX_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::plan::{Complete, Plan, Rays, Wishes};
-use crate::scene::{Integrator, LARGEST_SIDE, MOST_DEPTH, MOST_SPP, Request};
+use crate::scene::{Integrator, MAX_DEPTH, MAX_SIDE, MAX_SPP, Request};
 use crate::trace::Batch;
 
 /// The most shadow rays to a light from one place.
-pub const MOST_LIGHT_SAMPLES: u32 = 4096;
+pub const MAX_LIGHT_SAMPLES: u32 = 4096;
 
 /// What picture to make of a scene.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub struct Settings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples a pixel, 1 to [`MOST_SPP`]; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
+    /// Samples a pixel, 1 to [`MAX_SPP`]; 1 is the pixel's centre. With [`Settings::adaptive`] the fewest that a pixel has.
     pub spp: u32,
     /// Chooses among equally good sample patterns.
     pub seed: u64,
@@ -30,16 +30,16 @@ pub struct Settings {
     pub batch: Batch,
     /// Which tiles come first; never changes a picture.
     pub tile_order: TileOrder,
-    /// Edge of a tile in pixels, a power of two from 4 to [`LARGEST_TILE`]; never changes a native picture.
+    /// Edge of a tile in pixels, a power of two from 4 to [`MAX_TILE`]; never changes a native picture.
     pub tile: u32,
     /// Linear RGB behind everything, opaque. None is the scene's own, which where black is transparent.
     pub background: Option<Vec3>,
-    /// Shadow rays to each extended light where a ray hits, 1 to [`MOST_LIGHT_SAMPLES`]; paths ask one light, once.
+    /// Shadow rays to each extended light where a ray hits, 1 to [`MAX_LIGHT_SAMPLES`]; paths ask one light, once.
     pub light_samples: u32,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,
-    /// How often a ray may be sent on, up to [`MOST_DEPTH`]; what it would see after that is black. None is [`USUAL_DEPTH`](crate::plan::USUAL_DEPTH), for paths
-    /// [`USUAL_PATH_DEPTH`](crate::plan::USUAL_PATH_DEPTH).
+    /// How often a ray may be sent on, up to [`MAX_DEPTH`]; what it would see after that is black. None is [`DEFAULT_DEPTH`](crate::plan::DEFAULT_DEPTH), for paths
+    /// [`DEFAULT_PATH_DEPTH`](crate::plan::DEFAULT_PATH_DEPTH).
     pub max_depth: Option<u32>,
     /// The only part that is rendered; none for all of it. Its pixels are those of the whole picture.
     pub crop: Option<Crop>,
@@ -64,7 +64,7 @@ impl Default for Settings {
             filter: Filter::default(),
             batch: Batch::default(),
             tile_order: TileOrder::default(),
-            tile: USUAL_TILE,
+            tile: DEFAULT_TILE,
             background: None,
             light_samples: 1,
             integrator: None,
@@ -156,16 +156,16 @@ impl Settings {
     pub(crate) fn check(&self) -> Result<()> {
         let Self { width, height, spp, sampling, .. } = *self;
         for side in [width, height] {
-            if side == 0 || side > LARGEST_SIDE {
-                let message = format!("size {width}x{height}: both sides must be 1 to {LARGEST_SIDE} pixels");
+            if side == 0 || side > MAX_SIDE {
+                let message = format!("size {width}x{height}: both sides must be 1 to {MAX_SIDE} pixels");
                 return Err(Error::Usage(message));
             }
         }
         if self.background.is_some_and(|color| !color.is_finite()) {
             return Err(Error::Usage("a background that is not finite".to_owned()));
         }
-        if !(1..=MOST_SPP).contains(&spp) {
-            return Err(Error::Usage(format!("{spp} samples a pixel: 1 to {MOST_SPP} are possible")));
+        if !(1..=MAX_SPP).contains(&spp) {
+            return Err(Error::Usage(format!("{spp} samples a pixel: 1 to {MAX_SPP} are possible")));
         }
         if let Some(Crop { x, y, width: columns, height: rows }) = self.crop {
             let inside = |start: u32, length: u32, whole: u32| length > 0 && length <= whole.saturating_sub(start);
@@ -175,8 +175,8 @@ impl Settings {
                 return Err(Error::Usage(message));
             }
         }
-        if !self.tile.is_power_of_two() || self.tile < 4 || self.tile > LARGEST_TILE {
-            let message = format!("tiles of {0}x{0} pixels: 4, 8, 16, 32 or {LARGEST_TILE} is possible", self.tile);
+        if !self.tile.is_power_of_two() || self.tile < 4 || self.tile > MAX_TILE {
+            let message = format!("tiles of {0}x{0} pixels: 4, 8, 16, 32 or {MAX_TILE} is possible", self.tile);
             return Err(Error::Usage(message));
         }
         if let Some(adaptive) = &self.adaptive {
@@ -192,14 +192,12 @@ impl Settings {
                 )));
             }
         }
-        if let Some(depth) = self.max_depth.filter(|depth| *depth > MOST_DEPTH) {
-            return Err(Error::Usage(format!("a depth of {depth}: a ray may be sent on {MOST_DEPTH} times at most")));
+        if let Some(depth) = self.max_depth.filter(|depth| *depth > MAX_DEPTH) {
+            return Err(Error::Usage(format!("a depth of {depth}: a ray may be sent on {MAX_DEPTH} times at most")));
         }
         let count = self.light_samples;
-        if !(1..=MOST_LIGHT_SAMPLES).contains(&count) {
-            return Err(Error::Usage(format!(
-                "{count} shadow rays to a light: 1 to {MOST_LIGHT_SAMPLES} are possible"
-            )));
+        if !(1..=MAX_LIGHT_SAMPLES).contains(&count) {
+            return Err(Error::Usage(format!("{count} shadow rays to a light: 1 to {MAX_LIGHT_SAMPLES} are possible")));
         }
         Ok(())
     }

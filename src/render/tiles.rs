@@ -3,10 +3,10 @@
 use super::Crop;
 
 /// Largest edge of a tile in pixels; edges are powers of two.
-pub const LARGEST_TILE: u32 = 64;
+pub const MAX_TILE: u32 = 64;
 
 /// 1024 rays fill packets of any width and fit into the cache.
-pub(super) const USUAL_TILE: u32 = 32;
+pub(super) const DEFAULT_TILE: u32 = 32;
 
 /// The order in which tiles are begun. Never changes a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,10 +68,10 @@ impl Tile {
 }
 
 /// Column and row of every place along the curve.
-static Z_ORDER: [[u8; 2]; (LARGEST_TILE * LARGEST_TILE) as usize] = {
-    let mut order = [[0; 2]; (LARGEST_TILE * LARGEST_TILE) as usize];
+static Z_ORDER: [[u8; 2]; (MAX_TILE * MAX_TILE) as usize] = {
+    let mut order = [[0; 2]; (MAX_TILE * MAX_TILE) as usize];
     let mut place = 0;
-    while place < LARGEST_TILE * LARGEST_TILE {
+    while place < MAX_TILE * MAX_TILE {
         order[place as usize] = [every_other_bit(place), every_other_bit(place >> 1)];
         place += 1;
     }
@@ -148,7 +148,7 @@ fn spiral(columns: u32, rows: u32, (x, y): (u32, u32)) -> (i64, i64) {
 mod tests {
     use super::*;
 
-    const TILE: u32 = USUAL_TILE;
+    const TILE: u32 = DEFAULT_TILE;
 
     #[test]
     fn every_order_covers_every_pixel_once() {

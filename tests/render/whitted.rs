@@ -2,7 +2,7 @@
 
 use twincast::math::{DVec3, Vec3, Vec4};
 use twincast::render::{Control, Counted};
-use twincast::scene::{Attenuation, Camera, Geometry, Light, MOST_DEPTH, Material};
+use twincast::scene::{Attenuation, Camera, Geometry, Light, MAX_DEPTH, Material};
 use twincast::{Cuboid, Disk, Plane, Renderer, Scene, Settings, Shape, Sphere, World};
 
 use super::{engines, from_above, render, settings};
@@ -58,11 +58,11 @@ fn two_mirrors_make_a_geometric_series() {
 fn rays_are_sent_on_as_often_as_can_be_asked_for() {
     let mirror = Material { emission: Vec3::new(0.25, 0.5, 1.0), reflection: Vec3::ONE, ..black() };
     let scene = scene(vec![(plane(0.0, Vec3::Y), mirror.clone()), (plane(20.0, Vec3::NEG_Y), mirror)]);
-    let times = (MOST_DEPTH + 1) as f32;
-    let seen = pixel(&scene, &from_above(), &deep(MOST_DEPTH));
+    let times = (MAX_DEPTH + 1) as f32;
+    let seen = pixel(&scene, &from_above(), &deep(MAX_DEPTH));
     assert_eq!(seen, (Vec3::new(0.25, 0.5, 1.0) * times).extend(1.0));
     let world = World::new(&scene).unwrap();
-    let refused = Renderer::new(&scene, &world, from_above(), deep(MOST_DEPTH + 1)).map(|_| ()).unwrap_err();
+    let refused = Renderer::new(&scene, &world, from_above(), deep(MAX_DEPTH + 1)).map(|_| ()).unwrap_err();
     assert!(refused.to_string().contains("1000 times at most"), "{refused}");
 }
 

@@ -6,7 +6,7 @@ mod response;
 pub mod srgb;
 
 pub use compare::Difference;
-pub use response::{Curve, Developer, MOST_STOPS, Response, TEMPERATURES};
+pub use response::{Curve, Developer, MAX_STOPS, Response, TEMPERATURES};
 
 use crate::error::{Error, Result};
 use crate::math::Vec4;

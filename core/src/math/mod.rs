@@ -24,7 +24,7 @@ pub const UNIT_ROUNDOFF_64: f64 = f64::EPSILON / 2.0;
 
 /// Coordinates of a larger magnitude count as infinite, as in Embree (its `FLT_LARGE`): products of three such
 /// numbers with a direction still fit into f64, and reciprocals into f32.
-pub const LARGEST_COORDINATE: f32 = 1.844e18;
+pub const MAX_COORDINATE: f32 = 1.844e18;
 
 /// Bounds the relative error of `n` chained f32 operations: n u / (1 - n u).
 pub const fn gamma(n: u32) -> f32 {
@@ -86,7 +86,7 @@ pub fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
 /// Whether a vertex may take part in tracing: finite, and small enough not to overflow.
 pub fn is_traceable(p: Vec3) -> bool {
     // Written so that NaN gives false.
-    p.abs().max_element() <= LARGEST_COORDINATE && !p.is_nan()
+    p.abs().max_element() <= MAX_COORDINATE && !p.is_nan()
 }
 
 /// An axis-aligned box. Empty where `min > max` on any axis; [`Aabb::EMPTY`] is the neutral element of

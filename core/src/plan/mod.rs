@@ -29,7 +29,7 @@ pub use build::{BuildChoice, BuildRequest, EMBREE_BYTES, NotEnoughMemory};
 pub use census::Census;
 pub use reduction::{Complete, Reduction};
 pub use report::PlanReport;
-pub use work::{Rays, SAFE_DEPTH, Work};
+pub use work::{ROULETTE_MIN_DEPTH, Rays, Work};
 
 use crate::error::Result;
 use crate::math::Vec3;
@@ -60,9 +60,9 @@ pub enum Lighting {
 }
 
 /// How often rays are sent on by mirrors and glass where nobody says.
-pub const USUAL_DEPTH: u32 = 5;
+pub const DEFAULT_DEPTH: u32 = 5;
 /// How often paths are scattered at most where nobody says; nearly all end earlier, by chance.
-pub const USUAL_PATH_DEPTH: u32 = 64;
+pub const DEFAULT_PATH_DEPTH: u32 = 64;
 
 /// A share of the picture, in each channel, that is not worth the mirrored and refracted rays to what is white and less which would add it: below half the smallest
 /// step of 8 bits, which in sRGB is 1 / 255 / 12.92. Where something may be brighter, the share is as much smaller ([`Census::brightest`]).
@@ -292,8 +292,10 @@ impl Case<'_> {
         let Self { wishes, census, .. } = self;
         let always = wishes.complete.has(Reduction::Recursion);
         match integrator {
-            Integrator::Whitted if census.materials.sending_on > 0 || always => wishes.max_depth.unwrap_or(USUAL_DEPTH),
-            Integrator::Path if self.reflects(integrator) || always => wishes.max_depth.unwrap_or(USUAL_PATH_DEPTH),
+            Integrator::Whitted if census.materials.sending_on > 0 || always => {
+                wishes.max_depth.unwrap_or(DEFAULT_DEPTH)
+            }
+            Integrator::Path if self.reflects(integrator) || always => wishes.max_depth.unwrap_or(DEFAULT_PATH_DEPTH),
             Integrator::RayCast | Integrator::Whitted | Integrator::Path => 0,
         }
     }
@@ -424,7 +426,7 @@ mod tests {
         dark.lights = vec![Light::Directional { direction: DVec3::NEG_Y, color: Vec3::ZERO }];
         assert_eq!(of(&dark), Integrator::RayCast);
         dark.materials[0].emission = Vec3::ONE;
-        assert_eq!((of(&dark), plan(&dark).depth), (Integrator::Path, USUAL_PATH_DEPTH));
+        assert_eq!((of(&dark), plan(&dark).depth), (Integrator::Path, DEFAULT_PATH_DEPTH));
         assert!(!plan(&dark).idle_emitters);
         dark.ambient = Vec3::ONE;
         assert_eq!(of(&dark), Integrator::RayCast, "ambient light lights it too");
@@ -489,7 +491,7 @@ mod tests {
         let scene = scene();
         let all = Wishes { complete: Complete::ALL, ..Wishes::default() };
         let full = wished(&scene, &all);
-        assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, USUAL_DEPTH, 0.0));
+        assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, DEFAULT_DEPTH, 0.0));
         assert_eq!(full.attributes, Attributes::ALL);
         assert!(full.motion && full.alpha && full.normal_maps);
         let asked = Wishes { integrator: Some(Integrator::RayCast), ..all };

@@ -49,7 +49,7 @@ pub(super) struct Means {
 }
 
 /// How often a path is scattered before it may end by chance.
-pub const SAFE_DEPTH: u32 = 3;
+pub const ROULETTE_MIN_DEPTH: u32 = 3;
 
 impl Work {
     pub(super) fn new(means: &Means) -> Self {
@@ -62,7 +62,7 @@ impl Work {
             }
             Integrator::Path => {
                 let chance = albedo.clamp(0.0, 1.0);
-                let sent_on = (f64::from(SAFE_DEPTH) + chance / (1.0 - chance)).min(depth.into());
+                let sent_on = (f64::from(ROULETTE_MIN_DEPTH) + chance / (1.0 - chance)).min(depth.into());
                 // One light is asked at each surface, once.
                 let asks = if bare + extended > 0 { 1.0 + sent_on } else { 0.0 };
                 Self { sent_on, shadow: asks, area_shadow: 0.0 }

@@ -6,7 +6,7 @@ use super::pose::{Journey, Pose};
 use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 
 /// The vertical angle of view where nothing else is asked for, in degrees.
-pub const USUAL_FOV: f64 = 40.0;
+pub const DEFAULT_FOV: f64 = 40.0;
 
 /// A camera. It looks along its -z, +y is up, +x is right (glTF's convention).
 #[derive(Clone, Debug, PartialEq)]
@@ -130,7 +130,7 @@ impl fmt::Display for Fov {
 
 impl Camera {
     /// The largest [`shift`](Self::shift) that a picture is made with.
-    pub const MOST_SHIFT: f64 = 1000.0;
+    pub const MAX_SHIFT: f64 = 1000.0;
 
     /// A camera at `eye` that looks at `target`, with a vertical angle of view of `fov` radians, between 0 and pi. Where `up` is along the view, up in the
     /// picture is what it becomes for a camera that is tilted until it looks up or down: -z for one that looks along -z
@@ -179,7 +179,7 @@ impl Camera {
     /// # Panics
     /// For bounds that reach beyond 1e150, and an aspect that is not between 1e-100 and 1e100: lengths and angles are then not finite, or 0.
     pub fn framing(bounds: &DAabb, aspect: f64) -> Self {
-        let fov = USUAL_FOV.to_radians();
+        let fov = DEFAULT_FOV.to_radians();
         let half = (fov / 2.0).min(libm::atan(libm::tan(fov / 2.0) * aspect));
         // What f64 still keeps apart from the middle, so that there is a direction from there.
         let least = bounds.centre().abs().max_element() * 0.5f64.powi(40);

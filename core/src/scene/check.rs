@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{Alpha, AreaShape, Attenuation, Environment, Fog, Geometry, Group, Light, Material, Mesh, Scene};
 use crate::error::{Error, Result};
-use crate::math::{DVec3, LARGEST_COORDINATE, Vec3};
+use crate::math::{DVec3, MAX_COORDINATE, Vec3};
 
 impl Scene {
     /// Whether all indices are in range, attributes match, and materials, shapes, placements and lights can be. What `io::load` gives
@@ -206,7 +206,7 @@ fn is_unit(vector: DVec3) -> bool {
 }
 
 fn is_radius(radius: f64) -> bool {
-    radius > 0.0 && radius <= LARGEST_COORDINATE.into()
+    radius > 0.0 && radius <= MAX_COORDINATE.into()
 }
 
 fn check_mesh(mesh: &Mesh) -> std::result::Result<(), String> {

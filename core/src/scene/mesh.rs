@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, LARGEST_COORDINATE, Vec2, Vec3, Vec4, cofactor, is_traceable};
+use crate::math::{Aabb, DAabb, DAffine3, DMat3, DVec3, MAX_COORDINATE, Vec2, Vec3, Vec4, cofactor, is_traceable};
 
 /// Vertices or triangles that are worth a task of their own.
 const TASK: usize = 1 << 14;
@@ -159,7 +159,7 @@ impl Mesh {
 /// Whether a vertex that is not rounded yet may take part in tracing.
 pub fn is_traceable_f64(p: &DVec3) -> bool {
     // Written so that NaN gives false.
-    p.abs().cmple(DVec3::splat(LARGEST_COORDINATE.into())).all()
+    p.abs().cmple(DVec3::splat(MAX_COORDINATE.into())).all()
 }
 
 /// Around the triangles whose corners are there, finite and small enough to be traced.

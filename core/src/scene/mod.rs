@@ -23,7 +23,7 @@ mod rocks;
 mod search;
 mod texture;
 
-pub use camera::{Camera, Distortion, Fov, Projection, ThinLens, USUAL_FOV};
+pub use camera::{Camera, DEFAULT_FOV, Distortion, Fov, Projection, ThinLens};
 #[doc(hidden)]
 pub use check::fault;
 pub use environment::Environment;
@@ -38,7 +38,7 @@ pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossi
 pub use pose::{Journey, Pose};
 pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
-pub use request::{Integrator, LARGEST_SIDE, MOST_DEPTH, MOST_SPP, Request};
+pub use request::{Integrator, MAX_DEPTH, MAX_SIDE, MAX_SPP, Request};
 pub use rocks::rocks;
 pub use search::{Accel, Resolution, Search};
 pub use texture::{Filter, Pixels, Texture, Wrap};

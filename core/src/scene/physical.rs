@@ -28,7 +28,7 @@ use super::Material;
 use crate::math::Vec3;
 
 /// Smallest roughness, so that the exponent stays below about 20,000.
-const LEAST_ROUGHNESS: f32 = 0.1;
+const MIN_ROUGHNESS: f32 = 0.1;
 /// Share of a metal's colour that is diffuse, for the surroundings that it does not mirror.
 const MATTE_METAL: f32 = 0.5;
 /// What anything but metal mirrors, seen from the front.
@@ -217,7 +217,7 @@ impl MetallicRoughness {
             diffuse: diffuse * (1.0 - through),
             reflection: tint.min(Vec3::ONE).lerp(base, metal),
             transmission: base * through,
-            gloss: (roughness > LEAST_ROUGHNESS).then_some(plain.shininess / 4.0),
+            gloss: (roughness > MIN_ROUGHNESS).then_some(plain.shininess / 4.0),
             ..plain
         }
     }
@@ -235,7 +235,7 @@ impl SpecularGlossiness {
 
 /// A surface with a highlight.
 fn shiny(diffuse: Vec3, mirrored: Vec3, roughness: f32) -> Material {
-    let alpha = roughness.max(LEAST_ROUGHNESS).powi(2);
+    let alpha = roughness.max(MIN_ROUGHNESS).powi(2);
     let shininess = (2.0 / (alpha * alpha) - 2.0).max(0.0);
     Material {
         ambient: diffuse,

@@ -4,11 +4,11 @@ use super::search::Search;
 use crate::image::{Curve, Response};
 
 /// Most pixels a picture may have along one side.
-pub const LARGEST_SIDE: u32 = 65_536;
+pub const MAX_SIDE: u32 = 65_536;
 /// Most samples a pixel that can be asked for.
-pub const MOST_SPP: u32 = 65_536;
+pub const MAX_SPP: u32 = 65_536;
 /// How often a ray may be sent on at most. Rays that were sent on together are followed by a call of their own, so that the stack has to have room for as many.
-pub const MOST_DEPTH: u32 = 1000;
+pub const MAX_DEPTH: u32 = 1000;
 
 /// How far light is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,15 +44,15 @@ impl std::fmt::Display for Integrator {
 /// Settings of a render that a scene file may carry. They stand where the caller says nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
-    /// Width and height in pixels, each 1 to [`LARGEST_SIDE`].
+    /// Width and height in pixels, each 1 to [`MAX_SIDE`].
     pub size: Option<[u32; 2]>,
-    /// Samples a pixel, 1 to [`MOST_SPP`].
+    /// Samples a pixel, 1 to [`MAX_SPP`].
     pub spp: Option<u32>,
     /// Chooses among equally good sample patterns.
     pub seed: Option<u64>,
     /// How far light is followed; none for the cheapest way that shows all the scene contains.
     pub integrator: Option<Integrator>,
-    /// How often a ray may be sent on, up to [`MOST_DEPTH`].
+    /// How often a ray may be sent on, up to [`MAX_DEPTH`].
     pub max_depth: Option<u32>,
     /// Name of the picture's file, as it stands in the scene file.
     pub output: Option<String>,

@@ -51,7 +51,7 @@ impl Accel {
     }
 }
 
-/// How many cells a grid has. Halved along all axes as often as it takes to have no more than [`Resolution::MOST_CELLS`], and than
+/// How many cells a grid has. Halved along all axes as often as it takes to have no more than [`Resolution::MAX_CELLS`], and than
 /// a billion references to items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
@@ -63,22 +63,22 @@ pub enum Resolution {
 
 impl Resolution {
     /// Most cells along an axis.
-    pub const MOST: u32 = 2048;
+    pub const MAX: u32 = 2048;
     /// Most cells: 1 GB of numbers that say where their items are.
-    pub const MOST_CELLS: u64 = 1 << 28;
+    pub const MAX_CELLS: u64 = 1 << 28;
 
     /// Of one number, or of three.
     ///
     /// # Errors
     /// What was expected instead.
     pub fn of_sides(sides: &[u32]) -> Result<Self, String> {
-        let most = Self::MOST;
+        let most = Self::MAX;
         if !matches!(sides.len(), 1 | 3) || !sides.iter().all(|side| (1..=most).contains(side)) {
             return Err(format!("one number of cells or three, each 1 to {most}"));
         }
         match *sides {
-            [x, y, z] if u64::from(x) * u64::from(y) * u64::from(z) > Self::MOST_CELLS => {
-                Err(format!("at most {} cells in all", Self::MOST_CELLS))
+            [x, y, z] if u64::from(x) * u64::from(y) * u64::from(z) > Self::MAX_CELLS => {
+                Err(format!("at most {} cells in all", Self::MAX_CELLS))
             }
             [x, y, z] => Ok(Self::Axes(UVec3::new(x, y, z))),
             _ => Ok(Self::Longest(sides[0])),

@@ -11,7 +11,7 @@ use crate::scene::AreaShape;
 const ROUNDINGS: u32 = 32;
 
 /// Where a light is met at less than this, what stands in its place is taken to be in the way rather than that what stands before it is not.
-const LEAST_COSINE: f64 = 1e-3;
+const MIN_COSINE: f64 = 1e-3;
 
 /// What arrives at `point` from the part of the light that `xi`, a point of the unit square, chooses, as if all of it
 /// shone like that part; none where the light turns its back.
@@ -160,7 +160,7 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
 /// not be in its way. `cosine` is of the way to the surface's normal.
 pub(super) fn short_of(at: DVec3, to_light: DVec3, point: DVec3, cosine: f64) -> DVec3 {
     let slack = f64::from(gamma(ROUNDINGS)) * (at.abs().max_element() + (at - point).length());
-    let along = slack / cosine.abs().max(LEAST_COSINE);
+    let along = slack / cosine.abs().max(MIN_COSINE);
     at - to_light * along.min((at - point).dot(to_light).max(0.0))
 }
 

@@ -9,7 +9,7 @@ use super::quadric::{Inside, Quadric};
 use super::round::{outwards, spherical};
 use super::{InvalidShape, in_f32};
 use crate::math::number::{Formula, Number, cross, dot, minus, vector};
-use crate::math::{Aabb, DVec2, DVec3, LARGEST_COORDINATE, Mat3, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, MAX_COORDINATE, Mat3, Vec3, is_traceable};
 use crate::ray::Ray;
 
 /// An ellipsoid.
@@ -37,7 +37,7 @@ impl Ellipsoid {
         InvalidShape::unless(is_traceable(self.centre), || format!("the centre {} is not finite", self.centre))?;
         InvalidShape::unless([x_axis, y_axis, z_axis].into_iter().all(is_traceable), || {
             format!(
-                "the half axes {x_axis:?}, {y_axis:?}, {z_axis:?} are not finite, or longer than {LARGEST_COORDINATE:e}"
+                "the half axes {x_axis:?}, {y_axis:?}, {z_axis:?} are not finite, or longer than {MAX_COORDINATE:e}"
             )
         })?;
         InvalidShape::unless(Volume(self.axes).signs() != [0], || {

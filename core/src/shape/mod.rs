@@ -44,7 +44,7 @@ pub use sphere_methods::SphereMethod;
 pub use triangle_methods::TriangleMethod;
 
 use crate::error::Error;
-use crate::math::{Aabb, DVec2, DVec3, LARGEST_COORDINATE, Vec2, Vec3, is_traceable};
+use crate::math::{Aabb, DVec2, DVec3, MAX_COORDINATE, Vec2, Vec3, is_traceable};
 use crate::ray::Ray;
 use distance::Support;
 use line::{NO_ROOTS, Roots};
@@ -95,9 +95,7 @@ impl InvalidShape {
 
     fn unless_radius(radius: f32) -> Result<(), Self> {
         let holds = radius > 0.0 && is_traceable(Vec3::splat(radius));
-        Self::unless(holds, || {
-            format!("the radius is {radius:?}; it must be above 0 and at most {LARGEST_COORDINATE:e}")
-        })
+        Self::unless(holds, || format!("the radius is {radius:?}; it must be above 0 and at most {MAX_COORDINATE:e}"))
     }
 
     fn unless_direction(name: &str, v: Vec3) -> Result<(), Self> {

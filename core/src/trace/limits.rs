@@ -5,22 +5,22 @@ use crate::error::{Error, Result};
 
 /// Primitives that may stand in one system of coordinates, that of the world or of an object: what a leaf of the native tracer's
 /// trees can name.
-pub(crate) const MOST_PRIMITIVES: u64 = (1 << 29) - 1;
+pub(crate) const MAX_PRIMITIVES: u64 = (1 << 29) - 1;
 
 /// Whether `what`, which has these parts, can be traced.
 ///
 /// # Errors
-/// [`Error::Scene`] for more than [`MOST_PRIMITIVES`], with the number.
+/// [`Error::Scene`] for more than [`MAX_PRIMITIVES`], with the number.
 pub(super) fn check(parts: &[Part], what: &str) -> Result<()> {
     check_count(parts.iter().map(|part| part.primitives.len() as u64).sum(), what)
 }
 
 fn check_count(count: u64, what: &str) -> Result<()> {
-    if count <= MOST_PRIMITIVES {
+    if count <= MAX_PRIMITIVES {
         return Ok(());
     }
     let remedy = "simplify it, or store what repeats once and place it as instances";
-    Err(Error::Scene(format!("{what} has {count} primitives, more than {MOST_PRIMITIVES}; {remedy}")))
+    Err(Error::Scene(format!("{what} has {count} primitives, more than {MAX_PRIMITIVES}; {remedy}")))
 }
 
 #[cfg(test)]
@@ -29,7 +29,7 @@ mod tests {
 
     #[test]
     fn too_many_primitives_are_an_error_with_their_number() {
-        assert!(check_count(MOST_PRIMITIVES, "the scene").is_ok());
+        assert!(check_count(MAX_PRIMITIVES, "the scene").is_ok());
         let error = check_count(600_000_000, "the scene").expect_err("too many");
         assert_eq!(error.exit_code(), 3);
         let message = error.to_string();

@@ -24,7 +24,7 @@ const BITS: u32 = 18;
 const AXIS_BITS: u32 = BITS / 3;
 
 /// Each counting takes a mebibyte.
-const MOST_COUNTINGS: usize = 8;
+const MAX_COUNTINGS: usize = 8;
 
 /// Numbers in another order.
 pub struct Order {
@@ -37,7 +37,7 @@ pub struct Order {
 impl Order {
     /// By rising key; by rising number where keys are the same.
     fn by(keys: &[u32]) -> Self {
-        let threads = rayon::current_num_threads().min(MOST_COUNTINGS);
+        let threads = rayon::current_num_threads().min(MAX_COUNTINGS);
         let part = keys.len().div_ceil(threads).max(1);
         let count = |keys: &[u32]| {
             let mut counts = vec![0u32; 1 << BITS];

@@ -30,14 +30,14 @@ static POOLS: Mutex<Vec<Entry>> = Mutex::new(Vec::new());
 const KEPT: usize = 4;
 
 /// More threads than this are a mistake.
-const MOST: usize = 1024;
+const MAX: usize = 1024;
 
 /// How often it is looked whether Ctrl-C was pressed.
 const BEAT: Duration = Duration::from_millis(20);
 
 fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
-    let (process, threads) = (process::id(), threads.min(MOST));
+    let (process, threads) = (process::id(), threads.min(MAX));
     // Pools of the process that this one was forked from have no threads here: to drop them would wait for these.
     pools.extract_if(.., |entry| entry.process != process).for_each(std::mem::forget);
     let entry = match pools.iter().position(|entry| entry.threads == threads) {

@@ -11,10 +11,10 @@ use crate::io::records::Records;
 use crate::memory::Mapped;
 
 /// Most bytes that accessors without a buffer view, which are all zero, may stand for.
-const MOST_ZEROS: u64 = 1 << 28;
+const MAX_ZEROS: u64 = 1 << 28;
 
 /// Elements that are worth a task of their own.
-const LEAST_TASK: usize = 1 << 12;
+const MIN_TASK: usize = 1 << 12;
 
 /// A checked accessor: every index below `count` can be read.
 pub(super) struct View<'a> {
@@ -106,7 +106,7 @@ impl<'a> View<'a> {
             }
             None => {
                 let zeros = accessor.count.saturating_mul(size as u64);
-                document.spend_zeros(index, zeros, MOST_ZEROS).map_err(|m| ("/count", m))?;
+                document.spend_zeros(index, zeros, MAX_ZEROS).map_err(|m| ("/count", m))?;
                 None
             }
         };
@@ -166,7 +166,7 @@ impl<'a> View<'a> {
 
     /// What becomes of the first `count` elements, which must be there.
     pub(super) fn collect<const N: usize, T: Send>(&self, count: usize, make: impl Fn([f32; N]) -> T + Sync) -> Vec<T> {
-        let items = (0..count).into_par_iter().with_min_len(LEAST_TASK).map(|i| make(self.floats(i))).collect();
+        let items = (0..count).into_par_iter().with_min_len(MIN_TASK).map(|i| make(self.floats(i))).collect();
         self.done();
         items
     }
@@ -193,7 +193,7 @@ impl<'a> View<'a> {
             }),
             None => {
                 let triple = |i: usize| [self.index(3 * i), self.index(3 * i + 1), self.index(3 * i + 2)];
-                let triples = (0..count).into_par_iter().with_min_len(LEAST_TASK).map(triple).collect();
+                let triples = (0..count).into_par_iter().with_min_len(MIN_TASK).map(triple).collect();
                 self.done();
                 triples
             }

@@ -1,9 +1,9 @@
 //! Messages that quote a file, which may hold names of any length.
 
 /// Most characters of what is quoted.
-const MOST_QUOTED: usize = 60;
+const MAX_QUOTED: usize = 60;
 /// Most characters of a message.
-const MOST: usize = 600;
+const MAX: usize = 600;
 
 /// A message in which what stands between quotes (`"` as Rust and serde write texts, `` ` `` as serde writes names) is cut short.
 pub(super) fn shortened(message: &str) -> String {
@@ -14,8 +14,8 @@ pub(super) fn shortened(message: &str) -> String {
         let (before, quoted) = rest.split_at(start + 1);
         short.push_str(before);
         let end = end(quoted, quote);
-        short.extend(quoted[..end].chars().take(MOST_QUOTED));
-        if quoted[..end].chars().nth(MOST_QUOTED).is_some() {
+        short.extend(quoted[..end].chars().take(MAX_QUOTED));
+        if quoted[..end].chars().nth(MAX_QUOTED).is_some() {
             short.push('…');
         }
         let closed = (end + 1).min(quoted.len());
@@ -23,7 +23,7 @@ pub(super) fn shortened(message: &str) -> String {
         rest = &quoted[closed..];
     }
     short.push_str(rest);
-    match short.char_indices().nth(MOST) {
+    match short.char_indices().nth(MAX) {
         Some((end, _)) => format!("{}…", &short[..end]),
         None => short,
     }
@@ -85,6 +85,6 @@ mod tests {
         {
             assert_eq!(shortened(whole), whole);
         }
-        assert_eq!(shortened(&"é".repeat(5000)).chars().count(), MOST + 1);
+        assert_eq!(shortened(&"é".repeat(5000)).chars().count(), MAX + 1);
     }
 }

@@ -8,7 +8,7 @@ use super::Items;
 use super::color::Color;
 use super::header::{Element, Scalar};
 use super::vertices::{Layout, Positions, Vertices};
-use super::wedges::{AtOnce, MOST_CORNERS, Wedges, texture_number};
+use super::wedges::{AtOnce, MAX_CORNERS, Wedges, texture_number};
 use crate::io::Placeless;
 use crate::io::records::Records;
 use crate::io::weld::weld;
@@ -203,7 +203,7 @@ impl<const BIG: bool> Items for Binary<'_, BIG> {
             heads.sum::<usize>() + lists.map(|(_, size)| size).sum::<usize>()
         };
         let (count, stride) = (element.count as usize, offset(element.properties.len()));
-        if count as u64 >= MOST_CORNERS / 3 {
+        if count as u64 >= MAX_CORNERS / 3 {
             return None;
         }
         let bytes = self.rest.get(..count * stride)?;

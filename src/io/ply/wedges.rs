@@ -24,7 +24,7 @@ pub(super) const NUMBER: &str = "texnumber";
 const NONE: u32 = u32::MAX;
 
 /// Numbers of corners, of which [`Weld`] keeps two.
-pub(super) const MOST_CORNERS: u64 = u32::MAX as u64 - 2;
+pub(super) const MAX_CORNERS: u64 = u32::MAX as u64 - 2;
 
 /// What faces have of their own.
 pub(super) struct Wedges {
@@ -104,9 +104,9 @@ impl Wedges {
     /// Puts vertices in place of the positions of a face's corners, and notes the texture of the triangles that it is made of.
     pub(super) fn face(&mut self, face: &Item, corners: &mut [u32], triangles: usize) -> Placeless<()> {
         self.corners += corners.len() as u64;
-        if self.corners >= MOST_CORNERS {
+        if self.corners >= MAX_CORNERS {
             return Err(format!(
-                "more than {MOST_CORNERS} corners of faces with attributes of their own; divide the file"
+                "more than {MAX_CORNERS} corners of faces with attributes of their own; divide the file"
             ));
         }
         let mut coordinates = self.coordinates.map_or(&[][..], |list| &face.lists[list]);

@@ -11,7 +11,7 @@ use crate::scene::{Instance, Scene};
 /// Groups within groups within groups.
 const DEEPEST: usize = 64;
 /// Most placements of groups, unrolled: about 2 GB.
-const MOST: u64 = 10_000_000;
+const MAX: u64 = 10_000_000;
 
 /// What stands in a group, or at the top of the file.
 #[derive(Default)]
@@ -98,8 +98,8 @@ impl Groups<'_> {
             }
         }
         let Extent { count, .. } = self.extent(&self.top, &mut Vec::new(), &mut extents)?;
-        if count > MOST {
-            let message = format!("{count} placements of groups, those in groups counted; at most {MOST} are unrolled");
+        if count > MAX {
+            let message = format!("{count} placements of groups, those in groups counted; at most {MAX} are unrolled");
             return Err(Fault { at: 0, message });
         }
         self.place(&self.top, "", &Place::HERE, scene)

@@ -4,11 +4,11 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 use super::table::{Read, Table, Value};
-use crate::image::{Curve, MOST_STOPS, TEMPERATURES};
-use crate::math::{DVec2, DVec3, LARGEST_COORDINATE, Vec3};
+use crate::image::{Curve, MAX_STOPS, TEMPERATURES};
+use crate::math::{DVec2, DVec3, MAX_COORDINATE, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, Distortion, Fov, Integrator, LARGEST_SIDE, Light, MOST_DEPTH, MOST_SPP,
-    Pose, Projection, Request, Resolution, Search, ThinLens, USUAL_FOV,
+    Accel, AreaShape, Attenuation, Camera, DEFAULT_FOV, Distortion, Fov, Integrator, Light, MAX_DEPTH, MAX_SIDE,
+    MAX_SPP, Pose, Projection, Request, Resolution, Search, ThinLens,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
@@ -45,25 +45,25 @@ impl Render {
         };
         let Some(mut table) = table else { return Ok(render) };
         let side = |length: f64| {
-            (length.fract() == 0.0 && (1.0..=f64::from(LARGEST_SIDE)).contains(&length)).then_some(length as u32)
+            (length.fract() == 0.0 && (1.0..=f64::from(MAX_SIDE)).contains(&length)).then_some(length as u32)
         };
         render.request = Request {
             size: table.optional("size", |value| {
                 let [width, height] = value.numbers::<2>()?.map(side);
                 let size = width.zip(height).map(|(width, height)| [width, height]);
-                size.ok_or_else(|| value.fault(format!("\"size\" wants two whole numbers from 1 to {LARGEST_SIDE}")))
+                size.ok_or_else(|| value.fault(format!("\"size\" wants two whole numbers from 1 to {MAX_SIDE}")))
             })?,
-            spp: table.optional("spp", |value| value.whole(1..=MOST_SPP.into()))?.map(|spp| spp as u32),
+            spp: table.optional("spp", |value| value.whole(1..=MAX_SPP.into()))?.map(|spp| spp as u32),
             seed: table.optional("seed", |value| value.whole(0..=u64::MAX))?,
             integrator: table.optional("integrator", |value| value.choice(&integrators()))?.flatten(),
             max_depth: table
-                .optional("max_depth", |value| value.whole(0..=MOST_DEPTH.into()))?
+                .optional("max_depth", |value| value.whole(0..=MAX_DEPTH.into()))?
                 .map(|depth| depth as u32),
             output: table.optional("output", picture_name)?,
             exposure: table.optional("exposure", |value| {
                 let stops = value.number()? as f32;
-                let inside = stops.abs() <= MOST_STOPS;
-                if inside { Ok(stops) } else { Err(value.unlike(&format!("stops from -{MOST_STOPS} to {MOST_STOPS}"))) }
+                let inside = stops.abs() <= MAX_STOPS;
+                if inside { Ok(stops) } else { Err(value.unlike(&format!("stops from -{MAX_STOPS} to {MAX_STOPS}"))) }
             })?,
             white_balance: table.optional("white_balance", |value| {
                 let kelvin = value.number()? as f32;
@@ -103,7 +103,7 @@ fn picture_name(value: Value<'_>) -> Read<String> {
 fn search(table: &mut Table<'_>) -> Read<Search> {
     let accel = table.optional("accel", |value| value.one_of(Accel::ALL, Accel::name))?;
     let grid = table.optional("grid", |value| {
-        let side = |value: Value<'_>| value.whole(1..=Resolution::MOST.into()).map(|side| side as u32);
+        let side = |value: Value<'_>| value.whole(1..=Resolution::MAX.into()).map(|side| side as u32);
         let sides =
             if value.is_list() { value.items()?.map(side).collect() } else { side(value).map(|side| vec![side]) };
         Resolution::of_sides(&sides?).map_err(|expected| value.fault(format!("\"grid\" wants {expected}")))
@@ -187,9 +187,9 @@ pub(super) fn light(mut table: Table<'_>) -> Read<Light> {
             let centre = table.need("position")?.vector()?;
             let value = table.need("half_edges")?;
             let edges = value.items()?.map(|edge| edge.vector()).collect::<Read<Vec<_>>>()?;
-            let is_held = |edge: &DVec3| edge.abs().max_element() <= LARGEST_COORDINATE.into();
+            let is_held = |edge: &DVec3| edge.abs().max_element() <= MAX_COORDINATE.into();
             if !edges.iter().all(is_held) {
-                return Err(value.fault(format!("\"half_edges\" wants lengths of at most {LARGEST_COORDINATE:e}")));
+                return Err(value.fault(format!("\"half_edges\" wants lengths of at most {MAX_COORDINATE:e}")));
             }
             let half_edges = match edges[..] {
                 [a, b] if a.cross(b).length() > 0.0 => [a, b],
@@ -283,19 +283,15 @@ pub(super) fn camera(mut table: Table<'_>) -> Read<Camera> {
 
 fn shift(value: Value<'_>) -> Read<DVec2> {
     let shift = DVec2::from_array(value.numbers()?);
-    let inside = shift.abs().max_element() <= Camera::MOST_SHIFT;
-    if inside { Ok(shift) } else { Err(value.unlike(&format!("shares of at most {}", Camera::MOST_SHIFT))) }
+    let inside = shift.abs().max_element() <= Camera::MAX_SHIFT;
+    if inside { Ok(shift) } else { Err(value.unlike(&format!("shares of at most {}", Camera::MAX_SHIFT))) }
 }
 
 /// A place that rays can start from.
 fn place_of(value: Value<'_>) -> Read<DVec3> {
     let place = value.vector()?;
-    let is_held = place.abs().max_element() <= LARGEST_COORDINATE.into();
-    if is_held {
-        Ok(place)
-    } else {
-        Err(value.unlike(&format!("a place: coordinates of at most {LARGEST_COORDINATE:e}")))
-    }
+    let is_held = place.abs().max_element() <= MAX_COORDINATE.into();
+    if is_held { Ok(place) } else { Err(value.unlike(&format!("a place: coordinates of at most {MAX_COORDINATE:e}"))) }
 }
 
 /// Where a camera goes; what is not said stays as it is.
@@ -334,7 +330,7 @@ fn projection(table: &mut Table<'_>) -> Read<Projection> {
             let vertical = table.optional("fov", angle)?;
             let horizontal = table.optional("fov_x", angle)?;
             Ok(Projection::Perspective(match (horizontal, vertical) {
-                (None, vertical) => Fov::Vertical(vertical.unwrap_or(USUAL_FOV.to_radians())),
+                (None, vertical) => Fov::Vertical(vertical.unwrap_or(DEFAULT_FOV.to_radians())),
                 (Some(horizontal), None) => Fov::Horizontal(horizontal),
                 (Some(horizontal), Some(vertical)) => Fov::Both { horizontal, vertical },
             }))
@@ -365,8 +361,8 @@ fn length(value: Value<'_>) -> Read<f64> {
 /// A length that is no larger than coordinates may be.
 fn extent(value: Value<'_>) -> Read<f64> {
     let radius = length(value)?;
-    let is_held = radius <= LARGEST_COORDINATE.into();
-    if is_held { Ok(radius) } else { Err(value.unlike(&format!("a length of at most {LARGEST_COORDINATE:e}"))) }
+    let is_held = radius <= MAX_COORDINATE.into();
+    if is_held { Ok(radius) } else { Err(value.unlike(&format!("a length of at most {MAX_COORDINATE:e}"))) }
 }
 
 /// An angle of view, in radians.

@@ -22,7 +22,7 @@ const NAMES: f64 = 102.0;
 const RATES: f64 = 68.0;
 const PLOT: f64 = PANEL - NAMES - RATES;
 /// Letters that fit on the left.
-const MOST_LETTERS: usize = 17;
+const MAX_LETTERS: usize = 17;
 /// Height of a bar's row, and of the bar.
 const ROW: f64 = 17.0;
 const BAR: f64 = 9.0;
@@ -144,8 +144,8 @@ fn bar(svg: &mut Drawing, x: f64, middle: f64, rows: &[&TraversalRow], at: impl 
     let baseline = middle + 4.0;
     // Where there is no room for both, colours tell the engines apart.
     let name = format!("{} {}", best.backend, best.mode);
-    let name = if name.len() > MOST_LETTERS { best.mode } else { &name };
-    svg.text((x + NAMES - 7.0, baseline), Anchor::End, BODY, &shortened(name, MOST_LETTERS));
+    let name = if name.len() > MAX_LETTERS { best.mode } else { &name };
+    svg.text((x + NAMES - 7.0, baseline), Anchor::End, BODY, &shortened(name, MAX_LETTERS));
     let rate = best.mrays_per_s;
     let length = at(rate.median) - at(0.0);
     svg.rectangle((at(0.0), middle - BAR / 2.0), (length, BAR), color(best));

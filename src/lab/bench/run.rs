@@ -23,7 +23,7 @@ pub const WIDTHS: [Width; 3] = [Width::One, Width::Eight, Width::Sixteen];
 const BUILDING: f64 = 0.25;
 
 /// But no more often than this, if not asked to.
-const MOST_BUILDS: usize = 41;
+const MAX_BUILDS: usize = 41;
 
 /// An engine in one of its modes.
 pub struct Contender {
@@ -133,7 +133,7 @@ impl Setup<'_> {
         let mut rates = vec![Vec::new(); built.len()];
         let triangles = self.subject.world.stored_triangles() as f64;
         let mut seconds = 0.0;
-        for turn in 0..self.repeat.max(MOST_BUILDS) {
+        for turn in 0..self.repeat.max(MAX_BUILDS) {
             if turn >= self.repeat && seconds >= BUILDING {
                 break;
             }

@@ -10,13 +10,13 @@ use crate::scene::{self, Camera, Geometry, Group, Instance, Material, Mesh, Scen
 use crate::trace::World;
 
 /// Triangles of the largest terrain: 2 n^2 at this n are 800 million.
-const LARGEST_TERRAIN: u32 = 20_000;
+const MAX_TERRAIN: u32 = 20_000;
 /// Storeys of the largest building: 414 million triangles.
-const LARGEST_BUILDING: u32 = 100_000;
+const MAX_BUILDING: u32 = 100_000;
 /// Storeys where none are given: 198,720 triangles.
 const STOREYS: u32 = 48;
 /// Most placements: a placement takes 300 bytes or so, whatever is placed.
-const MOST_INSTANCES: u32 = 10_000_000;
+const MAX_INSTANCES: u32 = 10_000_000;
 /// Placements where no number is given: 20.5 million triangles as placed.
 const INSTANCES: u32 = 2500;
 
@@ -51,9 +51,9 @@ impl Procedural {
         let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
         let digits = &name[letters.len()..];
         let (rule, otherwise, largest): (fn(u32) -> Self, _, _) = match letters {
-            "terrain" => (Self::Terrain, None, LARGEST_TERRAIN),
-            "architecture" => (Self::Architecture, Some(STOREYS), LARGEST_BUILDING),
-            "instances" => (Self::Instances, Some(INSTANCES), MOST_INSTANCES),
+            "terrain" => (Self::Terrain, None, MAX_TERRAIN),
+            "architecture" => (Self::Architecture, Some(STOREYS), MAX_BUILDING),
+            "instances" => (Self::Instances, Some(INSTANCES), MAX_INSTANCES),
             _ => return Ok(None),
         };
         let number = if digits.is_empty() { otherwise } else { digits.parse().ok() };

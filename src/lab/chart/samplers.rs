@@ -20,7 +20,7 @@ use crate::trace::bvh::Bvh;
 /// Seeds of the two pictures that the reference is the mean of.
 const SEEDS: [u64; 2] = [0x00c0_ffee, 0x00be_ef00];
 /// Samples that adaptive sampling may take at most.
-const MOST: u32 = 4096;
+const MAX: u32 = 4096;
 
 /// A picture to be made again and again.
 struct Way {
@@ -207,7 +207,7 @@ fn ways(usual: &Settings, most: u32) -> Vec<Way> {
             label: noise.to_string(),
             settings: Settings {
                 filter: Filter::Box,
-                adaptive: Some(Adaptive { noise, max_spp: MOST.min(8 * most) }),
+                adaptive: Some(Adaptive { noise, max_spp: MAX.min(8 * most) }),
                 ..usual.clone()
             },
             filter: position(Filter::Box),

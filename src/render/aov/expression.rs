@@ -33,7 +33,7 @@ impl Event {
 }
 
 /// Most letters of an expression: a set of them is the bits of a number, of which one more stands for the eye.
-const MOST_LETTERS: usize = 60;
+const MAX_LETTERS: usize = 60;
 /// The eye, in sets of positions.
 const EYE: u64 = 1 << 63;
 
@@ -156,8 +156,8 @@ impl Reader<'_> {
     fn single(&mut self, c: char) -> Result<Piece, String> {
         self.rest = &self.rest[c.len_utf8()..];
         if c == '(' {
-            if self.depth == MOST_LETTERS {
-                return Err(format!("more than {MOST_LETTERS} ( within each other"));
+            if self.depth == MAX_LETTERS {
+                return Err(format!("more than {MAX_LETTERS} ( within each other"));
             }
             self.depth += 1;
             let piece = self.either()?;
@@ -177,8 +177,8 @@ impl Reader<'_> {
             }
             c => letter(c).ok_or_else(|| format!("{c:?} is none of D, S, T, . [ ] ( ) | * + ?"))?,
         };
-        if self.letters.len() == MOST_LETTERS {
-            return Err(format!("more than {MOST_LETTERS} letters"));
+        if self.letters.len() == MAX_LETTERS {
+            return Err(format!("more than {MAX_LETTERS} letters"));
         }
         self.letters.push(events);
         self.before.push(0);

@@ -3,7 +3,7 @@
 
 use super::no_ray;
 use crate::error::{Error, Result};
-use crate::math::{DVec2, DVec3, LARGEST_COORDINATE};
+use crate::math::{DVec2, DVec3, MAX_COORDINATE};
 use crate::ray::Ray;
 use crate::scene::{Camera, Distortion, Journey, Pose, Projection, ThinLens};
 
@@ -30,8 +30,8 @@ impl General {
         let journey = end.map(|end| Journey::new(pose, Pose { eye: end.eye - centre, ..end }));
         if let Some(ThinLens { radius, focus, .. }) = lens {
             for (name, length) in [("opening of radius", radius), ("focus at", focus)] {
-                if !(length > 0.0 && length <= LARGEST_COORDINATE.into()) {
-                    let range = format!("must be above 0, and at most {LARGEST_COORDINATE:e}");
+                if !(length > 0.0 && length <= MAX_COORDINATE.into()) {
+                    let range = format!("must be above 0, and at most {MAX_COORDINATE:e}");
                     return Err(Error::Usage(format!("a lens with an {name} {length} m: {range}")));
                 }
             }

@@ -6,7 +6,7 @@ mod general;
 mod pinhole;
 
 use crate::error::{Error, Result};
-use crate::math::{DMat3, DVec2, DVec3, LARGEST_COORDINATE, Vec3};
+use crate::math::{DMat3, DVec2, DVec3, MAX_COORDINATE, Vec3};
 use crate::ray::Ray;
 use crate::scene::{Camera, Distortion, Projection};
 
@@ -88,8 +88,8 @@ fn check_numbers(camera: &Camera) -> Result<()> {
         if !eye.is_finite() {
             return Err(Error::Usage(format!("a camera at {eye}: its place must be finite")));
         }
-        if eye.abs().max_element() > LARGEST_COORDINATE.into() {
-            let message = format!("a camera at {eye}: its coordinates must be at most {LARGEST_COORDINATE:e}");
+        if eye.abs().max_element() > MAX_COORDINATE.into() {
+            let message = format!("a camera at {eye}: its coordinates must be at most {MAX_COORDINATE:e}");
             return Err(Error::Usage(message));
         }
         // Not so of NaN.
@@ -106,12 +106,12 @@ fn check_numbers(camera: &Camera) -> Result<()> {
         return Err(Error::Usage("a camera whose lens shift or distortion is not finite".to_owned()));
     }
     if let Projection::Orthographic(height) = camera.projection
-        && height > LARGEST_COORDINATE.into()
+        && height > MAX_COORDINATE.into()
     {
-        return Err(Error::Usage(format!("a view of height {height:e} m: must be at most {LARGEST_COORDINATE:e}")));
+        return Err(Error::Usage(format!("a view of height {height:e} m: must be at most {MAX_COORDINATE:e}")));
     }
-    if shift.abs().max_element() > Camera::MOST_SHIFT {
-        let most = Camera::MOST_SHIFT;
+    if shift.abs().max_element() > Camera::MAX_SHIFT {
+        let most = Camera::MAX_SHIFT;
         let message = format!("a lens shift of {shift}: at most {most} pictures to a side are possible");
         return Err(Error::Usage(message));
     }

@@ -1,6 +1,6 @@
 //! How far from zero a ray may be, so that Embree's numbers suffice: in the world and in every object that is placed.
 //!
-//! Debian's Embree is built with an assertion that ends the process on a ray with a coordinate above [`MOST`]; and it holds
+//! Debian's Embree is built with an assertion that ends the process on a ray with a coordinate above [`MAX`]; and it holds
 //! rays of objects to the same, after it has moved them by the inverse that it makes of a transform in f32.
 
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::ray::Ray;
 use crate::trace::{Placement, World};
 
 /// The largest coordinate that Embree takes, its `FLT_LARGE`.
-const MOST: f32 = 1.844e18;
+const MAX: f32 = 1.844e18;
 
 /// Times at which what moves is looked at, from 0 to this.
 const TIMES: u8 = 16;
@@ -35,11 +35,11 @@ impl Reach {
     /// [`Error::Backend`] where an object is placed such that rays from what is in the scene cannot be traced.
     pub fn of(world: &World) -> Result<Self> {
         if world.placements.is_empty() {
-            return Ok(Self::new(MOST));
+            return Ok(Self::new(MAX));
         }
         let size = world.bounds();
         let size = if size.is_empty() { 0.0 } else { size.min.abs().max(size.max.abs()).max_element() };
-        let mut most = MOST;
+        let mut most = MAX;
         for placement in &world.placements {
             let times = if placement.motion.is_some() { 0..=TIMES } else { 0..=0 };
             for time in times {
@@ -60,7 +60,7 @@ impl Reach {
     }
 }
 
-/// The largest coordinate of a ray in the world that stays below [`MOST`] in the object, with a factor of 2 to spare; none where
+/// The largest coordinate of a ray in the world that stays below [`MAX`] in the object, with a factor of 2 to spare; none where
 /// the inverse is beyond f32.
 fn reach(to_world: &Affine3) -> Option<f32> {
     // As Embree does: the adjugate over the determinant, in f32.
@@ -71,8 +71,8 @@ fn reach(to_world: &Affine3) -> Option<f32> {
     let magnitudes = inverse.abs();
     let stretch = (magnitudes.x_axis + magnitudes.y_axis + magnitudes.z_axis).max_element();
     let away = (magnitudes * to_world.translation.abs()).max_element();
-    let reach = (MOST / 2.0 - away) / stretch;
-    (determinant.is_normal() && inverse.is_finite() && reach > 0.0).then_some(reach.min(MOST))
+    let reach = (MAX / 2.0 - away) / stretch;
+    (determinant.is_normal() && inverse.is_finite() && reach > 0.0).then_some(reach.min(MAX))
 }
 
 fn unable(placement: &Placement) -> Error {
@@ -89,7 +89,7 @@ fn unable(placement: &Placement) -> Error {
 #[cfg(test)]
 impl Reach {
     /// Without anything that is placed.
-    pub const WORLD: Self = Self::new(MOST);
+    pub const WORLD: Self = Self::new(MAX);
 }
 
 #[cfg(test)]
@@ -102,10 +102,10 @@ mod tests {
         let scaled = |scale: f32, place: f32| {
             reach(&Affine3 { matrix3: Mat3::from_diagonal(Vec3::splat(scale)), translation: Vec3::splat(place) })
         };
-        assert_eq!(scaled(1.0, 0.0), Some(MOST / 2.0));
-        assert_eq!(scaled(1e9, 0.0), Some(MOST));
+        assert_eq!(scaled(1.0, 0.0), Some(MAX / 2.0));
+        assert_eq!(scaled(1e9, 0.0), Some(MAX));
         let near = |x: Option<f32>, y: f32| (x.expect("it can be placed") / y - 1.0).abs() < 1e-5;
-        assert!(near(scaled(1e-6, 0.0), MOST / 2.0 * 1e-6));
+        assert!(near(scaled(1e-6, 0.0), MAX / 2.0 * 1e-6));
         assert_eq!(scaled(1e-6, 1e13), None, "the place is beyond Embree's numbers");
         assert_eq!(scaled(1e-13, 0.0), None, "the determinant is not normal");
         assert_eq!(scaled(0.0, 0.0), None);

@@ -17,7 +17,7 @@ use crate::trace::{Part, Primitives, World};
 /// Triangles in a block of Embree's.
 const BLOCK: u32 = 4;
 /// Most items in a leaf of a scene: seven blocks.
-const MOST_IN_LEAF: u32 = 7 * BLOCK;
+const MAX_IN_LEAF: u32 = 7 * BLOCK;
 
 /// The surface area heuristic's cost of the trees that Embree's builder makes for `world`: in tests of a block as
 /// the native tree has them ([`Bvh::BLOCK`](crate::trace::bvh::Bvh::BLOCK)), of which a node costs `node_cost`. High quality splits triangles, except where scenes are robust or compact:
@@ -90,8 +90,7 @@ impl Level {
             }
         }
         let blocks = |items: &[Item]| items.len().div_ceil(Bvh::BLOCK) as f64;
-        let rule =
-            Rule { quality, block: BLOCK, most: MOST_IN_LEAF, leaf: &blocks, node: node_cost, corners: &corners };
+        let rule = Rule { quality, block: BLOCK, most: MAX_IN_LEAF, leaf: &blocks, node: node_cost, corners: &corners };
         let of_triangles = builder::cost(device, triangles, &rule)?;
         let count = |items: &[Item]| items.len() as f64;
         let rule = Rule { quality: quality.min(Quality::Medium), block: 1, leaf: &count, ..rule };

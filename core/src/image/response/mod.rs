@@ -16,12 +16,12 @@ use crate::math::{Mat3, Vec3};
 pub use white::TEMPERATURES;
 
 /// Stops that exposure takes, up and down.
-pub const MOST_STOPS: f32 = 64.0;
+pub const MAX_STOPS: f32 = 64.0;
 
 /// What a camera makes of radiance. By default nothing but the sRGB transfer function.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Response {
-    /// Stops, at most [`MOST_STOPS`] up or down: radiance counts 2^exposure times.
+    /// Stops, at most [`MAX_STOPS`] up or down: radiance counts 2^exposure times.
     pub exposure: f32,
     /// Kelvin, within [`TEMPERATURES`] (what is beyond counts as its end): light of this temperature becomes white. None leaves colours as they are.
     pub white_balance: Option<f32>,

@@ -11,7 +11,7 @@ use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{Material, Specular};
 
 /// The highest exponent for which f32 gives a power to a thousandth.
-const MOST_IN_F32: f32 = 1e4;
+const MAX_IN_F32: f32 = 1e4;
 
 /// The highlight of a material.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ impl Highlight {
         };
         let base = base.clamp(0.0, 1.0);
         // In f32 the base's rounding would count: it is raised with it.
-        let height = if self.shininess <= MOST_IN_F32 {
+        let height = if self.shininess <= MAX_IN_F32 {
             libm::powf(base as f32, self.shininess)
         } else {
             libm::pow(base, self.shininess.into()) as f32

@@ -23,7 +23,7 @@ const DEEPEST: u32 = 20;
 const MOST_OF_CHILDREN: usize = 3;
 /// References for each item that splitting may add in all; every cell has its share. Where boxes overlap, each level would add more than
 /// the one before.
-const MOST_REFERENCES: usize = 12;
+const MAX_REFERENCES: usize = 12;
 
 /// The index.
 pub(super) struct Octree {
@@ -71,7 +71,7 @@ impl Index for Octree {
             tree.min = bounds.min.as_dvec3();
             tree.half = (bounds.max.as_dvec3() - tree.min).max_element() * 0.5;
             tree.nodes.push(Node { first: 0, count: 0 });
-            let room = MOST_REFERENCES * input.boxes.len();
+            let room = MAX_REFERENCES * input.boxes.len();
             tree.split(0, input.boxes, input.all(), tree.root(), 0, room);
         }
         tree

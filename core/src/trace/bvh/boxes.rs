@@ -41,15 +41,15 @@ impl fmt::Debug for BoxTree {
 
 impl BoxTree {
     /// Boxes that leaves can name.
-    pub const MOST: usize = Child::NAMES;
+    pub const MAX: usize = Child::NAMES;
 
     /// Over `boxes`; those that are empty or not finite are left out. And of which box each name is, by its index.
     ///
     /// # Panics
-    /// With more than [`BoxTree::MOST`] boxes, and where this processor does not have `options.isa`.
+    /// With more than [`BoxTree::MAX`] boxes, and where this processor does not have `options.isa`.
     pub fn build(boxes: &[Aabb], options: Options<'_>) -> (Self, Vec<u32>) {
         let kept = boxes.iter().enumerate().filter(|(_, bounds)| bounds.is_bounded());
-        Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), Child::MOST, &options)
+        Self::over(kept.map(|(i, bounds)| Record::new(bounds, 0, i as u32)).collect(), Child::MAX, &options)
     }
 
     /// Over boxes that move, from where the first of each pair is at time 0 to where the second is at time 1, in straight lines. Rays before and after that
@@ -58,7 +58,7 @@ impl BoxTree {
     /// # Panics
     /// As [`BoxTree::build`] does.
     pub fn moving(boxes: &[[Aabb; 2]], options: Options<'_>) -> (Self, Vec<u32>) {
-        Self::of_moving(boxes, Child::MOST, &options)
+        Self::of_moving(boxes, Child::MAX, &options)
     }
 
     /// The same with no more than `most` boxes in a leaf.

@@ -28,9 +28,9 @@ impl Child {
     /// The first node.
     pub const ROOT: Self = Self(0);
     /// Blocks that a leaf can hold. From 1 to 8 rates hardly differ; with 1 a triangle takes a quarter more memory.
-    pub const MOST: u32 = 4;
+    pub const MAX: u32 = 4;
     /// Blocks, or items before blocks are made of them, that leaves can name.
-    pub const NAMES: usize = limits::MOST_PRIMITIVES as usize;
+    pub const NAMES: usize = limits::MAX_PRIMITIVES as usize;
 
     /// Set for a leaf.
     const LEAF: u32 = 1 << 31;
@@ -44,7 +44,7 @@ impl Child {
 
     /// `count` blocks from `first` on.
     pub fn leaf(first: u32, count: u32) -> Self {
-        debug_assert!((1..=Self::MOST).contains(&count) && (first as usize) < Self::NAMES);
+        debug_assert!((1..=Self::MAX).contains(&count) && (first as usize) < Self::NAMES);
         Self(Self::LEAF | (count - 1) << Self::COUNT_SHIFT | first)
     }
 
@@ -68,7 +68,7 @@ impl Child {
     /// A leaf's number of blocks.
     #[inline(always)]
     pub fn count(self) -> u32 {
-        (self.0 >> Self::COUNT_SHIFT) % Self::MOST + 1
+        (self.0 >> Self::COUNT_SHIFT) % Self::MAX + 1
     }
 
     /// What a leaf of several blocks is without its first.

@@ -21,7 +21,7 @@ use std::fmt;
 use std::sync::OnceLock;
 
 use crate::error::{Error, Result};
-use crate::math::{DAabb, DVec3, LARGEST_COORDINATE, Vec3};
+use crate::math::{DAabb, DVec3, MAX_COORDINATE, Vec3};
 use crate::ray::Hit;
 use crate::scene::{Geometry, Material, Mesh, Scene};
 use crate::shape::triangle::TriangleHit;
@@ -31,7 +31,7 @@ use frame::Frame;
 pub use nearest_point::NearestPoint;
 
 /// Rays that start farther away, on any axis, miss.
-pub const FARTHEST_ORIGIN: f64 = 1e80;
+pub const MAX_ORIGIN: f64 = 1e80;
 
 /// A half-line in f64 with a valid range. A hit counts for `tmin <= t <= tmax`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,10 +69,10 @@ impl PreciseRay {
         Self { origin, direction, tmin: 0.0, tmax: f64::INFINITY }
     }
 
-    /// Whether it can hit anything: an origin whose largest component is not above 1e80 ([`FARTHEST_ORIGIN`]), a direction whose largest component is neither below
+    /// Whether it can hit anything: an origin whose largest component is not above 1e80 ([`MAX_ORIGIN`]), a direction whose largest component is neither below
     /// 1e-140 nor above 1e140, so that the square of one times the other holds in f64, and a range that is not empty. Any other ray misses.
     pub fn is_valid(&self) -> bool {
-        let placed = self.origin.abs().max_element() <= FARTHEST_ORIGIN && !self.origin.is_nan();
+        let placed = self.origin.abs().max_element() <= MAX_ORIGIN && !self.origin.is_nan();
         let directed = (1e-140..=1e140).contains(&self.direction.abs().max_element()) && !self.direction.is_nan();
         placed && directed && self.tmin >= 0.0 && self.tmin <= self.tmax
     }
@@ -201,7 +201,7 @@ impl Precise {
 
 /// Whether a corner is one that triangles with it can be hit.
 fn is_traceable(p: DVec3) -> bool {
-    p.abs().max_element() <= f64::from(LARGEST_COORDINATE) && !p.is_nan()
+    p.abs().max_element() <= f64::from(MAX_COORDINATE) && !p.is_nan()
 }
 
 /// Vertices that are no triangle's do not count: one that lies far away would leave f32 nothing of what is near.

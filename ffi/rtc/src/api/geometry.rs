@@ -91,10 +91,10 @@ pub unsafe extern "C-unwind" fn rtcSetGeometryTimeRange(geometry: *const Geometr
 /// How many attributes there are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C-unwind" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geometry, count: u32) {
-    const MOST: u32 = 1 << 16;
+    const MAX: u32 = 1 << 16;
     let set = |geometry: &Geometry| {
         let is_mesh = !matches!(geometry.kind, Kind::User | Kind::Instance | Kind::InstanceArray);
-        geometry.demand(is_mesh && count <= MOST)?;
+        geometry.demand(is_mesh && count <= MAX)?;
         geometry.modify(|state| {
             state.attributes.resize(count as usize, None);
             Ok(())

@@ -8,7 +8,7 @@ use crate::buffer::{Buffer, Items, View};
 use crate::failure::{Failure, Result};
 
 /// Embree's own limit.
-const MOST_VERTEX_BYTES: usize = 16 << 30;
+const MAX_VERTEX_BYTES: usize = 16 << 30;
 
 impl Geometry {
     /// Sets a buffer. What was committed stands until scenes are made anew: unlike other changes, this one needs no commit for that, as in Embree, while there are
@@ -78,7 +78,7 @@ impl Geometry {
         match name.0 {
             buffer_type::VERTEX => {
                 format.and(found)?;
-                let is_small = items.stride.checked_mul(items.count).is_some_and(|bytes| bytes <= MOST_VERTEX_BYTES);
+                let is_small = items.stride.checked_mul(items.count).is_some_and(|bytes| bytes <= MAX_VERTEX_BYTES);
                 let too_large = || Failure::operation("vertex buffer can be at most 16GB large");
                 is_small.then_some(()).ok_or_else(too_large)
             }

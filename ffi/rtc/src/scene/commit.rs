@@ -80,7 +80,7 @@ pub fn commit(scene: &Scene, plan: &Plan, mut old: Option<&mut Committed>) -> Re
     let mut boxes = scene.device.install(|| other_boxes(&records))?;
     let add = |(kept, count), (more, others)| (kept + more, count + others);
     let (kept, count) = makings.iter().map(Making::extent).fold((0, 0), add);
-    if count + boxes.boxes.len() > BoxTree::MOST {
+    if count + boxes.boxes.len() > BoxTree::MAX {
         return Err(Failure::operation("too many primitives in a scene"));
     }
     let expected = expected_bytes(count, boxes.boxes.len());

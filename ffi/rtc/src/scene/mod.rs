@@ -128,9 +128,9 @@ impl Scene {
     /// Adds a geometry under an id of the caller's.
     pub fn attach_by_id(&self, geometry: Arc<Geometry>, id: u32) -> Result<()> {
         // Ids are places in a list; one of a thousand million would be a slip.
-        const MOST: u32 = 1 << 28;
+        const MAX: u32 = 1 << 28;
         valid(id)?;
-        if id >= MOST {
+        if id >= MAX {
             return Err(Failure::operation("invalid geometry ID"));
         }
         let mut state = self.state();

@@ -11,7 +11,7 @@ use crate::failure::{Failure, Result};
 use crate::scene::{Body, Committed, Item, Near};
 
 /// Collisions told at a time.
-const MOST: usize = 16;
+const MAX: usize = 16;
 
 /// Primitives whose collisions one thread looks for at a time: fewer are not worth waking another.
 const TASK: usize = 1 << 6;
@@ -44,7 +44,7 @@ pub fn collide(first: &Committed, second: &Committed, function: RTCCollideFunc, 
         let count: usize = found.iter().map(Vec::len).sum();
         // As many more as there is room for, or fewer.
         len = if 2 * count < WAVE { 2 * len } else { (len / 2).max(TASK) };
-        for collisions in found.iter_mut().flat_map(|found| found.chunks_mut(MOST)) {
+        for collisions in found.iter_mut().flat_map(|found| found.chunks_mut(MAX)) {
             // SAFETY: the caller promised a function of this type; the list lives until it returns.
             unsafe { function(user, collisions.as_mut_ptr(), collisions.len() as u32) };
         }

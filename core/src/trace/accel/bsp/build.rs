@@ -28,7 +28,7 @@ const FEW: usize = 64;
 /// Planes above a cell, at most.
 const DEEPEST: u32 = 60;
 /// References for each item, and besides.
-const MOST_REFERENCES: [usize; 2] = [24, 4096];
+const MAX_REFERENCES: [usize; 2] = [24, 4096];
 /// How long it may take.
 const LONGEST: Duration = Duration::from_secs(10);
 /// As a share of the largest coordinate, how far from a plane counts as within it: a thousand times the rounding of the distance.
@@ -73,7 +73,7 @@ pub(super) fn build(input: &Input<'_>, options: &Options) -> Bsp {
     let doubt = DOUBT * reach(&bounds).max_element();
     let root = Link::Leaf(0);
     let tree = Bsp { bounds, doubt, root, nodes: Vec::new(), leaves: Vec::new(), items: Vec::new(), stopped: None };
-    let [each, besides] = MOST_REFERENCES;
+    let [each, besides] = MAX_REFERENCES;
     let longest = options.bsp_time.unwrap_or(LONGEST);
     let room = input.boxes.len().saturating_mul(each) + besides;
     let mut builder = Builder { input, tree, deadline: Instant::now().checked_add(longest), room, stopped: None };

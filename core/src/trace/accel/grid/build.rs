@@ -17,9 +17,9 @@ const CROWD: usize = 24;
 /// Grids within grids.
 const DEEPEST: u32 = 6;
 /// References for each item: beyond, a coarser grid serves better. Half as many in each grid within a grid, for these multiply.
-const MOST_REFERENCES: usize = 12;
+const MAX_REFERENCES: usize = 12;
 /// References in all where a resolution is asked for: 4 GB of them.
-const MOST_ENTRIES: usize = 1 << 30;
+const MAX_ENTRIES: usize = 1 << 30;
 
 impl Resolution {
     fn counts(self, bounds: &Aabb) -> UVec3 {
@@ -32,8 +32,8 @@ impl Resolution {
                 (size / edge).round().as_uvec3()
             }
         };
-        let mut counts = counts.clamp(UVec3::ONE, UVec3::splat(Self::MOST));
-        while cells(counts) > Self::MOST_CELLS {
+        let mut counts = counts.clamp(UVec3::ONE, UVec3::splat(Self::MAX));
+        while cells(counts) > Self::MAX_CELLS {
             counts = halved(counts);
         }
         counts
@@ -55,7 +55,7 @@ impl Grid {
             Some(resolution) => resolution.counts(bounds),
             None => counts_for(bounds, items.len()),
         };
-        let most = if resolution.is_some() { MOST_ENTRIES } else { (MOST_REFERENCES >> depth).max(2) * items.len() };
+        let most = if resolution.is_some() { MAX_ENTRIES } else { (MAX_REFERENCES >> depth).max(2) * items.len() };
         let mut grid = Self::empty(bounds, counts);
         // Where items are larger than cells, fewer cells lose nothing.
         while grid.references(boxes, items) > most && counts.max_element() > 1 {
@@ -206,7 +206,7 @@ fn counts_for(bounds: &Aabb, items: usize) -> UVec3 {
         edge = (volume / cells).powf(1.0 / f64::from(axes));
         takes_part = [0, 1, 2].map(|axis| size[axis] >= edge);
     }
-    (size / edge).round().clamp(DVec3::ONE, DVec3::splat(Resolution::MOST.into())).as_uvec3()
+    (size / edge).round().clamp(DVec3::ONE, DVec3::splat(Resolution::MAX.into())).as_uvec3()
 }
 
 fn intersection(a: &Aabb, b: &Aabb) -> Aabb {

@@ -24,7 +24,7 @@ const FEW: usize = 32;
 /// From this many items on, children are built side by side.
 const MANY: usize = 1 << 12;
 /// References for each item that cutting may add in all; every cell has its share.
-const MOST_REFERENCES: usize = 12;
+const MAX_REFERENCES: usize = 12;
 /// A tree of which the upper part is built by all threads. What is below is finished at once: two allocations for each of millions of
 /// leaves would take as long as choosing the planes.
 enum Branch {
@@ -53,7 +53,7 @@ struct Entry {
 /// The tree over all items, whose boxes are within `bounds`.
 pub(super) fn tree(input: &Input<'_>, bounds: Aabb) -> Tree {
     let items: Vec<Entry> = input.boxes.iter().zip(0..).map(|(&bounds, item)| Entry { bounds, item }).collect();
-    let room = MOST_REFERENCES * items.len();
+    let room = MAX_REFERENCES * items.len();
     // As deep as Havran 2000 found to pay, plus some for uneven scenes.
     let depth = (8.0 + 1.6 * (items.len().max(1) as f64).log2()) as u32;
     let whole = Part { bounds, items, depth: depth.min(STACK as u32), room };

@@ -35,7 +35,7 @@ struct Singles {
 /// Placed objects that a bundle of shadow rays may enter before the rest of its batch goes apart: each costs a bundle as much as dozens of
 /// rays, most of which pass it by or are in shadow already. Of 2,500 placements a bundle enters two or three, and is faster by a
 /// quarter; it takes many more, far away, to get here. Bundles of closest hits are faster with any number.
-const MOST_PLACES: u32 = 10;
+const MAX_PLACES: u32 = 10;
 
 /// Visits of single rays to placed objects that are kept waiting until they are traced together: enough for a flight.
 const VISITORS: usize = 64;
@@ -175,7 +175,7 @@ impl Bvh {
                 let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);
                 S::apart(Others::<Q> { bvh: self, rays, answers, t: &bundles.t });
             }
-            in_bundles &= !Q::ANY || bundles.entered <= MOST_PLACES;
+            in_bundles &= !Q::ANY || bundles.entered <= MAX_PLACES;
         }
     }
 }

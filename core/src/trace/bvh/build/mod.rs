@@ -83,7 +83,7 @@ enum Built {
 
 /// Reorders `items` so that every leaf is a range of them, and returns the tree whose leaves name these ranges.
 /// `block`, a power of two, is how many items are tested together, `most` how many such blocks a leaf may hold, up to
-/// [`Child::MOST`].
+/// [`Child::MAX`].
 ///
 /// # Panics
 /// With more than [`Child::NAMES`] items, and where this processor does not have `options.isa`.
@@ -255,7 +255,7 @@ mod tests {
             let reported = AtomicU64::new(0);
             let progress = |count| _ = reported.fetch_add(count, Ordering::Relaxed);
             let tree =
-                build(&mut items, block, Child::MOST, &Options { progress: Some(&progress), ..Options::default() });
+                build(&mut items, block, Child::MAX, &Options { progress: Some(&progress), ..Options::default() });
             assert_eq!(reported.into_inner(), u64::from(count));
             let mut seen = vec![false; items.len()];
             check(&tree, &items, Child::ROOT, block, &mut seen);

@@ -17,7 +17,7 @@ use crate::trace::bvh::meshes::Meshes;
 const BITS: u32 = 30;
 
 /// The most bits for one axis.
-const MOST_BITS: u32 = 16;
+const MAX_BITS: u32 = 16;
 
 /// Set in the codes of large triangles.
 const LARGE_BIT: u32 = BITS;
@@ -73,7 +73,7 @@ impl Grid {
             let axis = left.max_position();
             if left[axis] > 0.0 {
                 bits[axis].push(bit);
-                left[axis] = if bits[axis].len() < MOST_BITS as usize { left[axis] / 2.0 } else { 0.0 };
+                left[axis] = if bits[axis].len() < MAX_BITS as usize { left[axis] / 2.0 } else { 0.0 };
             }
         }
         let (mut scale, mut spread) = (Vec3::ZERO, Box::new([[[0; 256]; 2]; 3]));

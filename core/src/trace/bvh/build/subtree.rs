@@ -157,7 +157,7 @@ impl<S: Simd> Finder<S> {
     /// The best way to divide `items`, those of `range`.
     #[inline(always)]
     pub fn find(&mut self, items: &[Record], range: &Range, rule: &Rule) -> Split {
-        let best = if items.len() <= sweep::MOST {
+        let best = if items.len() <= sweep::MAX {
             sweep::best::<S>(items, rule)
         } else if items.len() < bins::LARGE {
             binned::<S, _>(&mut self.few, items, range, rule)

@@ -9,14 +9,14 @@ use crate::trace::bvh::simd::boxes::{Boxes, RANKED};
 use crate::trace::bvh::simd::{Array, Simd, Vector};
 
 /// The largest number of items.
-pub(super) const MOST: usize = RANKED;
+pub(super) const MAX: usize = RANKED;
 
-/// The cheapest division of 2 to [`MOST`] items; None where none costs a finite amount.
+/// The cheapest division of 2 to [`MAX`] items; None where none costs a finite amount.
 #[inline(always)]
 pub(super) fn best<S: Simd>(items: &[Record], rule: &Rule) -> Option<Split> {
     let n = items.len();
     let orders = sorted::<S>(items);
-    let mut right_areas = [[0.0; 4]; MOST];
+    let mut right_areas = [[0.0; 4]; MAX];
     let mut right = [S::V8::splat(f32::NEG_INFINITY); 3];
     for k in (1..n).rev() {
         right = join(right, at::<S>(items, &orders, k));
@@ -36,7 +36,7 @@ pub(super) fn best<S: Simd>(items: &[Record], rule: &Rule) -> Option<Split> {
 
 /// Of each axis' order the item in that place.
 #[inline(always)]
-fn at<S: Simd>(items: &[Record], orders: &[[u8; MOST]; 3], k: usize) -> [S::V8; 3] {
+fn at<S: Simd>(items: &[Record], orders: &[[u8; MAX]; 3], k: usize) -> [S::V8; 3] {
     // Written out: what is mapped over an array, or is a closure, is not always compiled for the instruction set.
     let [x, y, z] = orders;
     let [x, y, z] = [&items[usize::from(x[k])], &items[usize::from(y[k])], &items[usize::from(z[k])]];
@@ -45,22 +45,22 @@ fn at<S: Simd>(items: &[Record], orders: &[[u8; MOST]; 3], k: usize) -> [S::V8; 
 
 /// The items' numbers by rising centre, for each axis.
 #[inline(always)]
-fn sorted<S: Simd>(items: &[Record]) -> [[u8; MOST]; 3] {
-    let mut keys = [[0.0; MOST]; 3];
+fn sorted<S: Simd>(items: &[Record]) -> [[u8; MAX]; 3] {
+    let mut keys = [[0.0; MAX]; 3];
     for (i, item) in items.iter().enumerate() {
         let bounds = S::V8::load(&item.0);
         // Finite, for an infinite box has no centre.
         let finite = bounds.sub(bounds.swap_halves()).max(S::V8::splat(-1e38)).min(S::V8::splat(1e38)).to_array();
         for axis in 0..3 {
             // The number in the last five bits makes every key another one.
-            keys[axis][i] = f32::from_bits(finite[axis + 4].to_bits() & !(MOST as u32 - 1) | i as u32);
+            keys[axis][i] = f32::from_bits(finite[axis + 4].to_bits() & !(MAX as u32 - 1) | i as u32);
         }
     }
-    let mut orders = [[0; MOST]; 3];
+    let mut orders = [[0; MAX]; 3];
     for axis in 0..3 {
         let ranks = S::V8::ranks(&keys[axis], items.len());
         for i in 0..items.len() {
-            orders[axis][ranks[i] as usize % MOST] = i as u8;
+            orders[axis][ranks[i] as usize % MAX] = i as u8;
         }
     }
     orders

@@ -119,7 +119,7 @@ struct Doubt {
 }
 
 /// Of eight triangles and eight groups.
-const MOST_PAIRS: usize = 64;
+const MAX_PAIRS: usize = 64;
 
 impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
     /// Triangles of the block whose first is `first`, whose fronts all rays see; true where a limit has changed.
@@ -128,7 +128,7 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
         let (splat, zero) = (S::Wide::splat, S::Wide::splat(0.0));
         let (bundle, found) = (self.bundle, &mut *self.found);
         let (first_t, place) = (splat(bundle.first), splat(f32::from_bits(self.place)));
-        let (mut doubts, mut count) = ([Doubt { pair: Pair(0), open: 0 }; MOST_PAIRS], 0);
+        let (mut doubts, mut count) = ([Doubt { pair: Pair(0), open: 0 }; MAX_PAIRS], 0);
         let mut hit = zero.less(zero);
         for pair in pairs {
             let (lane, group) = (pair.lane(), pair.group::<S>());
@@ -153,11 +153,11 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
                 place.put_where(sure, bytemuck::cast_mut(&mut found.place), group);
             }
             hit = hit.or(sure);
-            doubts[count % MOST_PAIRS] = Doubt { pair, open: open as u16 };
+            doubts[count % MAX_PAIRS] = Doubt { pair, open: open as u16 };
             count += usize::from(open != 0);
         }
         let mut changed = hit.bits() != 0;
-        for &Doubt { pair, open } in &doubts[..count.min(MOST_PAIRS)] {
+        for &Doubt { pair, open } in &doubts[..count.min(MAX_PAIRS)] {
             let mut open = open.into();
             if P::IS_PARALLEL || self.bundle.is_turned {
                 open &= !self.behind_starts::<S>(edges, pair);

@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::math::{Aabb, LARGEST_COORDINATE, Vec3, is_traceable};
+use crate::math::{Aabb, MAX_COORDINATE, Vec3, is_traceable};
 use crate::trace::bvh::build::{MAX_DEPTH, spatial, triangle_items};
 use crate::trace::bvh::levels::leaves::Leaves;
 use crate::trace::bvh::meshes::Meshes;
@@ -135,7 +135,7 @@ const BATCH: usize = 256;
 impl Pass<'_> {
     fn check_nodes(&self, first: usize, nodes: &[Node]) -> Result<Counts, String> {
         let mut work = Work::default();
-        let most = Aabb { min: Vec3::ZERO, max: Vec3::splat(LARGEST_COORDINATE) };
+        let most = Aabb { min: Vec3::ZERO, max: Vec3::splat(MAX_COORDINATE) };
         // Above clusters boxes are around those of nodes, which are wide already.
         let most = widened(&widened(&most)).max;
         for (index, node) in (first..).zip(nodes) {

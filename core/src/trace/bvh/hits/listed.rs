@@ -6,9 +6,9 @@ use super::found::NONE;
 #[derive(Clone, Copy)]
 pub(in crate::trace::bvh) struct Listed {
     /// Block and lane of each: from the front of those that are sure, from the back of those that are not.
-    ids: [u32; Self::MOST],
+    ids: [u32; Self::MAX],
     /// Bounds on t of those that are sure.
-    t: [[f32; 2]; Self::MOST],
+    t: [[f32; 2]; Self::MAX],
     sures: usize,
     opens: usize,
     is_in_doubt: bool,
@@ -16,9 +16,9 @@ pub(in crate::trace::bvh) struct Listed {
 
 impl Listed {
     /// As many as are kept; a ray with more is in doubt.
-    const MOST: usize = 24;
+    const MAX: usize = 24;
     pub const NONE: Self =
-        Self { ids: [NONE; Self::MOST], t: [[0.0; 2]; Self::MOST], sures: 0, opens: 0, is_in_doubt: false };
+        Self { ids: [NONE; Self::MAX], t: [[0.0; 2]; Self::MAX], sures: 0, opens: 0, is_in_doubt: false };
 
     /// Nothing again.
     #[inline(always)]
@@ -28,7 +28,7 @@ impl Listed {
 
     #[inline(always)]
     fn has_room(&mut self) -> bool {
-        self.is_in_doubt |= self.sures + self.opens >= Self::MOST;
+        self.is_in_doubt |= self.sures + self.opens >= Self::MAX;
         !self.is_in_doubt
     }
 
@@ -52,26 +52,26 @@ impl Listed {
     pub fn push_open(&mut self, id: u32) {
         if self.has_room() {
             self.opens += 1;
-            self.ids[Self::MOST - self.opens] = id;
+            self.ids[Self::MAX - self.opens] = id;
         }
     }
 
     /// Those that are hit for sure.
     #[inline(always)]
     pub fn sure(&self) -> &[u32] {
-        &self.ids[..self.sures.min(Self::MOST)]
+        &self.ids[..self.sures.min(Self::MAX)]
     }
 
     /// Bounds on their t.
     #[inline(always)]
     pub fn t(&self) -> &[[f32; 2]] {
-        &self.t[..self.sures.min(Self::MOST)]
+        &self.t[..self.sures.min(Self::MAX)]
     }
 
     /// Those that may be hit.
     #[inline(always)]
     pub fn open(&self) -> &[u32] {
-        &self.ids[Self::MOST - self.opens.min(Self::MOST)..]
+        &self.ids[Self::MAX - self.opens.min(Self::MAX)..]
     }
 
     /// Leaves the ray to the caller.

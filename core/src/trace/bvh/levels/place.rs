@@ -163,7 +163,7 @@ impl Place {
         let direction = (noise / f64::from(largest)) as f32 + UNIT_ROUNDOFF;
         // Written so that NaN is unknown.
         let is_finite = (f32::MIN_POSITIVE..f32::INFINITY).contains(&largest) && origin < f32::MAX;
-        (is_finite && direction <= Blur::MOST).then_some(Blur { origin, direction: direction * 1.01 })
+        (is_finite && direction <= Blur::MAX).then_some(Blur { origin, direction: direction * 1.01 })
     }
 
     /// How far an origin may be off, given where it was and is.
@@ -255,7 +255,7 @@ impl<V: Vector> EightRays<V> {
         let off = size([lx, ly, lz]).mul_add(splat(UNIT_ROUNDOFF), computed);
         let off = off.mul_add(splat(1.01), splat(4.0 * f32::MIN_POSITIVE));
         let known = splat(f32::MIN_POSITIVE).at_most(largest).and(largest.less(splat(f32::INFINITY)));
-        let known = known.and(off.less(splat(f32::MAX))).and(turn.at_most(splat(Blur::MOST)));
+        let known = known.and(off.less(splat(f32::MAX))).and(turn.at_most(splat(Blur::MAX)));
         Self { columns: local, off, turn: turn.mul(splat(1.01)), known: known.bits() }
     }
 }

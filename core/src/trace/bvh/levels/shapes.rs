@@ -43,7 +43,7 @@ impl ShapeTree {
                 }
             }
         }
-        let tree = build::build(&mut items, 1, Child::MOST, options);
+        let tree = build::build(&mut items, 1, Child::MAX, options);
         let entry = |item: &Record| {
             let part = &parts[item.part() as usize];
             let Primitives::Shapes(list) = &part.primitives else { unreachable!("items come from lists of shapes") };

@@ -20,7 +20,7 @@ use crate::trace::bvh::simd::isa::{self, Kernel, Present};
 const ALL_VISITS: usize = 1 << 20;
 
 /// But no fewer than these for an entry of a table, which is worth it: each serves many placements.
-const LEAST_VISITS: usize = 16;
+const MIN_VISITS: usize = 16;
 
 /// The boxes around objects where they are placed.
 pub(super) struct Outlines<'a> {
@@ -43,7 +43,7 @@ impl<'a> Outlines<'a> {
         let searches = boxes.iter().map(|&boxes| Table::cells(boxes).map_or(6 * boxes, Table::entries));
         let visits = ALL_VISITS / searches.sum::<usize>().max(1);
         let table = |(level, &boxes): (&Level, &usize)| {
-            let support = |ways: &[_], values: &mut _| level.farthest(isa, ways, visits.max(LEAST_VISITS), values);
+            let support = |ways: &[_], values: &mut _| level.farthest(isa, ways, visits.max(MIN_VISITS), values);
             Table::cells(boxes).map(|cells| Table::new(cells, support))
         };
         Self { objects, isa, tables: objects.par_iter().zip(&boxes).map(table).collect(), visits }

@@ -58,7 +58,7 @@ impl TriangleTree {
                 if options.preset == Preset::High {
                     items = spatial::pieces(items, &meshes, options.isa.demand());
                 }
-                let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MOST, options);
+                let mut tree = build::build_beside(others, &mut items, LANES as u32, Child::MAX, options);
                 let leaves = Leaves::new(&mut tree, &items, meshes, options.preset.is_compact());
                 (tree, leaves, count)
             }

@@ -43,11 +43,11 @@ struct Disc {
 
 /// Of so many corners a disc is made around these; of more, around the discs of its children, by which it comes to be wider than it need be. With all discs but leaves' made
 /// so, a distance takes a fifteenth longer.
-const MOST_CORNERS: usize = 4096;
+const MAX_CORNERS: usize = 4096;
 
 impl Discs {
     pub(super) fn new(triangles: &TriangleTree) -> Self {
-        Self::around(triangles, MOST_CORNERS)
+        Self::around(triangles, MAX_CORNERS)
     }
 
     /// With discs around as many corners.
@@ -294,7 +294,7 @@ mod tests {
         let quad = |(i, k)| [[at(i, k), at(i + 1, k), at(i, k + 1)], [at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]];
         let bvh = built(&faces.flat_map(quad).collect::<Vec<_>>());
         let triangles = &bvh.fixed.triangles;
-        let [around_corners, around_discs] = [MOST_CORNERS, 0].map(|most| Discs::around(triangles, most));
+        let [around_corners, around_discs] = [MAX_CORNERS, 0].map(|most| Discs::around(triangles, most));
         let (mut smaller, mut sums) = (0, [0.0, 0.0]);
         for (i, node) in triangles.tree().nodes().iter().enumerate() {
             for (slot, _) in node.children().filter(|(_, child)| !child.is_leaf()) {
@@ -346,7 +346,7 @@ mod tests {
         let normal = across.cross(along).normalize();
         let bvh = built(&triangles);
         for height in [0.1, 1.0, 10.0] {
-            for most in [MOST_CORNERS, 0] {
+            for most in [MAX_CORNERS, 0] {
                 compare(&bvh, most, &[at(10, 10) + normal * height], |near, square| {
                     // A box that the point is in says nothing.
                     assert!(near <= square && near >= 0.999 * f64::from(height * height), "{near}, {square}");

@@ -11,7 +11,7 @@ use crate::trace::bvh::node::{Child, WIDTH};
 use crate::trace::bvh::simd::{Mask, Simd, Vector};
 
 /// Every level of a tree leaves at most seven siblings waiting, above [`Child::NONE`] at the bottom.
-const MOST: usize = (MAX_DEPTH * (WIDTH - 1) + 2).next_power_of_two();
+const MAX: usize = (MAX_DEPTH * (WIDTH - 1) + 2).next_power_of_two();
 
 /// A stack of children.
 #[derive(Clone, Copy)]
@@ -19,14 +19,14 @@ pub(super) struct Waiting {
     len: usize,
     /// [`Child::NONE`] at the bottom. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is stored
     /// beside.
-    children: [Child; MOST + WIDTH],
+    children: [Child; MAX + WIDTH],
     /// The squared distance of each: the bits of an f32, of which the lowest three are not part of it.
-    near: [u32; MOST + WIDTH],
+    near: [u32; MAX + WIDTH],
 }
 
 impl Waiting {
     /// Of a point at the end of its way.
-    pub const NOBODY: Self = Self { len: 1, children: [Child::NONE; MOST + WIDTH], near: [0; MOST + WIDTH] };
+    pub const NOBODY: Self = Self { len: 1, children: [Child::NONE; MAX + WIDTH], near: [0; MAX + WIDTH] };
 
     /// Nobody is waiting any more: what comes next is [`Child::NONE`].
     #[inline(always)]
@@ -37,8 +37,8 @@ impl Waiting {
     /// Goes on to the nearest of the children that the mask names, or to what is on top where it names none; the others wait.
     #[inline(always)]
     pub fn enter<S: Simd>(&mut self, near: S::V8, mask: <S::V8 as Vector>::Mask, children: &[Child; WIDTH]) -> Child {
-        let len = self.len % MOST;
-        let top = self.children[len.wrapping_sub(1) % MOST];
+        let len = self.len % MAX;
+        let top = self.children[len.wrapping_sub(1) % MAX];
         let (nears, stack) = (self.near[len..].first_chunk_mut(), self.children[len..].first_chunk_mut());
         let (Some(nears), Some(stack)) = (nears, stack) else { return Child::NONE };
         let (nearest, others) = S::nearest_apart(near, mask, children, nears, stack);
@@ -52,7 +52,7 @@ impl Waiting {
     pub fn pass(&mut self, leaf: Child) -> Child {
         let is_more = leaf.count() > 1;
         self.len -= usize::from(!is_more);
-        select_unpredictable(is_more, leaf.rest(), self.children[self.len % MOST])
+        select_unpredictable(is_more, leaf.rest(), self.children[self.len % MAX])
     }
 
     /// What is beyond the limit, a squared distance, waits no more. Past a block of a leaf, again: where [`Self::pass`] has led may be beyond it, too.
@@ -67,7 +67,7 @@ impl Waiting {
     /// Leaves out what is beyond the limit: eight at a time, which are most often all there are, so that nobody has to guess how many.
     #[inline(always)]
     fn shorten<S: Simd>(&mut self, limit_squared: f32) {
-        let (len, mut kept) = (self.len % MOST, 1);
+        let (len, mut kept) = (self.len % MAX, 1);
         for first in (1..len).step_by(WIDTH) {
             let (nears, children) = (self.near[first..].first_chunk(), self.children[first..].first_chunk());
             let (Some(&nears), Some(&children)) = (nears, children) else { break };
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn what_is_beyond_the_limit_goes() {
         let mut random = Random::new(4);
-        for len in [1, 2, 8, 9, 10, 17, 26, 100, MOST - 1] {
+        for len in [1, 2, 8, 9, 10, 17, 26, 100, MAX - 1] {
             for limit in [0.0, 0.3, 0.5, 1.0] {
                 let entries: Vec<_> = (1..len as u32)
                     .map(|i| ((random.vec3().x.abs().to_bits() & !7) | (i % 8), Child::inner(i)))

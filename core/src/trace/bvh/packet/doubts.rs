@@ -1,7 +1,7 @@
 //! Rays of a packet of which bounds left in doubt what they hit: decided as single rays, at once.
 
 use super::octet::{Met, Octet};
-use super::{MOST, Packet, PacketHits, RAYS};
+use super::{MAX, Packet, PacketHits, RAYS};
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::hits::coplanar::Spot;
@@ -10,9 +10,9 @@ use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::query::Query;
 use crate::trace::bvh::simd::{Array, Vector};
 
-/// What was decided of up to [`MOST`] packets.
+/// What was decided of up to [`MAX`] packets.
 pub(super) struct Doubts<'a> {
-    found: &'a mut [Found; MOST * RAYS],
+    found: &'a mut [Found; MAX * RAYS],
     /// A bit for each ray of which anything was.
     known: u32,
 }
@@ -20,7 +20,7 @@ pub(super) struct Doubts<'a> {
 impl<'a> Doubts<'a> {
     /// Nothing yet.
     #[inline(always)]
-    pub fn new(found: &'a mut [Found; MOST * RAYS]) -> Self {
+    pub fn new(found: &'a mut [Found; MAX * RAYS]) -> Self {
         Self { found, known: 0 }
     }
 
@@ -76,7 +76,7 @@ impl<'a> Doubts<'a> {
         while open != 0 {
             let lane = open.trailing_zeros() as usize % RAYS;
             open &= open - 1;
-            if let Some(found) = bvh.computed_triangle(&self.found[(number * RAYS + lane) % (MOST * RAYS)]) {
+            if let Some(found) = bvh.computed_triangle(&self.found[(number * RAYS + lane) % (MAX * RAYS)]) {
                 hits.put(lane, &found);
             }
         }

@@ -42,7 +42,7 @@ use scratch::{Scratch, with_scratch};
 const RAYS: usize = Packet::RAYS;
 
 /// Packets that travel together at most.
-const MOST: usize = 2;
+const MAX: usize = 2;
 
 /// Eight rays, component by component, in the order in which Embree's `RTCRay8` begins: a caller's can be read where it is.
 #[repr(C, align(32))]
@@ -191,7 +191,7 @@ impl Bvh {
     /// thread's own memory, and calls none of these functions meanwhile.
     #[inline]
     pub fn closest_packets<const N: usize>(&self, asked: &Asked<'_, N>, tell: impl FnOnce(&[PacketHits; N])) {
-        const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
+        const { assert!(N >= 1 && N <= MAX, "one packet, or two") };
         with_scratch(|scratch| {
             // Not asked before: what was given here is then read piece by piece, as it was written, and not in one go, which would have to wait for the pieces.
             if self.has_fixed() {
@@ -207,7 +207,7 @@ impl Bvh {
 
     /// [`Bvh::occludes`] of each ray of a packet, or of two that go together: a bit for each that is occluded.
     pub fn occluded_packets<const N: usize>(&self, asked: &Asked<'_, N>) -> [u32; N] {
-        const { assert!(N >= 1 && N <= MOST, "one packet, or two") };
+        const { assert!(N >= 1 && N <= MAX, "one packet, or two") };
         let mut occluded = [0; N];
         with_scratch(|scratch| {
             if self.has_fixed() {

@@ -4,17 +4,17 @@
 
 use std::cell::RefCell;
 
-use super::{MOST, PacketHits, RAYS};
+use super::{MAX, PacketHits, RAYS};
 use crate::trace::bvh::hits::found::Found;
 
 /// Room for what rays have hit of which there was doubt, and for the hits of packets.
 pub(super) struct Scratch {
-    pub found: [Found; MOST * RAYS],
-    pub hits: [PacketHits; MOST],
+    pub found: [Found; MAX * RAYS],
+    pub hits: [PacketHits; MAX],
 }
 
 impl Scratch {
-    const NEW: Self = Self { found: [Found::NONE; MOST * RAYS], hits: [PacketHits::NONE; MOST] };
+    const NEW: Self = Self { found: [Found::NONE; MAX * RAYS], hits: [PacketHits::NONE; MAX] };
 }
 
 thread_local! {

@@ -12,7 +12,7 @@ pub(super) mod woop;
 pub(in crate::trace) struct Blur {
     /// In each component of the origin.
     pub origin: f32,
-    /// In each component of the direction, relative to the largest of them; at most [`Blur::MOST`].
+    /// In each component of the direction, relative to the largest of them; at most [`Blur::MAX`].
     pub direction: f32,
 }
 
@@ -21,7 +21,7 @@ impl Blur {
     pub const NONE: Self = Self { origin: 0.0, direction: 0.0 };
 
     /// Of a direction; a larger one is treated as unknown.
-    pub(super) const MOST: f32 = 1.0 / 1024.0;
+    pub(super) const MAX: f32 = 1.0 / 1024.0;
 
     /// The ray may be anywhere: it meets all boxes, and no triangle is rejected or hit without doubt.
     pub(super) const UNKNOWN: Self = Self { origin: f32::INFINITY, direction: 0.0 };

@@ -62,7 +62,7 @@ const SMALL: usize = 1 << 14;
 const MAX_DEPTH: usize = 64;
 
 /// What the tree's leaves hold.
-const RULE: Rule = Rule { block: LANES as u32, leaf: LANES as u32 * Child::MOST, samples: false };
+const RULE: Rule = Rule { block: LANES as u32, leaf: LANES as u32 * Child::MAX, samples: false };
 
 /// `items`, triangles of `meshes`, and for what is cut one item for each piece; at most 1.3 times as many.
 pub(in crate::trace::bvh) fn pieces(items: Vec<Record>, meshes: &Meshes, isa: Present) -> Vec<Record> {

@@ -37,7 +37,7 @@ use crate::trace::bvh::simd::{Group, Mask, RAYS, Simd, Vector, axes, everywhere}
 pub(super) struct Parallel;
 
 /// Slopes nearer to zero than this are taken for it, where they are divided by.
-const LEAST_SLOPE: f32 = 1.0 / (1_u64 << 40) as f32;
+const MIN_SLOPE: f32 = 1.0 / (1_u64 << 40) as f32;
 
 /// Directions that are shorter along the bundle's axis make none, for t' counts in units of it.
 const SHORTEST: f32 = 1e-30;
@@ -170,7 +170,7 @@ impl Bundle {
 /// A slope that may be divided by.
 #[inline(always)]
 fn divisor(slope: f32) -> f32 {
-    if slope.abs() < LEAST_SLOPE { LEAST_SLOPE.copysign(slope) } else { slope }
+    if slope.abs() < MIN_SLOPE { MIN_SLOPE.copysign(slope) } else { slope }
 }
 
 impl Pencil for Parallel {
@@ -183,7 +183,7 @@ impl Pencil for Parallel {
         let (span, wide) = (away + reach, bundle.widest());
         let slopes = [divisor(bundle.common[0]), divisor(bundle.common[1])];
         let scale = [1.0 / slopes[0], 1.0 / slopes[1]];
-        let stray = 2.0 * LEAST_SLOPE * (span[along] + wide);
+        let stray = 2.0 * MIN_SLOPE * (span[along] + wide);
         let ends = |i: usize| [bundle.low[i] * scale[i], bundle.high[i] * scale[i]];
         let steepest = [scale[0].abs() * (span[p] + wide), scale[1].abs() * (span[q] + wide), span[along]];
         let is_finite = steepest[0].max(steepest[1]).max(steepest[2]) < HUGE;
