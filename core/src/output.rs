@@ -22,9 +22,9 @@ use crate::error::{Error, Result};
 /// What `write` returns, and [`Error::Output`] where the file cannot be put in place. The old file is then whole, and
 /// nothing is left beside it.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut files = Together::default();
+    let mut files = AtomicWrites::default();
     files.write(path, write);
-    files.put_in_place().into_result()
+    files.commit().into_result()
 }
 
 /// The same for what can be made again: a loss of power may leave an empty file.
@@ -32,14 +32,14 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) ->
 /// # Errors
 /// As of [`write_atomically`].
 pub fn write_passing(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut files = Together { is_passing: true, ..Together::default() };
+    let mut files = AtomicWrites { is_passing: true, ..AtomicWrites::default() };
     files.write(path, write);
-    files.put_in_place().into_result()
+    files.commit().into_result()
 }
 
 /// Files that are put in place together, once the work is done. One that cannot be written does not cost the others. Devices and pipes are written to at once.
 #[derive(Default)]
-pub struct Together {
+pub struct AtomicWrites {
     parts: Vec<Part>,
     faults: Vec<Error>,
     is_passing: bool,
@@ -47,14 +47,14 @@ pub struct Together {
 
 /// What became of them.
 #[derive(Debug, Default)]
-pub struct Written {
+pub struct WriteOutcome {
     /// Those that are in place.
     pub paths: Vec<PathBuf>,
     /// Why others are not: what was there before is still there.
     pub faults: Vec<Error>,
 }
 
-impl Written {
+impl WriteOutcome {
     /// # Errors
     /// The first of those that there were.
     pub fn into_result(self) -> Result<()> {
@@ -62,7 +62,7 @@ impl Written {
     }
 }
 
-impl Together {
+impl AtomicWrites {
     /// Has `write` make a file, as for [`write_atomically`], which is put in place with the others.
     pub fn write(&mut self, path: &Path, write: impl FnOnce(&Path) -> Result<()>) {
         let written = Part::beside(path).and_then(|target| match target {
@@ -81,10 +81,10 @@ impl Together {
     }
 
     /// Puts those in place that are whole, each of them that can be.
-    pub fn put_in_place(self) -> Written {
-        let mut written = Written { paths: Vec::new(), faults: self.faults };
+    pub fn commit(self) -> WriteOutcome {
+        let mut written = WriteOutcome { paths: Vec::new(), faults: self.faults };
         for part in &self.parts {
-            match part.put_in_place(self.is_passing) {
+            match part.commit(self.is_passing) {
                 Ok(()) => written.paths.push(part.path.clone()),
                 Err(error) => {
                     let message = reason("cannot put the finished file in place", &error);
@@ -171,7 +171,7 @@ impl Part {
         Ok(Target::File(Self { name, path: path.to_owned(), place, permissions }))
     }
 
-    fn put_in_place(&self, is_passing: bool) -> io::Result<()> {
+    fn commit(&self, is_passing: bool) -> io::Result<()> {
         if !is_passing {
             self.sync()?;
         }
@@ -344,14 +344,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [a, b, c] = ["a.txt", "b.txt", "c.txt"].map(|name| folder.path().join(name));
         fs::write(&b, "old").unwrap();
-        let mut files = Together::default();
+        let mut files = AtomicWrites::default();
         let new = |part: &Path| fs::write(part, "new").map_err(|e| cannot_create(part, &e));
         files.write(&a, new);
         files.write(&b, |part| new(part).and(Err(Error::output(part, "full"))));
         files.write(&c, new);
         // Something that cannot be replaced has come to the first one's place meanwhile.
         fs::create_dir_all(a.join("in")).unwrap();
-        let written = files.put_in_place();
+        let written = files.commit();
         assert_eq!(written.paths, std::slice::from_ref(&c));
         assert!(written.faults[0].to_string().contains("full"), "{:?}", written.faults);
         assert!(written.faults[1].to_string().contains("a.txt: cannot put"), "{:?}", written.faults);

@@ -8,7 +8,7 @@ use super::cache::CacheArgs;
 use super::engine::BackendArg;
 use super::named::one_of;
 use crate::error::{Error, Result};
-use crate::scene::{Accel, Resolution, Search};
+use crate::scene::{Accel, AcceleratorRequest, Resolution};
 use crate::shape::{SphereMethod, TriangleMethod};
 use crate::trace::accel::{Methods, Options};
 
@@ -54,16 +54,16 @@ pub(super) fn accels() -> impl TypedValueParser<Value = Accel> {
 
 impl AccelOptionArgs {
     /// What is said here.
-    fn search(&self) -> Search {
+    fn search(&self) -> AcceleratorRequest {
         let Self { grid, triangle_method, sphere_method } = *self;
-        Search { accel: None, grid, triangle_method, sphere_method }
+        AcceleratorRequest { accel: None, grid, triangle_method, sphere_method }
     }
 
     /// For these accelerators; what is not said here, `request` may say.
     ///
     /// # Errors
     /// [`Error::Usage`] for a resolution without a grid, and for methods without an accelerator that has a choice.
-    pub(super) fn choose(&self, accels: &[Accel], request: Search) -> Result<Options> {
+    pub(super) fn choose(&self, accels: &[Accel], request: AcceleratorRequest) -> Result<Options> {
         if self.grid.is_some() && !accels.contains(&Accel::Grid) {
             return Err(Error::Usage("--grid is the resolution of --accel grid; give both or neither".to_owned()));
         }
@@ -83,7 +83,7 @@ impl AccelOptionArgs {
 }
 
 /// What the scene asks for and is not to be had.
-fn unmet(search: &Search, why: &str, instead: &str) -> String {
+fn unmet(search: &AcceleratorRequest, why: &str, instead: &str) -> String {
     let triangle = search.triangle_method.map(|method| format!("triangle_method = {:?}", method.name()));
     let sphere = search.sphere_method.map(|method| format!("sphere_method = {:?}", method.name()));
     let asked: Vec<_> = [triangle, sphere].into_iter().flatten().collect();
@@ -91,8 +91,8 @@ fn unmet(search: &Search, why: &str, instead: &str) -> String {
     format!("the scene asks for {asked}, and {why}; write {instead}, or --triangle-method exact --sphere-method exact")
 }
 
-fn options(search: &Search) -> Options {
-    let Search { grid, triangle_method, sphere_method, .. } = *search;
+fn options(search: &AcceleratorRequest) -> Options {
+    let AcceleratorRequest { grid, triangle_method, sphere_method, .. } = *search;
     let methods = Methods { triangle: triangle_method.unwrap_or_default(), sphere: sphere_method.unwrap_or_default() };
     Options { grid, methods, ..Options::default() }
 }
@@ -105,7 +105,7 @@ impl AccelArgs {
     pub(super) fn check(&self, backend: BackendArg, build: Option<&BuildArgs>, cache: &CacheArgs) -> Result<()> {
         build.map_or(Ok(()), |build| build.check(backend))?;
         match self.accel {
-            Some(_) => self.choose(Search::default(), backend, build, cache).map(drop),
+            Some(_) => self.choose(AcceleratorRequest::default(), backend, build, cache).map(drop),
             None => Ok(()),
         }
     }
@@ -116,7 +116,7 @@ impl AccelArgs {
     /// [`Error::Usage`] where Embree alone renders, and where something is said about a native BVH that is not built.
     pub(super) fn choose(
         &self,
-        request: Search,
+        request: AcceleratorRequest,
         backend: BackendArg,
         build: Option<&BuildArgs>,
         cache: &CacheArgs,
@@ -124,7 +124,7 @@ impl AccelArgs {
         let flag = self.accel;
         if backend == BackendArg::Embree && flag.is_none() {
             // What a scene asks of the native engine does not concern Embree, but for what it would not see.
-            self.options.choose(&[Accel::Bvh], Search::default())?;
+            self.options.choose(&[Accel::Bvh], AcceleratorRequest::default())?;
             let search = self.options.search().or(request);
             if search.asks_for_methods() {
                 return Err(Error::Usage(unmet(&search, "Embree has its own", "--backend native")));
@@ -132,7 +132,7 @@ impl AccelArgs {
             return Ok((Accel::Bvh, Options::default()));
         }
         let accel = flag.or(request.accel).unwrap_or_default();
-        let options = self.options.choose(&[accel], Search { accel: Some(accel), ..request })?;
+        let options = self.options.choose(&[accel], AcceleratorRequest { accel: Some(accel), ..request })?;
         if accel == Accel::Bvh {
             return Ok((accel, options));
         }

@@ -188,7 +188,7 @@ mod with_embree {
     use crate::cli::{interrupt, outputs, progress, say, say_json, warn};
     use crate::error::{Error, Result};
     use crate::lab::bench::{Built, Contender, Setup, Subject, chart, processor};
-    use crate::scene::Search;
+    use crate::scene::AcceleratorRequest;
     use crate::trace::World;
     use crate::trace::accel::{self, Accel};
     use crate::trace::bvh::{self, Bvh, Isa, Preset};
@@ -211,7 +211,7 @@ mod with_embree {
         if !isa.is_available() {
             return Err(Error::Usage(format!("--isa {}: this processor does not have it", isa.name())));
         }
-        let options = args.options.choose(&args.accel, Search::default())?;
+        let options = args.options.choose(&args.accel, AcceleratorRequest::default())?;
         let mut kinds = args.rays.clone();
         kinds.sort_by_key(|&kind| kind as u8);
         kinds.dedup();

@@ -119,7 +119,7 @@ fn compare(args: &CompareArgs) -> Result<()> {
     use crate::image::{Metadata, WriteOptions};
     use crate::lab::Setup;
     use crate::lab::compare::BRUTE_LIMIT;
-    use crate::output::Together;
+    use crate::output::AtomicWrites;
     use crate::render::{Control, Renderer};
     use crate::trace::Tracer;
     use crate::trace::accel::{Accel, Built};
@@ -167,9 +167,9 @@ fn compare(args: &CompareArgs) -> Result<()> {
     let (a, b) = (&comparison.native_image, &comparison.embree_image);
     let mut written = Ok(());
     if !diff.is_empty() {
-        let (picture, mut files) = (a.difference_image(b)?, Together::default());
+        let (picture, mut files) = (a.difference_image(b)?, AtomicWrites::default());
         outputs::write_pictures(&mut files, diff, &picture, &[], &Metadata::default(), &WriteOptions::default());
-        written = outputs::put_in_place(files);
+        written = outputs::commit(files);
     }
     let report = &comparison.report;
     say_report(args.json, report)?;

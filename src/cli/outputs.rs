@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result, Warning};
 use crate::image::{self, Channel, Image, Metadata, WriteOptions};
-use crate::output::{self, Together, Written};
+use crate::output::{self, AtomicWrites, WriteOutcome};
 
 /// Whether every picture and the other files can be written, before anything is done for them; and whether none of them
 /// would replace another, nor one of the `inputs`.
@@ -78,8 +78,8 @@ pub(super) fn try_out(pictures: &[PathBuf]) -> Result<()> {
 }
 
 /// Puts files in place. Where there are some that cannot be written, the others are told.
-pub(super) fn put_in_place(files: Together) -> Result<()> {
-    let Written { paths, faults } = files.put_in_place();
+pub(super) fn commit(files: AtomicWrites) -> Result<()> {
+    let WriteOutcome { paths, faults } = files.commit();
     let mut faults = faults.into_iter();
     let Some(first) = faults.next() else { return Ok(()) };
     let whole = paths.iter().map(|path| Warning::new(path, "", "is written, unlike another output"));
@@ -90,7 +90,7 @@ pub(super) fn put_in_place(files: Together) -> Result<()> {
 
 /// Writes one picture to each path, in the format its suffix says, with the channels where that holds any; to be put in place with `files`.
 pub(super) fn write_pictures(
-    files: &mut Together,
+    files: &mut AtomicWrites,
     paths: &[PathBuf],
     picture: &Image,
     channels: &[Channel],
@@ -106,7 +106,7 @@ pub(super) fn write_pictures(
 }
 
 /// Writes a JSON document, to be put in place with `files`.
-pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Serialize) {
+pub(super) fn write_json(files: &mut AtomicWrites, path: &Path, document: &impl Serialize) {
     match serde_json::to_string_pretty(document) {
         Ok(text) => write_beside(files, path, &(text + "\n")),
         Err(error) => files.fail(Error::output(path, error.to_string())),
@@ -114,7 +114,7 @@ pub(super) fn write_json(files: &mut Together, path: &Path, document: &impl Seri
 }
 
 /// Writes a text, likewise.
-pub(super) fn write_beside(files: &mut Together, path: &Path, text: &str) {
+pub(super) fn write_beside(files: &mut AtomicWrites, path: &Path, text: &str) {
     files.write(path, |part| fill(path, part, text));
 }
 

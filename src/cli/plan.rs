@@ -122,9 +122,9 @@ pub(super) fn run(args: &PlanCommand) -> Result<()> {
     settings.check()?;
     let world = plan::world(&scene, settings.complete)?;
     let census = Census::new(&scene, &world);
-    let wishes = settings.wishes();
-    let plan = Plan::of_census(&scene, &world, &wishes, &census);
-    let left_out = plan.left_out(&scene, &world, &wishes, &census);
+    let options = settings.plan_options();
+    let plan = Plan::of_census(&scene, &world, &options, &census);
+    let left_out = plan.left_out(&scene, &world, &options, &census);
     let rays = settings.expected_rays(&plan);
     let pixels = settings.window().len() as u64;
     let build = match accel {

@@ -32,7 +32,7 @@ use crate::error::{Error, Result, Warning};
 use crate::image::{self, Metadata, Reference, Response, WriteOptions};
 use crate::io::Format;
 use crate::memory::process;
-use crate::output::Together;
+use crate::output::AtomicWrites;
 use crate::plan;
 use crate::render::{Crop, Renderer, Settings};
 use crate::scene::{Camera, Geometry, Request, Scene};
@@ -226,7 +226,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             kept.tell()?;
         }
         let (outcome, denoise) = outcome?;
-        let mut files = Together::default();
+        let mut files = AtomicWrites::default();
         let pass = &outcome.passes[0];
         let write_seconds = args.write(&mut files, &asked, pass);
         let [width, height] = asked.size();
@@ -248,7 +248,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         if let Some(path) = &args.stats {
             outputs::write_json(&mut files, path, &stats);
         }
-        outputs::put_in_place(files)?;
+        outputs::commit(files)?;
         asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
         if !args.quiet {
             let camera = &asked.camera_source;
@@ -319,7 +319,7 @@ impl RenderArgs {
     }
 
     /// Writes the pictures, to be put in place with `files`; in how many seconds.
-    fn write(&self, files: &mut Together, asked: &Asked, pass: &Pass) -> f64 {
+    fn write(&self, files: &mut AtomicWrites, asked: &Asked, pass: &Pass) -> f64 {
         let start = Instant::now();
         let picture = &pass.picture;
         let mean_spp = picture.samples as f64 / asked.pixels() as f64;

@@ -14,7 +14,7 @@ use super::named::one_of;
 use super::{interrupt, outputs, progress, say, say_json, say_report};
 use crate::error::{Error, Result};
 use crate::lab::stress::{Case, Column, Found, Report, Search, Setup, catalogue, columns, file, heat_map};
-use crate::output::Together;
+use crate::output::AtomicWrites;
 use crate::render::Control;
 
 /// What goes into the folder of a matrix.
@@ -165,12 +165,12 @@ fn matrix(args: &StressArgs, columns: Vec<Column>, control: Control<'_>) -> Resu
     let report = report?;
     say_report(args.json, &report)?;
     if let Some(folder) = &args.output {
-        let mut files = Together::default();
+        let mut files = AtomicWrites::default();
         let [document, map, commands] = MATRIX.map(|name| folder.join(name));
         outputs::write_json(&mut files, &document, &report);
         outputs::write_beside(&mut files, &map, &heat_map(&report));
         outputs::write_beside(&mut files, &commands, &failing(&report));
-        outputs::put_in_place(files)?;
+        outputs::commit(files)?;
     }
     report.check()
 }
@@ -220,7 +220,7 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
     let (rays, found) = search.run(control)?;
     let wrong = found.iter().filter(|found| found.column.is_exact()).count();
     let mut findings = Findings { seed: args.seed, rays, found: Vec::new() };
-    let mut files = Together::default();
+    let mut files = AtomicWrites::default();
     for (i, Found { who, fault, text, .. }) in found.into_iter().enumerate() {
         let file = args.output.as_ref().map(|folder| folder.join(format!("found-{i}.json")));
         if let Some(path) = &file {
@@ -229,7 +229,7 @@ fn search(args: &StressArgs, columns: Vec<Column>, time: Duration, control: Cont
         findings.found.push(Finding { who, fault, file });
     }
     // What was found is told all the same where it cannot be written.
-    let written = outputs::put_in_place(files);
+    let written = outputs::commit(files);
     if args.json {
         say_json(&findings)?;
     } else {

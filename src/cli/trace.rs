@@ -17,7 +17,7 @@ use crate::lab::oracle::Id;
 use crate::lab::stress::{catalogue, file};
 use crate::lab::tree::Oracle;
 use crate::ray::{Hit, Ray};
-use crate::scene::Search;
+use crate::scene::AcceleratorRequest;
 use crate::trace::accel::Accel;
 use crate::trace::{Tracer, World};
 
@@ -126,13 +126,13 @@ pub(super) fn run(args: &TraceArgs) -> Result<()> {
 }
 
 /// The world that is meant, and how its file wants to be searched.
-fn world(args: &TraceArgs) -> Result<(World, Search)> {
+fn world(args: &TraceArgs) -> Result<(World, AcceleratorRequest)> {
     let path: &Path = &args.scene.scene;
     if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("case:")) {
-        return Ok((case(name)?, Search::default()));
+        return Ok((case(name)?, AcceleratorRequest::default()));
     }
     if file::is_case_file(path) {
-        return Ok((file::read(path)?.1.world, Search::default()));
+        return Ok((file::read(path)?.1.world, AcceleratorRequest::default()));
     }
     let (scene, warnings) = args.scene.load(false)?;
     warn(&warnings);

@@ -14,7 +14,7 @@ use super::samples::{self, Samples, Type};
 use super::{Channel, Channels, Curve, Image, Metadata, Response, channels};
 use crate::error::{Error, Result, one_line, system_message};
 use crate::memory::Mapped;
-use crate::output::{self, Together, suffix};
+use crate::output::{self, AtomicWrites, suffix};
 
 /// How an image is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,14 +107,14 @@ pub fn write_channels(
     metadata: &Metadata,
     options: &WriteOptions,
 ) -> Result<()> {
-    let mut files = Together::default();
+    let mut files = AtomicWrites::default();
     write_beside(&mut files, path, image, channels, metadata, options)?;
-    files.put_in_place().into_result()
+    files.commit().into_result()
 }
 
 /// The same, as one of several files that are put in place together, which know of what goes wrong with the file.
 pub(crate) fn write_beside(
-    files: &mut Together,
+    files: &mut AtomicWrites,
     path: &Path,
     image: &Image,
     channels: &[Channel],

@@ -336,8 +336,8 @@ mod tests {
         let setup =
             Setup { scene: &scene, camera: &camera, settings: &settings, repeat: 2, control: Control::default() };
         let world = World::new(&scene).expect("sound");
-        let (census, wishes) = (Census::new(&scene, &world), settings.wishes());
-        let left_out = Plan::new(&scene, &world, &wishes).left_out(&scene, &world, &wishes, &census);
+        let (census, options) = (Census::new(&scene, &world), settings.plan_options());
+        let left_out = Plan::new(&scene, &world, &options).left_out(&scene, &world, &options, &census);
         let rows = setup.run(&left_out).expect("rendered");
         assert_eq!(rows.len(), left_out.len() + 1);
         assert!(rows.iter().all(|row| row.identical && row.needed_seconds.min > 0.0 && row.saved < 1.0));

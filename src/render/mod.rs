@@ -137,7 +137,7 @@ impl<'a> Renderer<'a> {
             let message = format!("a shutter from {open} to {close}: things move from time 0 to 1, and it closes last");
             return Err(Error::Usage(message));
         }
-        let plan = Plan::new(scene, world, &settings.wishes());
+        let plan = Plan::new(scene, world, &settings.plan_options());
         if plan.integrator == Integrator::Path && sampling == Sampling::Grid {
             let why = "its numbers are the same for every pixel, and what one path misses all of them miss";
             return Err(Error::Usage(format!("the sampler \"grid\" does not go with path tracing: {why}; take sobol")));

@@ -4,7 +4,7 @@ use super::tiles::DEFAULT_TILE;
 use super::{Adaptive, Aov, Filter, MAX_TILE, Sampling, TileOrder};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::plan::{Complete, Plan, Rays, Wishes};
+use crate::plan::{Complete, Plan, PlanOptions, Rays};
 use crate::scene::{Integrator, MAX_DEPTH, MAX_SIDE, MAX_SPP, Request};
 use crate::trace::Batch;
 
@@ -132,9 +132,9 @@ impl Settings {
     }
 
     /// What a plan follows from beside the scene.
-    pub fn wishes(&self) -> Wishes {
+    pub fn plan_options(&self) -> PlanOptions {
         let Self { integrator, background, max_depth, complete, .. } = *self;
-        Wishes { integrator, background, max_depth, complete }
+        PlanOptions { integrator, background, max_depth, complete }
     }
 
     /// The rays to expect of a render by `plan`.

@@ -2,8 +2,8 @@
 
 use twincast::math::{DVec2, DVec3, UVec3, Vec2, Vec3};
 use twincast::scene::{
-    Absorption, Accel, Alpha, AreaShape, Distortion, Fov, Geometry, Interface, Light, Projection, Resolution, Scene,
-    Search, Specular, ThinLens,
+    Absorption, Accel, AcceleratorRequest, Alpha, AreaShape, Distortion, Fov, Geometry, Interface, Light, Projection,
+    Resolution, Scene, Specular, ThinLens,
 };
 use twincast::{Shape, SphereMethod, TriangleMethod, World};
 
@@ -94,7 +94,7 @@ fn what_the_file_asks_of_a_render() {
     let request = &scene.request;
     assert_eq!((request.size, request.spp, request.seed), (Some([640, 480]), Some(16), Some(7)));
     assert_eq!((request.max_depth, request.output.as_deref()), (Some(5), Some("picture.png")));
-    let search = Search {
+    let search = AcceleratorRequest {
         accel: Some(Accel::Grid),
         grid: Some(Resolution::Axes(UVec3::new(20, 10, 20))),
         triangle_method: Some(TriangleMethod::Woop),

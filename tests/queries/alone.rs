@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use twincast::math::{Aabb, Vec3};
 use twincast::scene::{Geometry, Material, Mesh, Scene};
 use twincast::trace::brute::Brute;
-use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, Search, SingleRay, TriangleFound};
+use twincast::trace::bvh::{BoxTree, Bvh, Isa, Options, Preset, SingleRay, TriangleFound, VisitFlow};
 use twincast::{Ray, Tracer, TriangleMethod, World};
 
 use super::{Triangle, closest_triangle, grid_sphere, triangles};
@@ -100,7 +100,7 @@ fn visitors_see_every_hit_up_to_where_they_look() {
             let mut seen = BTreeSet::new();
             bvh.visit_triangles(ray, &mut |found| {
                 seen.insert(found.hit.id());
-                Search::Continue(ray.tmax)
+                VisitFlow::Continue(ray.tmax)
             });
             let is_hit = |triangle: &&Triangle| TriangleMethod::Exact.intersect(ray, triangle.corners).is_some();
             let expected: BTreeSet<_> = all.iter().filter(is_hit).map(|triangle| triangle.id).collect();
@@ -108,7 +108,7 @@ fn visitors_see_every_hit_up_to_where_they_look() {
             let mut first = 0;
             bvh.visit_triangles(ray, &mut |_| {
                 first += 1;
-                Search::Break(())
+                VisitFlow::Break(())
             });
             assert_eq!(first, usize::from(!expected.is_empty()));
         }
@@ -135,12 +135,12 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
         let mut named = BTreeSet::new();
         tree.visit(&ray, &mut |i| {
             named.insert(index(i));
-            Search::Continue(f32::INFINITY)
+            VisitFlow::Continue(f32::INFINITY)
         });
         let mut in_no_order = BTreeSet::new();
         tree.visit_any(&ray, &mut |i| {
             in_no_order.insert(index(i));
-            Search::Continue(f32::INFINITY)
+            VisitFlow::Continue(f32::INFINITY)
         });
         assert_eq!(named, in_no_order);
         for (i, bounds) in boxes[..500].iter().enumerate() {
@@ -155,7 +155,7 @@ fn boxes_on_the_way_and_near_a_point_are_named() {
         let mut near = BTreeSet::new();
         tree.visit_near(origin, radius, &mut |i| {
             near.insert(index(i));
-            Search::Continue(radius)
+            VisitFlow::Continue(radius)
         });
         let is_near =
             |bounds: &Aabb| origin.clamp(bounds.min, bounds.max).as_dvec3().distance(origin.as_dvec3()) <= 2.0;

@@ -1,7 +1,7 @@
 //! Meshes in f64 against every triangle in whole numbers: 128 bits hold every volume, so the verdicts are exact.
 
 use twincast::math::DVec3;
-use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh, PreciseRay};
+use twincast::trace::precise::{PreciseHit, PreciseMesh, PreciseRay, PreciseScene};
 
 use crate::scenes::Random;
 
@@ -30,7 +30,7 @@ fn hit(origin: Whole, d: Whole, corners: [Whole; 3]) -> Option<(bool, f64)> {
 struct Case {
     corners: Vec<[Whole; 3]>,
     rays: Vec<(Whole, Whole)>,
-    precise: Precise,
+    precise: PreciseScene,
     traced: Vec<PreciseRay>,
 }
 
@@ -73,7 +73,7 @@ fn case_beside(random: &mut Random, away: i64, scale: f64, others: &[[Whole; 3]]
     };
     let traced =
         rays.iter().map(|&(o, d)| PreciseRay::new(place(o), DVec3::from(d.map(|x| x as f64 * scale)))).collect();
-    Case { precise: Precise::new(vec![mesh]).expect("a mesh"), corners, rays, traced }
+    Case { precise: PreciseScene::new(vec![mesh]).expect("a mesh"), corners, rays, traced }
 }
 
 #[test]
@@ -100,14 +100,14 @@ fn every_hit_is_that_of_exact_arithmetic() {
         let mut first = vec![None; rays.len()];
         precise.closest_batch(&traced, &mut first);
         let mut names = vec![None; rays.len()];
-        precise.first_batch(&traced, &mut names);
+        precise.closest_ids_batch(&traced, &mut names);
         assert_eq!(names, first.iter().map(|hit| hit.map(|hit| (hit.geometry, hit.primitive))).collect::<Vec<_>>());
         let mut any = vec![false; rays.len()];
         precise.occluded_batch(&traced, &mut any);
         let (mut ends, mut all) = (Vec::new(), Vec::new());
         precise.all_hits_batch(&traced, &mut ends, &mut all);
         let (mut ends_of_names, mut all_names) = (Vec::new(), Vec::new());
-        precise.all_names_batch(&traced, &mut ends_of_names, &mut all_names);
+        precise.all_ids_batch(&traced, &mut ends_of_names, &mut all_names);
         assert_eq!(ends_of_names, ends);
         assert_eq!(all_names, all.iter().map(|hit| (hit.geometry, hit.primitive)).collect::<Vec<_>>());
         let mut counts = vec![0; rays.len()];
@@ -170,12 +170,12 @@ fn names_are_those_of_hits_within_the_range() {
             }
         }
         let mut names = vec![None; rays.len()];
-        precise.first_batch(&rays, &mut names);
+        precise.closest_ids_batch(&rays, &mut names);
         assert_eq!(names, expected);
         // One by one: a range in f32 is traced as it is, but not among others that are none.
         for (ray, expected) in rays.iter().zip(&expected) {
             let mut name = [None];
-            precise.first_batch(&[*ray], &mut name);
+            precise.closest_ids_batch(&[*ray], &mut name);
             assert_eq!(name[0], *expected, "{ray:?}");
         }
         assert!(expected.iter().filter(|name| name.is_none()).count() > 50, "{}", expected.len());
@@ -185,7 +185,7 @@ fn names_are_those_of_hits_within_the_range() {
 #[test]
 fn indices_that_are_not_there_are_an_error() {
     let mesh = PreciseMesh { positions: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2], [0, 1, 3]] };
-    let error = Precise::new(vec![mesh]).expect_err("no fourth vertex");
+    let error = PreciseScene::new(vec![mesh]).expect_err("no fourth vertex");
     assert!(error.to_string().contains("triangle 1 of mesh 0"), "{error}");
 }
 
@@ -194,7 +194,7 @@ fn points_beyond_the_squares_of_f32_have_a_nearest_point() {
     let Case { corners, precise, .. } = case(&mut Random::new(6), 0, 1.0);
     for away in [1e10, 1e18, 1e19, 1e25, 1e38, 1e100] {
         let point = DVec3::new(away, -0.5 * away, 0.25 * away);
-        let found = precise.nearest_point(point).expect("there are triangles");
+        let found = precise.closest_point(point).expect("there are triangles");
         let distance = |corner: &Whole| (DVec3::from(corner.map(|x| x as f64)) - point).length();
         let least = corners.iter().flatten().map(distance).fold(f64::INFINITY, f64::min);
         let error = (found.distance_squared.sqrt() - least).abs();
@@ -215,7 +215,7 @@ fn tetrahedron() -> PreciseMesh {
 
 #[test]
 fn meshes_are_closed_where_an_even_number_of_triangles_meet_at_every_edge() {
-    let is_closed = |meshes: &[PreciseMesh]| Precise::new(meshes.to_vec()).expect("meshes").is_closed();
+    let is_closed = |meshes: &[PreciseMesh]| PreciseScene::new(meshes.to_vec()).expect("meshes").is_closed();
     let whole = tetrahedron();
     assert!(is_closed(std::slice::from_ref(&whole)), "corners at one place are one");
     let mut signed = whole.clone();
@@ -271,7 +271,7 @@ fn points_that_travel_together_have_each_their_nearest() {
         })
         .collect();
     let triangles = (0..500).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let precise = Precise::new(vec![PreciseMesh { positions: corners.concat(), triangles }]).expect("a mesh");
+    let precise = PreciseScene::new(vec![PreciseMesh { positions: corners.concat(), triangles }]).expect("a mesh");
     let mut points: Vec<DVec3> = (0..333).map(|_| anywhere(4.0)).collect();
     // At corners, which are nearest at a distance of 0; and what cannot travel.
     points.extend(corners.iter().take(20).map(|triangle| triangle[0]));
@@ -282,11 +282,11 @@ fn points_that_travel_together_have_each_their_nearest() {
     for count in [0, 1, 7, 32, 33, 353] {
         let points = &points[..count];
         let mut together = vec![None; count];
-        precise.nearest_point_batch(points, &mut together);
+        precise.closest_point_batch(points, &mut together);
         let mut distances = vec![0.0; count];
         precise.distance_squared_batch(points, &mut distances);
         for ((&point, together), distance) in points.iter().zip(&together).zip(distances) {
-            assert_eq!(*together, precise.nearest_point(point), "{point}");
+            assert_eq!(*together, precise.closest_point(point), "{point}");
             let expected = together.map_or(f64::NAN, |found| found.distance_squared);
             assert_eq!(distance.to_bits(), expected.to_bits(), "{point}");
             assert_eq!(together.is_some(), point.is_finite(), "{point}");
@@ -305,8 +305,8 @@ fn small_triangles_have_an_inside() {
     for exponent in [-1, -80, -200, -400] {
         let size = 2f64.powi(exponent);
         let positions = vec![DVec3::ZERO, DVec3::X * size, DVec3::Y * size];
-        let precise = Precise::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a mesh");
-        let found = precise.nearest_point(DVec3::new(0.25, 0.25, 1.0) * size).expect("a point");
+        let precise = PreciseScene::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a mesh");
+        let found = precise.closest_point(DVec3::new(0.25, 0.25, 1.0) * size).expect("a point");
         assert_eq!((found.u, found.v, found.distance_squared), (0.25, 0.25, size * size), "2^{exponent}");
         assert_eq!(found.point, DVec3::new(0.25, 0.25, 0.0) * size);
     }
@@ -315,14 +315,14 @@ fn small_triangles_have_an_inside() {
 #[test]
 fn nothing_is_within_a_clearance() {
     let mesh = tetrahedron();
-    let precise = Precise::new(vec![mesh.clone()]).expect("a mesh");
+    let precise = PreciseScene::new(vec![mesh.clone()]).expect("a mesh");
     let mut random = Random::new(7);
     let sides = mesh.triangles.iter().map(|triangle| triangle.map(|i| mesh.positions[i as usize]));
     let sides: Vec<[DVec3; 3]> = sides.collect();
     for _ in 0..1000 {
         let [x, y, z] = [0; 3].map(|_| f64::from(random.unit()) * 3.0 - 1.0);
         let point = DVec3::new(x, y, z);
-        let nearest = precise.nearest_point(point).expect("there are triangles");
+        let nearest = precise.closest_point(point).expect("there are triangles");
         let clearance = precise.clearance(point, nearest.distance_squared);
         assert_eq!(precise.clearance(point, f64::NAN), 0.0);
         // The ball is no larger than to that point, no smaller than rounding asks for, and none of the tetrahedron's own points is in it.
@@ -341,7 +341,7 @@ fn nothing_is_within_a_clearance() {
 #[test]
 fn repeats_are_left_out_of_what_is_distinct() {
     let whole = tetrahedron();
-    let precise = Precise::new(vec![whole.clone()]).expect("a tetrahedron");
+    let precise = PreciseScene::new(vec![whole.clone()]).expect("a tetrahedron");
     assert!(!precise.knows_distinct());
     assert!(std::ptr::eq(precise.distinct(), &precise) && precise.knows_distinct(), "no second tree for nothing");
 
@@ -357,11 +357,11 @@ fn repeats_are_left_out_of_what_is_distinct() {
         triangles: whole.triangles.iter().map(|&[a, b, c]| [b, a, c]).collect(),
     };
     let count = |meshes: &[PreciseMesh]| {
-        let precise = Precise::new(meshes.to_vec()).expect("meshes");
+        let precise = PreciseScene::new(meshes.to_vec()).expect("meshes");
         let (mut ends, mut names) = (Vec::new(), Vec::new());
         // In through the side in the plane of y and z, and out through the slanted one.
         let ray = PreciseRay::new(DVec3::new(-1.0, 0.2, 0.3), DVec3::X);
-        precise.distinct().all_names_batch(&[ray], &mut ends, &mut names);
+        precise.distinct().all_ids_batch(&[ray], &mut ends, &mut names);
         let mut counts = [0];
         precise.distinct().count_batch(&[ray], &mut counts);
         assert_eq!(counts[0] as usize, names.len());
@@ -370,7 +370,7 @@ fn repeats_are_left_out_of_what_is_distinct() {
     assert_eq!(count(std::slice::from_ref(&whole)), [(0, 2), (0, 3)]);
     // The first two, then all four in another turn, then the others.
     assert_eq!(count(std::slice::from_ref(&twice)), [(0, 4), (0, 5)]);
-    let doubled = Precise::new(vec![twice.clone()]).expect("a mesh");
+    let doubled = PreciseScene::new(vec![twice.clone()]).expect("a mesh");
     assert!(doubled.is_closed() && doubled.distinct().is_closed(), "four at an edge, or two of them");
     assert_eq!(count(&[twice, flipped]).len(), 4);
     assert_eq!(count(&[whole.clone(), whole]).len(), 4);

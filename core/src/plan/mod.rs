@@ -70,7 +70,7 @@ pub const FAINT: f32 = 1e-4;
 
 /// What is wanted of a render. What is none is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wishes {
+pub struct PlanOptions {
     /// How far light is followed.
     pub integrator: Option<Integrator>,
     /// Stands in for the scene's own; linear RGB.
@@ -132,31 +132,31 @@ pub fn world(scene: &Scene, complete: Complete) -> Result<World> {
 
 impl Plan {
     /// The plan for a scene.
-    pub fn new(scene: &Scene, world: &World, wishes: &Wishes) -> Self {
-        Self::of_census(scene, world, wishes, &Census::new(scene, world))
+    pub fn new(scene: &Scene, world: &World, options: &PlanOptions) -> Self {
+        Self::of_census(scene, world, options, &Census::new(scene, world))
     }
 
     /// The same of a scene that is counted already.
-    pub fn of_census(scene: &Scene, world: &World, wishes: &Wishes, census: &Census) -> Self {
-        let case = Case { scene, world, wishes, census };
-        let (integrator, why) = case.integrator();
-        let depth = case.depth(integrator);
-        let needed = case.lighting(integrator);
+    pub fn of_census(scene: &Scene, world: &World, options: &PlanOptions, census: &Census) -> Self {
+        let inputs = PlanInputs { scene, world, options, census };
+        let (integrator, why) = inputs.integrator();
+        let depth = inputs.depth(integrator);
+        let needed = inputs.lighting(integrator);
         let is_lit = integrator == Integrator::Path
             || census.environment
             || !matches!(&needed, Lighting::None) && needed != Lighting::Lights(vec![]);
-        let lighting = case.completed(needed, integrator);
+        let lighting = inputs.completed(needed, integrator);
         // What ambient light stands for, paths find.
         let ambient = integrator != Integrator::Path && census.ambient && census.materials.ambient > 0;
-        let has = |reduction| wishes.complete.has(reduction);
-        let (attributes, normal_maps) = case.attributes(is_lit || depth > 0, ambient);
+        let has = |reduction| options.complete.has(reduction);
+        let (attributes, normal_maps) = inputs.attributes(is_lit || depth > 0, ambient);
         let casting = match &lighting {
             Lighting::Lights(lights) => &lights[..],
             Lighting::None | Lighting::Headlight => &[],
         };
         let extended = casting.iter().filter(|&&i| scene.lights[i].is_extended()).count();
         let around = usize::from(census.environment && lighting != Lighting::None);
-        let glowing = usize::from(integrator == Integrator::Path && case.has_bodies());
+        let glowing = usize::from(integrator == Integrator::Path && inputs.has_bodies());
         Self {
             levels: if world.placements.is_empty() { Levels::One } else { Levels::Two },
             attributes,
@@ -164,17 +164,17 @@ impl Plan {
             ambient,
             integrator,
             why,
-            idle_emitters: case.has_idle_emitters(integrator),
+            idle_emitters: inputs.has_idle_emitters(integrator),
             depth,
             faint: if has(Reduction::Faint) { 0.0 } else { FAINT / census.brightest },
             alpha: census.materials.alpha > 0 || has(Reduction::Alpha),
             normal_maps,
             environment: census.environment,
             fog: scene.fog.filter(|_| census.fog),
-            background: case.background(),
+            background: inputs.background(),
             primitives: world.primitive_count(),
             materials: census.materials.used as usize,
-            work: Work::new(&work::Means {
+            work: Work::new(&work::WorkInputs {
                 integrator,
                 depth,
                 ways: census.ways,
@@ -190,16 +190,16 @@ impl Plan {
         self.work.shadow + self.work.area_shadow > 0.0
     }
 
-    /// What of the complete model is left out of this plan, which was made with `wishes`.
-    pub fn left_out(&self, scene: &Scene, world: &World, wishes: &Wishes, census: &Census) -> Vec<Reduction> {
+    /// What of the complete model is left out of this plan, which was made with `options`.
+    pub fn left_out(&self, scene: &Scene, world: &World, options: &PlanOptions, census: &Census) -> Vec<Reduction> {
         let changes = |reduction: &Reduction| {
-            let complete = wishes.complete.with(*reduction);
+            let complete = options.complete.with(*reduction);
             match reduction {
-                Reduction::Levels => !wishes.complete.has(Reduction::Levels) && !world.fixed.is_empty(),
+                Reduction::Levels => !options.complete.has(Reduction::Levels) && !world.fixed.is_empty(),
                 Reduction::Faint => {
                     self.faint > 0.0 && census.materials.sending_on > 0 && self.integrator == Integrator::Whitted
                 }
-                _ => Self::of_census(scene, world, &Wishes { complete, ..*wishes }, census) != *self,
+                _ => Self::of_census(scene, world, &PlanOptions { complete, ..*options }, census) != *self,
             }
         };
         Reduction::ALL.into_iter().filter(changes).collect()
@@ -207,16 +207,16 @@ impl Plan {
 }
 
 /// What a plan follows from.
-struct Case<'a> {
+struct PlanInputs<'a> {
     scene: &'a Scene,
     world: &'a World,
-    wishes: &'a Wishes,
+    options: &'a PlanOptions,
     census: &'a Census,
 }
 
-impl Case<'_> {
+impl PlanInputs<'_> {
     fn background(&self) -> Option<Vec3> {
-        self.wishes.background.or(self.scene.background)
+        self.options.background.or(self.scene.background)
     }
 
     /// Whether what is behind everything is light to paths.
@@ -236,13 +236,13 @@ impl Case<'_> {
 
     /// Whether what glows would light something if paths were traced, which is left to whoever asks for them.
     fn has_idle_emitters(&self, integrator: Integrator) -> bool {
-        let is_chosen = self.wishes.integrator.is_none() && integrator != Integrator::Path;
+        let is_chosen = self.options.integrator.is_none() && integrator != Integrator::Path;
         is_chosen && self.census.materials.lit > 0 && self.has_bodies()
     }
 
     /// How far light is followed, and why.
     fn integrator(&self) -> (Integrator, &'static str) {
-        let Self { scene, wishes, census, .. } = self;
+        let Self { scene, options, census, .. } = self;
         let has_lights = !scene.lights.is_empty() || scene.environment.is_some();
         let is_meant_dark = scene.unlit == Unlit::Darkness || has_lights;
         let asked = integrator::Needs {
@@ -251,9 +251,9 @@ impl Case<'_> {
             is_dark: is_meant_dark && census.lights.bright.is_empty() && !census.environment && !census.ambient,
             emitters: &|| self.shines() || self.has_bodies(),
         };
-        let (chosen, why) = integrator::choose(wishes.integrator, &asked);
-        let is_free = chosen == Integrator::RayCast && wishes.integrator.is_none();
-        let sends_on = is_free && wishes.complete.has(Reduction::Recursion);
+        let (chosen, why) = integrator::choose(options.integrator, &asked);
+        let is_free = chosen == Integrator::RayCast && options.integrator.is_none();
+        let sends_on = is_free && options.complete.has(Reduction::Recursion);
         (if sends_on { Integrator::Whitted } else { chosen }, why)
     }
 
@@ -277,7 +277,7 @@ impl Case<'_> {
     /// The lights that are asked, needed or not.
     fn completed(&self, needed: Lighting, integrator: Integrator) -> Lighting {
         match needed {
-            Lighting::None | Lighting::Lights(_) if self.wishes.complete.has(Reduction::Lights) => {
+            Lighting::None | Lighting::Lights(_) if self.options.complete.has(Reduction::Lights) => {
                 // The bodies of black lights would be mistaken for them by paths.
                 let is_path = integrator == Integrator::Path;
                 let all = || (0..self.scene.lights.len()).collect();
@@ -289,13 +289,13 @@ impl Case<'_> {
 
     /// How often rays are sent on.
     fn depth(&self, integrator: Integrator) -> u32 {
-        let Self { wishes, census, .. } = self;
-        let always = wishes.complete.has(Reduction::Recursion);
+        let Self { options, census, .. } = self;
+        let always = options.complete.has(Reduction::Recursion);
         match integrator {
             Integrator::Whitted if census.materials.sending_on > 0 || always => {
-                wishes.max_depth.unwrap_or(DEFAULT_DEPTH)
+                options.max_depth.unwrap_or(DEFAULT_DEPTH)
             }
-            Integrator::Path if self.reflects(integrator) || always => wishes.max_depth.unwrap_or(DEFAULT_PATH_DEPTH),
+            Integrator::Path if self.reflects(integrator) || always => options.max_depth.unwrap_or(DEFAULT_PATH_DEPTH),
             Integrator::RayCast | Integrator::Whitted | Integrator::Path => 0,
         }
     }
@@ -303,7 +303,7 @@ impl Case<'_> {
     /// What is interpolated where a ray hits, and whether normals are mapped. `is_shaded`: whether light is asked for there, or rays go on.
     fn attributes(&self, is_shaded: bool, ambient: bool) -> (Attributes, bool) {
         let Census { materials, meshes, .. } = self.census;
-        let all = self.wishes.complete.has(Reduction::Surfaces);
+        let all = self.options.complete.has(Reduction::Surfaces);
         let normal_maps = all || is_shaded && materials.normal_mapped > 0;
         let is_coloured = is_shaded || ambient || materials.alpha > 0;
         let attributes = Attributes {
@@ -332,11 +332,11 @@ mod tests {
     }
 
     fn plan(scene: &Scene) -> Plan {
-        wished(scene, &Wishes::default())
+        wished(scene, &PlanOptions::default())
     }
 
-    fn wished(scene: &Scene, wishes: &Wishes) -> Plan {
-        Plan::new(scene, &World::new(scene).unwrap(), wishes)
+    fn wished(scene: &Scene, options: &PlanOptions) -> Plan {
+        Plan::new(scene, &World::new(scene).unwrap(), options)
     }
 
     #[test]
@@ -359,7 +359,7 @@ mod tests {
     fn what_glows_is_asked_by_paths() {
         let mut scene = scene();
         scene.materials[0].emission = Vec3::ONE;
-        let by = |integrator| Wishes { integrator: Some(integrator), ..Wishes::default() };
+        let by = |integrator| PlanOptions { integrator: Some(integrator), ..PlanOptions::default() };
         assert!(!wished(&scene, &by(Integrator::Whitted)).shadows());
         let paths = wished(&scene, &by(Integrator::Path));
         assert!(paths.shadows() && paths.work.rays(100, 1).shadow > 100, "{:?}", paths.work);
@@ -435,14 +435,14 @@ mod tests {
         dark.lights.clear();
         assert_eq!(plan(&dark).lighting, Lighting::Headlight);
         for integrator in Integrator::ALL {
-            let wishes = Wishes { integrator: Some(integrator), max_depth: Some(7), ..Wishes::default() };
-            let plan = wished(&lit, &wishes);
+            let options = PlanOptions { integrator: Some(integrator), max_depth: Some(7), ..PlanOptions::default() };
+            let plan = wished(&lit, &options);
             assert_eq!(plan.integrator, integrator);
-            assert!(!wished(&dark, &wishes).idle_emitters, "it was asked for");
+            assert!(!wished(&dark, &options).idle_emitters, "it was asked for");
             assert_eq!(plan.depth, if integrator == Integrator::RayCast { 0 } else { 7 });
         }
-        let wishes = Wishes { integrator: Some(Integrator::Path), ..Wishes::default() };
-        let path = wished(&dark, &wishes);
+        let options = PlanOptions { integrator: Some(Integrator::Path), ..PlanOptions::default() };
+        let path = wished(&dark, &options);
         assert_eq!((path.lighting, path.ambient), (Lighting::Lights(vec![]), false), "what glows is light enough");
     }
 
@@ -464,7 +464,7 @@ mod tests {
         scene.lights = vec![near(4.0), near(6.0)];
         assert_eq!(plan(&scene).lighting, Lighting::Lights(vec![1]));
         let complete = Complete::NOTHING.with(Reduction::Lights);
-        let full = wished(&scene, &Wishes { complete, ..Wishes::default() });
+        let full = wished(&scene, &PlanOptions { complete, ..PlanOptions::default() });
         assert_eq!(full.lighting, Lighting::Lights(vec![0, 1]));
         assert_eq!((plan(&scene).work.shadow, full.work.shadow), (1.0, 2.0));
         // A plane is within reach of whatever shines on it, though no box holds it.
@@ -489,24 +489,24 @@ mod tests {
     #[test]
     fn the_complete_model_is_all_of_it_and_what_is_left_out_is_named() {
         let scene = scene();
-        let all = Wishes { complete: Complete::ALL, ..Wishes::default() };
+        let all = PlanOptions { complete: Complete::ALL, ..PlanOptions::default() };
         let full = wished(&scene, &all);
         assert_eq!((full.integrator, full.depth, full.faint), (Integrator::Whitted, DEFAULT_DEPTH, 0.0));
         assert_eq!(full.attributes, Attributes::ALL);
         assert!(full.motion && full.alpha && full.normal_maps);
-        let asked = Wishes { integrator: Some(Integrator::RayCast), ..all };
+        let asked = PlanOptions { integrator: Some(Integrator::RayCast), ..all };
         assert_eq!(wished(&scene, &asked).integrator, Integrator::RayCast, "what is asked for stays");
 
         let world = World::new(&scene).unwrap();
         let census = Census::new(&scene, &world);
-        let wishes = Wishes::default();
+        let options = PlanOptions::default();
         use Reduction::{Alpha, Faint, Levels, Motion, Recursion, Surfaces};
         // The headlight is all the light there is, and nothing is faint where nothing mirrors.
-        let left_out = plan(&scene).left_out(&scene, &world, &wishes, &census);
+        let left_out = plan(&scene).left_out(&scene, &world, &options, &census);
         assert_eq!(left_out, [Levels, Surfaces, Motion, Recursion, Alpha]);
         let mut mirror = scene.clone();
         mirror.materials[0].reflection = Vec3::X;
-        let left_out = plan(&mirror).left_out(&mirror, &world, &wishes, &Census::new(&mirror, &world));
+        let left_out = plan(&mirror).left_out(&mirror, &world, &options, &Census::new(&mirror, &world));
         assert_eq!(left_out, [Levels, Surfaces, Motion, Alpha, Faint]);
         assert!(full.left_out(&scene, &world, &all, &census).is_empty());
     }

@@ -37,7 +37,7 @@ impl Rays {
 }
 
 /// What rays depend on.
-pub(super) struct Means {
+pub(super) struct WorkInputs {
     pub(super) integrator: Integrator,
     pub(super) depth: u32,
     /// Ways on from a surface by mirrors and glass, on average.
@@ -52,8 +52,8 @@ pub(super) struct Means {
 pub const ROULETTE_MIN_DEPTH: u32 = 3;
 
 impl Work {
-    pub(super) fn new(means: &Means) -> Self {
-        let Means { integrator, depth, ways, albedo, lights: [bare, extended] } = *means;
+    pub(super) fn new(means: &WorkInputs) -> Self {
+        let WorkInputs { integrator, depth, ways, albedo, lights: [bare, extended] } = *means;
         match integrator {
             Integrator::RayCast | Integrator::Whitted => {
                 let sent_on: f64 = (1..=depth.min(1000)).map(|k| ways.powi(k as i32)).sum();
@@ -82,25 +82,30 @@ impl Work {
 mod tests {
     use super::*;
 
-    const CAST: Means = Means { integrator: Integrator::RayCast, depth: 0, ways: 0.0, albedo: 0.5, lights: [2, 1] };
+    const CAST: WorkInputs =
+        WorkInputs { integrator: Integrator::RayCast, depth: 0, ways: 0.0, albedo: 0.5, lights: [2, 1] };
 
     #[test]
     fn each_hit_asks_each_light() {
         let rays = Work::new(&CAST).rays(1000, 4);
         assert_eq!(rays, Rays { camera: 1000, sent_on: 0, shadow: 6000 });
         // Half of what is seen is glass: one way on, on average, at each of five depths.
-        let glass = Means { integrator: Integrator::Whitted, depth: 5, ways: 1.0, ..CAST };
+        let glass = WorkInputs { integrator: Integrator::Whitted, depth: 5, ways: 1.0, ..CAST };
         assert_eq!(Work::new(&glass).rays(1000, 4), Rays { camera: 1000, sent_on: 5000, shadow: 36_000 });
     }
 
     #[test]
     fn paths_go_on_by_what_surfaces_send_on_and_ask_one_light() {
-        let path = Means { integrator: Integrator::Path, depth: 64, ..CAST };
+        let path = WorkInputs { integrator: Integrator::Path, depth: 64, ..CAST };
         assert_eq!(Work::new(&path).rays(1000, 4), Rays { camera: 1000, sent_on: 4000, shadow: 5000 });
-        let short = Means { depth: 2, lights: [0, 0], ..path };
+        let short = WorkInputs { depth: 2, lights: [0, 0], ..path };
         assert_eq!(Work::new(&short).rays(1000, 4), Rays { camera: 1000, sent_on: 2000, shadow: 0 });
-        let white = Means { albedo: f64::INFINITY, depth: 1000, ..CAST };
-        assert_eq!(Work::new(&Means { integrator: Integrator::Path, ..white }).sent_on, 1000.0, "nothing ends them");
+        let white = WorkInputs { albedo: f64::INFINITY, depth: 1000, ..CAST };
+        assert_eq!(
+            Work::new(&WorkInputs { integrator: Integrator::Path, ..white }).sent_on,
+            1000.0,
+            "nothing ends them"
+        );
         assert_eq!(Rays { camera: u64::MAX, sent_on: 1, shadow: 1 }.total(), u64::MAX);
     }
 }

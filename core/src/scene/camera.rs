@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::pose::{Journey, Pose};
+use super::pose::{Pose, PoseInterpolation};
 use crate::math::{DAabb, DAffine3, DMat3, DVec2, DVec3};
 
 /// The vertical angle of view where nothing else is asked for, in degrees.
@@ -17,7 +17,7 @@ pub struct Camera {
     pub eye: DVec3,
     /// Right, up and back as unit columns; of one that moves, at time 0.
     pub frame: DMat3,
-    /// Of one that moves, where it is at time 1. In between it is on its [`Journey`] there.
+    /// Of one that moves, where it is at time 1. In between it is on its [`PoseInterpolation`] there.
     pub end: Option<Pose>,
     /// Which ray belongs to a point of the picture.
     pub projection: Projection,
@@ -192,7 +192,7 @@ impl Camera {
     /// Where it is at a time from 0 to 1.
     pub fn pose(&self, time: f64) -> Pose {
         let start = Pose { eye: self.eye, frame: self.frame };
-        self.end.map_or(start, |end| Journey::new(start, end).at(time))
+        self.end.map_or(start, |end| PoseInterpolation::new(start, end).at(time))
     }
 
     /// Moves the camera. Scale and shear move the eye and leave angles of view as they are; lengths are scaled.

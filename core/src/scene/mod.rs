@@ -35,12 +35,12 @@ pub use mesh::Mesh;
 #[doc(hidden)]
 pub use mesh::{bounds_of, choose_origin, is_traceable_f64};
 pub use physical::{MetallicRoughness, Physical, PhysicalTextures, SpecularGlossiness, Texels, Workflow};
-pub use pose::{Journey, Pose};
+pub use pose::{Pose, PoseInterpolation};
 pub use procedural::{architecture, terrain};
 pub use recipes::{RECIPES, Recipe};
 pub use request::{Integrator, MAX_DEPTH, MAX_SIDE, MAX_SPP, Request};
 pub use rocks::rocks;
-pub use search::{Accel, Resolution, Search};
+pub use search::{Accel, AcceleratorRequest, Resolution};
 pub use texture::{Filter, Pixels, Texture, Wrap};
 
 use std::path::PathBuf;

@@ -34,7 +34,7 @@ impl Pose {
 
 /// From one pose at time 0 to another at time 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Journey {
+pub struct PoseInterpolation {
     start: Pose,
     end: DVec3,
     /// What the camera turns about, by at most half a turn; of length 1.
@@ -43,7 +43,7 @@ pub struct Journey {
     angle: f64,
 }
 
-impl Journey {
+impl PoseInterpolation {
     /// By the shorter way round.
     pub fn new(start: Pose, end: Pose) -> Self {
         let turn = DQuat::from_mat3(&(end.frame * start.frame.transpose()));
@@ -80,7 +80,7 @@ mod tests {
         let start = pose(DVec3::new(1e7, 0.0, 0.0), DMat3::from_rotation_x(0.3));
         for degrees in [-170.0, -40.0, 0.0, 1e-6, 90.0, 179.0f64] {
             let turned = |share: f64| DMat3::from_rotation_y((degrees * share).to_radians()) * start.frame;
-            let journey = Journey::new(start, pose(DVec3::new(1e7, 8.0, 0.0), turned(1.0)));
+            let journey = PoseInterpolation::new(start, pose(DVec3::new(1e7, 8.0, 0.0), turned(1.0)));
             for share in [0.0, 0.25, 0.5, 1.0] {
                 let Pose { eye, frame } = journey.at(share);
                 assert_eq!(eye, DVec3::new(1e7, 8.0 * share, 0.0));

@@ -1,6 +1,6 @@
 //! What a scene file says about the picture that is to be made of it.
 
-use super::search::Search;
+use super::search::AcceleratorRequest;
 use crate::image::{Curve, Response};
 
 /// Most pixels a picture may have along one side.
@@ -63,7 +63,7 @@ pub struct Request {
     /// From light to codes.
     pub response: Option<Curve>,
     /// How the scene is searched.
-    pub search: Search,
+    pub search: AcceleratorRequest,
 }
 
 impl Request {

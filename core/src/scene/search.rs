@@ -88,7 +88,7 @@ impl Resolution {
 
 /// What is asked of the search, as far as anything is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Search {
+pub struct AcceleratorRequest {
     /// The accelerator.
     pub accel: Option<Accel>,
     /// Cells of a grid.
@@ -99,7 +99,7 @@ pub struct Search {
     pub sphere_method: Option<SphereMethod>,
 }
 
-impl Search {
+impl AcceleratorRequest {
     /// What is said here, and what `other` says of the rest. Whoever names an accelerator says, too, that it is not the
     /// other's grid.
     #[must_use]
@@ -126,20 +126,24 @@ mod tests {
 
     #[test]
     fn what_is_said_first_wins_and_the_rest_is_taken_over() {
-        let file = Search {
+        let file = AcceleratorRequest {
             accel: Some(Accel::Grid),
             grid: Some(Resolution::Longest(7)),
             triangle_method: Some(TriangleMethod::Woop),
             sphere_method: None,
         };
-        assert_eq!(Search::default().or(file), file);
-        let flag = Search { accel: Some(Accel::Kd), sphere_method: Some(SphereMethod::Accurate), ..Search::default() };
+        assert_eq!(AcceleratorRequest::default().or(file), file);
+        let flag = AcceleratorRequest {
+            accel: Some(Accel::Kd),
+            sphere_method: Some(SphereMethod::Accurate),
+            ..AcceleratorRequest::default()
+        };
         let both = flag.or(file);
         assert_eq!((both.accel, both.grid), (Some(Accel::Kd), None), "a kd-tree has no cells");
         assert_eq!((both.triangle_method, both.sphere_method), (file.triangle_method, flag.sphere_method));
-        let finer = Search { grid: Some(Resolution::Longest(9)), ..Search::default() };
+        let finer = AcceleratorRequest { grid: Some(Resolution::Longest(9)), ..AcceleratorRequest::default() };
         assert_eq!(finer.or(file).grid, finer.grid);
-        assert!(both.asks_for_methods() && !Search::default().asks_for_methods());
+        assert!(both.asks_for_methods() && !AcceleratorRequest::default().asks_for_methods());
     }
 
     #[test]

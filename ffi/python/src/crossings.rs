@@ -6,7 +6,7 @@ use numpy::{Element, IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use twincast::trace::precise::{Precise, PreciseRay};
+use twincast::trace::precise::{PreciseRay, PreciseScene};
 
 use crate::arrays::{Answers, CHUNK, Ends, Points, Rays, finite_f32, weights_f32};
 use crate::pool;
@@ -69,7 +69,7 @@ impl Scene {
         let counted = self.counted(py, threads)?;
         let (ray, primitive, location) = pool::interruptible(py, threads, |cancel| {
             let found = if locations {
-                found(counted, &rays, cancel, Precise::all_hits_batch, |task| {
+                found(counted, &rays, cancel, PreciseScene::all_hits_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, hits) in task.by_ray() {
                         let PreciseRay { origin, direction, .. } = task.rays[i];
@@ -81,7 +81,7 @@ impl Scene {
                     columns
                 })
             } else {
-                found(counted, &rays, cancel, Precise::all_names_batch, |task| {
+                found(counted, &rays, cancel, PreciseScene::all_ids_batch, |task| {
                     let mut columns = Columns::default();
                     for (i, names) in task.by_ray() {
                         for &(_, primitive) in &names[..names.len().min(most)] {
@@ -152,10 +152,10 @@ impl<H> Task<'_, H> {
 
 /// What `keep` keeps of all hits, as `ask` gives them, task by task; of no rays once it is called off.
 fn found<H: Send, T: Send>(
-    precise: &Precise,
+    precise: &PreciseScene,
     rays: &Rays<'_>,
     cancel: &AtomicBool,
-    ask: fn(&Precise, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
+    ask: fn(&PreciseScene, &[PreciseRay], &mut Vec<usize>, &mut Vec<H>),
     keep: impl Fn(&Task<'_, H>) -> T + Sync,
 ) -> Vec<T> {
     let chunks = (0..rays.len().div_ceil(CHUNK)).into_par_iter();
@@ -179,7 +179,7 @@ impl Scene {
     ) -> PyResult<List<'py>> {
         let counted = self.counted(py, threads)?;
         let (splits, [ray, primitive, geometry], t, uv) = pool::interruptible(py, threads, |cancel| {
-            let found = found(counted, rays, cancel, Precise::all_hits_batch, |task| {
+            let found = found(counted, rays, cancel, PreciseScene::all_hits_batch, |task| {
                 let (mut ids, mut t, mut uv) = ([const { Vec::new() }; 3], Vec::new(), Vec::new());
                 for (i, hits) in task.by_ray() {
                     for hit in hits {

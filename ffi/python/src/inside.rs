@@ -1,7 +1,7 @@
 //! Which points are inside, by rays that are counted.
 
 use twincast::math::DVec3;
-use twincast::trace::precise::{Precise, PreciseRay};
+use twincast::trace::precise::{PreciseRay, PreciseScene};
 
 use crate::scene::Scene;
 
@@ -19,7 +19,7 @@ fn direction(sample: usize) -> DVec3 {
 impl Scene {
     /// Whether each point is inside of meshes that are closed when they are [`counted`](Scene::counted); `squares` are the points' squared distances from these, or NaN. A ball around a point that holds no triangle is all inside or all outside,
     /// so of points along a curve few need be asked.
-    pub fn are_inside_closed(&self, counted: &Precise, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
+    pub fn are_inside_closed(&self, counted: &PreciseScene, points: &[DVec3], squares: &[f64], inside: &mut [bool]) {
         // Points that are asked, and of each point which of them tells.
         let (mut asked, mut tells) = (Vec::new(), Vec::with_capacity(points.len()));
         let mut last = (DVec3::NAN, 0.0);
@@ -39,7 +39,7 @@ impl Scene {
 }
 
 /// Whether each point is inside, by the vote of so many rays; see [`Scene`]'s `inside`.
-pub fn are_inside(counted: &Precise, points: &[DVec3], samples: usize, both_ways: bool, inside: &mut [bool]) {
+pub fn are_inside(counted: &PreciseScene, points: &[DVec3], samples: usize, both_ways: bool, inside: &mut [bool]) {
     let mut votes = vec![0; points.len()];
     for sample in 0..samples {
         let mut odd = are_odd(counted, points, direction(sample));
@@ -57,7 +57,7 @@ pub fn are_inside(counted: &Precise, points: &[DVec3], samples: usize, both_ways
 }
 
 /// Whether a ray from each point crosses the meshes an odd number of times.
-fn are_odd(counted: &Precise, points: &[DVec3], direction: DVec3) -> Vec<bool> {
+fn are_odd(counted: &PreciseScene, points: &[DVec3], direction: DVec3) -> Vec<bool> {
     let rays: Vec<PreciseRay> = points.iter().map(|&point| PreciseRay::new(point, direction)).collect();
     let mut counts = vec![0; rays.len()];
     counted.count_batch(&rays, &mut counts);

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use rayon::slice::ChunksMut;
 use twincast::math::DVec3;
-use twincast::trace::precise::NearestPoint;
+use twincast::trace::precise::PreciseClosestPoint;
 
 use crate::arrays::{Answers, CHUNK, Points, Rows, weights_f32};
 use crate::inside::are_inside;
@@ -86,7 +86,7 @@ impl Scene {
             self.precise.prepare_for_points();
             let order = Order::of_points(&rows);
             let found = along_order(&rows, order.as_ref(), cancel, None, |points, found| {
-                self.precise.nearest_point_batch(points, found)
+                self.precise.closest_point_batch(points, found)
             });
             let tasks = tasks.into_par_iter().zip(others.into_par_iter()).enumerate();
             tasks.for_each(|(chunk, ((point, uv, normal), (primitive, geometry, distance)))| {
@@ -95,7 +95,7 @@ impl Scene {
                 }
                 for i in 0..distance.len() {
                     let number = chunk * CHUNK + i;
-                    let found: &Option<NearestPoint> =
+                    let found: &Option<PreciseClosestPoint> =
                         &found[order.as_ref().map_or(number, |order| order.place(number))];
                     point[3 * i..3 * i + 3].fill(f64::NAN);
                     (primitive[i], geometry[i], distance[i]) = (INVALID, INVALID, f64::NAN);

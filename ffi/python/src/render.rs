@@ -25,7 +25,7 @@ type View = ([f64; 3], [f64; 3], [f64; 3], f64);
 
 /// What is to be made of a scene; what is not given the scene says, or is usual.
 #[derive(FromPyObject)]
-pub struct Wishes {
+pub struct RenderOptions {
     #[pyo3(item)]
     size: Option<(u32, u32)>,
     #[pyo3(item)]
@@ -46,7 +46,7 @@ pub struct Wishes {
     threads: usize,
 }
 
-impl Wishes {
+impl RenderOptions {
     fn settings(&self, scene: &Scene) -> PyResult<Settings> {
         let asked = Settings::of_request(&scene.request);
         let (width, height) = self.size.unwrap_or((asked.width, asked.height));
@@ -114,11 +114,11 @@ fn by_name<T: Copy, const N: usize>(argument: &str, name: &str, known: [(&str, T
 
 /// Renders a scene file; also the warnings about it.
 #[pyfunction]
-#[pyo3(signature = (path, wishes, up_axis = "y", unit = "m", normals = "file"))]
+#[pyo3(signature = (path, render_options, up_axis = "y", unit = "m", normals = "file"))]
 pub fn render_file<'py>(
     py: Python<'py>,
     path: PathBuf,
-    wishes: Wishes,
+    render_options: RenderOptions,
     up_axis: &str,
     unit: &str,
     normals: &str,
@@ -129,18 +129,18 @@ pub fn render_file<'py>(
         normals: by_name("normals", normals, Normals::ALL.map(|kind| (kind.name(), kind)))?,
         ..LoadOptions::default()
     };
-    let loaded = pool::run(py, wishes.threads, || io::load(&path, &options))?;
+    let loaded = pool::run(py, render_options.threads, || io::load(&path, &options))?;
     let (scene, warnings) = loaded.map_err(value_error)?;
-    Ok((wishes.render(py, &scene)?, warnings.iter().map(ToString::to_string).collect()))
+    Ok((render_options.render(py, &scene)?, warnings.iter().map(ToString::to_string).collect()))
 }
 
 /// Renders meshes: vertices, triangles, and their diffuse colour, linear.
 #[pyfunction]
-#[pyo3(signature = (meshes, wishes, normals = "flat"))]
+#[pyo3(signature = (meshes, render_options, normals = "flat"))]
 pub fn render_meshes<'py>(
     py: Python<'py>,
     meshes: Vec<(Points<'py>, PyReadonlyArray2<'py, u32>, [f32; 3])>,
-    wishes: Wishes,
+    render_options: RenderOptions,
     normals: &str,
 ) -> PyResult<Picture<'py>> {
     let is_smooth = by_name("normals", normals, [("flat", false), ("smooth", true)])?;
@@ -154,7 +154,7 @@ pub fn render_meshes<'py>(
             return Err(PyValueError::new_err(message));
         }
         let mut mesh = Mesh { material: number as u32, ..Mesh::new(Vec::new(), triangles) };
-        pool::run(py, wishes.threads, || {
+        pool::run(py, render_options.threads, || {
             mesh.set_positions(&positions);
             mesh.drop_strays();
             if is_smooth {
@@ -164,7 +164,7 @@ pub fn render_meshes<'py>(
         geometries.push(Geometry::Mesh(mesh));
         materials.push(Material { diffuse: Vec3::from(*color), ..Material::default() });
     }
-    wishes.render(py, &Scene::from_geometries(geometries, materials))
+    render_options.render(py, &Scene::from_geometries(geometries, materials))
 }
 
 /// The command line, on these arguments, of which the first is the program's name; returns the exit code.

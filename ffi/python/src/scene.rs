@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use twincast::math::DVec3;
-use twincast::trace::precise::{Precise, PreciseHit, PreciseMesh};
+use twincast::trace::precise::{PreciseHit, PreciseMesh, PreciseScene};
 use twincast::{Batch, Hit, Tracer};
 
 use crate::arrays::{Answers, CHUNK, Ends, Points, Rays, finite_f32, weights_f32};
@@ -17,7 +17,7 @@ pub const INVALID: u32 = u32::MAX;
 /// Triangle meshes, ready to be asked; never changes.
 #[pyclass(frozen, module = "twincast._native")]
 pub struct Scene {
-    pub precise: Precise,
+    pub precise: PreciseScene,
 }
 
 /// Hits in f32: t, (u, v), primitive, geometry, normal.
@@ -64,7 +64,7 @@ impl Scene {
             })
         };
         let meshes: Vec<PreciseMesh> = meshes.iter().map(read).collect::<PyResult<_>>()?;
-        let precise = pool::run(py, threads, || Precise::new(meshes))?.map_err(value_error)?;
+        let precise = pool::run(py, threads, || PreciseScene::new(meshes))?.map_err(value_error)?;
         Ok(Self { precise })
     }
 
@@ -87,7 +87,7 @@ impl Scene {
                 first.iter_mut().zip(hits).for_each(|(first, hit)| *first = hit.map_or(-1, |hit| hit.primitive.into()));
             } else {
                 let mut names = [None; CHUNK];
-                self.precise.first_batch(&rays.some(rays.chunk(chunk)), &mut names[..first.len()]);
+                self.precise.closest_ids_batch(&rays.some(rays.chunk(chunk)), &mut names[..first.len()]);
                 first.iter_mut().zip(names).for_each(|(first, name)| *first = name.map_or(-1, |(_, i)| i.into()));
             }
         })?;
@@ -232,7 +232,7 @@ fn normal([a, b, c]: [DVec3; 3], normalize: bool) -> DVec3 {
 impl Scene {
     /// What counts are taken of: the meshes without triangles that repeat others. When it is first asked it is looked for these, on so many threads, without
     /// the interpreter's lock.
-    pub fn counted(&self, py: Python<'_>, threads: usize) -> PyResult<&Precise> {
+    pub fn counted(&self, py: Python<'_>, threads: usize) -> PyResult<&PreciseScene> {
         if self.precise.knows_distinct() {
             return Ok(self.precise.distinct());
         }

@@ -7,8 +7,8 @@ use super::table::{Read, Table, Value};
 use crate::image::{Curve, MAX_STOPS, TEMPERATURES};
 use crate::math::{DVec2, DVec3, MAX_COORDINATE, Vec3};
 use crate::scene::{
-    Accel, AreaShape, Attenuation, Camera, DEFAULT_FOV, Distortion, Fov, Integrator, Light, MAX_DEPTH, MAX_SIDE,
-    MAX_SPP, Pose, Projection, Request, Resolution, Search, ThinLens,
+    Accel, AcceleratorRequest, AreaShape, Attenuation, Camera, DEFAULT_FOV, Distortion, Fov, Integrator, Light,
+    MAX_DEPTH, MAX_SIDE, MAX_SPP, Pose, Projection, Request, Resolution, ThinLens,
 };
 use crate::shape::{SphereMethod, TriangleMethod};
 
@@ -100,7 +100,7 @@ fn picture_name(value: Value<'_>) -> Read<String> {
 }
 
 /// The keys of `[render]` that say how the scene is searched.
-fn search(table: &mut Table<'_>) -> Read<Search> {
+fn search(table: &mut Table<'_>) -> Read<AcceleratorRequest> {
     let accel = table.optional("accel", |value| value.one_of(Accel::ALL, Accel::name))?;
     let grid = table.optional("grid", |value| {
         let side = |value: Value<'_>| value.whole(1..=Resolution::MAX.into()).map(|side| side as u32);
@@ -115,7 +115,7 @@ fn search(table: &mut Table<'_>) -> Read<Search> {
     if grid.is_some() && accel != Some(Accel::Grid) {
         return Err(fault(table, "grid", "is the resolution of accel = \"grid\"; write that, too, or leave it out"));
     }
-    let search = Search {
+    let search = AcceleratorRequest {
         accel,
         grid,
         triangle_method: table

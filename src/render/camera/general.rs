@@ -5,14 +5,14 @@ use super::no_ray;
 use crate::error::{Error, Result};
 use crate::math::{DVec2, DVec3, MAX_COORDINATE};
 use crate::ray::Ray;
-use crate::scene::{Camera, Distortion, Journey, Pose, Projection, ThinLens};
+use crate::scene::{Camera, Distortion, Pose, PoseInterpolation, Projection, ThinLens};
 
 /// A camera in front of a film of given size, in world coordinates.
 #[derive(Clone, Debug)]
 pub(in crate::render) struct General {
     /// At time 0.
     pose: Pose,
-    journey: Option<Journey>,
+    poses: Option<PoseInterpolation>,
     projection: Projection,
     /// Pixels.
     size: DVec2,
@@ -27,7 +27,7 @@ impl General {
     pub(super) fn new(camera: &Camera, centre: DVec3, size: DVec2, half: DVec2) -> Result<Self> {
         let Camera { frame, end, projection, shift, lens, distortion, .. } = *camera;
         let pose = Pose { eye: camera.eye - centre, frame };
-        let journey = end.map(|end| Journey::new(pose, Pose { eye: end.eye - centre, ..end }));
+        let poses = end.map(|end| PoseInterpolation::new(pose, Pose { eye: end.eye - centre, ..end }));
         if let Some(ThinLens { radius, focus, .. }) = lens {
             for (name, length) in [("opening of radius", radius), ("focus at", focus)] {
                 if !(length > 0.0 && length <= MAX_COORDINATE.into()) {
@@ -47,7 +47,7 @@ impl General {
         if distortion.is_some() && !matches!(projection, Projection::Perspective(_)) {
             return Err(Error::Usage("lens distortion is for perspective views alone".into()));
         }
-        Ok(Self { pose, journey, projection, size, half, shift, lens, distortion })
+        Ok(Self { pose, poses, projection, size, half, shift, lens, distortion })
     }
 
     pub(super) const fn has_lens(&self) -> bool {
@@ -55,7 +55,7 @@ impl General {
     }
 
     pub(super) const fn moves(&self) -> bool {
-        self.journey.is_some()
+        self.poses.is_some()
     }
 
     /// What chooses the middle of the lens.
@@ -66,7 +66,7 @@ impl General {
 
     /// The ray through a point of the film and, where there is a lens, through the point of it that `lens` gives.
     pub(super) fn ray(&self, film: DVec2, lens: DVec2, time: f32) -> Ray {
-        let Pose { eye, frame } = self.journey.map_or(self.pose, |journey| journey.at(time.into()));
+        let Pose { eye, frame } = self.poses.map_or(self.pose, |poses| poses.at(time.into()));
         // From the picture's middle, in halves of its sides, y up.
         let at = (film / self.size * 2.0 - 1.0) * DVec2::new(1.0, -1.0) + self.shift * 2.0;
         let (mut origin, mut direction) = (DVec3::ZERO, DVec3::NEG_Z);

@@ -11,7 +11,7 @@
 //! are farther from them than that.
 
 use super::items::Input;
-use super::ray::{IndexRay, Range};
+use super::ray::{IndexRay, TInterval};
 use super::{Index, Options, share};
 use crate::math::{Aabb, DVec3};
 
@@ -126,7 +126,7 @@ impl Octree {
         node: Node,
         cell: Cell,
         ray: &IndexRay,
-        range: Range,
+        range: TInterval,
         mut limit: f64,
         each: &mut impl FnMut(u32) -> f64,
     ) -> f64 {
@@ -136,7 +136,7 @@ impl Octree {
             }
             return limit;
         }
-        let sides = |axis: usize, range: Range| {
+        let sides = |axis: usize, range: TInterval| {
             let (near, far) = ray.split(axis, cell.middle[axis], range.until(limit));
             let first = usize::from(ray.backwards[axis]);
             [(first, near), (1 - first, far)]

@@ -17,12 +17,12 @@ use crate::trace::nearest::Nearest;
 
 /// A range of t; empty where `from > to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Range {
+pub(super) struct TInterval {
     pub from: f64,
     pub to: f64,
 }
 
-impl Range {
+impl TInterval {
     pub fn is_empty(self) -> bool {
         self.from > self.to
     }
@@ -85,13 +85,13 @@ impl IndexRay {
 
     /// Where it is within the box, up to `limit`.
     #[inline]
-    pub fn within(&self, min: DVec3, max: DVec3, limit: f64) -> Range {
+    pub fn within(&self, min: DVec3, max: DVec3, limit: f64) -> TInterval {
         let backwards = BVec3::from_array(self.backwards);
         let first = DVec3::select(backwards, max, min);
         let second = DVec3::select(backwards, min, max);
         let from = (first - self.early) * self.reciprocal;
         let to = (second - self.late) * self.reciprocal;
-        let mut range = Range { from: self.begin, to: limit };
+        let mut range = TInterval { from: self.begin, to: limit };
         for axis in 0..3 {
             // NaN leaves the range as it is.
             if from[axis] > range.from {
@@ -106,17 +106,17 @@ impl IndexRay {
 
     /// The same, of a box in f32.
     #[inline]
-    pub fn within_box(&self, bounds: &Aabb, limit: f64) -> Range {
+    pub fn within_box(&self, bounds: &Aabb, limit: f64) -> TInterval {
         self.within(bounds.min.as_dvec3(), bounds.max.as_dvec3(), limit)
     }
 
     /// The parts of a range before and behind a plane across an axis; they overlap by the doubt about where it is met.
     #[inline]
-    pub fn split(&self, axis: usize, plane: f64, range: Range) -> (Range, Range) {
+    pub fn split(&self, axis: usize, plane: f64, range: TInterval) -> (TInterval, TInterval) {
         let from = (plane - self.early[axis]) * self.reciprocal[axis];
         let to = (plane - self.late[axis]) * self.reciprocal[axis];
-        let before = Range { to: if to < range.to { to } else { range.to }, ..range };
-        let behind = Range { from: if from > range.from { from } else { range.from }, ..range };
+        let before = TInterval { to: if to < range.to { to } else { range.to }, ..range };
+        let behind = TInterval { from: if from > range.from { from } else { range.from }, ..range };
         (before, behind)
     }
 }
@@ -142,13 +142,13 @@ mod tests {
         );
         let beside = ray(DVec3::new(0.3, 0.0, -0.0)).within(DVec3::new(0.4, 0.3, 0.3), DVec3::ONE, 9.0);
         assert!(beside.is_empty(), "{beside:?}");
-        let (before, behind) = ray(DVec3::new(-0.5, 0.0, 0.0)).split(0, -0.4, Range { from: 0.0, to: 4.0 });
+        let (before, behind) = ray(DVec3::new(-0.5, 0.0, 0.0)).split(0, -0.4, TInterval { from: 0.0, to: 4.0 });
         assert!(before.to >= 1.0 && behind.from <= 1.0 && before.to - behind.from < 1e-13);
         // Along the plane, on either side of it, and in it.
-        let whole = Range { from: 0.0, to: 4.0 };
+        let whole = TInterval { from: 0.0, to: 4.0 };
         for (zero, [below, above]) in [(0.0, [0, 1]), (-0.0, [1, 0])] {
             let along = ray(DVec3::new(1.0, zero, 0.0));
-            let both = |plane| <[Range; 2]>::from(along.split(1, plane, whole));
+            let both = |plane| <[TInterval; 2]>::from(along.split(1, plane, whole));
             assert!(both(0.5)[below] == whole && both(0.5)[above].is_empty());
             assert!(both(0.1)[above] == whole && both(0.1)[below].is_empty());
             assert_eq!(both(0.2), [whole; 2]);

@@ -69,7 +69,7 @@ mod tree;
 mod visits;
 mod walk;
 
-pub use alone::{Search, SingleRay, Travel, TriangleFound};
+pub use alone::{SingleRay, Travel, TriangleFound, VisitFlow};
 #[doc(hidden)]
 pub use batch::prepare_thread;
 pub use boxes::BoxTree;

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use super::alone::Search;
+use super::alone::VisitFlow;
 use super::boxes::BoxTree;
 use super::near::ball::Ball;
 use super::overlap::visit_overlapping;
@@ -18,16 +18,16 @@ use crate::ray::Ray;
 impl BoxTree {
     /// Names boxes that `ray` enters at its time, or nearly, up to the t that `visitor` returns last (at first the ray's tmax), near ones
     /// mostly first, until it has seen enough. The search takes each box that the ray enters; it may take others.
-    pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
+    pub fn visit(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         self.visit_as::<Closest>(ray, visitor);
     }
 
     /// The same for a visitor to whom it does not matter which are near.
-    pub fn visit_any(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
+    pub fn visit_any(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         self.visit_as::<Occluded>(ray, visitor);
     }
 
-    fn visit_as<Q: Query>(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> Search) {
+    fn visit_as<Q: Query>(&self, ray: &Ray, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         if !self.is_empty() && ray.is_valid() {
             isa::dispatch(self.isa(), VisitBoxes { boxes: self, ray, visitor, query: PhantomData::<Q> });
         }
@@ -42,7 +42,7 @@ impl BoxTree {
     /// Names boxes whose distance from `point` is at most the radius that `visitor` returns last (at first `radius`), near
     /// ones mostly first, until it has seen enough; and some that are farther, in the same leaves or by a millionth of
     /// coordinates. What moves is at time 0.
-    pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> Search) {
+    pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32) -> VisitFlow) {
         if !self.is_empty() && point.is_finite() {
             isa::dispatch(self.isa(), NearBoxes { tree: self.tree(), point, radius, visitor });
         }
@@ -53,7 +53,7 @@ struct NearBoxes<'a, 'v> {
     tree: &'a Tree,
     point: Vec3,
     radius: f32,
-    visitor: &'a mut (dyn FnMut(u32) -> Search + 'v),
+    visitor: &'a mut (dyn FnMut(u32) -> VisitFlow + 'v),
 }
 
 impl Kernel for NearBoxes<'_, '_> {
@@ -69,8 +69,8 @@ impl Kernel for NearBoxes<'_, '_> {
             |leaf| {
                 for item in leaf.blocks() {
                     match visitor(item) {
-                        Search::Continue(wanted) => radius = wanted,
-                        Search::Break(()) => return None,
+                        VisitFlow::Continue(wanted) => radius = wanted,
+                        VisitFlow::Break(()) => return None,
                     }
                 }
                 Some(radius)
@@ -82,7 +82,7 @@ impl Kernel for NearBoxes<'_, '_> {
 struct VisitBoxes<'a, 'v, Q> {
     boxes: &'a BoxTree,
     ray: &'a Ray,
-    visitor: &'a mut (dyn FnMut(u32) -> Search + 'v),
+    visitor: &'a mut (dyn FnMut(u32) -> VisitFlow + 'v),
     query: PhantomData<Q>,
 }
 
@@ -98,8 +98,8 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
             ray.tmax.next_up(),
             #[inline(always)]
             |item| match visitor(item) {
-                Search::Continue(t) => Visit::Until(t),
-                Search::Break(()) => Visit::Stop,
+                VisitFlow::Continue(t) => Visit::Until(t),
+                VisitFlow::Break(()) => Visit::Stop,
             },
         );
     }
@@ -144,7 +144,7 @@ mod tests {
                 let mut seen = vec![false; boxes.len()];
                 tree.visit(&ray, &mut |i| {
                     seen[order[i as usize] as usize] = true;
-                    Search::Continue(f32::INFINITY)
+                    VisitFlow::Continue(f32::INFINITY)
                 });
                 assert!(!seen[7], "it is nowhere at the end");
                 named += seen.iter().filter(|seen| **seen).count();

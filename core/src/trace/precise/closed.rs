@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::{Precise, is_traceable};
+use super::{PreciseScene, is_traceable};
 use crate::math::DVec3;
 use crate::once::made_outside;
 
 /// More than distances in f64 are off by, relative to the largest coordinate of what they were computed from.
 const ROUNDING: f64 = 1e-13;
 
-impl Precise {
+impl PreciseScene {
     /// Whether the triangles leave no opening: at every edge an even number of them meet, those of all meshes together. Corners are the same where they are at the same
     /// place. Then every ray from a point crosses them an odd number of times, or each an even number; crossings are those of
     /// [`count_batch`](Self::count_batch).

@@ -8,12 +8,12 @@
 //!
 //! Trees over f64 boxes, the simpler alternative, would take twice the memory and half of the lanes.
 //!
-//! Where all coordinates are f32 to begin with, and lie well ([`Precise::exact`]), the rounding is none, and rays in f32 may ask
+//! Where all coordinates are f32 to begin with, and lie well ([`PreciseScene::exact`]), the rounding is none, and rays in f32 may ask
 //! the [`Bvh`] itself.
 
 mod closed;
+mod closest_point;
 mod frame;
-mod nearest_point;
 mod query;
 mod repeats;
 
@@ -27,8 +27,8 @@ use crate::scene::{Geometry, Material, Mesh, Scene};
 use crate::shape::triangle::TriangleHit;
 use crate::trace::World;
 use crate::trace::bvh::{Bvh, Discs};
+pub use closest_point::PreciseClosestPoint;
 use frame::Frame;
-pub use nearest_point::NearestPoint;
 
 /// Rays that start farther away, on any axis, miss.
 pub const MAX_ORIGIN: f64 = 1e80;
@@ -122,7 +122,7 @@ impl PreciseMesh {
 }
 
 /// Meshes in f64, ready to be asked.
-pub struct Precise {
+pub struct PreciseScene {
     meshes: Vec<PreciseMesh>,
     bvh: Bvh,
     bounds: DAabb,
@@ -131,15 +131,15 @@ pub struct Precise {
     /// Found out when it is first asked.
     closed: OnceLock<bool>,
     /// Found out when it is first asked; nothing where no triangle is repeated.
-    distinct: OnceLock<Option<Box<Precise>>>,
+    distinct: OnceLock<Option<Box<PreciseScene>>>,
     frame: Frame,
 }
 
-impl fmt::Debug for Precise {
+impl fmt::Debug for PreciseScene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { meshes, bvh, bounds, .. } = self;
         let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-        f.debug_struct("Precise")
+        f.debug_struct("PreciseScene")
             .field("meshes", &meshes.len())
             .field("triangles", &triangles)
             .field("bounds", bounds)
@@ -148,7 +148,7 @@ impl fmt::Debug for Precise {
     }
 }
 
-impl Precise {
+impl PreciseScene {
     /// Builds the tree, on rayon's current thread pool.
     ///
     /// # Errors
@@ -231,7 +231,7 @@ mod tests {
 
     /// What is looked at in f64: of a ray its candidates, of a point the triangles that are measured.
     struct Count<'a> {
-        precise: &'a Precise,
+        precise: &'a PreciseScene,
         point: Option<DVec3>,
         measured: std::cell::Cell<usize>,
     }
@@ -270,7 +270,7 @@ mod tests {
         for far in [0.0, 1e6, 1e9] {
             let ground = [[-0.1, 0.0, -3.0], [far, -far, -3.0], [far, far, -3.1]].map(DVec3::from).to_vec();
             let ground = PreciseMesh { positions: ground, triangles: vec![[0, 1, 2]] };
-            let precise = Precise::new(vec![hills.clone(), ground]).expect("meshes");
+            let precise = PreciseScene::new(vec![hills.clone(), ground]).expect("meshes");
             let (mut candidates, mut measured) = (0, 0);
             for k in 0..200 {
                 let point = DVec3::new(0.0237 * f64::from(k), 0.0219 * f64::from(k), 1.0);
@@ -299,7 +299,7 @@ mod tests {
         for scale in [1.0, 0.1] {
             let mesh = |strays: &[DVec3]| {
                 let positions = corners.map(|p| p * scale).into_iter().chain(strays.iter().copied()).collect();
-                Precise::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a triangle")
+                PreciseScene::new(vec![PreciseMesh { positions, triangles: vec![[0, 1, 2]] }]).expect("a triangle")
             };
             let (plain, strewn) = (mesh(&[]), mesh(&strays));
             assert_eq!(strewn.bounds(), plain.bounds());

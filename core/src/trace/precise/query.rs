@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::frame::{self, LocalRay};
-use super::{Precise, PreciseHit, PreciseRay, is_traceable};
+use super::{PreciseHit, PreciseRay, PreciseScene, is_traceable};
 use crate::math::{DVec3, Vec3};
 use crate::ray::Ray;
 use crate::shape::crossing::{Crossing, crossing_line};
@@ -20,7 +20,7 @@ const CHUNK: usize = 1024;
 /// Misses.
 const INVALID: Ray = Ray { origin: Vec3::NAN, direction: Vec3::ZERO, tmin: 0.0, tmax: 0.0, time: 0.0 };
 
-impl Precise {
+impl PreciseScene {
     /// The nearest hit of each ray, into `hits` of the same length; at equal t that of the lowest id. On the calling thread, as all
     /// queries.
     ///
@@ -39,7 +39,7 @@ impl Precise {
     ///
     /// # Panics
     /// Unless there is one answer a ray.
-    pub fn first_batch(&self, rays: &[PreciseRay], names: &mut [Option<(u32, u32)>]) {
+    pub fn closest_ids_batch(&self, rays: &[PreciseRay], names: &mut [Option<(u32, u32)>]) {
         assert_eq!(rays.len(), names.len(), "one name a ray");
         let (mut pairs, mut found) = (Pairs::default(), Vec::new());
         let mut hits = vec![None; rays.len().min(CHUNK)];
@@ -163,7 +163,7 @@ impl Precise {
 
     /// The geometry and the primitive of each hit of [`Self::all_hits_batch`], in the same order, without computing t, u and v of a ray whose hits lie so far apart
     /// that they are in order without. (Where sizes squared times a direction vanish in f64, [`Self::all_hits_batch`] may miss what is named here.)
-    pub fn all_names_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, names: &mut Vec<(u32, u32)>) {
+    pub fn all_ids_batch(&self, rays: &[PreciseRay], ends: &mut Vec<usize>, names: &mut Vec<(u32, u32)>) {
         ends.clear();
         names.clear();
         let (mut arrivals, mut hits) = (Arrivals::default(), Vec::new());
@@ -405,7 +405,11 @@ impl Pairs {
     }
 
     /// Of each the ray, and what it comes to; in their order.
-    fn meet<'a>(&'a mut self, precise: &'a Precise, rays: &'a [PreciseRay]) -> impl Iterator<Item = (usize, Met)> + 'a {
+    fn meet<'a>(
+        &'a mut self,
+        precise: &'a PreciseScene,
+        rays: &'a [PreciseRay],
+    ) -> impl Iterator<Item = (usize, Met)> + 'a {
         let Self { found, names, indices, corners } = self;
         names.clear();
         names.extend(found.iter().map(|&(_, id, _)| precise.bvh.triangle(id)));
@@ -468,11 +472,11 @@ mod tests {
     use crate::trace::precise::PreciseMesh;
 
     /// Squares one behind the other, as far apart as is said.
-    fn squares(apart: f64) -> Precise {
+    fn squares(apart: f64) -> PreciseScene {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let positions = (0..3).flat_map(|k| corners.map(|[x, y]| DVec3::new(x, y, apart * f64::from(k)))).collect();
         let triangles = (0..3).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|i| 4 * k + i))).collect();
-        Precise::new(vec![PreciseMesh { positions, triangles }]).expect("squares")
+        PreciseScene::new(vec![PreciseMesh { positions, triangles }]).expect("squares")
     }
 
     /// A ray that starts on an edge, or in a corner, meets all that touch there at t = 0, of which some compute -0.
@@ -481,7 +485,7 @@ mod tests {
         let rim = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [-1.0, 0.0, 1.0], [0.0, -1.0, -0.5]].map(DVec3::from);
         let positions = std::iter::once(DVec3::ZERO).chain(rim).collect();
         let triangles = vec![[0, 1, 2], [2, 3, 0], [0, 3, 4], [4, 1, 0], [0, 2, 1]];
-        let precise = Precise::new(vec![PreciseMesh { positions, triangles }]).expect("a fan");
+        let precise = PreciseScene::new(vec![PreciseMesh { positions, triangles }]).expect("a fan");
         let starts = [DVec3::ZERO, rim[0] * 0.5, rim[1] * 0.5, rim[2] * 0.5, rim[3] * 0.5];
         let ways = [[0.1, 0.2, 1.0], [-0.3, 0.2, -1.0], [0.1, -0.7, 1.0], [0.3, 0.2, -0.9], [0.5, 0.1, 0.7]];
         for (start, way) in starts.iter().flat_map(|&start| ways.map(|way| (start, DVec3::from(way)))) {
@@ -493,7 +497,7 @@ mod tests {
             let nearest = nearest[0].expect("a hit");
             assert_eq!((nearest.t.to_bits(), nearest.primitive), (0, lowest), "{ray:?}");
             let mut names = [None];
-            precise.first_batch(&[ray], &mut names);
+            precise.closest_ids_batch(&[ray], &mut names);
             assert_eq!(names, [Some((0, lowest))], "{ray:?}");
             let (mut ends, mut all) = (Vec::new(), Vec::new());
             precise.all_hits_batch(&[ray], &mut ends, &mut all);
@@ -520,7 +524,7 @@ mod tests {
             told.sort_by(|[a, _], [b, _]| a.total_cmp(b));
             assert_eq!(told.windows(2).all(|pair| pair[0][1] < pair[1][0]), is_known, "{told:?}");
             let (mut ends, mut names) = (Vec::new(), Vec::new());
-            precise.all_names_batch(&[ray], &mut ends, &mut names);
+            precise.all_ids_batch(&[ray], &mut ends, &mut names);
             assert_eq!((ends, names), (vec![3], expected.to_vec()));
         }
     }

@@ -11,7 +11,7 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::{Precise, PreciseMesh, is_traceable};
+use super::{PreciseMesh, PreciseScene, is_traceable};
 use crate::math::DVec3;
 use crate::once::made_outside;
 
@@ -21,7 +21,7 @@ const TOGETHER: usize = 4096;
 /// The bits of three corners, the lowest first: the same for all that repeat each other.
 type Key = [[u64; 3]; 3];
 
-impl Precise {
+impl PreciseScene {
     /// The same without triangles that repeat an earlier one of their mesh, with the same corners in the same winding, for whoever counts: these are never hit there. All others keep
     /// their numbers. Found out when it is first asked, on rayon's current thread pool; a second tree, where there are any.
     pub fn distinct(&self) -> &Self {

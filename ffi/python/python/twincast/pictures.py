@@ -96,7 +96,7 @@ def render(
     UserWarning
         Of what is odd about a file, but can be rendered.
     """
-    wishes = {
+    render_options = {
         "size": None if size is None else _size(size),
         "spp": None if spp is None else _arguments.whole("spp", spp, least=1, most=_U32),
         "seed": None if seed is None else _arguments.whole("seed", seed, most=2**64 - 1),
@@ -116,13 +116,13 @@ def render(
     if not is_file and (up_axis, unit) != ("y", "m"):
         raise ValueError("up_axis and unit are those of a file: meshes are taken as they are")
     meshes = None if is_file else _meshes(scene)
-    wishes["view"] = _view(meshes, eye, look_at, up, fov)
+    render_options["view"] = _view(meshes, eye, look_at, up, fov)
     if meshes is not None:
-        return _native.render_meshes(meshes, wishes, "flat" if normals is None else normals)
+        return _native.render_meshes(meshes, render_options, "flat" if normals is None else normals)
     path = os.fspath(scene)
     if not os.path.exists(path):
         raise FileNotFoundError(f"no such scene file: {path}")
-    picture, complaints = _native.render_file(path, wishes, up_axis, unit, "file" if normals is None else normals)
+    picture, complaints = _native.render_file(path, render_options, up_axis, unit, "file" if normals is None else normals)
     for complaint in complaints:
         warnings.warn(complaint, stacklevel=2)
     return picture

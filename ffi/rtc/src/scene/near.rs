@@ -5,7 +5,7 @@
 //! whether it is near at the time of the query is looked at before the caller is shown it.
 
 use twincast_core::math::{Aabb, Vec3};
-use twincast_core::trace::bvh::{BoxTree, Options, Search};
+use twincast_core::trace::bvh::{BoxTree, Options, VisitFlow};
 
 use super::committed::{Body, Committed, Item};
 use super::path;
@@ -78,15 +78,15 @@ impl Near {
     }
 
     /// Names primitives that are near a point at a time, or whenever, up to the radius that the visitor returns last.
-    pub fn visit(&self, point: Vec3, mut radius: f32, time: Option<f32>, visitor: &mut dyn FnMut(Item) -> Search) {
+    pub fn visit(&self, point: Vec3, mut radius: f32, time: Option<f32>, visitor: &mut dyn FnMut(Item) -> VisitFlow) {
         self.tree.visit_near(point, radius, &mut |i| {
             if let (Some(path), Some(time)) = (&self.paths[i as usize], time)
                 && !is_near(path, point, radius, time)
             {
-                return Search::Continue(radius);
+                return VisitFlow::Continue(radius);
             }
             let search = visitor(self.items[i as usize]);
-            if let Search::Continue(reach) = search {
+            if let VisitFlow::Continue(reach) = search {
                 radius = reach;
             }
             search

@@ -1,7 +1,7 @@
 //! One ray: the triangles, then everything else.
 
 use twincast_core::math::{DAffine3, DVec3, Vec3, triangle_normal};
-use twincast_core::trace::bvh::{Bvh, Search, SingleRay, TriangleFound};
+use twincast_core::trace::bvh::{Bvh, SingleRay, TriangleFound, VisitFlow};
 use twincast_core::{Ray, TriangleMethod};
 
 use super::offer::{Nearest, Target};
@@ -208,10 +208,10 @@ fn show_solid(committed: &Committed, solid: &Bvh, query: Query, target: Target, 
 }
 
 /// How far the search still goes.
-fn onwards(target: &Target) -> Search {
+fn onwards(target: &Target) -> VisitFlow {
     let tfar = target.tfar();
     // Below 0 for a ray that has found what it wanted, or that a callback has ended.
-    if tfar < 0.0 { Search::Break(()) } else { Search::Continue(tfar.next_up()) }
+    if tfar < 0.0 { VisitFlow::Break(()) } else { VisitFlow::Continue(tfar.next_up()) }
 }
 
 /// Among everything that is not a triangle that stands still.

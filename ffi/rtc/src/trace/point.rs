@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use twincast_core::math::{self, Affine3, DAffine3, Vec3};
-use twincast_core::trace::bvh::Search;
+use twincast_core::trace::bvh::VisitFlow;
 
 use crate::abi::{
     InstanceId, RTCPointQuery, RTCPointQueryContext, RTCPointQueryFunction, RTCPointQueryFunctionArguments,
@@ -66,7 +66,7 @@ impl Search1 {
                     _ => self.show(record, item, space),
                 };
             }
-            Search::Continue(limit())
+            VisitFlow::Continue(limit())
         };
         for solid in committed.solids().filter(|_| committed.names_triangles()) {
             solid

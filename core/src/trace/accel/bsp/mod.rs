@@ -14,7 +14,7 @@ mod build;
 mod polyhedron;
 
 use super::items::Input;
-use super::ray::{IndexRay, Range};
+use super::ray::{IndexRay, TInterval};
 use super::{Cell, Index, Options};
 use crate::math::{Aabb, DVec3, Vec3};
 
@@ -125,7 +125,7 @@ impl Bsp {
         &self,
         mut link: Link,
         ray: &IndexRay,
-        mut range: Range,
+        mut range: TInterval,
         mut limit: f64,
         each: &mut impl FnMut(u32) -> f64,
     ) -> f64 {
@@ -158,7 +158,7 @@ impl Bsp {
     }
 
     /// The parts of a range before and behind a plane: see [`IndexRay::split`], which is this for planes across an axis.
-    fn split(&self, plane: &Plane, ray: &IndexRay, range: Range) -> (Range, Range) {
+    fn split(&self, plane: &Plane, ray: &IndexRay, range: TInterval) -> (TInterval, TInterval) {
         let doubt = 2.0 * self.doubt + 2.0 * plane.normal.abs().dot(ray.pad);
         let distance = plane.distance(ray.origin);
         let slope = ray.direction.dot(plane.normal);
@@ -166,8 +166,8 @@ impl Bsp {
         let from = (-side - distance) / slope;
         let to = (side - distance) / slope;
         // NaN, of a ray that stays at the edge of the doubt, leaves both parts as they are.
-        let before = Range { to: if to < range.to { to } else { range.to }, ..range };
-        let behind = Range { from: if from > range.from { from } else { range.from }, ..range };
+        let before = TInterval { to: if to < range.to { to } else { range.to }, ..range };
+        let behind = TInterval { from: if from > range.from { from } else { range.from }, ..range };
         (before, behind)
     }
 }

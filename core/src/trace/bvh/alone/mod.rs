@@ -43,7 +43,7 @@ pub use some::Travel;
 pub(super) type Doubted = Option<Found>;
 
 /// Whether a search goes on, and up to which t, or which radius; whoever wants what lies at t itself gives `t.next_up()`.
-pub type Search = ControlFlow<(), f32>;
+pub type VisitFlow = ControlFlow<(), f32>;
 
 impl Bvh {
     /// The nearest [fixed](crate::World::fixed) triangle that `ray` hits, into `found`. Whether there is one. What is placed by transforms, and what is
@@ -65,7 +65,7 @@ impl Bvh {
 
     /// Shows `visitor` fixed triangles, as [`Bvh::closest_triangle`] has them, that `ray` hits, up to the t that it returns last (at first the ray's tmax), until it
     /// has seen enough. The order is not that of t; in the high preset a triangle may come several times.
-    pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> Search) {
+    pub fn visit_triangles(&self, ray: &Ray, visitor: &mut dyn FnMut(&TriangleFound) -> VisitFlow) {
         if self.has_fixed() && ray.is_valid() {
             isa::dispatch(self.isa, VisitAll { bvh: self, ray, visitor });
         }
@@ -317,7 +317,7 @@ impl Kernel for AnyAlone<'_> {
 struct VisitAll<'a, 'v> {
     bvh: &'a Bvh,
     ray: &'a Ray,
-    visitor: &'a mut (dyn FnMut(&TriangleFound) -> Search + 'v),
+    visitor: &'a mut (dyn FnMut(&TriangleFound) -> VisitFlow + 'v),
 }
 
 impl Kernel for VisitAll<'_, '_> {
@@ -347,8 +347,8 @@ impl Kernel for VisitAll<'_, '_> {
                     instance: part.instance,
                 };
                 match visitor(&TriangleFound::new(hit, corners)) {
-                    Search::Continue(t) => Some(t),
-                    Search::Break(()) => None,
+                    VisitFlow::Continue(t) => Some(t),
+                    VisitFlow::Break(()) => None,
                 }
             },
         );

@@ -38,7 +38,7 @@ struct Singles {
 const MAX_PLACES: u32 = 10;
 
 /// Visits of single rays to placed objects that are kept waiting until they are traced together: enough for a flight.
-const VISITORS: usize = 64;
+const DEFERRED: usize = 64;
 
 thread_local! {
     /// Taken while a batch is traced: a batch within a batch gets one of its own.
@@ -162,14 +162,14 @@ impl Bvh {
                 open &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
             }
             let is_last = start == rays.len();
-            let visitors = &mut bundles.visitors;
-            if Q::ANY && !visitors.is_empty() && (is_last || visitors.len() >= VISITORS) {
+            let deferred = &mut bundles.deferred;
+            if Q::ANY && !deferred.is_empty() && (is_last || deferred.len() >= DEFERRED) {
                 let objects = match &objects {
                     Some(objects) => objects,
                     None => objects.insert(Objects::new::<S>(self)),
                 };
-                flight::visit::<S, Q>(&mut singles.flight, self, objects, visitors, rays, answers);
-                visitors.clear();
+                flight::trace_deferred::<S, Q>(&mut singles.flight, self, objects, deferred, rays, answers);
+                deferred.clear();
             }
             if !is_all {
                 let (rays, answers) = (&rays[chunk.clone()], &mut answers[chunk]);

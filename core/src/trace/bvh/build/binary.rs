@@ -1,6 +1,6 @@
 //! A range of items divided in two again and again: the binary tree from which [`collapse`](super::collapse) makes the wide one.
 
-use super::split::{Range, Rule};
+use super::split::{PrimitiveRange, Rule};
 use super::subtree::{Local, in_halves};
 use crate::trace::bvh::node::WIDTH;
 use crate::trace::bvh::simd::Simd;
@@ -30,8 +30,8 @@ pub(super) struct Branch {
 impl Branch {
     /// As a leaf.
     #[inline(always)]
-    fn new(range: &Range, rule: &Rule) -> Self {
-        let &Range { first, len, bounds, .. } = range;
+    fn new(range: &PrimitiveRange, rule: &Rule) -> Self {
+        let &PrimitiveRange { first, len, bounds, .. } = range;
         let mut costs = [f32::INFINITY; 2 * WIDTH];
         costs[WIDTH..].fill(rule.blocks(len as usize) * range.half_area());
         Self { first, len, bounds, second: 0, is_leaf: true, costs, shares: [0; WIDTH] }
@@ -42,7 +42,7 @@ impl Binary {
     /// Divides `whole` until ranges fill a block, or a leaf is no worse than its halves. Where `levels` would not suffice for anything else, down the middle; for
     /// halves of the whole they do.
     #[inline(always)]
-    pub fn new<S: Simd>(whole: Range, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
+    pub fn new<S: Simd>(whole: PrimitiveRange, levels: u32, rule: &Rule, local: &mut Local<'_, S>) -> Self {
         debug_assert!(in_halves(whole.len) <= levels, "{} items in {levels} levels", whole.len);
         let most = (3 * whole.len / rule.block + 1).min(2 * whole.len);
         let mut branches: Vec<Branch> = Vec::with_capacity(most as usize);
@@ -97,7 +97,7 @@ impl Binary {
 /// A part of a binary tree.
 pub(super) enum Piece {
     /// A branch by itself. Its first side is the next piece, its second one so many pieces after it.
-    Branch { range: Range, second: usize },
+    Branch { range: PrimitiveRange, second: usize },
     /// All that is below.
     Whole(Binary),
 }

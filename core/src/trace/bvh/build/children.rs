@@ -1,22 +1,22 @@
 //! A node above the subtrees: the child with the largest surface is divided, until there are eight or none is worth it.
 
 use super::fill;
-use super::split::{Range, Rule};
+use super::split::{PrimitiveRange, Rule};
 use super::top::Shared;
 use crate::trace::bvh::node::{NODE_COST, Node, WIDTH};
 
 /// A child of the node that is made.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Child {
-    pub range: Range,
+    pub range: PrimitiveRange,
     area: f32,
     pub is_leaf: bool,
 }
 
 impl Child {
-    const NONE: Self = Self { range: Range::EMPTY, area: 0.0, is_leaf: true };
+    const NONE: Self = Self { range: PrimitiveRange::EMPTY, area: 0.0, is_leaf: true };
 
-    fn new(range: Range, rule: &Rule) -> Self {
+    fn new(range: PrimitiveRange, rule: &Rule) -> Self {
         Self { range, area: range.half_area(), is_leaf: range.len <= rule.block }
     }
 }
@@ -29,7 +29,7 @@ pub(super) struct Children {
 
 impl Children {
     /// Of `range`.
-    pub fn new(range: Range, shared: &mut Shared<'_>) -> Self {
+    pub fn new(range: PrimitiveRange, shared: &mut Shared<'_>) -> Self {
         let rule = shared.rule;
         let mut children = Self { list: [Child::NONE; WIDTH], len: 1 };
         children.list[0] = Child::new(range, rule);
@@ -64,7 +64,7 @@ impl Children {
     pub fn node(&self, rule: &Rule) -> Node {
         let mut node = Node::empty();
         for (slot, child) in self.iter() {
-            let Range { first, len, bounds, .. } = &child.range;
+            let PrimitiveRange { first, len, bounds, .. } = &child.range;
             fill(&mut node, slot, bounds, child.is_leaf.then_some((*first, *len)), rule);
         }
         node

@@ -44,7 +44,7 @@ use super::tree::Tree;
 use crate::memory::room;
 use children::Children;
 pub(super) use record::{Record, triangle_items};
-use split::{Range, Rule};
+use split::{PrimitiveRange, Rule};
 use subtree::Subtree;
 use top::Shared;
 
@@ -119,7 +119,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// Of `items`, which are those of `range`, with so many levels above them.
-    fn build(self, range: Range, items: &mut [Record], depth: usize) -> Built {
+    fn build(self, range: PrimitiveRange, items: &mut [Record], depth: usize) -> Built {
         let Self { rule, is_small, options } = self;
         let isa = options.isa.demand();
         if range.len <= TASK || depth == TOP_LEVELS {
@@ -129,7 +129,7 @@ impl Builder<'_> {
             return Built::Subtree { first: range.first, nodes };
         }
         let children = Children::new(range, &mut Shared { rule, items, base: range.first, isa });
-        let mut inner: Vec<(usize, Range)> =
+        let mut inner: Vec<(usize, PrimitiveRange)> =
             children.iter().filter(|(_, child)| !child.is_leaf).map(|(slot, child)| (slot, child.range)).collect();
         options.report((range.len - inner.iter().map(|(_, range)| range.len).sum::<u32>()) as usize);
         inner.sort_by_key(|(_, range)| range.first);

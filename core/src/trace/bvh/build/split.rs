@@ -44,7 +44,7 @@ impl Rule {
 
 /// A range of items, and what a split needs to know of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Range {
+pub(super) struct PrimitiveRange {
     pub first: u32,
     pub len: u32,
     /// The box around them, as [-min, max].
@@ -53,7 +53,7 @@ pub(super) struct Range {
     pub centres: [f32; 8],
 }
 
-impl Range {
+impl PrimitiveRange {
     pub const EMPTY: Self = Self { first: 0, len: 0, bounds: EMPTY, centres: EMPTY };
 
     /// Of `items`, the first of which has the index `first`.
@@ -149,7 +149,7 @@ impl Split {
     /// Puts the items of the left side first, and gives the two sides; `items` are those of `range`. A plane that leaves
     /// nothing on one side gives an empty range.
     #[inline(always)]
-    pub fn partition<S: Simd>(&self, items: &mut [Record], range: &Range) -> [Range; 2] {
+    pub fn partition<S: Simd>(&self, items: &mut [Record], range: &PrimitiveRange) -> [PrimitiveRange; 2] {
         let nothing = S::V8::splat(f32::NEG_INFINITY);
         let (mut left, mut right, mut split) = (nothing, nothing, 0);
         match self.cut {
@@ -190,14 +190,20 @@ impl Split {
 
     /// As [`Self::partition`], down the middle where that leaves nothing on one side.
     #[inline(always)]
-    pub fn apply<S: Simd>(&self, items: &mut [Record], range: &Range) -> [Range; 2] {
+    pub fn apply<S: Simd>(&self, items: &mut [Record], range: &PrimitiveRange) -> [PrimitiveRange; 2] {
         let sides = self.partition::<S>(items, range);
         if sides[0].len > 0 && sides[1].len > 0 { sides } else { Self::HALF.partition::<S>(items, range) }
     }
 
     /// The two sides of `range`, by the number of items of the left one and by their boxes.
     #[inline(always)]
-    pub fn sides<S: Simd>(&self, range: &Range, left_len: usize, left: S::V8, right: S::V8) -> [Range; 2] {
+    pub fn sides<S: Simd>(
+        &self,
+        range: &PrimitiveRange,
+        left_len: usize,
+        left: S::V8,
+        right: S::V8,
+    ) -> [PrimitiveRange; 2] {
         // Doubled centres lie within doubled boxes: not always the smallest box, but to find that one would take another look at each item.
         let centres = S::V8::load(&range.centres);
         let (mut left_centres, mut right_centres) = (left.add(left).min(centres), right.add(right).min(centres));
@@ -209,8 +215,8 @@ impl Split {
         }
         let (first, len) = (range.first, left_len as u32);
         [
-            Range { first, len, bounds: left.to_array(), centres: left_centres.to_array() },
-            Range {
+            PrimitiveRange { first, len, bounds: left.to_array(), centres: left_centres.to_array() },
+            PrimitiveRange {
                 first: first + len,
                 len: range.len - len,
                 bounds: right.to_array(),
@@ -269,7 +275,7 @@ mod tests {
                     Record::new(&Aabb { min: corner, max: corner + random.vec3().abs() * 0.5 }, 0, i)
                 };
                 let mut items: Vec<Record> = (0..100).map(item).collect();
-                let range = Range { first: 1000, ..Range::new::<Portable>(&items, 0) };
+                let range = PrimitiveRange { first: 1000, ..PrimitiveRange::new::<Portable>(&items, 0) };
                 let centre = |item: &Record| (item.bounds().min + item.bounds().max).to_array();
                 let count = items.iter().filter(|item| centre(item)[axis] < at).count();
                 let split = Split { cut: Cut::Plane { axis, at }, cost: 0.0 };

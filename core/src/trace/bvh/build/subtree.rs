@@ -3,7 +3,7 @@
 use super::binary::{Binary, Piece};
 use super::bins::{self, Bins, Grid};
 use super::record::Record;
-use super::split::{Range, Rule, Split};
+use super::split::{PrimitiveRange, Rule, Split};
 use super::sweep;
 use crate::trace::bvh::node::Node;
 use crate::trace::bvh::simd::Simd;
@@ -16,7 +16,7 @@ const PIECE: u32 = 1 << 11;
 pub(super) struct Subtree<'a> {
     pub rule: &'a Rule,
     pub items: &'a mut [Record],
-    pub range: Range,
+    pub range: PrimitiveRange,
     /// Levels that its nodes may have.
     pub levels: usize,
 }
@@ -47,7 +47,7 @@ impl Subtree<'_> {
 struct BinaryKernel<'a> {
     rule: &'a Rule,
     items: &'a mut [Record],
-    range: Range,
+    range: PrimitiveRange,
     /// Levels that it may have.
     levels: u32,
     is_root: bool,
@@ -55,7 +55,7 @@ struct BinaryKernel<'a> {
 
 impl<'a> BinaryKernel<'a> {
     /// For so many levels of nodes. Where it comes to that, a node takes three levels of the binary tree.
-    fn new(rule: &'a Rule, items: &'a mut [Record], range: Range, levels: usize) -> Self {
+    fn new(rule: &'a Rule, items: &'a mut [Record], range: PrimitiveRange, levels: usize) -> Self {
         Self { rule, items, range, levels: 3 * levels as u32, is_root: false }
     }
 
@@ -98,15 +98,15 @@ impl Kernel for BinaryKernel<'_> {
 struct DivideKernel<'a> {
     rule: &'a Rule,
     items: &'a mut [Record],
-    range: Range,
+    range: PrimitiveRange,
     levels: u32,
 }
 
 impl Kernel for DivideKernel<'_> {
-    type Output = Option<[Range; 2]>;
+    type Output = Option<[PrimitiveRange; 2]>;
 
     #[inline(always)]
-    fn run<S: Simd>(self) -> Option<[Range; 2]> {
+    fn run<S: Simd>(self) -> Option<[PrimitiveRange; 2]> {
         let Self { rule, items, range, levels } = self;
         Local::<S>::new(rule, items, range.first).divide(&range, levels)
     }
@@ -156,7 +156,7 @@ impl<S: Simd> Finder<S> {
 
     /// The best way to divide `items`, those of `range`.
     #[inline(always)]
-    pub fn find(&mut self, items: &[Record], range: &Range, rule: &Rule) -> Split {
+    pub fn find(&mut self, items: &[Record], range: &PrimitiveRange, rule: &Rule) -> Split {
         let best = if items.len() <= sweep::MAX {
             sweep::best::<S>(items, rule)
         } else if items.len() < bins::LARGE {
@@ -177,7 +177,7 @@ impl<'a, S: Simd> Local<'a, S> {
 
     /// The two sides of `range`, by the best split, or down the middle where `levels` would not suffice for anything else; none where a leaf is no worse.
     #[inline(always)]
-    pub fn divide(&mut self, range: &Range, levels: u32) -> Option<[Range; 2]> {
+    pub fn divide(&mut self, range: &PrimitiveRange, levels: u32) -> Option<[PrimitiveRange; 2]> {
         let split = if in_halves(range.len) < levels { self.find(range) } else { Split::HALF };
         if self.rule.prefers_leaf(range.len, range.half_area(), split.cost) {
             return None;
@@ -187,13 +187,13 @@ impl<'a, S: Simd> Local<'a, S> {
 
     /// The best way to divide `range`.
     #[inline(always)]
-    fn find(&mut self, range: &Range) -> Split {
+    fn find(&mut self, range: &PrimitiveRange) -> Split {
         self.finder.find(&self.items[range.within(self.base)], range, self.rule)
     }
 
     /// Does it.
     #[inline(always)]
-    fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+    fn apply(&mut self, range: &PrimitiveRange, split: &Split) -> [PrimitiveRange; 2] {
         split.apply::<S>(&mut self.items[range.within(self.base)], range)
     }
 }
@@ -209,7 +209,7 @@ pub(super) fn in_halves(len: u32) -> u32 {
 pub(super) fn binned<S: Simd, const N: usize>(
     bins: &mut Bins<N>,
     items: &[Record],
-    range: &Range,
+    range: &PrimitiveRange,
     rule: &Rule,
 ) -> Option<Split> {
     let grid = Grid::new::<S, N>(&range.centres);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bins::{Bins, Grid, MANY};
 use super::record::Record;
-use super::split::{Range, Rule, Split};
+use super::split::{PrimitiveRange, Rule, Split};
 use super::subtree::binned;
 use crate::trace::bvh::simd::isa::{self, Kernel, Present};
 use crate::trace::bvh::simd::{Array, Portable, Simd, Vector};
@@ -15,10 +15,10 @@ use crate::trace::bvh::simd::{Array, Portable, Simd, Vector};
 const CHUNK: usize = 1 << 15;
 
 /// The range of all `items`.
-pub(super) fn whole(items: &[Record], isa: Present) -> Range {
+pub(super) fn whole(items: &[Record], isa: Present) -> PrimitiveRange {
     let chunk = |items| isa::dispatch(isa, RangeKernel(items));
-    let whole = items.par_chunks(CHUNK).map(chunk).reduce(|| Range::EMPTY, Range::union);
-    Range { len: items.len() as u32, ..whole }
+    let whole = items.par_chunks(CHUNK).map(chunk).reduce(|| PrimitiveRange::EMPTY, PrimitiveRange::union);
+    PrimitiveRange { len: items.len() as u32, ..whole }
 }
 
 /// Divides ranges of `items`, the first of which has the index `base`, by all threads.
@@ -31,7 +31,7 @@ pub(super) struct Shared<'a> {
 
 impl Shared<'_> {
     /// The best way to divide `range`.
-    pub fn find(&mut self, range: &Range) -> Split {
+    pub fn find(&mut self, range: &PrimitiveRange) -> Split {
         let items = &self.items[range.within(self.base)];
         let found = if self.rule.samples {
             isa::dispatch(self.isa, FindKernel { items, range, rule: self.rule })
@@ -48,16 +48,16 @@ impl Shared<'_> {
     }
 
     /// Does it.
-    pub fn apply(&mut self, range: &Range, split: &Split) -> [Range; 2] {
+    pub fn apply(&mut self, range: &PrimitiveRange, split: &Split) -> [PrimitiveRange; 2] {
         let isa = self.isa;
         let items = &mut self.items[range.within(self.base)];
         if matches!(split.cut, super::split::Cut::Half) {
             return isa::dispatch(isa, PartitionKernel { items, range, split });
         }
         let chunks = items.par_chunks_mut(CHUNK);
-        let sides: Vec<[Range; 2]> = chunks
+        let sides: Vec<[PrimitiveRange; 2]> = chunks
             .map(|items| {
-                let range = Range { first: 0, len: items.len() as u32, ..*range };
+                let range = PrimitiveRange { first: 0, len: items.len() as u32, ..*range };
                 isa::dispatch(isa, PartitionKernel { items, range: &range, split })
             })
             .collect();
@@ -66,8 +66,8 @@ impl Shared<'_> {
         if left_len == 0 || left_len == items.len() {
             return isa::dispatch(isa, PartitionKernel { items, range, split: &Split::HALF });
         }
-        let union = |[left, right]: [Range; 2], [l, r]: [Range; 2]| [left.union(l), right.union(r)];
-        let [left, right] = sides.into_iter().fold([Range::EMPTY; 2], union);
+        let union = |[left, right]: [PrimitiveRange; 2], [l, r]: [PrimitiveRange; 2]| [left.union(l), right.union(r)];
+        let [left, right] = sides.into_iter().fold([PrimitiveRange::EMPTY; 2], union);
         let load = <Portable as Simd>::V8::load;
         split.sides::<Portable>(range, left_len, load(&left.bounds), load(&right.bounds))
     }
@@ -75,7 +75,7 @@ impl Shared<'_> {
 
 /// Brings the left sides of all chunks together at the front: what is of the right side there changes place with what is
 /// of the left side behind.
-fn gather(items: &mut [Record], sides: &[[Range; 2]], left_len: usize) {
+fn gather(items: &mut [Record], sides: &[[PrimitiveRange; 2]], left_len: usize) {
     let (front, back) = items.split_at_mut(left_len);
     let (mut gaps, mut strays) = (Vec::new(), Vec::new());
     let mut at = 0;
@@ -120,7 +120,7 @@ pub(super) fn parts(
     ranges.into_iter().map(part).collect()
 }
 
-impl Range {
+impl PrimitiveRange {
     pub(super) fn union(self, other: Self) -> Self {
         let max = |a: [f32; 8], b: [f32; 8]| a.max(b);
         let (bounds, centres) = (max(self.bounds, other.bounds), max(self.centres, other.centres));
@@ -131,16 +131,16 @@ impl Range {
 struct RangeKernel<'a>(&'a [Record]);
 
 impl Kernel for RangeKernel<'_> {
-    type Output = Range;
+    type Output = PrimitiveRange;
     #[inline(always)]
-    fn run<S: Simd>(self) -> Range {
-        Range::new::<S>(self.0, 0)
+    fn run<S: Simd>(self) -> PrimitiveRange {
+        PrimitiveRange::new::<S>(self.0, 0)
     }
 }
 
 struct FindKernel<'a> {
     items: &'a [Record],
-    range: &'a Range,
+    range: &'a PrimitiveRange,
     rule: &'a Rule,
 }
 
@@ -172,14 +172,14 @@ impl Kernel for FillKernel<'_> {
 /// [`Split::partition`].
 pub(super) struct PartitionKernel<'a> {
     pub items: &'a mut [Record],
-    pub range: &'a Range,
+    pub range: &'a PrimitiveRange,
     pub split: &'a Split,
 }
 
 impl Kernel for PartitionKernel<'_> {
-    type Output = [Range; 2];
+    type Output = [PrimitiveRange; 2];
     #[inline(always)]
-    fn run<S: Simd>(self) -> [Range; 2] {
+    fn run<S: Simd>(self) -> [PrimitiveRange; 2] {
         self.split.partition::<S>(self.items, self.range)
     }
 }

@@ -1,7 +1,7 @@
 //! Rays of a bundle, of which closest hits are wanted, that go through a placed object each by itself, because they are no bundle in its coordinates.
 
 use super::found::BundleFound;
-use super::range::Range;
+use super::range::RayIntervals;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::alone::{Doubted, Noted, SingleRay};
@@ -18,7 +18,7 @@ pub(super) fn trace<S: Simd>(
     place: u32,
     rays: &[Ray; RAYS],
     mut open: u64,
-    range: &mut Range,
+    range: &mut RayIntervals,
     found: &mut BundleFound,
 ) {
     let mut ready = [ReadyRay::NONE; 8];
@@ -46,7 +46,7 @@ fn trace_one<S: Simd>(
     rays: &[Ray; RAYS],
     i: usize,
     ready: Option<&ReadyRay>,
-    range: &mut Range,
+    range: &mut RayIntervals,
     found: &mut BundleFound,
 ) {
     let (ray, single) = (&rays[i], SingleRay::from(&rays[i]));

@@ -40,7 +40,7 @@ use std::marker::PhantomData;
 
 use super::Bvh;
 use super::build::MAX_DEPTH;
-use super::flight::Visitors;
+use super::flight::DeferredRays;
 use super::levels::placements::FIXED;
 use super::node::WIDTH;
 use super::query::{Query, SOMETHING};
@@ -52,7 +52,7 @@ use octants::{Octants, Part};
 use parallel::{FillParallel, Parallel, may_be_parallel};
 use pencil::{Central, Pencil};
 use placed::Tour;
-use range::Range;
+use range::RayIntervals;
 use rays::{Bundle, Fill, Fit};
 use walk::{Walk, few};
 use way::{Entry, Way};
@@ -65,7 +65,7 @@ pub(super) struct Scratch {
     /// How many placed objects the last bundles entered.
     pub entered: u32,
     /// Rays that look for any hit, and are still to go through placed objects each by itself.
-    pub visitors: Vec<Visitors>,
+    pub deferred: Vec<DeferredRays>,
     /// Rays of one octant.
     part: Part,
 }
@@ -84,7 +84,7 @@ struct One {
     /// In the world, and in the coordinates of a placed object.
     bundle: Bundle,
     local: Bundle,
-    range: Range,
+    range: RayIntervals,
     found: BundleFound,
 }
 
@@ -92,15 +92,15 @@ impl Scratch {
     pub fn new() -> Self {
         let found = BundleFound::new();
         let stack = [Entry::root(!0); STACK];
-        let (bundle, local, range) = (Bundle::new(), Bundle::new(), Range::new());
+        let (bundle, local, range) = (Bundle::new(), Bundle::new(), RayIntervals::new());
         let one = One { upper: stack, stack, bundle, local, range, found };
-        Self { one, t: [0.0; RAYS], entered: 0, visitors: Vec::new(), part: Part::new() }
+        Self { one, t: [0.0; RAYS], entered: 0, deferred: Vec::new(), part: Part::new() }
     }
 }
 
 /// Traces up to 64 rays that start in one point (or, for any hit, that end in one), or run the same way, through all triangles, into `answers` of
 /// the same length and, for closest hits, `scratch.t`. A bit is set in the result for every ray that was traced; the others
-/// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.visitors`, among whom ray 0 is called `first`.
+/// have too little in common. Of any hit some may have to be asked of placed objects yet: `scratch.deferred`, among whom ray 0 is called `first`.
 #[inline(always)]
 pub(super) fn trace<S: Simd, Q: Query>(
     scratch: &mut Scratch,
@@ -109,7 +109,7 @@ pub(super) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> u64 {
-    let Scratch { one, t, entered, visitors, part } = scratch;
+    let Scratch { one, t, entered, deferred, part } = scratch;
     *entered = 0;
     // Of a part; filled only where there is one.
     let mut parted = None;
@@ -141,17 +141,17 @@ pub(super) fn trace<S: Simd, Q: Query>(
         } else {
             S::apart(Fill::<Q> { bundle, rays: group, range, query: PhantomData })
         };
-        let before = visitors.len();
+        let before = deferred.len();
         let those = Members { rays: group, count };
         let is_traced = fit == Fit::Whole
             && if is_parallel {
                 let (answers, t) = (group_answers, group_t);
-                S::apart(OfParallel::<Q> { one, bvh, rays: those, answers, t, entered, visitors })
+                S::apart(OfParallel::<Q> { one, bvh, rays: those, answers, t, entered, deferred })
             } else {
-                one.trace::<S, Q, Central>(bvh, &those, group_answers, group_t, entered, visitors)
+                one.trace::<S, Q, Central>(bvh, &those, group_answers, group_t, entered, deferred)
             };
         // Until here their bits are of the part, if there is one.
-        for some in &mut visitors[before..] {
+        for some in &mut deferred[before..] {
             some.first = first;
             if octants.is_some() {
                 some.rays = part.members(some.rays);
@@ -187,7 +187,7 @@ struct OfParallel<'a, Q: Query> {
     answers: &'a mut [Q::Answer; RAYS],
     t: &'a mut [f64; RAYS],
     entered: &'a mut u32,
-    visitors: &'a mut Vec<Visitors>,
+    deferred: &'a mut Vec<DeferredRays>,
 }
 
 impl<Q: Query> Kernel for OfParallel<'_, Q> {
@@ -195,8 +195,8 @@ impl<Q: Query> Kernel for OfParallel<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { one, bvh, rays, answers, t, entered, visitors } = self;
-        one.trace::<S, Q, Parallel>(bvh, &rays, answers, t, entered, visitors)
+        let Self { one, bvh, rays, answers, t, entered, deferred } = self;
+        one.trace::<S, Q, Parallel>(bvh, &rays, answers, t, entered, deferred)
     }
 }
 
@@ -210,7 +210,7 @@ impl One {
         answers: &mut [Q::Answer; RAYS],
         t: &mut [f64; RAYS],
         entered: &mut u32,
-        visitors: &mut Vec<Visitors>,
+        deferred: &mut Vec<DeferredRays>,
     ) -> bool {
         let Self { upper, stack, bundle, local, range, found } = self;
         let Some(mut tour) = Tour::<P>::new(bvh, bundle, count, upper) else { return false };
@@ -227,7 +227,7 @@ impl One {
             let is_apart =
                 |place: u32| P::IS_PARALLEL || bvh.placements.at(place).grain * GRAINS < bundle.grain(near, count);
             if Q::ANY && place != FIXED && is_apart(place) {
-                visitors.push(Visitors { place, first: 0, rays: seeing });
+                deferred.push(DeferredRays { place, first: 0, rays: seeing });
                 continue;
             }
             *entered += u32::from(place != FIXED);
@@ -237,7 +237,7 @@ impl One {
             let reach = tree.tree().reach();
             let Some(slab) = (if is_bundle { P::slab(bundle, reach) } else { None }) else {
                 if Q::ANY {
-                    visitors.push(Visitors { place, first: 0, rays: seeing });
+                    deferred.push(DeferredRays { place, first: 0, rays: seeing });
                 } else {
                     alone::trace::<S>(bvh, place, rays, seeing & !range.done::<S>(), range, found);
                 }

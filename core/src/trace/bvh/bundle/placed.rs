@@ -2,7 +2,7 @@
 //! in the object's coordinates, one with a common direction ray by ray.
 
 use super::pencil::Pencil;
-use super::range::Range;
+use super::range::RayIntervals;
 use super::rays::Bundle;
 use super::way::{Entry, Goal, Way};
 use crate::trace::bvh::Bvh;
@@ -69,7 +69,7 @@ impl<'a, P: Pencil> Tour<'a, P> {
 
     /// The next place, a bit for every ray that may go there, and where the first of them enters its box.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, range: &Range) -> Option<(u32, u64, f32)> {
+    pub fn next<S: Simd>(&mut self, range: &RayIntervals) -> Option<(u32, u64, f32)> {
         if std::mem::take(&mut self.visits_fixed) {
             return Some((FIXED, !0, 0.0));
         }

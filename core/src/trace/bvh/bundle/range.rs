@@ -5,7 +5,7 @@ use super::rays::{Bundle, SLACK, TINY};
 use crate::trace::bvh::simd::{Group, Mask, PerRay, RAYS, Simd, Vector};
 
 /// Which t of each ray are still of interest, in units of its direction; of the turned one where the bundle is turned.
-pub(super) struct Range {
+pub(super) struct RayIntervals {
     /// The least t, rounded inwards and outwards.
     pub begin: PerRay,
     pub start: PerRay,
@@ -15,7 +15,7 @@ pub(super) struct Range {
     pub limit: PerRay,
 }
 
-impl Range {
+impl RayIntervals {
     pub fn new() -> Self {
         Self { begin: PerRay::ZERO, start: PerRay::ZERO, sure: PerRay::ZERO, limit: PerRay::ZERO }
     }

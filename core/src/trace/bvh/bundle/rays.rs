@@ -11,12 +11,12 @@
 //!
 //! **Placed.** In the coordinates of an object the same rays are a bundle again ([`Bundle::place`]), with an origin that is not quite
 //! the one that is meant, and directions that are rounded: each component by u, so that slopes are off by twice as much as in the
-//! world. From bundle to bundle results are handed on in t ([`Range`]), which all of them share.
+//! world. From bundle to bundle results are handed on in t ([`RayIntervals`]), which all of them share.
 
 use std::marker::PhantomData;
 
 use super::pencil::{Central, Pencil};
-use super::range::Range;
+use super::range::RayIntervals;
 use super::rows::Rows;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 use crate::ray::Ray;
@@ -97,7 +97,7 @@ const STEEPEST: f32 = 16.0;
 pub(super) struct Fill<'a, Q> {
     pub bundle: &'a mut Bundle,
     pub rays: &'a [Ray; RAYS],
-    pub range: &'a mut Range,
+    pub range: &'a mut RayIntervals,
     pub query: PhantomData<Q>,
 }
 
@@ -145,7 +145,7 @@ impl Bundle {
     /// Takes the rays of `world` in the coordinates of an object. They start, or end, in one point there, too; but need not run
     /// into one octant. True if they fit as a whole.
     #[inline(always)]
-    pub fn place<S: Simd>(&mut self, world: &Self, place: &Place, range: &Range) -> bool {
+    pub fn place<S: Simd>(&mut self, world: &Self, place: &Place, range: &RayIntervals) -> bool {
         let (origin, blur) = place.point::<S>(Vec3::from_array(world.origin), world.blur);
         (self.origin, self.blur, self.is_turned) = (origin.to_array(), blur, world.is_turned);
         let noise = place.directions::<S>(&world.direction, &mut self.direction);
@@ -167,7 +167,7 @@ impl Bundle {
 
     /// Directions and ranges as they are; where all rays start, or end.
     #[inline(always)]
-    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
+    fn gather<S: Simd, Q: Query>(&mut self, rays: &[Ray; RAYS], range: &mut RayIntervals) -> Fit {
         let zero = S::V8::splat(0.0);
         let start = splat::<S>(rays[0].origin);
         let last = rays[0].origin + rays[0].direction;
@@ -225,7 +225,7 @@ impl Bundle {
 
     /// The most t' that is wanted of each ray.
     #[inline(always)]
-    pub fn limit_of<S: Simd, P: Pencil>(&self, range: &Range, limit: &mut PerRay) {
+    pub fn limit_of<S: Simd, P: Pencil>(&self, range: &RayIntervals, limit: &mut PerRay) {
         for group in 0..RAYS / S::Wide::LANES {
             let (most, depth) = (S::Wide::at(&range.limit, group), S::Wide::at(&self.depth, group));
             let most = self.beyond_start::<S, P>(most.mul(depth), group);
@@ -235,7 +235,7 @@ impl Bundle {
 
     /// Everything that is derived from the directions.
     #[inline(always)]
-    fn project<S: Simd>(&mut self, range: &Range) -> Fit {
+    fn project<S: Simd>(&mut self, range: &RayIntervals) -> Fit {
         let [x, y, z] = &self.direction;
         self.axis = largest_axis(Vec3::new(x.0[0], y.0[0], z.0[0]).abs());
         let [p, q, along] = axes(self.axis);
@@ -277,7 +277,7 @@ impl Bundle {
 
     /// Sets which t' of a group are of interest, by `depth`, and tells the least of them, rounded outwards.
     #[inline(always)]
-    pub fn bound<S: Simd, P: Pencil>(&mut self, range: &Range, group: usize) -> S::Wide {
+    pub fn bound<S: Simd, P: Pencil>(&mut self, range: &RayIntervals, group: usize) -> S::Wide {
         let splat = S::Wide::splat;
         let (up, down, tiny, less) = (splat(1.0 + SLACK), splat(1.0 - SLACK), splat(TINY), splat(-TINY));
         let depth = S::Wide::at(&self.depth, group);

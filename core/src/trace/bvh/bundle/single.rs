@@ -37,7 +37,7 @@ struct Seen<V> {
 }
 
 /// From where, and up to where, a ray looks along the bundle's axis.
-struct Range {
+struct DepthInterval {
     /// Rounded down.
     first: f32,
     /// Rounded up.
@@ -131,7 +131,7 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
 
     /// Takes what a ray may hit in the block whose first triangle is `first`; true where its limit has changed.
     #[inline(always)]
-    fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Judged<S::V8>, range: &Range) -> bool {
+    fn take<S: Simd>(&mut self, ray: usize, first: u32, met: &Judged<S::V8>, range: &DepthInterval) -> bool {
         let &Judged { lanes: mut open, sure, low, high } = met;
         let sure = sure.and(S::V8::splat(range.begin).at_most(low));
         let (low, high) = if P::IS_PARALLEL && !Q::ANY { self.in_bundle::<S>(ray, low, high) } else { (low, high) };
@@ -172,17 +172,22 @@ impl<Q: Query, P: Pencil> Walk<'_, Q, P> {
 
     /// Of a ray that starts where the bundle does.
     #[inline(always)]
-    fn range(&self, ray: usize) -> Range {
+    fn range(&self, ray: usize) -> DepthInterval {
         let Self { bundle, found, .. } = self;
-        Range { first: bundle.first, begin: bundle.begin.0[ray], sure: found.sure.0[ray], limit: found.limit.0[ray] }
+        DepthInterval {
+            first: bundle.first,
+            begin: bundle.begin.0[ray],
+            sure: found.sure.0[ray],
+            limit: found.limit.0[ray],
+        }
     }
 
     /// Of a ray that is looked at from its own origin.
     #[inline(always)]
-    fn own_range(&self, ray: usize) -> Range {
+    fn own_range(&self, ray: usize) -> DepthInterval {
         let Self { bundle, found, .. } = self;
         let (depth, tmin, tmax) = (bundle.depth.0[ray], self.rays[ray].tmin, self.rays[ray].tmax);
-        let mut range = Range {
+        let mut range = DepthInterval {
             // Not a little below 0, whose products are slow.
             first: (tmin * depth * (1.0 - SLACK) - TINY).max(0.0),
             begin: tmin * depth * (1.0 + SLACK) + TINY,
@@ -259,7 +264,7 @@ fn meet_between_corners<S: Simd>(
     planes: &mut Option<Planes<S::V8>>,
     block: &Block,
     bundle: &Bundle,
-    range: &Range,
+    range: &DepthInterval,
 ) -> Option<Judged<S::V8>> {
     let splat = S::V8::splat;
     // A turned bundle runs against its rays.
@@ -298,7 +303,7 @@ fn meet_planes<S: Simd>(
     &Heights { height, error }: &Heights<S::V8>,
     bundle: &Bundle,
     ray: usize,
-    range: &Range,
+    range: &DepthInterval,
 ) -> Option<Judged<S::V8>> {
     let (splat, zero) = (S::V8::splat, S::V8::splat(0.0));
     let Planes { normal: [nx, ny, nz], size: [sx, sy, sz] } = planes;

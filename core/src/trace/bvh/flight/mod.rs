@@ -4,7 +4,7 @@
 //! has chosen, and how many children are entered is anyone's guess, so every other node is mispredicted. Here a round
 //! gives every ray of the flight one step, but those that wait at placements. Steps of different rays do not depend on each other, and what can be is told without
 //! branches: who is at a node, at a leaf, or has arrived, by masks of what all of them reach next; which child of a node comes first, by
-//! minima; and at a leaf all rays look on which sides of edges they pass ([`Sight`]) before
+//! minima; and at a leaf all rays look on which sides of edges they pass ([`LeafTest`]) before
 //! those that may pass within a triangle are gone through again. A branch there, taken for every other leaf, cost an eighth of the time, for
 //! when it turns out to be wrong all that follows has been done in vain. What a ray reaches next is fetched while the others take their turn.
 //!
@@ -15,19 +15,19 @@
 //! then, would be bound by latency again. To make it ready for the object costs as much as several nodes, but eight together, each for an object of its own, not much
 //! more than one: so whoever comes to a placement waits until half of the flight does, or nobody else has a step to take.
 //!
-//! **Visitors.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`visit`]). Those of several bundles set out
+//! **Deferred rays.** Bundles of rays that look for any hit leave some to placed objects each by itself ([`trace_deferred`]). Those of several bundles set out
 //! together, in the objects' coordinates from the beginning.
 
 pub(super) mod addresses;
-mod ground;
+mod deferred;
+mod ray_state;
 pub(super) mod set;
-mod traveller;
-mod visitors;
+mod target;
 
 use std::cell::Cell;
 use std::marker::PhantomData;
 
-use self::set::{Set, TRAVELLERS};
+use self::set::{IN_FLIGHT, Set};
 use super::Bvh;
 use super::hits::found::Found;
 use super::hits::listed::Listed;
@@ -43,70 +43,70 @@ use super::simd::isa::Kernel;
 use super::simd::{Array, Simd, Vector};
 use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
-pub(in crate::trace) use ground::Decide;
-pub(super) use ground::Objects;
-use ground::{Ground, Placed, Plain, Rounded};
-use traveller::{Space, Start, Traveller};
-use visitors::Queue;
-pub(super) use visitors::Visitors;
+use deferred::DeferredQueue;
+pub(super) use deferred::DeferredRays;
+use ray_state::{RayState, Start, TreeId};
+pub(in crate::trace) use target::Decide;
+pub(super) use target::Objects;
+use target::{Placed, Plain, Rounded, TraversalTarget};
 
 /// Rays in flight.
-const RAYS: usize = TRAVELLERS;
+const RAYS: usize = IN_FLIGHT;
 
 /// Room for a flight.
 pub(super) struct Flight {
-    travellers: [Traveller; RAYS],
+    states: [RayState; RAYS],
     /// What each reaches next; [`Child::NONE`] of one that has arrived, or waits to return from an object or from the fixed triangles.
     next: [Child; RAYS],
     /// Where it does.
-    space: [Space; RAYS],
+    tree_id: [TreeId; RAYS],
 }
 
 impl Flight {
     pub fn new() -> Self {
-        Self { travellers: [Traveller::NONE; RAYS], next: [Child::NONE; RAYS], space: [Space::UPPER; RAYS] }
+        Self { states: [RayState::NONE; RAYS], next: [Child::NONE; RAYS], tree_id: [TreeId::UPPER; RAYS] }
     }
 
-    /// Traveller `k`'s next step leads to `next`, which is loaded meanwhile.
+    /// RayState `k`'s next step leads to `next`, which is loaded meanwhile.
     #[inline(always)]
-    fn send<S: Simd, G: Ground>(&mut self, k: usize, next: Child, ground: &G) {
+    fn send<S: Simd, G: TraversalTarget>(&mut self, k: usize, next: Child, target: &G) {
         self.next[k] = next;
-        let space = self.travellers[k].space;
+        let tree_id = self.states[k].tree_id;
         if G::HAS_PLACEMENTS {
-            self.space[k] = space;
+            self.tree_id[k] = tree_id;
         }
-        S::prefetch(ground.address(space, next));
+        S::prefetch(target.address(tree_id, next));
     }
 
-    /// Those at placements go into them, made ready eight at a time; of fewer than [`MANY`] each by itself, if there is `nobody_else`.
+    /// Those at placements go into them, made ready eight at a time; of fewer than [`MANY`] each by itself, if there is `all_waiting`.
     #[inline(always)]
-    fn descend<S: Simd, G: Ground>(
+    fn descend<S: Simd, G: TraversalTarget>(
         &mut self,
         mut waiting: Set,
-        mut nobody_else: bool,
+        mut all_waiting: bool,
         bvh: &Bvh,
-        ground: &G,
+        target: &G,
         rays: &[Ray],
     ) {
         while !waiting.is_empty() {
             let group = waiting.take_eight();
             let are_many = group.len() >= MANY;
-            if !are_many && !nobody_else {
+            if !are_many && !all_waiting {
                 return;
             }
             let (ready, known) =
                 if are_many { self.ready_in_places::<S>(group, bvh, rays) } else { ([ReadyRay::NONE; 8], 0) };
             for (i, k) in group.enumerate() {
-                let (traveller, leaf) = (&mut self.travellers[k], self.next[k]);
+                let (state, leaf) = (&mut self.states[k], self.next[k]);
                 let next = if known >> i & 1 != 0 {
                     let number = leaf.first();
-                    traveller.descend_ready(number, bvh.placements.at(number).object, &ready[i % 8])
+                    state.descend_ready(number, bvh.placements.at(number).object, &ready[i % 8])
                 } else {
-                    traveller.descend::<S>(leaf, bvh, rays)
+                    state.descend::<S>(leaf, bvh, rays)
                 };
-                self.send::<S, G>(k, next, ground);
+                self.send::<S, G>(k, next, target);
             }
-            nobody_else = false;
+            all_waiting = false;
         }
     }
 
@@ -116,11 +116,11 @@ impl Flight {
         let mut others = group;
         let Some(mut k) = others.next() else { return ([ReadyRay::NONE; 8], 0) };
         let (first, _) = bvh.object_at(self.next[k].first());
-        let (mut places, mut some) = ([first; 8], [&rays[self.travellers[k].ray]; 8]);
+        let (mut places, mut some) = ([first; 8], [&rays[self.states[k].ray]; 8]);
         let (mut reach, mut has_triangles) = ([[0.0; 8]; 3], 0);
         for i in 0..8 {
             let (place, triangles) = bvh.object_at(self.next[k].first());
-            (places[i], some[i]) = (place, &rays[self.travellers[k].ray]);
+            (places[i], some[i]) = (place, &rays[self.states[k].ray]);
             let Vec3 { x, y, z } = triangles.tree().reach();
             (reach[0][i], reach[1][i], reach[2][i]) = (x, y, z);
             has_triangles |= u32::from(!triangles.tree().is_empty()) << i;
@@ -135,10 +135,10 @@ impl Flight {
 
     /// Who of `flying` takes which step.
     #[inline(always)]
-    fn steps<S: Simd, G: Ground>(&self, flying: Set) -> Steps {
+    fn steps<S: Simd, G: TraversalTarget>(&self, flying: Set) -> Steps {
         let next = bytemuck::cast_ref(&self.next);
         let (leaf, none) = (S::highest_bits(next), S::equal(next, Child::NONE.0));
-        let upper = if G::HAS_PLACEMENTS { S::equal(bytemuck::cast_ref(&self.space), Space::UPPER.0) } else { none };
+        let upper = if G::HAS_PLACEMENTS { S::equal(bytemuck::cast_ref(&self.tree_id), TreeId::UPPER.0) } else { none };
         Steps {
             at_nodes: flying.of(!leaf),
             at_leaves: flying.of(leaf & !none & !upper),
@@ -149,10 +149,10 @@ impl Flight {
     }
 }
 
-/// What a traveller has seen at a leaf.
+/// On which sides of a block's edges a ray passes.
 #[derive(Clone, Copy)]
-struct Sight<V: Vector> {
-    traveller: usize,
+struct LeafTest<V: Vector> {
+    state: usize,
     leaf: Child,
     sides: Sides<V>,
     /// The triangles that it may pass within.
@@ -171,7 +171,7 @@ struct Steps {
 }
 
 /// Who is still to set out.
-trait Departures {
+trait RaySource {
     /// The next one.
     fn next<S: Simd>(&mut self) -> Option<Start>;
     /// The one that came last.
@@ -179,24 +179,24 @@ trait Departures {
 }
 
 /// Rays that start in the world.
-struct Outside<'a> {
+struct WorldRays<'a> {
     rays: ReadyRays<'a>,
-    space: Space,
+    tree_id: TreeId,
 }
 
-impl<'a> Outside<'a> {
+impl<'a> WorldRays<'a> {
     /// `bounds` are those of all that the rays may meet.
     fn new(bvh: &Bvh, bounds: Aabb, rays: &'a [Ray], blur: Blur) -> Self {
-        let space = if bvh.fixed.triangles.tree().is_empty() { Space::UPPER } else { Space::FIXED };
-        Self { rays: ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur), space }
+        let tree_id = if bvh.fixed.triangles.tree().is_empty() { TreeId::UPPER } else { TreeId::FIXED };
+        Self { rays: ReadyRays::new(rays, bounds.min.abs().max(bounds.max.abs()), blur), tree_id }
     }
 }
 
-impl Departures for Outside<'_> {
+impl RaySource for WorldRays<'_> {
     #[inline(always)]
     fn next<S: Simd>(&mut self) -> Option<Start> {
         let ray = self.rays.next::<S>()?;
-        Some(Start { ray, place: FIXED, space: self.space })
+        Some(Start { ray, place: FIXED, tree_id: self.tree_id })
     }
 
     #[inline(always)]
@@ -216,15 +216,15 @@ pub(super) fn trace<S: Simd, Q: Query>(
     let fixed = &bvh.fixed.triangles;
     let bounds = fixed.tree().bounds();
     if bvh.placements.has_triangles() {
-        let departures = Outside::new(bvh, bounds.union(bvh.placements.tree().bounds()), rays, Blur::NONE);
-        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, departures, done);
+        let source = WorldRays::new(bvh, bounds.union(bvh.placements.tree().bounds()), rays, Blur::NONE);
+        return run::<S, Q, _>(flight, bvh, &Placed::new::<S>(bvh), rays, source, done);
     }
-    let departures = Outside::new(bvh, bounds, rays, Blur::NONE);
+    let source = WorldRays::new(bvh, bounds, rays, Blur::NONE);
     match fixed.leaves() {
         Leaves::Blocks(blocks) => {
-            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, departures, done);
+            run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, &blocks[..]), rays, source, done);
         }
-        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, departures, done),
+        Leaves::Numbers(leaves) => run::<S, Q, _>(flight, bvh, &Plain::new::<S>(fixed, leaves), rays, source, done),
     }
 }
 
@@ -240,19 +240,19 @@ pub(super) fn trace_rounded<S: Simd, Q: Query>(
 ) {
     let triangles = &bvh.fixed.triangles;
     if !triangles.tree().is_empty() {
-        let ground = Rounded::new::<S>(triangles, decide);
-        let departures = Outside::new(bvh, triangles.tree().bounds(), rays, blur);
-        run::<S, Q, _>(flight, bvh, &ground, rays, departures, done);
+        let target = Rounded::new::<S>(triangles, decide);
+        let source = WorldRays::new(bvh, triangles.tree().bounds(), rays, blur);
+        run::<S, Q, _>(flight, bvh, &target, rays, source, done);
     }
 }
 
 /// Rays that have answers already, and may get others by what they hit in the objects that they visit; any hit will do.
 #[inline(always)]
-pub(super) fn visit<S: Simd, Q: Query>(
+pub(super) fn trace_deferred<S: Simd, Q: Query>(
     flight: &mut Flight,
     bvh: &Bvh,
     objects: &Objects<'_>,
-    visitors: &[Visitors],
+    deferred: &[DeferredRays],
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) {
@@ -262,7 +262,7 @@ pub(super) fn visit<S: Simd, Q: Query>(
         bvh,
         objects,
         rays,
-        Queue::<Q>::new(bvh, visitors, rays, answers),
+        DeferredQueue::<Q>::new(bvh, deferred, rays, answers),
         #[inline(always)]
         |ray, found, _| {
             if found.is_hit() {
@@ -272,53 +272,55 @@ pub(super) fn visit<S: Simd, Q: Query>(
     );
 }
 
-/// Runs as a function of its own ([`Simd::apart_narrow`]), so `departures` and `done` are of no instruction set, or of one that is narrow.
+/// Runs as a function of its own ([`Simd::apart_narrow`]), so `source` and `done` are of no instruction set, or of one that is narrow.
 #[inline(always)]
-fn run<S: Simd, Q: Query, G: Ground>(
+fn run<S: Simd, Q: Query, G: TraversalTarget>(
     flight: &mut Flight,
     bvh: &Bvh,
-    ground: &G,
+    target: &G,
     rays: &[Ray],
-    departures: impl Departures,
+    source: impl RaySource,
     done: impl FnMut(usize, &Found, &Listed),
 ) {
-    S::apart_narrow(Journey { flight, bvh, ground, rays, departures, done, query: PhantomData::<Q> });
+    S::apart_narrow(FlightKernel { flight, bvh, target, rays, source, done, query: PhantomData::<Q> });
 }
 
 /// A flight from the first departure to the last arrival.
-struct Journey<'a, Q, G, D, F> {
+struct FlightKernel<'a, Q, G, D, F> {
     flight: &'a mut Flight,
     bvh: &'a Bvh,
-    ground: &'a G,
+    target: &'a G,
     rays: &'a [Ray],
-    departures: D,
+    source: D,
     done: F,
     query: PhantomData<Q>,
 }
 
-impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kernel for Journey<'_, Q, G, D, F> {
+impl<Q: Query, G: TraversalTarget, D: RaySource, F: FnMut(usize, &Found, &Listed)> Kernel
+    for FlightKernel<'_, Q, G, D, F>
+{
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { flight, bvh, ground, rays, mut departures, mut done, .. } = self;
-        let mut flying = Set::NOBODY;
+        let Self { flight, bvh, target, rays, mut source, mut done, .. } = self;
+        let mut flying = Set::EMPTY;
         for k in 0..RAYS {
-            let Some(start) = departures.next::<S>() else { break };
-            let next = flight.travellers[k].start::<Q, G>(start, departures.ready());
-            flight.send::<S, G>(k, next, ground);
+            let Some(start) = source.next::<S>() else { break };
+            let next = flight.states[k].start::<Q, G>(start, source.ready());
+            flight.send::<S, G>(k, next, target);
             flying.insert(k);
         }
-        let nothing = Sight { traveller: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
-        let mut sights: [Sight<S::V8>; RAYS] = [nothing; RAYS];
-        let far = ground.far().filter(|_| S::PREFETCHES);
+        let nothing = LeafTest { state: 0, leaf: Child::NONE, sides: Sides::none(), passed: 0 };
+        let mut tests: [LeafTest<S::V8>; RAYS] = [nothing; RAYS];
+        let far = target.far().filter(|_| S::PREFETCHES);
         while !flying.is_empty() {
             let Steps { mut at_nodes, at_leaves, arrived, at_placements, returning } = flight.steps::<S, G>(flying);
             for k in arrived {
-                let traveller = &mut flight.travellers[k];
-                done(traveller.ray, &traveller.found, &traveller.listed);
-                if let Some(start) = departures.next::<S>() {
-                    flight.next[k] = traveller.start::<Q, G>(start, departures.ready());
+                let state = &mut flight.states[k];
+                done(state.ray, &state.found, &state.listed);
+                if let Some(start) = source.next::<S>() {
+                    flight.next[k] = state.start::<Q, G>(start, source.ready());
                     at_nodes.insert(k);
                 } else {
                     flying.remove(k);
@@ -330,9 +332,9 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
                 }
             }
             for k in at_nodes {
-                let (traveller, next) = (&mut flight.travellers[k], flight.next[k]);
-                let next = traveller.enter::<S, Q, G>(ground.node(traveller.space, next));
-                flight.send::<S, G>(k, next, ground);
+                let (state, next) = (&mut flight.states[k], flight.next[k]);
+                let next = state.enter::<S, Q, G>(target.node(state.tree_id, next));
+                flight.send::<S, G>(k, next, target);
             }
             if let Some(numbers) = far {
                 for k in at_leaves {
@@ -341,37 +343,37 @@ impl<Q: Query, G: Ground, D: Departures, F: FnMut(usize, &Found, &Listed)> Kerne
             }
             if G::IS_PUT_TOGETHER {
                 for k in at_leaves {
-                    let (traveller, leaf) = (&mut flight.travellers[k], flight.next[k]);
-                    let next = traveller.visit::<S, Q, G>(leaf, bvh, ground, rays);
-                    flight.send::<S, G>(k, next, ground);
+                    let (state, leaf) = (&mut flight.states[k], flight.next[k]);
+                    let next = state.visit::<S, Q, G>(leaf, bvh, target, rays);
+                    flight.send::<S, G>(k, next, target);
                 }
             } else {
                 let mut count = 0;
                 for k in at_leaves {
-                    let (traveller, leaf, mut scratch) = (&mut flight.travellers[k], flight.next[k], None);
-                    let block = ground.block::<S>(traveller.space, leaf.first(), &mut scratch);
-                    let (sides, passed) = traveller.look::<S, G>(block);
-                    sights[count % RAYS] = Sight { traveller: k, leaf, sides, passed };
+                    let (state, leaf, mut scratch) = (&mut flight.states[k], flight.next[k], None);
+                    let block = target.block::<S>(state.tree_id, leaf.first(), &mut scratch);
+                    let (sides, passed) = state.look::<S, G>(block);
+                    tests[count % RAYS] = LeafTest { state: k, leaf, sides, passed };
                     count += usize::from(passed != 0);
-                    let next = traveller.pass(leaf);
-                    flight.send::<S, G>(k, next, ground);
+                    let next = state.pass(leaf);
+                    flight.send::<S, G>(k, next, target);
                 }
-                for Sight { traveller: k, leaf, sides, passed } in &sights[..count.min(RAYS)] {
-                    let (traveller, mut scratch) = (&mut flight.travellers[*k % RAYS], None);
-                    let block = ground.block::<S>(traveller.space, leaf.first(), &mut scratch);
-                    if let Some(next) = traveller.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, ground, rays) {
-                        flight.send::<S, G>(*k % RAYS, next, ground);
+                for LeafTest { state: k, leaf, sides, passed } in &tests[..count.min(RAYS)] {
+                    let (state, mut scratch) = (&mut flight.states[*k % RAYS], None);
+                    let block = target.block::<S>(state.tree_id, leaf.first(), &mut scratch);
+                    if let Some(next) = state.hit::<S, Q, G>(*leaf, block, sides, *passed, bvh, target, rays) {
+                        flight.send::<S, G>(*k % RAYS, next, target);
                     }
                 }
             }
             if G::HAS_PLACEMENTS {
                 for k in returning {
-                    let next = flight.travellers[k].leave();
-                    flight.send::<S, G>(k, next, ground);
+                    let next = flight.states[k].leave();
+                    flight.send::<S, G>(k, next, target);
                 }
-                let nobody_else = at_nodes.is_empty() && at_leaves.is_empty() && returning.is_empty();
-                if nobody_else || 2 * at_placements.len() >= flying.len() {
-                    flight.descend::<S, G>(at_placements, nobody_else, bvh, ground, rays);
+                let all_waiting = at_nodes.is_empty() && at_leaves.is_empty() && returning.is_empty();
+                if all_waiting || 2 * at_placements.len() >= flying.len() {
+                    flight.descend::<S, G>(at_placements, all_waiting, bvh, target, rays);
                 }
             }
         }

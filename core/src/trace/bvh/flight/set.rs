@@ -1,14 +1,14 @@
-//! Some of the travellers of a flight, be they rays or points.
+//! Some of what is in flight, be it rays or points.
 
 /// How many travel together, at most.
-pub(in crate::trace::bvh) const TRAVELLERS: usize = u32::BITS as usize;
+pub(in crate::trace::bvh) const IN_FLIGHT: usize = u32::BITS as usize;
 
-/// A bit for each traveller that belongs to it. Gone through, it gives their numbers.
+/// A bit for each ray or point that belongs to it. Gone through, it gives their numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::trace::bvh) struct Set(u32);
 
 impl Set {
-    pub const NOBODY: Self = Self(0);
+    pub const EMPTY: Self = Self(0);
 
     #[inline(always)]
     pub fn is_empty(self) -> bool {
@@ -58,7 +58,7 @@ impl Iterator for Set {
         if self.0 == 0 {
             return None;
         }
-        let first = self.0.trailing_zeros() as usize % TRAVELLERS;
+        let first = self.0.trailing_zeros() as usize % IN_FLIGHT;
         self.0 &= self.0 - 1;
         Some(first)
     }

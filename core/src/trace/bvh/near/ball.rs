@@ -5,7 +5,7 @@
 
 use crate::math::Vec3;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::alone::Search;
+use crate::trace::bvh::alone::VisitFlow;
 use crate::trace::bvh::block::{Block, LANES};
 use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::node::{Child, Node};
@@ -19,7 +19,7 @@ impl Bvh {
     /// Names fixed triangles, by geometry and primitive, whose box is no farther from `point` than the radius that `visitor` returns last (at first `radius`), near ones
     /// mostly first, until it has seen enough; and some that are farther by a millionth. What is placed by transforms, and what is no triangle, is not named. In
     /// the high preset a triangle may come several times.
-    pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32, u32) -> Search) {
+    pub fn visit_near(&self, point: Vec3, radius: f32, visitor: &mut dyn FnMut(u32, u32) -> VisitFlow) {
         if self.has_fixed() && point.is_finite() {
             let triangles = &self.fixed.triangles;
             isa::dispatch(self.isa, NearTriangles { triangles, ball: Ball { point }, radius, visitor });
@@ -109,7 +109,7 @@ struct NearTriangles<'a, 'v> {
     triangles: &'a TriangleTree,
     ball: Ball,
     radius: f32,
-    visitor: &'a mut (dyn FnMut(u32, u32) -> Search + 'v),
+    visitor: &'a mut (dyn FnMut(u32, u32) -> VisitFlow + 'v),
 }
 
 impl Kernel for NearTriangles<'_, '_> {
@@ -131,13 +131,13 @@ impl Kernel for NearTriangles<'_, '_> {
                         let lane = open.trailing_zeros() as usize % LANES;
                         open &= open - 1;
                         match visitor(triangles.part(block.part[lane]).geometry, block.primitive[lane]) {
-                            Search::Continue(wanted) => {
+                            VisitFlow::Continue(wanted) => {
                                 if wanted < radius {
                                     open &= ball.reached::<S>(block, wanted);
                                 }
                                 radius = wanted;
                             }
-                            Search::Break(()) => return None,
+                            VisitFlow::Break(()) => return None,
                         }
                     }
                 }
@@ -207,11 +207,11 @@ mod tests {
                     bvh.visit_near(point, radius, &mut |geometry, primitive| {
                         assert_eq!(geometry, 0);
                         seen[0][primitive as usize] += 1;
-                        Search::Continue(radius)
+                        VisitFlow::Continue(radius)
                     });
                     tree.visit_near(point, radius, &mut |i| {
                         seen[1][order[i as usize] as usize] += 1;
-                        Search::Continue(radius)
+                        VisitFlow::Continue(radius)
                     });
                     for (i, bounds) in boxes.iter().enumerate() {
                         let (near, radius) = (distance(bounds, point), f64::from(radius));
@@ -242,13 +242,13 @@ mod tests {
             bvh.visit_near(point, f32::INFINITY, &mut |_, primitive| {
                 seen += 1;
                 best = best.min(distance(&boxes[primitive as usize], point));
-                Search::Continue(best as f32)
+                VisitFlow::Continue(best as f32)
             });
             assert_eq!(best, nearest);
             let mut alone = 0;
             bvh.visit_near(point, f32::INFINITY, &mut |_, _| {
                 alone += 1;
-                Search::Break(())
+                VisitFlow::Break(())
             });
             assert_eq!(alone, 1);
         }

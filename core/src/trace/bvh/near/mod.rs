@@ -18,7 +18,7 @@ mod waiting;
 use self::discs::Discs;
 use super::Bvh;
 use super::flight::addresses::Addresses;
-use super::flight::set::{Set, TRAVELLERS};
+use super::flight::set::{IN_FLIGHT, Set};
 use super::levels::triangles::TriangleTree;
 use super::node::Child;
 use super::simd::isa::{self, Kernel};
@@ -54,8 +54,8 @@ pub(in crate::trace) struct NearestTriangle {
 
 /// Who asks for points, and has the corners as they were given.
 pub(in crate::trace) trait Surveyor {
-    /// Is told what is nearest to the traveller's last point, if it had one, and says its next one. After None it is not asked for that traveller again.
-    fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought>;
+    /// Is told what is nearest to the seeker's last point, if it had one, and says its next one. After None it is not asked for that seeker again.
+    fn next(&mut self, seeker: usize, last: Option<NearestTriangle>) -> Option<Sought>;
     /// The corners of a triangle as they were given, by its geometry and its primitive.
     fn corners(&self, geometry: u32, primitive: u32) -> [DVec3; 3];
     /// Whether those in the tree are just these.
@@ -70,20 +70,20 @@ pub(in crate::trace) trait Surveyor {
 
 impl Bvh {
     /// Points in flight.
-    pub(in crate::trace) const POINTS: usize = TRAVELLERS;
+    pub(in crate::trace) const POINTS: usize = IN_FLIGHT;
 
     /// What [`nearest_triangles`](Self::nearest_triangles) looks at besides boxes.
     pub(in crate::trace) fn discs(&self) -> Discs {
         Discs::new(&self.fixed.triangles)
     }
 
-    /// Finds the nearest fixed triangle of each point that is asked for, by so many travellers, no more than [`Self::POINTS`]; where there are no triangles nobody
+    /// Finds the nearest fixed triangle of each point that is asked for, by so many count, no more than [`Self::POINTS`]; where there are no triangles nobody
     /// is asked. `discs` are this tree's.
-    pub(in crate::trace) fn nearest_triangles(&self, discs: &Discs, travellers: usize, surveyor: &mut impl Surveyor) {
-        debug_assert!(travellers <= Self::POINTS, "{travellers} travellers");
+    pub(in crate::trace) fn nearest_triangles(&self, discs: &Discs, count: usize, surveyor: &mut impl Surveyor) {
+        debug_assert!(count <= Self::POINTS, "{count} count");
         let triangles = &self.fixed.triangles;
         if !triangles.tree().is_empty() {
-            let mut seekers = vec![Seeker::NOBODY; travellers.min(Self::POINTS)];
+            let mut seekers = vec![Seeker::IDLE; count.min(Self::POINTS)];
             isa::dispatch_narrow(self.isa, Near { triangles, discs, seekers: &mut seekers, surveyor });
         }
     }
@@ -91,7 +91,7 @@ impl Bvh {
 
 /// What a seeker has seen at a leaf.
 #[derive(Clone, Copy)]
-struct Sight<V> {
+struct LeafTest<V> {
     seeker: usize,
     leaf: Child,
     lower: Lower<V>,
@@ -109,16 +109,16 @@ fn fetch<S: Simd>(addresses: &Addresses, discs: &Discs, next: Child) {
 struct Near<'a, Y> {
     triangles: &'a TriangleTree,
     discs: &'a Discs,
-    /// One for each traveller.
+    /// One for each seeker.
     seekers: &'a mut [Seeker],
     surveyor: &'a mut Y,
 }
 
 impl<Y: Surveyor> Near<'_, Y> {
-    /// Goes through what a seeker has seen. What it reaches next, if that is another child now.
+    /// Goes through the triangles of a block that may be near enough to a seeker. What it reaches next, if that is another child now.
     #[inline(always)]
-    fn measure<S: Simd>(&mut self, sight: &Sight<S::V8>) -> Option<Child> {
-        let Sight { seeker: k, leaf, lower, open } = sight;
+    fn measure<S: Simd>(&mut self, test: &LeafTest<S::V8>) -> Option<Child> {
+        let LeafTest { seeker: k, leaf, lower, open } = test;
         let (seeker, mut open, mut scratch) = (&mut self.seekers[*k], *open, None);
         let block = self.triangles.block::<S>(leaf.first(), &mut scratch);
         let (before, scale) = (seeker.limit, self.surveyor.scale());
@@ -153,10 +153,10 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
         let (triangles, discs) = (self.triangles, self.discs);
         let tree = triangles.tree();
         let addresses = Addresses::of_triangles::<S>(triangles);
-        let (mut flying, mut next) = (Set::NOBODY, [Child::NONE; TRAVELLERS]);
+        let (mut flying, mut next) = (Set::EMPTY, [Child::NONE; IN_FLIGHT]);
         (0..self.seekers.len()).for_each(|k| flying.insert(k));
-        let nothing = Sight { seeker: 0, leaf: Child::NONE, lower: Lower::none(), open: 0 };
-        let mut sights: [Sight<S::V8>; TRAVELLERS] = [nothing; TRAVELLERS];
+        let nothing = LeafTest { seeker: 0, leaf: Child::NONE, lower: Lower::none(), open: 0 };
+        let mut tests: [LeafTest<S::V8>; IN_FLIGHT] = [nothing; IN_FLIGHT];
         let rounding = if self.surveyor.is_exact() { 0.0 } else { UNIT_ROUNDOFF };
         while !flying.is_empty() {
             let (leaf, none) =
@@ -183,14 +183,14 @@ impl<Y: Surveyor> Kernel for Near<'_, Y> {
                 let block = triangles.block::<S>(leaf.first(), &mut scratch);
                 let lower = lower_bounds::<S>(block, seeker.local, seeker.error, rounding);
                 let open = lower.within(seeker.limit) & block.lanes;
-                sights[count % TRAVELLERS] = Sight { seeker: k, leaf, lower, open };
+                tests[count % IN_FLIGHT] = LeafTest { seeker: k, leaf, lower, open };
                 count += usize::from(open != 0);
                 next[k] = seeker.waiting.pass(leaf);
                 fetch::<S>(&addresses, discs, next[k]);
             }
-            for sight in &sights[..count.min(TRAVELLERS)] {
-                if let Some(child) = self.measure::<S>(sight) {
-                    next[sight.seeker] = child;
+            for test in &tests[..count.min(IN_FLIGHT)] {
+                if let Some(child) = self.measure::<S>(test) {
+                    next[test.seeker] = child;
                     fetch::<S>(&addresses, discs, child);
                 }
             }
@@ -207,7 +207,7 @@ mod tests {
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::{Isa, Options, Preset};
 
-    /// Traveller k asks for points k, k + [`Bvh::POINTS`] and so on.
+    /// RayState k asks for points k, k + [`Bvh::POINTS`] and so on.
     struct Survey<'a> {
         points: &'a [Vec3],
         geometries: &'a [Vec<[Vec3; 3]>],
@@ -220,12 +220,12 @@ mod tests {
     }
 
     impl Surveyor for Survey<'_> {
-        fn next(&mut self, traveller: usize, last: Option<NearestTriangle>) -> Option<Sought> {
-            let asked = &mut self.asked[traveller];
+        fn next(&mut self, seeker: usize, last: Option<NearestTriangle>) -> Option<Sought> {
+            let asked = &mut self.asked[seeker];
             if *asked > 0 {
-                self.found[traveller + (*asked - 1) * Bvh::POINTS] = last;
+                self.found[seeker + (*asked - 1) * Bvh::POINTS] = last;
             }
-            let &local = self.points.get(traveller + *asked * Bvh::POINTS)?;
+            let &local = self.points.get(seeker + *asked * Bvh::POINTS)?;
             *asked += 1;
             Some(Sought { point: local.as_dvec3() * self.size, local, error: 0.0 })
         }

@@ -34,7 +34,7 @@ pub(super) struct Seeker {
 }
 
 impl Seeker {
-    pub const NOBODY: Self = Self {
+    pub const IDLE: Self = Self {
         local: Vec3::ZERO,
         error: 0.0,
         pad: 0.0,
@@ -43,7 +43,7 @@ impl Seeker {
         square: f64::INFINITY,
         id: (u32::MAX, u32::MAX),
         corners: [[0.0; 4]; 3],
-        waiting: Waiting::NOBODY,
+        waiting: Waiting::EMPTY,
     };
 
     /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near this one too.

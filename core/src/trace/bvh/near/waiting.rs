@@ -26,7 +26,7 @@ pub(super) struct Waiting {
 
 impl Waiting {
     /// Of a point at the end of its way.
-    pub const NOBODY: Self = Self { len: 1, children: [Child::NONE; MAX + WIDTH], near: [0; MAX + WIDTH] };
+    pub const EMPTY: Self = Self { len: 1, children: [Child::NONE; MAX + WIDTH], near: [0; MAX + WIDTH] };
 
     /// Nobody is waiting any more: what comes next is [`Child::NONE`].
     #[inline(always)]
@@ -108,7 +108,7 @@ mod tests {
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
                 for isa in Present::all() {
-                    let mut waiting = Waiting { len, ..Waiting::NOBODY };
+                    let mut waiting = Waiting { len, ..Waiting::EMPTY };
                     for (i, &(near, child)) in entries.iter().enumerate() {
                         (waiting.near[i + 1], waiting.children[i + 1]) = (near, child);
                     }

@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::math::{Aabb, Random, Vec3};
     use crate::trace::bvh::Isa;
-    use crate::trace::bvh::alone::Search;
+    use crate::trace::bvh::alone::VisitFlow;
     use crate::trace::bvh::build::preset::Options;
 
     /// Every box that a ray enters by itself is named, with a bit for each ray that is asked for, and rays are placed as points and vectors are.
@@ -212,7 +212,7 @@ mod tests {
                 if is_together && is_asked {
                     tree.visit(&packet.ray(lane), &mut |i| {
                         assert!(named[i as usize] >> lane & 1 != 0, "{round}: box {i} of ray {lane}");
-                        Search::Continue(f32::INFINITY)
+                        VisitFlow::Continue(f32::INFINITY)
                     });
                 }
             }

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 use super::bins;
 use super::record::Record;
-use super::split::{Range, Rule};
+use super::split::{PrimitiveRange, Rule};
 use super::top::Shared;
 use crate::memory::room;
 use crate::trace::bvh::block::LANES;
@@ -80,7 +80,7 @@ pub(in crate::trace::bvh) fn pieces(items: Vec<Record>, meshes: &Meshes, isa: Pr
 /// A range, and how much surface its items have.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
-    range: Range,
+    range: PrimitiveRange,
     surface: f64,
     largest: f32,
 }
@@ -94,21 +94,21 @@ impl Extent {
             surface += f64::from(area);
             largest = largest.max(area);
         }
-        Self { range: Range::new::<S>(items, 0), surface, largest }
+        Self { range: PrimitiveRange::new::<S>(items, 0), surface, largest }
     }
 
     /// By all threads; sums are of chunks, and do not depend on these.
     fn of_many(items: &[Record], isa: Present) -> Self {
         let of_chunk = |items| isa::dispatch(isa, ExtentKernel(items));
         let chunks: Vec<Self> = items.par_chunks(CHUNK).map(of_chunk).collect();
-        let nothing = Self { range: Range::EMPTY, surface: 0.0, largest: 0.0 };
+        let nothing = Self { range: PrimitiveRange::EMPTY, surface: 0.0, largest: 0.0 };
         let join = |all: Self, chunk: Self| Self {
             range: all.range.union(chunk.range),
             surface: all.surface + chunk.surface,
             largest: all.largest.max(chunk.largest),
         };
         let whole = chunks.into_iter().fold(nothing, join);
-        Self { range: Range { len: items.len() as u32, ..whole.range }, ..whole }
+        Self { range: PrimitiveRange { len: items.len() as u32, ..whole.range }, ..whole }
     }
 
     /// Whether a plane is looked for where so many new references are left.
@@ -172,12 +172,12 @@ impl Splitter<'_> {
 
     /// Whether the sides of a division have so much in common that a plane is looked for.
     #[inline(always)]
-    fn is_worth_a_look(&self, [left, right]: &[Range; 2]) -> bool {
+    fn is_worth_a_look(&self, [left, right]: &[PrimitiveRange; 2]) -> bool {
         half_area_of_common(&left.bounds, &right.bounds) > self.overlap
     }
 
     /// The best plane that cuts, by all threads.
-    fn plane_of_many(&self, items: &[Record], range: &Range) -> Option<Plane> {
+    fn plane_of_many(&self, items: &[Record], range: &PrimitiveRange) -> Option<Plane> {
         let Self { meshes, isa, .. } = *self;
         let of_chunk = |items| Box::new(isa::dispatch(isa, SlabsKernel { items, bounds: &range.bounds, meshes }));
         let slabs = items.par_chunks(CHUNK).map(of_chunk).reduce_with(|mut all, chunk| {

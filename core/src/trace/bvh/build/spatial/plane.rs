@@ -1,7 +1,7 @@
 //! A plane that cuts what it passes.
 
 use super::super::record::Record;
-use super::super::split::Range;
+use super::super::split::PrimitiveRange;
 use super::slabs::{Plane, Side};
 use super::{RULE, clip};
 use crate::trace::bvh::meshes::Meshes;
@@ -9,7 +9,7 @@ use crate::trace::bvh::simd::boxes::half_area;
 
 /// Blocks times areas of the two sides of a division.
 #[inline(always)]
-pub(super) fn cost(sides: &[Range; 2]) -> f32 {
+pub(super) fn cost(sides: &[PrimitiveRange; 2]) -> f32 {
     let [left, right] = sides.each_ref().map(|side| side.half_area() * RULE.blocks(side.len as usize));
     left + right
 }
@@ -17,7 +17,7 @@ pub(super) fn cost(sides: &[Range; 2]) -> f32 {
 impl Plane {
     /// Whether it costs less than a division into `sides`, and cuts no more than `spare`.
     #[inline(always)]
-    pub fn is_better(&self, sides: &[Range; 2], spare: usize) -> bool {
+    pub fn is_better(&self, sides: &[PrimitiveRange; 2], spare: usize) -> bool {
         let count = u64::from(sides[0].len) + u64::from(sides[1].len);
         let cut = u64::from(self.sides[0].count) + u64::from(self.sides[1].count) - count;
         self.cost < cost(sides) && cut <= spare as u64

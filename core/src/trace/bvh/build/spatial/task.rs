@@ -2,7 +2,7 @@
 
 use super::super::bins;
 use super::super::record::Record;
-use super::super::split::Range;
+use super::super::split::PrimitiveRange;
 use super::super::subtree::Finder;
 use super::slabs::{Grid, Plane, Slabs};
 use super::{Extent, RULE, Splitter, share};
@@ -63,7 +63,7 @@ struct Step<'a, S> {
 impl<S: Simd> Step<'_, S> {
     /// Divides `items`, those of `range`, of which there are several and may be `spare` more.
     #[inline(always)]
-    fn divide(&mut self, items: &mut [Record], range: &Range, spare: usize) {
+    fn divide(&mut self, items: &mut [Record], range: &PrimitiveRange, spare: usize) {
         let Self { splitter, finder, sides } = self;
         let halves = finder.find(items, range, &RULE).apply::<S>(items, range);
         let plane = if !splitter.is_worth_a_look(&halves) {
@@ -88,7 +88,7 @@ impl<S: Simd> Step<'_, S> {
 
 /// The best plane that cuts, between `N` slabs.
 #[inline(always)]
-fn plane<S: Simd, const N: usize>(splitter: &Splitter<'_>, items: &[Record], range: &Range) -> Option<Plane> {
+fn plane<S: Simd, const N: usize>(splitter: &Splitter<'_>, items: &[Record], range: &PrimitiveRange) -> Option<Plane> {
     let mut slabs = Slabs::<N>::EMPTY;
     let grid = Grid::new::<S>(&range.bounds);
     slabs.add_all::<S>(items, &grid, splitter.meshes);

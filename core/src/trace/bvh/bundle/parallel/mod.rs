@@ -20,7 +20,7 @@ mod triangles;
 use super::edges::Edges;
 use super::footprint::Footprints;
 use super::pencil::Pencil;
-use super::range::Range;
+use super::range::RayIntervals;
 use super::rays::{AHEAD, Bundle, Fit, store};
 use super::rows::Rows;
 use super::slab::BundleSlab;
@@ -57,7 +57,7 @@ pub(super) fn may_be_parallel(rays: &[Ray; RAYS]) -> bool {
 pub(super) struct FillParallel<'a> {
     pub bundle: &'a mut Bundle,
     pub rays: &'a [Ray; RAYS],
-    pub range: &'a mut Range,
+    pub range: &'a mut RayIntervals,
 }
 
 impl Kernel for FillParallel<'_> {
@@ -79,7 +79,7 @@ impl Kernel for FillParallel<'_> {
 impl Bundle {
     /// Origins and ranges as they are; and the direction that all rays have.
     #[inline(always)]
-    fn gather_parallel<S: Simd>(&mut self, rays: &[Ray; RAYS], range: &mut Range) -> Fit {
+    fn gather_parallel<S: Simd>(&mut self, rays: &[Ray; RAYS], range: &mut RayIntervals) -> Fit {
         let direction = rays[0].direction;
         self.axis = largest_axis(direction.abs());
         let order = axes(self.axis);
@@ -116,7 +116,7 @@ impl Bundle {
 
     /// Everything that is derived from the origins.
     #[inline(always)]
-    fn shear<S: Simd>(&mut self, range: &Range) -> Fit {
+    fn shear<S: Simd>(&mut self, range: &RayIntervals) -> Fit {
         let splat = S::Wide::splat;
         let [p, q, along] = axes(self.axis);
         let (forward, depth) = (splat(self.forward), splat(self.least_depth));
@@ -221,7 +221,7 @@ mod tests {
     use crate::trace::bvh::simd::Portable;
 
     fn fit(rays: &[Ray; RAYS]) -> Option<Fit> {
-        let (mut bundle, mut range) = (Bundle::new(), Range::new());
+        let (mut bundle, mut range) = (Bundle::new(), RayIntervals::new());
         let fill = FillParallel { bundle: &mut bundle, rays, range: &mut range };
         may_be_parallel(rays).then(|| fill.run::<Portable>())
     }

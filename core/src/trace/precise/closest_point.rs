@@ -2,7 +2,7 @@
 //!
 //! The tree finds it among what may be nearest for all that rounding hides; distances are computed in f64 from the corners as they were given.
 
-use super::{Precise, is_traceable};
+use super::{PreciseScene, is_traceable};
 use crate::math::DVec3;
 use crate::once::made_outside;
 use crate::shape::closest::{TrianglePoint, closest_point};
@@ -11,7 +11,7 @@ use crate::trace::bvh::{Bvh, Discs, NearestTriangle, Sought, Surveyor};
 
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NearestPoint {
+pub struct PreciseClosestPoint {
     /// Where it is, in the coordinates of the meshes.
     pub point: DVec3,
     /// How far from the point that was asked for, squared.
@@ -26,7 +26,7 @@ pub struct NearestPoint {
     pub geometry: u32,
 }
 
-impl NearestPoint {
+impl PreciseClosestPoint {
     const fn id(&self) -> (u32, u32) {
         (self.geometry, self.primitive)
     }
@@ -52,12 +52,12 @@ impl NearestPoint {
 /// Farther away, in the coordinates of the tree, squares of distances leave f32.
 const FARTHEST: f32 = 1e18;
 
-impl Precise {
+impl PreciseScene {
     /// The point on any triangle that is nearest to `point`; at equal distances that of the lowest (geometry, primitive). Triangles
     /// without an area count too. None for a point that is not finite, and where there are no triangles. Squares of distances above 1e154 are infinite.
-    pub fn nearest_point(&self, point: DVec3) -> Option<NearestPoint> {
+    pub fn closest_point(&self, point: DVec3) -> Option<PreciseClosestPoint> {
         let mut nearest = [None];
-        self.nearest_point_batch(&[point], &mut nearest);
+        self.closest_point_batch(&[point], &mut nearest);
         nearest[0]
     }
 
@@ -66,11 +66,11 @@ impl Precise {
     ///
     /// # Panics
     /// Unless there is one answer a point.
-    pub fn nearest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<NearestPoint>]) {
+    pub fn closest_point_batch(&self, points: &[DVec3], nearest: &mut [Option<PreciseClosestPoint>]) {
         self.survey(points, nearest, None);
     }
 
-    /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where [`Self::nearest_point_batch`] finds none.
+    /// How far these points are, squared, from any triangle, into `distances` of the same length; NaN where [`Self::closest_point_batch`] finds none.
     /// That is a little faster than to find the points as well.
     ///
     /// # Panics
@@ -103,13 +103,14 @@ impl Precise {
     }
 
     /// By a look at every triangle, which are all about as far away.
-    fn nearest_of_all(&self, point: DVec3) -> Option<NearestPoint> {
-        let mut best: Option<NearestPoint> = None;
+    fn nearest_of_all(&self, point: DVec3) -> Option<PreciseClosestPoint> {
+        let mut best: Option<PreciseClosestPoint> = None;
         for (mesh, geometry) in self.meshes.iter().zip(0..) {
             for primitive in 0..mesh.triangles.len() as u32 {
                 let corners = self.corners(geometry, primitive);
                 if corners.iter().all(|&corner| is_traceable(corner)) {
-                    let answer = NearestPoint::new(point, closest_point(point, corners), corners, geometry, primitive);
+                    let answer =
+                        PreciseClosestPoint::new(point, closest_point(point, corners), corners, geometry, primitive);
                     if best.as_ref().is_none_or(|best| answer.is_before(best)) {
                         best = Some(answer);
                     }
@@ -125,20 +126,20 @@ trait Answer: Clone {
     /// Whether the nearest point is part of it.
     const HAS_POINT: bool;
     /// Of a triangle that the tree has found.
-    fn of(precise: &Precise, point: DVec3, nearest: &NearestTriangle) -> Self;
+    fn of(precise: &PreciseScene, point: DVec3, nearest: &NearestTriangle) -> Self;
     /// Of a look at every triangle.
-    fn of_all(nearest: Option<NearestPoint>) -> Self;
+    fn of_all(nearest: Option<PreciseClosestPoint>) -> Self;
 }
 
-impl Answer for Option<NearestPoint> {
+impl Answer for Option<PreciseClosestPoint> {
     const HAS_POINT: bool = true;
 
-    fn of(precise: &Precise, point: DVec3, nearest: &NearestTriangle) -> Self {
+    fn of(precise: &PreciseScene, point: DVec3, nearest: &NearestTriangle) -> Self {
         let NearestTriangle { on, geometry, primitive, .. } = *nearest;
-        on.map(|on| NearestPoint::new(point, on, precise.corners(geometry, primitive), geometry, primitive))
+        on.map(|on| PreciseClosestPoint::new(point, on, precise.corners(geometry, primitive), geometry, primitive))
     }
 
-    fn of_all(nearest: Option<NearestPoint>) -> Self {
+    fn of_all(nearest: Option<PreciseClosestPoint>) -> Self {
         nearest
     }
 }
@@ -147,11 +148,11 @@ impl Answer for Option<NearestPoint> {
 impl Answer for f64 {
     const HAS_POINT: bool = false;
 
-    fn of(_: &Precise, _: DVec3, nearest: &NearestTriangle) -> Self {
+    fn of(_: &PreciseScene, _: DVec3, nearest: &NearestTriangle) -> Self {
         nearest.distance_squared
     }
 
-    fn of_all(nearest: Option<NearestPoint>) -> Self {
+    fn of_all(nearest: Option<PreciseClosestPoint>) -> Self {
         nearest.map_or(f64::NAN, |nearest| nearest.distance_squared)
     }
 }
@@ -166,7 +167,7 @@ struct Run<'a, A> {
 
 /// Batches of points on their way through the tree.
 struct Survey<'a, A> {
-    precise: &'a Precise,
+    precise: &'a PreciseScene,
     runs: Vec<Run<'a, A>>,
 }
 

@@ -3,7 +3,7 @@
 //! Rounds are compiled once for each, so that scenes without placements pay nothing for them.
 
 use super::addresses::Addresses;
-use super::traveller::Space;
+use super::ray_state::TreeId;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
 use crate::trace::bvh::levels::numbers::{Blocks, Numbers};
@@ -16,7 +16,7 @@ use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::tree::Tree;
 
 /// What rays travel through.
-pub(super) trait Ground {
+pub(super) trait TraversalTarget {
     /// Whether rays go on from the fixed triangles to placements, and into their objects.
     const HAS_PLACEMENTS: bool;
     /// Whether they may be in placed objects.
@@ -31,16 +31,16 @@ pub(super) trait Ground {
     fn decide(&self, _ray: usize, _block: &Block, _lane: usize) -> Verdict {
         Verdict::Doubt
     }
-    fn node(&self, space: Space, child: Child) -> &Node;
+    fn node(&self, tree_id: TreeId, child: Child) -> &Node;
     /// A leaf's block; `scratch` is where it may be put together.
-    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
+    fn block<'a, S: Simd>(&'a self, tree_id: TreeId, index: u32, scratch: &'a mut Option<Block>) -> &'a Block;
     /// What corners are to be fetched ahead from ([`Blocks::far`]).
     #[inline(always)]
     fn far(&self) -> Option<&Numbers> {
         None
     }
     /// Where in memory a node is, or a leaf's first block, or a placement.
-    fn address(&self, space: Space, next: Child) -> *const u8;
+    fn address(&self, tree_id: TreeId, next: Child) -> *const u8;
 }
 
 /// The triangles of the world, and nothing else.
@@ -57,7 +57,7 @@ impl<'a, L: Blocks + ?Sized> Plain<'a, L> {
     }
 }
 
-impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
+impl<L: Blocks + ?Sized> TraversalTarget for Plain<'_, L> {
     const HAS_PLACEMENTS: bool = false;
     const IS_PUT_TOGETHER: bool = L::IS_PUT_TOGETHER;
 
@@ -71,11 +71,11 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
         filter.meet::<S, false, false>(block, sides, passed, limit)
     }
     #[inline(always)]
-    fn node(&self, _: Space, child: Child) -> &Node {
+    fn node(&self, _: TreeId, child: Child) -> &Node {
         self.tree.node(child)
     }
     #[inline(always)]
-    fn block<'a, S: Simd>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+    fn block<'a, S: Simd>(&'a self, _: TreeId, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         self.leaves.block::<S>(index, scratch)
     }
     #[inline(always)]
@@ -83,7 +83,7 @@ impl<L: Blocks + ?Sized> Ground for Plain<'_, L> {
         self.leaves.far()
     }
     #[inline(always)]
-    fn address(&self, _: Space, next: Child) -> *const u8 {
+    fn address(&self, _: TreeId, next: Child) -> *const u8 {
         self.addresses.of(next)
     }
 }
@@ -104,7 +104,7 @@ impl<'a> Rounded<'a> {
 /// Says whether a ray, by its number, hits a triangle, by its geometry and its primitive.
 pub(in crate::trace) type Decide<'a> = &'a dyn Fn(usize, u32, u32) -> Verdict;
 
-impl Ground for Rounded<'_> {
+impl TraversalTarget for Rounded<'_> {
     const HAS_PLACEMENTS: bool = false;
 
     #[inline(always)]
@@ -122,24 +122,24 @@ impl Ground for Rounded<'_> {
         (self.decide)(ray, geometry, block.primitive[lane])
     }
     #[inline(always)]
-    fn node(&self, _: Space, child: Child) -> &Node {
+    fn node(&self, _: TreeId, child: Child) -> &Node {
         self.triangles.tree().node(child)
     }
     #[inline(always)]
-    fn block<'a, S: Simd>(&'a self, _: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+    fn block<'a, S: Simd>(&'a self, _: TreeId, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
         self.triangles.block::<S>(index, scratch)
     }
     #[inline(always)]
-    fn address(&self, _: Space, next: Child) -> *const u8 {
+    fn address(&self, _: TreeId, next: Child) -> *const u8 {
         self.addresses.of(next)
     }
 }
 
-/// The triangles of the world and of objects in their places: what each space has, in one table, since rays of a round are in
+/// The triangles of the world and of objects in their places: what each tree has, in one table, since rays of a round are in
 /// different ones, and nobody can predict which.
 pub(super) struct Placed<'a>(Vec<Region<'a>>);
 
-/// What a space has.
+/// What a tree has.
 struct Region<'a> {
     nodes: &'a [Node],
     triangles: &'a TriangleTree,
@@ -166,7 +166,7 @@ impl<'a> Region<'a> {
     }
 }
 
-impl Ground for Placed<'_> {
+impl TraversalTarget for Placed<'_> {
     const HAS_PLACEMENTS: bool = true;
 
     #[inline(always)]
@@ -178,16 +178,16 @@ impl Ground for Placed<'_> {
         filter.meet::<S, true, false>(block, sides, passed, limit)
     }
     #[inline(always)]
-    fn node(&self, space: Space, child: Child) -> &Node {
-        &self.0[space.0 as usize].nodes[child.node() as usize]
+    fn node(&self, tree_id: TreeId, child: Child) -> &Node {
+        &self.0[tree_id.0 as usize].nodes[child.node() as usize]
     }
     #[inline(always)]
-    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.0[space.0 as usize].triangles.block::<S>(index, scratch)
+    fn block<'a, S: Simd>(&'a self, tree_id: TreeId, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0[tree_id.0 as usize].triangles.block::<S>(index, scratch)
     }
     #[inline(always)]
-    fn address(&self, space: Space, next: Child) -> *const u8 {
-        self.0[space.0 as usize].addresses.of(next)
+    fn address(&self, tree_id: TreeId, next: Child) -> *const u8 {
+        self.0[tree_id.0 as usize].addresses.of(next)
     }
 }
 
@@ -200,7 +200,7 @@ impl<'a> Objects<'a> {
     }
 }
 
-impl Ground for Objects<'_> {
+impl TraversalTarget for Objects<'_> {
     const HAS_PLACEMENTS: bool = false;
     const HAS_PLACES: bool = true;
 
@@ -213,15 +213,15 @@ impl Ground for Objects<'_> {
         Placed::meet::<S>(filter, block, sides, passed, limit)
     }
     #[inline(always)]
-    fn node(&self, space: Space, child: Child) -> &Node {
-        self.0.node(space, child)
+    fn node(&self, tree_id: TreeId, child: Child) -> &Node {
+        self.0.node(tree_id, child)
     }
     #[inline(always)]
-    fn block<'a, S: Simd>(&'a self, space: Space, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
-        self.0.block::<S>(space, index, scratch)
+    fn block<'a, S: Simd>(&'a self, tree_id: TreeId, index: u32, scratch: &'a mut Option<Block>) -> &'a Block {
+        self.0.block::<S>(tree_id, index, scratch)
     }
     #[inline(always)]
-    fn address(&self, space: Space, next: Child) -> *const u8 {
-        self.0.address(space, next)
+    fn address(&self, tree_id: TreeId, next: Child) -> *const u8 {
+        self.0.address(tree_id, next)
     }
 }

@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::ground::Ground;
+use super::target::TraversalTarget;
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::block::Block;
@@ -28,9 +28,9 @@ const _: () = assert!(2 * MAX_DEPTH * (WIDTH - 1) + 3 < STACK);
 /// Where a ray is: at the fixed triangles, among the placements, or (2 and more) in an object's tree.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(super) struct Space(pub u32);
+pub(super) struct TreeId(pub u32);
 
-impl Space {
+impl TreeId {
     pub const FIXED: Self = Self(0);
     /// Among the placements; and whoever comes through them arrives from here.
     pub const UPPER: Self = Self(1);
@@ -53,20 +53,20 @@ pub(super) struct Start {
     pub ray: usize,
     /// The placement that it is in, or [`FIXED`].
     pub place: u32,
-    pub space: Space,
+    pub tree_id: TreeId,
 }
 
 /// A ray on its way. What steps need is in as few cache lines as may be.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-pub(super) struct Traveller {
+pub(super) struct RayState {
     /// The ray where it set out, in the world mostly, and in the object where it is.
     ready: [ReadyRay; 2],
     /// Children on the stack.
     len: usize,
     /// Which of the rays it is.
     pub ray: usize,
-    pub space: Space,
+    pub tree_id: TreeId,
     /// The placement that the ray is in, or [`FIXED`].
     place: u32,
     pub found: Found,
@@ -79,9 +79,9 @@ pub(super) struct Traveller {
     pub listed: Listed,
 }
 
-/// As many lines from one traveller to the next let those that steps need fall into different sets of a cache of 64 sets: four of 32 travellers in one at most.
+/// As many lines from one state to the next let those that steps need fall into different sets of a cache of 64 sets: four of 32 states in one at most.
 #[cfg(target_pointer_width = "64")]
-const _: () = assert!(size_of::<Traveller>() == 78 * 64);
+const _: () = assert!(size_of::<RayState>() == 78 * 64);
 
 /// A stack that begins with a cache line: what most rays have waiting, and what is stored above it, is in that one.
 #[repr(align(64))]
@@ -104,23 +104,27 @@ impl<T> DerefMut for AlignedStack<T> {
     }
 }
 
-impl Traveller {
+impl RayState {
     pub const NONE: Self = Self {
         ready: [ReadyRay::NONE; 2],
         found: Found::NONE,
         listed: Listed::NONE,
         ray: 0,
         len: 1,
-        space: Space::UPPER,
+        tree_id: TreeId::UPPER,
         place: FIXED,
         stack: AlignedStack([Child::NONE; STACK + WIDTH]),
         near: AlignedStack([0; STACK + WIDTH]),
     };
 
-    /// Sets out with a ray of its own, for the root of the tree in the space where it starts; from the fixed triangles, where there are placements, then for
+    /// Sets out with a ray of its own, for the root of the tree in which it starts; from the fixed triangles, where there are placements, then for
     /// theirs. What it reaches next: that root.
     #[inline(always)]
-    pub fn start<Q: Query, G: Ground>(&mut self, Start { ray, place, space }: Start, ready: &ReadyRay) -> Child {
+    pub fn start<Q: Query, G: TraversalTarget>(
+        &mut self,
+        Start { ray, place, tree_id }: Start,
+        ready: &ReadyRay,
+    ) -> Child {
         self.ready[0] = *ready;
         self.found.start(ready.end());
         if Q::LISTS {
@@ -128,9 +132,9 @@ impl Traveller {
         }
         (self.ray, self.len) = (ray, 1);
         if G::HAS_PLACES {
-            (self.place, self.space) = (place, space);
+            (self.place, self.tree_id) = (place, tree_id);
         }
-        if G::HAS_PLACEMENTS && space == Space::FIXED {
+        if G::HAS_PLACEMENTS && tree_id == TreeId::FIXED {
             // Near entries of 0: they stay whatever the ray hits.
             (self.near[1], self.stack[1]) = (0, Child::ROOT);
             (self.near[2], self.stack[2]) = (0, Child::NONE);
@@ -139,15 +143,15 @@ impl Traveller {
         Child::ROOT
     }
 
-    /// The ray in the space where it is.
+    /// The ray in the coordinates of the tree where it is.
     #[inline(always)]
-    fn ready<G: Ground>(&self) -> &ReadyRay {
-        &self.ready[usize::from(G::HAS_PLACEMENTS && self.space.is_object())]
+    fn ready<G: TraversalTarget>(&self) -> &ReadyRay {
+        &self.ready[usize::from(G::HAS_PLACEMENTS && self.tree_id.is_object())]
     }
 
     /// One node. What it reaches next, as of all steps.
     #[inline(always)]
-    pub fn enter<S: Simd, Q: Query, G: Ground>(&mut self, node: &Node) -> Child {
+    pub fn enter<S: Simd, Q: Query, G: TraversalTarget>(&mut self, node: &Node) -> Child {
         let (mask, near) = self.ready::<G>().slab().enter::<S>(node, self.found.limit);
         let len = self.len % STACK;
         let top = self.stack[len.wrapping_sub(1) % STACK];
@@ -165,18 +169,24 @@ impl Traveller {
 
     /// What it sees of a block: what is to be told of that to [`Self::hit`], and which triangles it may pass within.
     #[inline(always)]
-    pub fn look<S: Simd, G: Ground>(&self, block: &Block) -> (Sides<S::V8>, u32) {
+    pub fn look<S: Simd, G: TraversalTarget>(&self, block: &Block) -> (Sides<S::V8>, u32) {
         G::look::<S>(&self.ready::<G>().filter(), block)
     }
 
     /// One block of a leaf, all at once: looks at it, and takes what it hits.
     #[inline(always)]
-    pub fn visit<S: Simd, Q: Query, G: Ground>(&mut self, leaf: Child, bvh: &Bvh, ground: &G, rays: &[Ray]) -> Child {
+    pub fn visit<S: Simd, Q: Query, G: TraversalTarget>(
+        &mut self,
+        leaf: Child,
+        bvh: &Bvh,
+        target: &G,
+        rays: &[Ray],
+    ) -> Child {
         let mut scratch = None;
-        let block = ground.block::<S>(self.space, leaf.first(), &mut scratch);
+        let block = target.block::<S>(self.tree_id, leaf.first(), &mut scratch);
         let (sides, passed) = self.look::<S, G>(block);
         let next = self.pass(leaf);
-        let hit = if passed == 0 { None } else { self.hit::<S, Q, G>(leaf, block, &sides, passed, bvh, ground, rays) };
+        let hit = if passed == 0 { None } else { self.hit::<S, Q, G>(leaf, block, &sides, passed, bvh, target, rays) };
         hit.unwrap_or(next)
     }
 
@@ -191,14 +201,14 @@ impl Traveller {
     /// What it hits of a block that it has looked at, and passed; what it reaches next, if that is another child now.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "what it has seen, and where")]
-    pub fn hit<S: Simd, Q: Query, G: Ground>(
+    pub fn hit<S: Simd, Q: Query, G: TraversalTarget>(
         &mut self,
         leaf: Child,
         block: &Block,
         sides: &Sides<S::V8>,
         passed: u32,
         bvh: &Bvh,
-        ground: &G,
+        target: &G,
         rays: &[Ray],
     ) -> Option<Child> {
         let (index, limit) = (leaf.first(), self.found.limit);
@@ -218,10 +228,10 @@ impl Traveller {
             &candidates,
             &rays[number],
             #[inline(always)]
-            |lane| ground.decide(number, block, lane),
+            |lane| target.decide(number, block, lane),
         );
         if Q::ANY && self.found.is_hit() || Q::DOUBTS && self.listed.is_in_doubt() {
-            self.space = Space::UPPER;
+            self.tree_id = TreeId::UPPER;
             return Some(Child::NONE);
         }
         (self.found.limit < limit).then(
@@ -254,14 +264,14 @@ impl Traveller {
         let top = self.len % STACK;
         (self.near[top], self.stack[top]) = (0, Child::NONE);
         self.len = top + 1;
-        (self.place, self.space) = (number, Space::object(object));
+        (self.place, self.tree_id) = (number, TreeId::object(object));
         Child::ROOT
     }
 
     /// Out of it again.
     #[inline(always)]
     pub fn leave(&mut self) -> Child {
-        self.space = Space::UPPER;
+        self.tree_id = TreeId::UPPER;
         self.pop()
     }
 
@@ -293,7 +303,7 @@ mod tests {
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
-    struct Shorten<'a>(&'a mut Traveller);
+    struct Shorten<'a>(&'a mut RayState);
 
     impl Kernel for Shorten<'_> {
         type Output = ();
@@ -316,15 +326,15 @@ mod tests {
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
                 for isa in Present::all() {
-                    let mut traveller = Traveller { len, ..Traveller::NONE };
-                    traveller.found.limit = limit;
+                    let mut state = RayState { len, ..RayState::NONE };
+                    state.found.limit = limit;
                     for (i, &(near, child)) in entries.iter().enumerate() {
-                        (traveller.near[i + 1], traveller.stack[i + 1]) = (near, child);
+                        (state.near[i + 1], state.stack[i + 1]) = (near, child);
                     }
-                    dispatch(isa, Shorten(&mut traveller));
-                    let kept = traveller.near.0.into_iter().zip(traveller.stack.0).take(traveller.len).skip(1);
+                    dispatch(isa, Shorten(&mut state));
+                    let kept = state.near.0.into_iter().zip(state.stack.0).take(state.len).skip(1);
                     assert_eq!(kept.collect::<Vec<_>>(), expected, "{isa:?}: {len} entries, up to {limit}");
-                    assert_eq!(traveller.stack[0], Child::NONE);
+                    assert_eq!(state.stack[0], Child::NONE);
                 }
             }
         }

@@ -2,8 +2,8 @@
 
 use std::cell::Cell;
 
-use super::Departures;
-use super::traveller::{Space, Start};
+use super::RaySource;
+use super::ray_state::{Start, TreeId};
 use crate::ray::Ray;
 use crate::trace::bvh::Bvh;
 use crate::trace::bvh::query::Query;
@@ -12,7 +12,7 @@ use crate::trace::bvh::simd::Simd;
 
 /// Rays that are to go through one placed object, which has triangles.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::trace::bvh) struct Visitors {
+pub(in crate::trace::bvh) struct DeferredRays {
     /// The number of the placement.
     pub place: u32,
     /// The ray whose bit is the lowest.
@@ -21,30 +21,30 @@ pub(in crate::trace::bvh) struct Visitors {
     pub rays: u64,
 }
 
-/// Visitors who wait for their turn.
-pub(super) struct Queue<'a, Q: Query> {
+/// Deferred rays that wait for their turn.
+pub(super) struct DeferredQueue<'a, Q: Query> {
     bvh: &'a Bvh,
     rays: &'a [Ray],
     answers: &'a [Cell<Q::Answer>],
-    waiting: std::slice::Iter<'a, Visitors>,
+    waiting: std::slice::Iter<'a, DeferredRays>,
     /// Those of one object who are not ready yet.
-    current: Visitors,
+    current: DeferredRays,
     /// Those who are, a bit each, and where the first of them is among `ready`.
     group: u64,
     slot: usize,
     ready: [ReadyRay; 8],
 }
 
-impl<'a, Q: Query> Queue<'a, Q> {
-    pub fn new(bvh: &'a Bvh, all: &'a [Visitors], rays: &'a [Ray], answers: &'a [Cell<Q::Answer>]) -> Self {
-        let nobody = Visitors { place: 0, first: 0, rays: 0 };
+impl<'a, Q: Query> DeferredQueue<'a, Q> {
+    pub fn new(bvh: &'a Bvh, all: &'a [DeferredRays], rays: &'a [Ray], answers: &'a [Cell<Q::Answer>]) -> Self {
+        let nobody = DeferredRays { place: 0, first: 0, rays: 0 };
         let (waiting, ready) = (all.iter(), [ReadyRay::NONE; 8]);
         Self { bvh, rays, answers, waiting, current: nobody, group: 0, slot: 0, ready }
     }
 
     /// Those who have not got what they want from other objects meanwhile.
     #[inline(always)]
-    fn open(&self, &Visitors { first, rays, .. }: &Visitors) -> u64 {
+    fn open(&self, &DeferredRays { first, rays, .. }: &DeferredRays) -> u64 {
         let (mut open, mut rest) = (rays, rays);
         while rest != 0 {
             let ray = rest.trailing_zeros();
@@ -57,7 +57,7 @@ impl<'a, Q: Query> Queue<'a, Q> {
     /// Up to eight more.
     #[inline(always)]
     fn prepare<S: Simd>(&mut self) {
-        let Visitors { place, first, rays: open } = self.current;
+        let DeferredRays { place, first, rays: open } = self.current;
         (self.group, self.slot) = (lowest_eight(open), 0);
         self.current.rays &= !self.group;
         let rays = &self.rays[first..];
@@ -77,26 +77,26 @@ impl<'a, Q: Query> Queue<'a, Q> {
     }
 }
 
-impl<Q: Query> Departures for Queue<'_, Q> {
+impl<Q: Query> RaySource for DeferredQueue<'_, Q> {
     #[inline(always)]
     fn next<S: Simd>(&mut self) -> Option<Start> {
         loop {
             if self.group == 0 {
                 if self.current.rays == 0 {
                     let next = *self.waiting.next()?;
-                    self.current = Visitors { rays: self.open(&next), ..next };
+                    self.current = DeferredRays { rays: self.open(&next), ..next };
                     continue;
                 }
                 self.prepare::<S>();
                 continue;
             }
-            let Visitors { place, first, .. } = self.current;
+            let DeferredRays { place, first, .. } = self.current;
             let ray = first + self.group.trailing_zeros() as usize;
             self.group &= self.group - 1;
             self.slot += 1;
             if !Q::is_enough(self.answers[ray].get()) {
                 let object = self.bvh.placements.at(place).object;
-                return Some(Start { ray, place, space: Space::object(object) });
+                return Some(Start { ray, place, tree_id: TreeId::object(object) });
             }
         }
     }
