@@ -6,7 +6,7 @@
 use crate::math::Vec3;
 use crate::ray::Ray;
 use crate::shade::SurfacePoint;
-use crate::shade::fog::{Stretch, stretch};
+use crate::shade::fog::{FogSegment, segment};
 
 use super::Renderer;
 use super::media::Surroundings;
@@ -15,27 +15,27 @@ use super::wavefront::Path;
 impl Renderer<'_> {
     /// What the fog does on a ray to `point`; none where there is none.
     #[inline]
-    pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<Stretch> {
+    pub(super) fn fog_on(&self, path: &Path, ray: &Ray, point: &SurfacePoint) -> Option<FogSegment> {
         let fog = self.plan.fog.as_ref()?;
         (self.surroundings(path, point, true) == Surroundings::Outside)
-            .then(|| stretch(fog, path.way(ray.direction, point)))
+            .then(|| segment(fog, path.way(ray.direction, point)))
     }
 
     /// The same for a ray that hits nothing.
     #[inline]
-    pub(super) fn fog_beyond(&self, path: &Path) -> Option<Stretch> {
+    pub(super) fn fog_beyond(&self, path: &Path) -> Option<FogSegment> {
         let fog = self.plan.fog.as_ref()?;
-        path.media.is_outside().then(|| stretch(fog, fog.reach))
+        path.media.is_outside().then(|| segment(fog, fog.reach))
     }
 }
 
 impl Path {
     /// Goes on behind the fog; what came in on the way is the light that is returned.
     #[inline]
-    pub(super) fn pass(&mut self, fog: Option<Stretch>) -> Vec3 {
-        let Some(Stretch { left, added }) = fog else { return Vec3::ZERO };
-        let added = self.weight * added;
-        self.weight *= left;
+    pub(super) fn pass(&mut self, fog: Option<FogSegment>) -> Vec3 {
+        let Some(FogSegment { left, added }) = fog else { return Vec3::ZERO };
+        let added = self.throughput * added;
+        self.throughput *= left;
         added
     }
 }

@@ -5,7 +5,7 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Absorption, Interface, Material};
-use crate::shade::light::{Illumination, LightSource};
+use crate::shade::light::{LightSample, LightSource};
 use crate::shade::{SurfacePoint, fog};
 
 use super::Renderer;
@@ -75,12 +75,12 @@ impl Renderer<'_> {
     ///
     /// Of what is absorbed only lights know that cast shadows: the surface of the body that they are outside of hides them. What comes from infinitely
     /// far is absorbed by nothing, as where rays hit nothing.
-    pub(super) fn left_of_light(
+    pub(super) fn light_transmittance(
         &self,
         path: &Path,
         point: &SurfacePoint,
         source: &LightSource,
-        arriving: &Illumination,
+        arriving: &LightSample,
     ) -> Option<Vec3> {
         let way = |end: DVec3| (end - point.position).length() as f32;
         // Through what is rough it arrives from behind.
@@ -118,7 +118,7 @@ impl Renderer<'_> {
 impl Path {
     /// How long the way of the path's ray is from the surface that it left to `point`.
     pub(super) fn way(&self, direction: Vec3, point: &SurfacePoint) -> f32 {
-        (point.t as f32 * direction.length() + self.ahead).max(0.0)
+        (point.t as f32 * direction.length() + self.spawn_offset).max(0.0)
     }
 }
 

@@ -16,9 +16,9 @@ use crate::plan::ROULETTE_MIN_DEPTH;
 use crate::ray::{Hit, Ray};
 use crate::scene::Material;
 use crate::shade::SurfacePoint;
-use crate::shade::light::Illumination;
+use crate::shade::light::LightSample;
 use crate::shade::lights::{Chosen, Found};
-use crate::shade::scattering::{Lobes, Shading, Value, Ways};
+use crate::shade::scattering::{Bsdf, BsdfValue, Shading, SpecularDirections};
 use crate::trace::Tracer;
 
 use super::Renderer;
@@ -32,7 +32,7 @@ use super::wavefront::{Buffers, Path, Wave};
 struct Vertex<'a> {
     path: Path,
     point: &'a SurfacePoint,
-    lobes: Lobes<'a>,
+    bsdf: Bsdf<'a>,
     pattern: &'a Pattern,
     bounces: &'a Bounces,
     sample: u32,
@@ -42,14 +42,14 @@ struct Vertex<'a> {
 /// What a light answered.
 struct Asked<'a> {
     chosen: Chosen<'a>,
-    arriving: Illumination,
-    value: Value,
+    arriving: LightSample,
+    value: BsdfValue,
     /// What is left of its light on the way; none for all of it.
     left: Option<Vec3>,
     /// What the answer counts, by the choice of this light and of this way to find it.
     share: f32,
     /// What the pixel gets if nothing is in between.
-    worth: Vec3,
+    contribution: Vec3,
 }
 
 impl Renderer<'_> {
@@ -90,7 +90,7 @@ impl Renderer<'_> {
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
                 let fog = path.pass(self.fog_beyond(&path));
-                let share = path.weight * self.share_of_environment(&path, ray);
+                let share = path.throughput * self.share_of_environment(&path, ray);
                 let seen = share.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
@@ -101,22 +101,24 @@ impl Renderer<'_> {
             };
             let point = self.surface(ray, hit);
             let material = &*self.appearance(&point);
-            path.weight *= self.transmittance(&path, ray.direction, &point);
+            path.throughput *= self.transmittance(&path, ray.direction, &point);
             let fog = path.pass(self.fog_on(&path, ray, &point));
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
-            let own = path.weight * self.glow(&path, ray, hit, &point, material, shading.base) + fog;
+            let own = path.throughput * self.glow(&path, ray, hit, &point, material, shading.base) + fog;
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
             if let Some(tally) = &mut tally {
                 tally.add(path.pixel, route, own);
             }
-            let ways = Ways::new(material, &point, shading.direction());
-            let Some(lobes) = Lobes::new(&shading, ways, material.gloss) else { continue };
+            let ways = SpecularDirections::new(material, &point, shading.direction());
+            let Some(bsdf) = Bsdf::new(&shading, ways, material.gloss) else { continue };
             let (pattern, bounces) = (&patterns[path.pixel as usize], &bounces[path.pixel as usize]);
-            let vertex = Vertex { path, point: &point, lobes, pattern, bounces, sample, depth };
-            let is_choice = self.lights.is_choice() || vertex.lobes.is_choice();
+            let vertex = Vertex { path, point: &point, bsdf, pattern, bounces, sample, depth };
+            let is_choice = self.lights.is_choice() || vertex.bsdf.is_choice();
             let DVec2 { x: light, y: lobe } = if is_choice { self.choice(&vertex, Choice::Which) } else { DVec2::ZERO };
-            if let Some(Asked { chosen, arriving, value, left, share, worth }) = self.ask(&vertex, light) {
+            if let Some(Asked { chosen, arriving, value, left, share, contribution }) =
+                self.sample_light(&vertex, light)
+            {
                 trail.light(&path, vertex.point, || {
                     let faces = shading.faces(arriving.to_light);
                     let [diffuse, highlight] = if faces { shading.lobes(arriving.to_light) } else { [Vec3::ZERO; 2] };
@@ -127,17 +129,22 @@ impl Renderer<'_> {
                         lobes: [diffuse, highlight, value.share - diffuse - highlight],
                         left: left.unwrap_or(Vec3::ONE),
                         share,
-                        contribution: worth,
+                        contribution,
                     }
                 });
-                let sent =
-                    Sent { source: chosen.source, arriving: &arriving, point: vertex.point, pixel: path.pixel, worth };
+                let sent = Sent {
+                    source: chosen.source,
+                    arriving: &arriving,
+                    point: vertex.point,
+                    pixel: path.pixel,
+                    contribution,
+                };
                 let told = tally.as_deref_mut().map(|tally| {
-                    (tally, Parts::new(route, worth, vertex.lobes.parts(arriving.to_light, chosen.can_be_found)))
+                    (tally, Parts::new(route, contribution, vertex.bsdf.parts(arriving.to_light, chosen.can_be_found)))
                 });
                 shadows.add(&sent, radiance, told);
             }
-            if let (true, Some((ray, path))) = (depth < self.plan.depth, self.go_on(&vertex, lobe)) {
+            if let (true, Some((ray, path))) = (depth < self.plan.depth, self.extend_path(&vertex, lobe)) {
                 if let Some(tally) = &tally {
                     onwards.routes.push(self.route_on(tally, &vertex, route, &ray, &path));
                 }
@@ -156,9 +163,9 @@ impl Renderer<'_> {
     /// What share of the light from around the scene counts that a ray finds which hits nothing.
     fn share_of_environment(&self, path: &Path, ray: &Ray) -> f32 {
         match &self.environment {
-            Some(environment) if path.density > 0.0 => {
-                let asked = self.lights.environment_density(environment, ray.direction.as_dvec3());
-                power_heuristic(f64::from(path.density), asked)
+            Some(environment) if path.pdf > 0.0 => {
+                let asked = self.lights.environment_pdf(environment, ray.direction.as_dvec3());
+                power_heuristic(f64::from(path.pdf), asked)
             }
             _ => 1.0,
         }
@@ -174,80 +181,87 @@ impl Renderer<'_> {
         material: &Material,
         emission: Vec3,
     ) -> Vec3 {
-        if path.density == 0.0 || emission == Vec3::ZERO || material.unlit {
+        if path.pdf == 0.0 || emission == Vec3::ZERO || material.unlit {
             return emission;
         }
         match self.lights.found(hit, point, ray.origin.as_dvec3(), emission) {
             Found::Alone => emission,
-            Found::Shared { radiance, density } => radiance * power_heuristic(f64::from(path.density), density),
+            Found::Shared { radiance, pdf } => radiance * power_heuristic(f64::from(path.pdf), pdf),
             Found::Dark => Vec3::ZERO,
         }
     }
 
-    /// Light from one of the lights, and what it is worth if nothing is in between.
-    fn ask(&self, vertex: &Vertex<'_>, choice: f64) -> Option<Asked<'_>> {
-        if !vertex.lobes.has_values() {
+    /// Light from one of the lights, and what it contributes if nothing is in between.
+    fn sample_light(&self, vertex: &Vertex<'_>, choice: f64) -> Option<Asked<'_>> {
+        if !vertex.bsdf.has_values() {
             return None;
         }
         let chosen = self.lights.choose(choice)?;
         let xi = if chosen.source.is_extended() { self.choice(vertex, Choice::Light) } else { DVec2::ZERO };
         // From where rays start that find it, or the two estimates would be weighed by different distances.
-        let is_found_from_above = chosen.can_be_found && !vertex.lobes.go_through();
+        let is_found_from_above = chosen.can_be_found && !vertex.bsdf.go_through();
         let lift = if is_found_from_above { vertex.point.lift } else { DVec3::ZERO };
-        let arriving = chosen.source.illuminate(vertex.point.position + lift, xi)?;
-        let value = vertex.lobes.lit(arriving.to_light, chosen.can_be_found);
-        let share = match arriving.density {
+        let arriving = chosen.source.sample(vertex.point.position + lift, xi)?;
+        let value = vertex.bsdf.eval(arriving.to_light, chosen.can_be_found);
+        let share = match arriving.pdf {
             // Where the path ends, nothing else finds the light.
-            Some(density) if chosen.can_be_found && vertex.depth < self.plan.depth => {
-                power_heuristic(density * chosen.chance, value.density)
+            Some(pdf) if chosen.can_be_found && vertex.depth < self.plan.depth => {
+                power_heuristic(pdf * chosen.chance, value.pdf)
             }
             _ => 1.0,
         };
-        let left = self.left_of_light(&vertex.path, vertex.point, chosen.source, &arriving);
+        let left = self.light_transmittance(&vertex.path, vertex.point, chosen.source, &arriving);
         let share = share / chosen.chance as f32;
-        let mut worth = vertex.path.weight * value.share * arriving.color * share;
+        let mut contribution = vertex.path.throughput * value.share * arriving.color * share;
         if let Some(left) = left {
-            worth *= left;
+            contribution *= left;
         }
-        (worth != Vec3::ZERO && worth.is_finite()).then_some(Asked { chosen, arriving, value, left, share, worth })
+        (contribution != Vec3::ZERO && contribution.is_finite()).then_some(Asked {
+            chosen,
+            arriving,
+            value,
+            left,
+            share,
+            contribution,
+        })
     }
 
     /// How light comes to the eye that the ray finds which goes on.
     fn route_on(&self, tally: &Tally, vertex: &Vertex<'_>, route: Route, ray: &Ray, path: &Path) -> Route {
         let direction = ray.direction.as_dvec3();
-        if path.density == 0.0 {
+        if path.pdf == 0.0 {
             let goes_through = !vertex.point.is_above(direction);
             return tally.after(route, if goes_through { Event::Transmitted } else { Event::Specular });
         }
         // The other number of the pair says whether the path ends.
         let xi = self.choice(vertex, Choice::End).y;
-        tally.choose(route, vertex.lobes.parts(direction.normalize(), true), xi)
+        tally.choose(route, vertex.bsdf.parts(direction.normalize(), true), xi)
     }
 
     /// The ray that goes on from a surface, if any does.
-    fn go_on(&self, vertex: &Vertex<'_>, choice: f64) -> Option<(Ray, Path)> {
-        let Vertex { path, point, lobes, depth, .. } = vertex;
-        let scattered = lobes.sample(choice, self.choice(vertex, Choice::Direction))?;
-        let mut weight = path.weight * scattered.weight;
-        let scale = path.scale * scattered.scale;
+    fn extend_path(&self, vertex: &Vertex<'_>, choice: f64) -> Option<(Ray, Path)> {
+        let Vertex { path, point, bsdf, depth, .. } = vertex;
+        let scattered = bsdf.sample(choice, self.choice(vertex, Choice::Direction))?;
+        let mut throughput = path.throughput * scattered.weight;
+        let eta_scale = path.eta_scale * scattered.scale;
         if *depth >= ROULETTE_MIN_DEPTH {
             // What radiance lost on its way into glass it gains on the way out. What has lost nothing goes on: to end it now and then would
             // make what is left worth more than there is light.
-            let chance = (weight.max_element() / scale).min(1.0);
+            let chance = (throughput.max_element() / eta_scale).min(1.0);
             if self.choice(vertex, Choice::End).x >= f64::from(chance) {
                 return None;
             }
-            weight /= chance;
+            throughput /= chance;
         }
         let goes_through = !point.is_above(scattered.direction);
         let media = if goes_through { self.media_behind(path, point) } else { path.media };
-        let density = scattered.density.map_or(0.0, |density| density as f32);
+        let pdf = scattered.pdf.map_or(0.0, |pdf| pdf as f32);
         let ray = point.spawn(scattered.direction.as_vec3(), f32::INFINITY);
-        Some((ray, Path { weight, media, density, scale, ahead: point.ahead(&ray), ..*path }))
+        Some((ray, Path { throughput, media, pdf, eta_scale, spawn_offset: point.ahead(&ray), ..*path }))
     }
 }
 
-/// What share of an estimate counts that was chosen with density `own`, beside one with `other`.
+/// What share of an estimate counts that was chosen with pdf `own`, beside one with `other`.
 fn power_heuristic(own: f64, other: f64) -> f32 {
     if own.is_infinite() {
         return 1.0;

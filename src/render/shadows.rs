@@ -3,7 +3,7 @@
 use crate::math::{Vec3, Vec4};
 use crate::ray::Ray;
 use crate::shade::SurfacePoint;
-use crate::shade::light::{Illumination, LightSource};
+use crate::shade::light::{LightSample, LightSource};
 use crate::trace::{Batch, Tracer};
 
 use super::Renderer;
@@ -23,11 +23,11 @@ pub(super) struct Shadows {
 /// What a light sends to a pixel by way of a surface.
 pub(super) struct Sent<'a> {
     pub(super) source: &'a LightSource,
-    pub(super) arriving: &'a Illumination,
+    pub(super) arriving: &'a LightSample,
     pub(super) point: &'a SurfacePoint,
     pub(super) pixel: u32,
     /// What the pixel gets if nothing is in between.
-    pub(super) worth: Vec3,
+    pub(super) contribution: Vec3,
 }
 
 impl Shadows {
@@ -40,13 +40,13 @@ impl Shadows {
     /// Keeps it until the shadow rays are traced; what casts no shadows is there at once. `tally` is what light is told apart in, if it is, and by what parts.
     #[inline]
     pub(super) fn add(&mut self, sent: &Sent<'_>, radiance: &mut [Vec4], tally: Option<(&mut Tally, Parts)>) {
-        let Sent { source, arriving, point, pixel, worth } = *sent;
+        let Sent { source, arriving, point, pixel, contribution } = *sent;
         if source.casts_shadows {
             self.rays.push(LightSource::shadow_ray(point, arriving));
-            self.light.push((pixel, worth));
+            self.light.push((pixel, contribution));
             self.parts.extend(tally.map(|(_, parts)| parts));
         } else {
-            radiance[pixel as usize] += worth.extend(0.0);
+            radiance[pixel as usize] += contribution.extend(0.0);
             if let Some((tally, parts)) = tally {
                 tally.add_parts(pixel, &parts, 1.0);
             }
@@ -55,8 +55,8 @@ impl Shadows {
 
     /// Adds what arrives: of each ray the share that nothing is in the way of.
     pub(super) fn settle(&self, free: impl Fn(usize) -> f32, radiance: &mut [Vec4], tally: Option<&mut Tally>) {
-        for (i, (pixel, worth)) in self.light.iter().enumerate().filter(|(i, _)| free(*i) > 0.0) {
-            radiance[*pixel as usize] += (*worth * free(i)).extend(0.0);
+        for (i, (pixel, contribution)) in self.light.iter().enumerate().filter(|(i, _)| free(*i) > 0.0) {
+            radiance[*pixel as usize] += (*contribution * free(i)).extend(0.0);
         }
         let Some(tally) = tally else { return };
         for (i, ((pixel, _), parts)) in self.light.iter().zip(&self.parts).enumerate().filter(|(i, _)| free(*i) > 0.0) {
@@ -66,7 +66,7 @@ impl Shadows {
 }
 
 impl Renderer<'_> {
-    /// Traces the shadow rays, and adds what is worth those that are free.
+    /// Traces the shadow rays, and adds what those that are free contribute.
     pub(super) fn add_unshadowed<T: Tracer + ?Sized>(&self, tracer: &T, batch: Batch, buffers: &mut Buffers) {
         let Buffers { radiance, shadows, tally, occluded, trail, .. } = buffers;
         if shadows.rays.is_empty() {

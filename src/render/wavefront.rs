@@ -84,32 +84,32 @@ pub(super) struct Path {
     /// Index in the tile.
     pub(super) pixel: u32,
     /// Share of what the ray sees that reaches the pixel.
-    pub(super) weight: Vec3,
+    pub(super) throughput: Vec3,
     /// Number of the ray in the sample's tree of rays: 0 for the camera's, 2 n + 1 and 2 n + 2 for those that n sends on.
     pub(super) branch: u32,
     /// What the ray is inside of.
     pub(super) media: Media,
     /// How densely its direction was chosen, per steradian; 0 where no other could have been.
-    pub(super) density: f32,
-    /// By how much radiance grew where it was refracted, all in all.
-    pub(super) scale: f32,
+    pub(super) pdf: f32,
+    /// By how much radiance grew where it was refracted, all in all: the product of squared relative indices of refraction.
+    pub(super) eta_scale: f32,
     /// How large a share of the pixel may be left out of what the ray and those that follow from it see.
-    pub(super) allowance: f32,
+    pub(super) error_budget: f32,
     /// How much of its way, from the surface that it leaves, lies before its origin.
-    pub(super) ahead: f32,
+    pub(super) spawn_offset: f32,
 }
 
 impl Path {
     /// A camera ray's.
     const CAMERA: Self = Self {
         pixel: 0,
-        weight: Vec3::ONE,
+        throughput: Vec3::ONE,
         branch: 0,
         media: Media::OUTSIDE,
-        density: 0.0,
-        scale: 1.0,
-        allowance: 0.0,
-        ahead: 0.0,
+        pdf: 0.0,
+        eta_scale: 1.0,
+        error_budget: 0.0,
+        spawn_offset: 0.0,
     };
 }
 
@@ -205,7 +205,7 @@ impl Renderer<'_> {
         hits.resize(patterns.len(), None);
         // Camera paths differ in their pixel alone, and nobody changes them: those of the last sample stay.
         let known = paths.len();
-        paths.resize(patterns.len(), Path { allowance: self.plan.faint, ..Path::CAMERA });
+        paths.resize(patterns.len(), Path { error_budget: self.plan.faint, ..Path::CAMERA });
         paths.iter_mut().zip(0..).skip(known).for_each(|(path, pixel)| path.pixel = pixel);
         let (groups, rest) = match &self.view {
             View::Pinhole(pinhole) => {

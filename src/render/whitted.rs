@@ -13,7 +13,7 @@ use std::ops::Range;
 use crate::math::{DVec2, Vec3};
 use crate::scene::Integrator;
 use crate::shade::SurfacePoint;
-use crate::shade::scattering::{Shading, Ways};
+use crate::shade::scattering::{Shading, SpecularDirections};
 use crate::trace::{Batch, Tracer};
 
 use super::Renderer;
@@ -92,7 +92,7 @@ impl Renderer<'_> {
             let pixel = &mut radiance[path.pixel as usize];
             let Some(hit) = hit else {
                 let fog = path.pass(self.fog_beyond(&path));
-                let seen = path.weight.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
+                let seen = path.throughput.extend(1.0) * self.behind(ray.direction, depth == 0) + fog.extend(0.0);
                 trail.ray(self, depth, ray, &path, None, seen.truncate());
                 *pixel += seen;
                 if let Some(tally) = tally {
@@ -103,17 +103,17 @@ impl Renderer<'_> {
             let point = self.surface(ray, hit);
             let material = &*self.appearance(&point);
             let shading = Shading::new(&point, ray.direction, material, &self.scene.textures, self.ambient);
-            path.weight *= self.transmittance(&path, ray.direction, &point);
+            path.throughput *= self.transmittance(&path, ray.direction, &point);
             let fog = path.pass(self.fog_on(&path, ray, &point));
-            let own = path.weight * shading.base + fog;
+            let own = path.throughput * shading.base + fog;
             trail.ray(self, depth, ray, &path, Some((hit, &point)), own);
             *pixel += own.extend(coverage);
             if let Some(tally) = tally.as_deref_mut().filter(|tally| tally.follows()) {
                 // Ambient light is scattered, what a surface gives off is not.
                 let dark = Shading::new(&point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
-                tally.add(path.pixel, route, path.weight * dark.base + fog);
+                tally.add(path.pixel, route, path.throughput * dark.base + fog);
                 let scattered = tally.after(route, Event::Diffuse);
-                tally.add(path.pixel, scattered, path.weight * (shading.base - dark.base));
+                tally.add(path.pixel, scattered, path.throughput * (shading.base - dark.base));
             }
             lit.push(Lit { path, route, direction: ray.direction, point, shading });
         }
@@ -128,14 +128,14 @@ impl Renderer<'_> {
         wave.clear();
         for Lit { path, route, direction, point, shading } in lit {
             let material = &*self.appearance(point);
-            let ways = Ways::new(material, point, direction.as_dvec3().normalize());
-            let weights = [&ways.mirrored, &ways.refracted]
-                .map(|way| way.as_ref().map_or(Vec3::ZERO, |way| path.weight * way.share * way.scale));
-            let (is_followed, allowance) = followed(weights.map(Vec3::max_element), path.allowance);
-            let ways = [(1, ways.mirrored, Event::Specular), (2, ways.refracted, Event::Transmitted)];
+            let on = SpecularDirections::new(material, point, direction.as_dvec3().normalize());
+            let throughputs = [&on.mirrored, &on.refracted]
+                .map(|way| way.as_ref().map_or(Vec3::ZERO, |way| path.throughput * way.share * way.scale));
+            let (is_followed, error_budget) = followed(throughputs.map(Vec3::max_element), path.error_budget);
+            let ways = [(1, on.mirrored, Event::Specular), (2, on.refracted, Event::Transmitted)];
             for (k, (which, way, event)) in ways.into_iter().enumerate() {
                 let Some(way) = way.filter(|_| is_followed[k]) else { continue };
-                let weight = weights[k];
+                let throughput = throughputs[k];
                 let branch = path.branch.wrapping_mul(2).wrapping_add(which);
                 let direction = match material.gloss {
                     None => Some(way.direction),
@@ -147,7 +147,14 @@ impl Renderer<'_> {
                 let Some(direction) = direction else { continue };
                 let ray = point.spawn(direction.as_vec3(), f32::INFINITY);
                 let media = if which == 2 { self.media_behind(path, point) } else { path.media };
-                wave.paths.push(Path { weight, branch, media, allowance, ahead: point.ahead(&ray), ..*path });
+                wave.paths.push(Path {
+                    throughput,
+                    branch,
+                    media,
+                    error_budget,
+                    spawn_offset: point.ahead(&ray),
+                    ..*path
+                });
                 wave.rays.push(ray);
                 if let Some(tally) = tally {
                     wave.routes.push(tally.after(*route, event));
@@ -162,12 +169,12 @@ impl Renderer<'_> {
         let (Integrator::RayCast, Some(environment)) = (self.plan.integrator, &self.environment) else { return };
         let Buffers { radiance, lit, tally, trail, .. } = buffers;
         for Lit { path, route, direction, point, .. } in lit.iter() {
-            let ways = Ways::new(&self.appearance(point), point, direction.as_dvec3().normalize());
+            let ways = SpecularDirections::new(&self.appearance(point), point, direction.as_dvec3().normalize());
             for (way, event) in [(ways.mirrored, Event::Specular), (ways.refracted, Event::Transmitted)] {
                 let Some(way) = way else { continue };
-                let mut path = Path { weight: path.weight * way.share, ..*path };
+                let mut path = Path { throughput: path.throughput * way.share, ..*path };
                 let fog = path.pass(self.fog_beyond(&path));
-                let seen = path.weight * environment.radiance(way.direction) + fog;
+                let seen = path.throughput * environment.radiance(way.direction) + fog;
                 let faked = point.spawn(way.direction.as_vec3(), f32::INFINITY);
                 trail.ray(self, 1, &faked, &path, None, seen);
                 radiance[path.pixel as usize] += seen.extend(0.0);
@@ -193,7 +200,7 @@ impl Renderer<'_> {
         shadows.clear();
         let mut tally = tally.as_deref_mut().filter(|tally| tally.follows());
         for Lit { path, route, point, shading, .. } in lit.iter() {
-            let weight = if count == 1 { path.weight } else { path.weight / count as f32 };
+            let weight = if count == 1 { path.throughput } else { path.throughput / count as f32 };
             for k in 0..count {
                 let xi = if light.is_extended() {
                     let dimension = Dimension::light(index, path.branch);
@@ -201,11 +208,11 @@ impl Renderer<'_> {
                 } else {
                     DVec2::ZERO
                 };
-                let Some(arriving) = light.illuminate(point.position, xi) else { continue };
+                let Some(arriving) = light.sample(point.position, xi) else { continue };
                 if !shading.faces(arriving.to_light) {
                     continue;
                 }
-                let left = self.left_of_light(path, point, light, &arriving);
+                let left = self.light_transmittance(path, point, light, &arriving);
                 let [diffuse, highlight] = shading.lobes(arriving.to_light);
                 let mut reflected = weight * ((diffuse + highlight) * arriving.color);
                 if let Some(left) = left {
@@ -220,7 +227,8 @@ impl Renderer<'_> {
                     share: 1.0 / count as f32,
                     contribution: reflected,
                 });
-                let sent = Sent { source: light, arriving: &arriving, point, pixel: path.pixel, worth: reflected };
+                let sent =
+                    Sent { source: light, arriving: &arriving, point, pixel: path.pixel, contribution: reflected };
                 let told = tally
                     .as_deref_mut()
                     .map(|tally| (tally, Parts::new(*route, reflected, [diffuse, highlight, Vec3::ZERO])));
@@ -252,8 +260,8 @@ impl Wave {
 
 /// Which of two ways are followed, and what each of these may leave out: the smaller ones are not as long as they fit into what may be left out, and the rest of that is
 /// shared. So all that is left out of a tree of rays, however large, stays below what its first ray may leave out.
-fn followed(shares: [f32; 2], allowance: f32) -> ([bool; 2], f32) {
-    let (mut is_followed, mut left) = ([true; 2], allowance);
+fn followed(shares: [f32; 2], error_budget: f32) -> ([bool; 2], f32) {
+    let (mut is_followed, mut left) = ([true; 2], error_budget);
     let smaller = usize::from(shares[1] < shares[0]);
     for k in [smaller, 1 - smaller] {
         if shares[k] <= left {

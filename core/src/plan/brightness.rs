@@ -26,7 +26,7 @@ pub(super) fn bound(scene: &Scene, world: &World) -> f32 {
     let (tint, ambient) = (largest_tint(scene), scene.ambient.max_element());
     let of_material = |material: &Material| surface(material, tint, ambient, arriving + environment);
     let surfaces = scene.materials.iter().map(of_material).fold(0.0, f32::max);
-    let denser: f32 = scene.materials.iter().map(density).product();
+    let denser: f32 = scene.materials.iter().map(radiance_scale).product();
     [environment, behind, fog, surfaces].into_iter().fold(1.0, f32::max) * denser
 }
 
@@ -110,7 +110,7 @@ fn surface(material: &Material, tint: f32, ambient: f32, arriving: f32) -> f32 {
 }
 
 /// By how much light is denser on one side of a surface than on the other.
-fn density(material: &Material) -> f32 {
+fn radiance_scale(material: &Material) -> f32 {
     let refracts = material.transmission.max_element() > 0.0;
     if refracts { material.ior.max(material.ior.recip()).powi(2) } else { 1.0 }
 }

@@ -96,7 +96,7 @@ mod tests {
                 let share = (random.vector().as_dvec3() + 1.0) / 2.0;
                 let point = bounds.min + (bounds.max - bounds.min) * share;
                 let xi = DVec2::new(random.unit().into(), random.unit().into());
-                source.illuminate(point, xi).is_some_and(|arriving| arriving.color != Vec3::ZERO)
+                source.sample(point, xi).is_some_and(|arriving| arriving.color != Vec3::ZERO)
             });
             let reached = reaches(&light, &bounds);
             assert!(reached || !gives, "{light:?}");

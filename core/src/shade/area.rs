@@ -2,7 +2,7 @@
 //! for direct lighting calculations*), by the solid angle they fill for rectangles and disks that are near, by area for other flat ones.
 
 use super::ellipse::SphericalEllipse;
-use super::light::Illumination;
+use super::light::LightSample;
 use super::rectangle::SphericalRectangle;
 use crate::math::{DVec2, DVec3, UNIT_ROUNDOFF, Vec3, gamma, tangents};
 use crate::scene::AreaShape;
@@ -15,7 +15,7 @@ const MIN_COSINE: f64 = 1e-3;
 
 /// What arrives at `point` from the part of the light that `xi`, a point of the unit square, chooses, as if all of it
 /// shone like that part; none where the light turns its back.
-pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DVec2) -> Option<Illumination> {
+pub(super) fn sample(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DVec2) -> Option<LightSample> {
     match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
@@ -27,8 +27,8 @@ pub(super) fn illuminate(shape: &AreaShape, radiance: Vec3, point: DVec3, xi: DV
         }
         AreaShape::Disk { centre, normal, radius } => {
             if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
-                let (offset, density) = seen.at(xi);
-                return Some(towards(point, offset, density, radiance, normal));
+                let (offset, pdf) = seen.at(xi);
+                return Some(towards(point, offset, pdf, radiance, normal));
             }
             let [x, y] = tangents(normal);
             let (distance, angle) = (radius * xi.x.sqrt(), xi.y * std::f64::consts::TAU);
@@ -48,17 +48,17 @@ fn near(point: DVec3, centre: DVec3, half_edges: [DVec3; 2]) -> Option<Spherical
 }
 
 /// From the light at `offset` from the point, in whose direction as many are chosen, per steradian; `across` is a vector across it.
-fn towards(point: DVec3, offset: DVec3, density: f64, radiance: Vec3, across: DVec3) -> Illumination {
+fn towards(point: DVec3, offset: DVec3, pdf: f64, radiance: Vec3, across: DVec3) -> LightSample {
     let to_light = offset.normalize();
     let cosine = to_light.dot(across.normalize_or_zero());
-    let color = radiance * (1.0 / (std::f64::consts::PI * density)) as f32;
+    let color = radiance * (1.0 / (std::f64::consts::PI * pdf)) as f32;
     let end = Some(short_of(point + offset, to_light, point, cosine));
-    Illumination { to_light, color, end, density: Some(density) }
+    LightSample { to_light, color, end, pdf: Some(pdf) }
 }
 
 /// From a point on a flat light of the given area (a vector across it): E = L cos A / d^2, of which a white matte surface
 /// sends on 1 / pi.
-fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumination> {
+fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<LightSample> {
     let offset = at - point;
     let squared = offset.length_squared();
     let to_light = offset.try_normalize()?;
@@ -68,12 +68,12 @@ fn flat(point: DVec3, at: DVec3, area: DVec3, radiance: Vec3) -> Option<Illumina
     }
     let color = radiance * (facing / (std::f64::consts::PI * squared)) as f32;
     let end = Some(short_of(at, to_light, point, facing / area.length()));
-    let density = Some(squared / facing);
-    color.is_finite().then_some(Illumination { to_light, color, end, density })
+    let pdf = Some(squared / facing);
+    color.is_finite().then_some(LightSample { to_light, color, end, pdf })
 }
 
 /// From a direction of the cone that the sphere fills; none where a point on it looks away from it.
-fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -> Option<Illumination> {
+fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -> Option<LightSample> {
     let offset = centre - point;
     let distance = offset.length();
     let axis = offset.try_normalize().unwrap_or(DVec3::Y);
@@ -92,9 +92,9 @@ fn sphere(point: DVec3, centre: DVec3, radius: f64, radiance: Vec3, xi: DVec2) -
     let half_chord = (radius * radius - (distance * off_axis).powi(2)).max(0.0).sqrt();
     let way = distance * cosine + if side == Side::Outside { -half_chord } else { half_chord };
     let at = point + to_light * way.max(0.0);
-    let density = Some(1.0 / (std::f64::consts::TAU * opening));
+    let pdf = Some(1.0 / (std::f64::consts::TAU * opening));
     let end = Some(short_of(at, to_light, point, half_chord / radius));
-    Some(Illumination { to_light, color, end, density })
+    Some(LightSample { to_light, color, end, pdf })
 }
 
 /// The cone that a sphere fills, as 1 - cos of its half angle, without the difference; of all directions for a point inside.
@@ -130,9 +130,9 @@ impl Side {
     }
 }
 
-/// How densely [`illuminate`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where the
+/// How densely [`sample`] chooses the direction from `point` to `at`, a point of the light, per steradian; none where the
 /// light turns its back.
-pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
+pub(super) fn pdf(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64> {
     let area = match *shape {
         AreaShape::Rectangle { centre, half_edges: [a, b] } => {
             if let Some(seen) = near(point, centre, [a, b]) {
@@ -142,7 +142,7 @@ pub(super) fn density(shape: &AreaShape, point: DVec3, at: DVec3) -> Option<f64>
         }
         AreaShape::Disk { centre, normal, radius } => {
             if let Some(seen) = SphericalEllipse::seen_from(point, centre, normal, radius) {
-                return Some(seen.density(at - point));
+                return Some(seen.pdf(at - point));
             }
             normal * (std::f64::consts::PI * radius * radius)
         }
@@ -175,7 +175,7 @@ mod tests {
 
     fn mean(side: i32, shape: &AreaShape, point: DVec3, normal: DVec3) -> f64 {
         let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-        let each = (0..side * side).filter_map(|k| illuminate(shape, Vec3::ONE, point, xi(k)));
+        let each = (0..side * side).filter_map(|k| sample(shape, Vec3::ONE, point, xi(k)));
         each.map(|light| f64::from(light.color.x) * light.to_light.dot(normal).max(0.0)).sum::<f64>()
             / f64::from(side * side)
     }
@@ -210,14 +210,14 @@ mod tests {
             half_edges: [DVec3::Z * b / 2.0, DVec3::X * a / 2.0],
         };
         assert_eq!(reflected(&turned, DVec3::ZERO, DVec3::Y), 0.0, "and this one up");
-        assert_eq!(density(&turned, DVec3::ZERO, DVec3::Y * d), None);
+        assert_eq!(pdf(&turned, DVec3::ZERO, DVec3::Y * d), None);
         let back = AreaShape::Disk { centre: up, normal: DVec3::Y, radius: r };
         assert_eq!(reflected(&back, DVec3::ZERO, DVec3::Y), 0.0, "behind it is dark");
     }
 
-    /// The density that is told afterwards is the one that was sampled with, and color is radiance / (pi density).
+    /// The pdf that is told afterwards is the one that was sampled with, and color is radiance / (pi pdf).
     #[test]
-    fn densities_agree() {
+    fn pdfs_agree() {
         let centre = DVec3::new(1.0, 4.0, 2.0);
         for shape in [
             AreaShape::Sphere { centre, radius: 1.5 },
@@ -229,9 +229,9 @@ mod tests {
             AreaShape::Rectangle { centre, half_edges: [DVec3::X * 0.1, DVec3::Z * 0.2] },
             AreaShape::Disk { centre, normal: DVec3::new(0.6, -0.8, 0.0), radius: 0.5 },
         ] {
-            let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, DVec2::new(0.3, 0.6)).unwrap();
-            let (sampled, at) = (arriving.density.unwrap(), arriving.end.unwrap());
-            let told = density(&shape, DVec3::ZERO, at).unwrap();
+            let arriving = sample(&shape, Vec3::ONE, DVec3::ZERO, DVec2::new(0.3, 0.6)).unwrap();
+            let (sampled, at) = (arriving.pdf.unwrap(), arriving.end.unwrap());
+            let told = pdf(&shape, DVec3::ZERO, at).unwrap();
             assert!((sampled / told - 1.0).abs() < 1e-4, "{shape:?}: {sampled} {told}");
             assert!((f64::from(arriving.color.x) * std::f64::consts::PI * sampled - 1.0).abs() < 1e-6);
         }
@@ -282,7 +282,7 @@ mod tests {
             let point = centre - DVec3::Y * distance;
             let expected = (radius / distance).powi(2);
             assert!((reflected(&ball, point, DVec3::Y) - expected).abs() < 1e-4);
-            let end = illuminate(&ball, Vec3::ONE, point, DVec2::new(0.01, 0.5)).unwrap().end.unwrap();
+            let end = sample(&ball, Vec3::ONE, point, DVec2::new(0.01, 0.5)).unwrap().end.unwrap();
             assert!((end - point).length() < 0.05 * radius, "{end}");
         }
     }
@@ -294,7 +294,7 @@ mod tests {
         let disk = AreaShape::Disk { centre, normal, radius: 3.0 };
         for cosine in [0.1, 0.01, 0.002] {
             let point = centre + DVec3::new(-1000.0, -1000.0 * cosine, 0.0);
-            let end = illuminate(&disk, Vec3::ONE, point, DVec2::new(0.3, 0.6)).unwrap().end.unwrap();
+            let end = sample(&disk, Vec3::ONE, point, DVec2::new(0.3, 0.6)).unwrap().end.unwrap();
             let before = (end - centre).dot(normal);
             assert!(before > 1e-3 && before < 1e-2, "{cosine}: {before}");
         }
@@ -309,7 +309,7 @@ mod tests {
         ] {
             for k in 0..100 {
                 let xi = DVec2::new(f64::from(k % 10) + 0.5, f64::from(k / 10) + 0.5) / 10.0;
-                let arriving = illuminate(&shape, Vec3::ONE, DVec3::ZERO, xi).unwrap();
+                let arriving = sample(&shape, Vec3::ONE, DVec3::ZERO, xi).unwrap();
                 let end = arriving.end.unwrap();
                 let beyond = match shape {
                     AreaShape::Sphere { .. } => (end - centre).length() - 3.0,

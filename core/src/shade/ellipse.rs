@@ -66,19 +66,19 @@ impl SphericalEllipse {
         let distance = self.height / direction.dot(self.across);
         // At the rim rounding may lead past the disk, or nearly along it.
         let distance = if distance > 0.0 { distance.min(self.farthest) } else { self.farthest };
-        (direction * distance, self.density_to_rim(squared))
+        (direction * distance, self.pdf_to_rim(squared))
     }
 
     /// How densely [`Self::at`] chooses the direction of `offset`, which meets the disk, per steradian.
-    pub(super) fn density(&self, offset: DVec3) -> f64 {
+    pub(super) fn pdf(&self, offset: DVec3) -> f64 {
         let [x, y, _] = self.axes;
         let side = DVec2::new(offset.dot(x), offset.dot(y));
         let share = (side / self.half).length_squared();
-        self.density_to_rim(if share > 0.0 { side.length_squared() / share } else { self.half.x * self.half.x })
+        self.pdf_to_rim(if share > 0.0 { side.length_squared() / share } else { self.half.x * self.half.x })
     }
 
     /// Towards a point of the rim, as its direction is chosen evenly around the ellipse. It differs by a factor of 2 at most.
-    fn density_to_rim(&self, squared: f64) -> f64 {
+    fn pdf_to_rim(&self, squared: f64) -> f64 {
         (1.0 + cosine(squared)) / (TAU * self.half.x * self.half.y)
     }
 }
@@ -129,7 +129,7 @@ mod tests {
         [0.4, 0.2, 3.5],
     ];
 
-    /// Directions, each for as much as the density says, fill the solid angle of the disk and of each part of it.
+    /// Directions, each for as much as the pdf says, fill the solid angle of the disk and of each part of it.
     #[test]
     fn disks_and_their_parts_fill_their_solid_angles() {
         for [right, up, away] in PLACES {
@@ -139,15 +139,15 @@ mod tests {
             let (side, mut sums) = (600, [0.0; 4]);
             for k in 0..side * side {
                 let xi = (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-                let (offset, density) = seen.at(xi);
+                let (offset, pdf) = seen.at(xi);
                 let at = point + offset;
                 assert!((at - CENTRE).length() < RADIUS * (1.0 + 1e-9), "{right} {up} {away}: {at}");
                 assert!((at - CENTRE).dot(normal()).abs() < 1e-9, "{right} {up} {away}: {at}");
-                let again = seen.density(offset);
-                assert!((again / density - 1.0).abs() < 1e-6, "{right} {up} {away}: {again} {density}");
+                let again = seen.pdf(offset);
+                assert!((again / pdf - 1.0).abs() < 1e-6, "{right} {up} {away}: {again} {pdf}");
                 for (sum, ([right, up], share)) in sums.iter_mut().zip(parts) {
                     if (at - place(right, up, 0.0)).length() <= share * RADIUS * (1.0 + 1e-9) {
-                        *sum += 1.0 / density / f64::from(side * side);
+                        *sum += 1.0 / pdf / f64::from(side * side);
                     }
                 }
             }

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::area::short_of;
 use super::bodies;
-use super::light::{Illumination, LightSource};
+use super::light::{LightSample, LightSource};
 use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, similarity, tangents};
 use crate::ray::Hit;
 use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
@@ -303,7 +303,7 @@ impl Patches {
     }
 
     /// What arrives at `point` from a place on a patch that `xi` chooses.
-    pub(super) fn illuminate(&self, point: DVec3, xi: DVec2) -> Option<Illumination> {
+    pub(super) fn sample(&self, point: DVec3, xi: DVec2) -> Option<LightSample> {
         let wanted = xi.x * self.total();
         let index = self.cumulative.partition_point(|&sum| sum <= wanted).min(self.patches.len().checked_sub(1)?);
         let before = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
@@ -322,15 +322,10 @@ impl Patches {
         let offset = at - point;
         let to_light = offset.try_normalize()?;
         let cosine = normal.dot(to_light).abs();
-        let density = brightness(emission) / self.total() * offset.length_squared() / cosine;
-        let color = emission * (1.0 / (PI * density)) as f32;
+        let pdf = brightness(emission) / self.total() * offset.length_squared() / cosine;
+        let color = emission * (1.0 / (PI * pdf)) as f32;
         let end = Some(short_of(at, to_light, point, cosine));
-        (density.is_finite() && color.is_finite()).then_some(Illumination {
-            to_light,
-            color,
-            end,
-            density: Some(density),
-        })
+        (pdf.is_finite() && color.is_finite()).then_some(LightSample { to_light, color, end, pdf: Some(pdf) })
     }
 }
 
@@ -362,7 +357,7 @@ mod tests {
         patches.add_triangle([corner(0.0, 0.0), corner(1.5, 0.8), corner(0.0, 0.8)], bright);
         let side = 300;
         let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
-        let each = (0..side * side).filter_map(|k| patches.illuminate(DVec3::ZERO, xi(k)));
+        let each = (0..side * side).filter_map(|k| patches.sample(DVec3::ZERO, xi(k)));
         let mean = each.map(|l| f64::from(l.color.y) * l.to_light.y).sum::<f64>() / f64::from(side * side);
         // Howell's B-3: a parallel rectangle with a corner over the element.
         let (x, y) = (0.75f64, 0.4f64);

@@ -1,18 +1,18 @@
 //! Light from infinitely far, all around, sampled where it is bright.
 //!
-//! Directions are chosen by a density that is constant within each pixel: rows by how bright they are, then a pixel of
+//! Directions are chosen by a pdf that is constant within each pixel: rows by how bright they are, then a pixel of
 //! the row (Pharr, Jakob and Humphreys 2016, *Physically Based Rendering* 14.2.4). The picture is interpolated between pixels, so a
-//! pixel counts by the mean of the interpolation over it: then nothing bright has a density of 0, but for what is below 2^-24 of its row.
+//! pixel counts by the mean of the interpolation over it: then nothing bright has a pdf of 0, but for what is below 2^-24 of its row.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use super::light::Illumination;
+use super::light::LightSample;
 use crate::image::Image;
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::Environment;
 
-/// An environment with the density of its light.
+/// An environment with the pdf of its light.
 #[derive(Clone, Debug)]
 pub struct EnvironmentLight {
     image: Arc<Image>,
@@ -69,27 +69,27 @@ impl EnvironmentLight {
     }
 
     /// Light from a direction that `xi` chooses.
-    pub(super) fn illuminate(&self, xi: DVec2) -> Option<Illumination> {
+    pub(super) fn sample(&self, xi: DVec2) -> Option<LightSample> {
         let (y, down) = choose(self.rows.len(), |i| self.rows[i], xi.y);
         let row = self.row(y);
         let (x, right) = choose(row.len(), |i| f64::from(row[i]), xi.x);
         let size = DVec2::new(f64::from(self.image.width), f64::from(self.image.height));
         let to_light = self.direction(DVec2::new(x as f64 + right, y as f64 + down) / size);
-        let density = self.density(to_light)?;
-        let color = self.radiance(to_light) * (1.0 / (PI * density)) as f32;
-        Some(Illumination { to_light, color, end: None, density: Some(density) })
+        let pdf = self.pdf(to_light)?;
+        let color = self.radiance(to_light) * (1.0 / (PI * pdf)) as f32;
+        Some(LightSample { to_light, color, end: None, pdf: Some(pdf) })
     }
 
     /// How densely a direction is chosen, per steradian; none where it never is.
-    pub fn density(&self, direction: DVec3) -> Option<f64> {
+    pub fn pdf(&self, direction: DVec3) -> Option<f64> {
         let (width, height) = (f64::from(self.image.width), f64::from(self.image.height));
         let at = self.pixel(direction);
         let (x, y) = ((at.x.max(0.0) as usize).min(width as usize - 1), (at.y as usize).min(height as usize - 1));
         let row = self.row(y);
         let share = (self.rows[y + 1] - self.rows[y]) * f64::from(row[x + 1] - row[x]);
         let around = libm::sin(at.y / height * PI);
-        let density = share * width * height / (TAU * PI * around);
-        (density > 0.0 && density.is_finite()).then_some(density)
+        let pdf = share * width * height / (TAU * PI * around);
+        (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
     fn row(&self, y: usize) -> &[f32] {
@@ -173,17 +173,17 @@ mod tests {
     }
 
     #[test]
-    fn directions_have_their_density_and_give_the_whole_light() {
+    fn directions_have_their_pdf_and_give_the_whole_light() {
         let light = light(sun, 1.0);
         let side = 400;
         let xi = |k: i32| (DVec2::new(f64::from(k % side), f64::from(k / side)) + 0.5) / f64::from(side);
         let (mut irradiance, mut area) = (0.0, 0.0);
         for k in 0..side * side {
-            let arriving = light.illuminate(xi(k)).unwrap();
-            let density = arriving.density.unwrap();
-            assert!((light.density(arriving.to_light).unwrap() / density - 1.0).abs() < 1e-12);
+            let arriving = light.sample(xi(k)).unwrap();
+            let pdf = arriving.pdf.unwrap();
+            assert!((light.pdf(arriving.to_light).unwrap() / pdf - 1.0).abs() < 1e-12);
             irradiance += f64::from(arriving.color.y) * PI;
-            area += 1.0 / density;
+            area += 1.0 / pdf;
         }
         let n = f64::from(side * side);
         // Against sums over the sphere, step by step; of the constant 1, its area.
@@ -204,6 +204,6 @@ mod tests {
     #[test]
     fn black_is_black() {
         let black = light(|_, _| Vec3::ZERO, 0.0);
-        assert_eq!(black.density(DVec3::Y), None);
+        assert_eq!(black.pdf(DVec3::Y), None);
     }
 }

@@ -10,7 +10,7 @@ use crate::scene::Fog;
 
 /// What a stretch of fog does to light that passes through.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct FogSegment {
     /// The share that is left.
     pub left: Vec3,
     /// Radiance that is added.
@@ -18,9 +18,9 @@ pub struct Stretch {
 }
 
 /// Of `length` metres, which may be infinite.
-pub fn stretch(fog: &Fog, length: f32) -> Stretch {
+pub fn segment(fog: &Fog, length: f32) -> FogSegment {
     let left = transmittance(fog, length);
-    Stretch { left, added: fog.color * (1.0 - left) }
+    FogSegment { left, added: fog.color * (1.0 - left) }
 }
 
 /// The share of light that is left after `length` metres.
@@ -38,20 +38,20 @@ mod tests {
 
     #[test]
     fn light_fades_by_beers_law_into_the_fogs_colour() {
-        let Stretch { left, added } = stretch(&FOG, 2.0);
+        let FogSegment { left, added } = segment(&FOG, 2.0);
         let expected = [(-1f64).exp(), 1.0, (-6f64).exp()].map(|x| x as f32);
         assert!((left - Vec3::from_array(expected)).abs().max_element() < 1e-7, "{left}");
         assert!((added - Vec3::new(1.0 - expected[0], 0.0, 0.25 * (1.0 - expected[2]))).abs().max_element() < 1e-7);
-        let endless = stretch(&FOG, f32::INFINITY);
+        let endless = segment(&FOG, f32::INFINITY);
         assert_eq!((endless.left, endless.added), (Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 0.0, 0.25)));
-        assert_eq!(stretch(&FOG, 0.0), Stretch { left: Vec3::ONE, added: Vec3::ZERO });
+        assert_eq!(segment(&FOG, 0.0), FogSegment { left: Vec3::ONE, added: Vec3::ZERO });
     }
 
     #[test]
     fn stretches_in_a_row_are_one() {
         let behind = Vec3::new(3.0, 0.5, 0.0);
         let through = |length, light: Vec3| {
-            let Stretch { left, added } = stretch(&FOG, length);
+            let FogSegment { left, added } = segment(&FOG, length);
             left * light + added
         };
         let (once, twice) = (through(1.75, behind), through(0.5, through(1.25, behind)));

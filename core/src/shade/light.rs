@@ -33,7 +33,7 @@ enum Kind {
 
 /// Light that arrives at a point, before any shadow.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Illumination {
+pub struct LightSample {
     /// Unit vector towards the light.
     pub to_light: DVec3,
     /// Linear RGB that a white matte surface facing the light would reflect.
@@ -41,7 +41,7 @@ pub struct Illumination {
     /// Up to where the way must be free, world coordinates; none for all of it.
     pub end: Option<DVec3>,
     /// How densely the direction was chosen, per steradian, among those to an extended light.
-    pub density: Option<f64>,
+    pub pdf: Option<f64>,
 }
 
 impl LightSource {
@@ -101,16 +101,16 @@ impl LightSource {
 
     /// What arrives at `point` if nothing is in between; none where the light does not reach. Of an extended light a part is
     /// asked that `xi`, a point of the unit square, chooses.
-    pub fn illuminate(&self, point: DVec3, xi: DVec2) -> Option<Illumination> {
+    pub fn sample(&self, point: DVec3, xi: DVec2) -> Option<LightSample> {
         match &self.kind {
             Kind::Light(light) => from_light(light, point, xi),
-            Kind::Environment(environment) => environment.illuminate(xi),
-            Kind::Patches(patches) => patches.illuminate(point, xi),
+            Kind::Environment(environment) => environment.sample(xi),
+            Kind::Patches(patches) => patches.sample(point, xi),
         }
     }
 
     /// The ray that must be free for `arriving` to reach `surface`.
-    pub fn shadow_ray(surface: &SurfacePoint, arriving: &Illumination) -> Ray {
+    pub fn shadow_ray(surface: &SurfacePoint, arriving: &LightSample) -> Ray {
         match arriving.end {
             None => surface.spawn(arriving.to_light.as_vec3(), f32::INFINITY),
             Some(end) => surface.spawn_to(end),
@@ -119,10 +119,10 @@ impl LightSource {
 }
 
 /// What arrives from a light of the scene.
-fn from_light(light: &Light, point: DVec3, xi: DVec2) -> Option<Illumination> {
+fn from_light(light: &Light, point: DVec3, xi: DVec2) -> Option<LightSample> {
     match light {
         Light::Directional { direction, color } => {
-            Some(Illumination { to_light: -*direction, color: *color, end: None, density: None })
+            Some(LightSample { to_light: -*direction, color: *color, end: None, pdf: None })
         }
         Light::Point { position, color, attenuation, range, radius } => {
             let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
@@ -133,7 +133,7 @@ fn from_light(light: &Light, point: DVec3, xi: DVec2) -> Option<Illumination> {
             }
             Some(arriving)
         }
-        Light::Area { shape, radiance } => area::illuminate(shape, *radiance, point, xi),
+        Light::Area { shape, radiance } => area::sample(shape, *radiance, point, xi),
         Light::Spot { position, direction, color, attenuation, range, inner_angle, outer_angle } => {
             let mut arriving = from_point(point, *position, *color, attenuation, *range)?;
             arriving.color *= cone(-arriving.to_light.dot(*direction), *inner_angle, *outer_angle);
@@ -148,16 +148,16 @@ fn from_point(
     color: Vec3,
     attenuation: &Attenuation,
     range: f64,
-) -> Option<Illumination> {
+) -> Option<LightSample> {
     let offset = position - point;
     let distance = offset.length();
     let color = color * (attenuation.factor(distance as f32) * window(distance, range));
     // At the light itself there is neither a direction nor, with 1 / d^2, a finite colour.
-    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO).then(|| Illumination {
+    (distance > 0.0 && color.is_finite() && color != Vec3::ZERO).then(|| LightSample {
         to_light: offset / distance,
         color,
         end: Some(position),
-        density: None,
+        pdf: None,
     })
 }
 
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn attenuates_by_the_polynomial() {
-        let arriving = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap();
+        let arriving = spot(f64::INFINITY).sample(DVec3::Y, DVec2::ZERO).unwrap();
         // At distance 2: 1 / (1 + 0.5 * 2 + 0.25 * 4) = 1/3.
         assert!((arriving.color - Vec3::new(2.0, 4.0, 8.0) / 3.0).length() < 1e-6);
         assert_eq!(arriving.to_light, DVec3::Y);
@@ -205,10 +205,10 @@ mod tests {
 
     #[test]
     fn the_range_window_is_gltfs() {
-        let full = spot(f64::INFINITY).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
-        let half = spot(4.0).illuminate(DVec3::Y, DVec2::ZERO).unwrap().color;
+        let full = spot(f64::INFINITY).sample(DVec3::Y, DVec2::ZERO).unwrap().color;
+        let half = spot(4.0).sample(DVec3::Y, DVec2::ZERO).unwrap().color;
         assert!((half - full * (1.0 - 0.5f32.powi(4))).length() < 1e-6);
-        assert_eq!(spot(2.0).illuminate(DVec3::Y, DVec2::ZERO), None);
+        assert_eq!(spot(2.0).sample(DVec3::Y, DVec2::ZERO), None);
     }
 
     #[test]
@@ -242,6 +242,6 @@ mod tests {
             range: 1.0,
             radius: 0.0,
         };
-        assert_eq!(LightSource::new(&light, DVec3::ZERO).illuminate(DVec3::ZERO, DVec2::ZERO), None);
+        assert_eq!(LightSource::new(&light, DVec3::ZERO).sample(DVec3::ZERO, DVec2::ZERO), None);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Whitted's recursion asks each of them. A path tracer asks one that is chosen by about how much it gives in the middle
 //! of the scene; a share of the choices is even, for the lights that matter elsewhere. What a scattered ray finds glowing by itself has
-//! a density in the light's terms as well, so that the two estimates can be weighed against each other.
+//! a pdf in the light's terms as well, so that the two estimates can be weighed against each other.
 
 use std::sync::Arc;
 
@@ -55,7 +55,7 @@ pub enum Found {
         /// Linear RGB.
         radiance: Vec3,
         /// Of the direct question.
-        density: f64,
+        pdf: f64,
     },
     /// The light alone decides.
     Dark,
@@ -119,15 +119,15 @@ impl Lights {
                 let squared = offset.length_squared();
                 let cosine = offset.normalize_or_zero().dot(point.normal).abs();
                 // What is rounded may start on the very patch that it finds: nobody asks for that direction.
-                let density = if squared > 0.0 { brightness / total * squared / cosine } else { 0.0 };
-                Found::Shared { radiance: emission, density: density * self.chance(index) }
+                let pdf = if squared > 0.0 { brightness / total * squared / cosine } else { 0.0 };
+                Found::Shared { radiance: emission, pdf: pdf * self.chance(index) }
             }
             (Seat::Alone, _) | (Seat::Patch(_), None) => Found::Alone,
             // Where bodies cover a part of a light, it is asked for all that it gives.
             (Seat::Body(index), _) if !self.can_be_found[index as usize] => Found::Dark,
             (Seat::Body(index), _) => match self.sources[index as usize].light() {
-                Some(Light::Area { shape, radiance }) => match area::density(shape, from, point.position) {
-                    Some(density) => Found::Shared { radiance: *radiance, density: density * self.chance(index) },
+                Some(Light::Area { shape, radiance }) => match area::pdf(shape, from, point.position) {
+                    Some(pdf) => Found::Shared { radiance: *radiance, pdf: pdf * self.chance(index) },
                     None => Found::Dark,
                 },
                 Some(Light::Directional { .. } | Light::Point { .. } | Light::Spot { .. }) | None => Found::Dark,
@@ -136,9 +136,9 @@ impl Lights {
     }
 
     /// How densely an environment is asked along `direction`; 0 where it never is.
-    pub fn environment_density(&self, environment: &EnvironmentLight, direction: DVec3) -> f64 {
+    pub fn environment_pdf(&self, environment: &EnvironmentLight, direction: DVec3) -> f64 {
         let chance = self.environment.map_or(0.0, |index| self.chance(index));
-        chance * environment.density(direction).unwrap_or(0.0)
+        chance * environment.pdf(direction).unwrap_or(0.0)
     }
 
     fn chance(&self, index: u32) -> f64 {
@@ -161,7 +161,7 @@ fn chances(sources: &[LightSource], bounds: &Aabb) -> Vec<f64> {
         .filter(|place| place.is_finite())
         .collect();
     let gives = |source: &LightSource, place: &DVec3| {
-        let arriving = source.illuminate(*place, DVec2::splat(0.5)).map_or(0.0, |light| light.color.max_element());
+        let arriving = source.sample(*place, DVec2::splat(0.5)).map_or(0.0, |light| light.color.max_element());
         f64::from(if arriving.is_finite() { arriving } else { 0.0 })
     };
     let weights: Vec<f64> = sources.iter().map(|source| places.iter().map(|p| gives(source, p)).sum()).collect();
@@ -202,10 +202,10 @@ mod tests {
         let hit = Bvh::build(&world).closest(&ray).expect("a hit");
         let point = SurfacePoint::new(&scene, &world, &ray, &hit, Attributes::ALL);
         let found = |from| lights.found(&hit, &point, from, Vec3::ONE);
-        assert_eq!(found(point.position), Found::Shared { radiance: Vec3::ONE, density: 0.0 });
+        assert_eq!(found(point.position), Found::Shared { radiance: Vec3::ONE, pdf: 0.0 });
         // Two squared over a cosine of 1, and six square metres.
-        let Found::Shared { density, .. } = found(point.position + DVec3::Z * 2.0) else { panic!("a patch") };
-        assert!((density - 4.0 / 6.0).abs() < 1e-6, "{density}");
+        let Found::Shared { pdf, .. } = found(point.position + DVec3::Z * 2.0) else { panic!("a patch") };
+        assert!((pdf - 4.0 / 6.0).abs() < 1e-6, "{pdf}");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::ray::{Hit, Ray};
 use crate::render::Renderer;
 use crate::render::wavefront::Buffers;
 use crate::shade::SurfacePoint;
-use crate::shade::scattering::{Shading, Ways};
+use crate::shade::scattering::{Shading, SpecularDirections};
 use crate::shade::{Attributes, normal_map};
 
 /// How light of each colour came from where a path is to the eye: states of the [`Automaton`].
@@ -183,7 +183,7 @@ impl Renderer<'_> {
     fn albedo(&self, ray: &Ray, point: &SurfacePoint) -> Vec3 {
         let material = &*self.appearance(point);
         let shading = Shading::new(point, ray.direction, material, &self.scene.textures, Vec3::ZERO);
-        let ways = Ways::new(material, point, ray.direction.as_dvec3().normalize());
+        let ways = SpecularDirections::new(material, point, ray.direction.as_dvec3().normalize());
         let sent_on = [ways.mirrored, ways.refracted].into_iter().flatten().map(|way| way.share).sum::<Vec3>();
         let unlit = if material.unlit { shading.base } else { Vec3::ZERO };
         (shading.albedo() + sent_on + unlit).clamp(Vec3::ZERO, Vec3::ONE)

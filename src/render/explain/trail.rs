@@ -6,7 +6,7 @@ use crate::ray::{Hit, Ray};
 use crate::render::Renderer;
 use crate::render::wavefront::Path;
 use crate::shade::SurfacePoint;
-use crate::shade::light::{Illumination, LightSource};
+use crate::shade::light::{LightSample, LightSource};
 
 /// Notes of one pixel; none are taken where none are wanted.
 #[derive(Default)]
@@ -25,7 +25,7 @@ struct Notes {
 pub(in crate::render) struct Answer<'a> {
     pub(in crate::render) light: u32,
     pub(in crate::render) source: &'a LightSource,
-    pub(in crate::render) arriving: &'a Illumination,
+    pub(in crate::render) arriving: &'a LightSample,
     /// pi f cos of Lambert's lobe, the highlight, and glossy ways.
     pub(in crate::render) lobes: [Vec3; 3],
     pub(in crate::render) left: Vec3,
@@ -78,7 +78,7 @@ impl Trail {
                 origin: renderer.in_scene(ray.origin.as_dvec3()),
                 direction: ray.direction.normalize_or_zero().to_array(),
                 time: ray.time,
-                weight: path.weight.to_array(),
+                weight: path.throughput.to_array(),
                 hit,
                 own: own.to_array(),
                 lights: Vec::new(),

@@ -1,4 +1,4 @@
-//! The highlights of Phong (1975, *Illumination for computer generated pictures*) and Blinn (1977, *Models of light
+//! The highlights of Phong (1975, *LightSample for computer generated pictures*) and Blinn (1977, *Models of light
 //! reflection for computer synthesized pictures*), classic and energy-conserving.
 //!
 //! The classic highlight is ks cos^n: no cosine of the light, and no scale, so that wide ones send on more than they get. The
@@ -78,15 +78,15 @@ impl Highlight {
         }
     }
 
-    /// The density of [`Highlight::sample`].
-    pub(super) fn density(&self, normal: DVec3, to_viewer: DVec3, l: DVec3) -> f64 {
+    /// The pdf of [`Highlight::sample`].
+    pub(super) fn pdf(&self, normal: DVec3, to_viewer: DVec3, l: DVec3) -> f64 {
         let n = f64::from(self.shininess);
         match self.model {
-            Specular::Phong => warp::power_density((normal * (2.0 * normal.dot(l)) - l).dot(to_viewer), n),
+            Specular::Phong => warp::power_pdf((normal * (2.0 * normal.dot(l)) - l).dot(to_viewer), n),
             Specular::BlinnPhong => {
                 let half = (l + to_viewer).normalize_or_zero();
                 let cosine = half.dot(to_viewer);
-                if cosine > 0.0 { warp::power_density(half.dot(normal), n) / (4.0 * cosine) } else { 0.0 }
+                if cosine > 0.0 { warp::power_pdf(half.dot(normal), n) / (4.0 * cosine) } else { 0.0 }
             }
         }
     }
@@ -113,9 +113,9 @@ mod tests {
                         .map(|k| (DVec2::new((k % SIDE).into(), (k / SIDE).into()) + 0.5) / f64::from(SIDE));
                     let worth = xi.map(|xi| {
                         let l = highlight.sample(normal, to_viewer, xi);
-                        let density = highlight.density(normal, to_viewer, l);
+                        let pdf = highlight.pdf(normal, to_viewer, l);
                         let value = f64::from(highlight.value(normal, to_viewer, l, l.dot(normal)).x);
-                        if density > 0.0 { value / (density * std::f64::consts::PI) } else { 0.0 }
+                        if pdf > 0.0 { value / (pdf * std::f64::consts::PI) } else { 0.0 }
                     });
                     worth.sum::<f64>() / f64::from(SIDE * SIDE)
                 };

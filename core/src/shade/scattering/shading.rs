@@ -4,7 +4,7 @@
 //! lights of a picture share is in [`Shading`]; each light then adds [`Shading::reflect`].
 
 use super::highlight::Highlight;
-use super::ways;
+use super::specular;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Interface, Material, Texture};
 use crate::shade::{SurfacePoint, texture};
@@ -61,7 +61,7 @@ impl Shading {
             // What is diffuse lies below, and gets what is not mirrored.
             Interface::Fresnel | Interface::Thin => {
                 if material.is_lit() {
-                    shading.scale(1.0 - ways::mirrored_share(material, point, -shading.to_viewer) as f32);
+                    shading.scale(1.0 - specular::mirrored_share(material, point, -shading.to_viewer) as f32);
                 }
             }
         }

@@ -1,49 +1,49 @@
 //! All lobes of a surface together, for integrators that follow one of them at random.
 //!
-//! A lobe is chosen by about how much light it sends on, a direction by the lobe's own density; the density of the
+//! A lobe is chosen by about how much light it sends on, a direction by the lobe's own pdf; the pdf of the
 //! result is the sum over all lobes, so that directions that several lobes can give are not noisier than others (Veach and
 //! Guibas 1995, *Optimally combining sampling techniques for Monte Carlo rendering*: the balance heuristic).
 
 use std::f64::consts::PI;
 
-use super::{Shading, Way, Ways, warp};
+use super::{Shading, SpecularDirection, SpecularDirections, warp};
 use crate::math::{DVec2, DVec3, Vec3};
 
 /// What of the light from a direction goes to the viewer, and how likely that direction is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Value {
+pub struct BsdfValue {
     /// pi f cos, linear RGB.
     pub share: Vec3,
-    /// Of [`Lobes::sample`], per steradian.
-    pub density: f64,
+    /// Of [`Bsdf::sample`], per steradian.
+    pub pdf: f64,
 }
 
 /// Where a path goes on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scattered {
+pub struct BsdfSample {
     /// Unit vector away from the surface.
     pub direction: DVec3,
-    /// f cos over the density: what the radiance from there is multiplied by.
+    /// f cos over the pdf: what the radiance from there is multiplied by.
     pub weight: Vec3,
     /// Per steradian; none for a direction that no other could have been.
-    pub density: Option<f64>,
-    /// See [`Way::scale`].
+    pub pdf: Option<f64>,
+    /// See [`SpecularDirection::scale`].
     pub scale: f32,
 }
 
 /// A surface with everything it does with light.
-pub struct Lobes<'a> {
+pub struct Bsdf<'a> {
     shading: &'a Shading,
-    ways: Ways,
+    ways: SpecularDirections,
     gloss: Option<f64>,
     /// How likely each is chosen: Lambert's, the highlight, mirrored, refracted. They sum up to 1.
     chances: [f64; 4],
 }
 
-impl<'a> Lobes<'a> {
+impl<'a> Bsdf<'a> {
     /// None where nothing is sent on.
-    pub fn new(shading: &'a Shading, ways: Ways, gloss: Option<f32>) -> Option<Self> {
-        let share = |way: &Option<Way>| way.map_or(0.0, |way| way.share.max_element());
+    pub fn new(shading: &'a Shading, ways: SpecularDirections, gloss: Option<f32>) -> Option<Self> {
+        let share = |way: &Option<SpecularDirection>| way.map_or(0.0, |way| way.share.max_element());
         let albedo =
             [shading.diffuse.max_element(), shading.highlight.albedo(), share(&ways.mirrored), share(&ways.refracted)];
         let sum: f32 = albedo.iter().sum();
@@ -61,23 +61,23 @@ impl<'a> Lobes<'a> {
         self.gloss.is_some() && self.ways.refracted.is_some()
     }
 
-    /// Whether there are several, of which [`Lobes::sample`] follows one.
+    /// Whether there are several, of which [`Bsdf::sample`] follows one.
     pub fn is_choice(&self) -> bool {
         self.chances.iter().filter(|&&chance| chance > 0.0).count() > 1
     }
 
     /// For light along `to_light`. A light that cannot be seen is seen in no mirror either, however blunt: highlights alone show it, and its
-    /// density is that of directions among them.
-    pub fn lit(&self, to_light: DVec3, can_be_seen: bool) -> Value {
+    /// pdf is that of directions among them.
+    pub fn eval(&self, to_light: DVec3, can_be_seen: bool) -> BsdfValue {
         let Shading { normal, horizon, to_viewer, highlight, .. } = self.shading;
         let [diffuse, shiny, mirrored, refracted] = self.chances;
-        let mut value = Value { share: Vec3::ZERO, density: 0.0 };
+        let mut value = BsdfValue { share: Vec3::ZERO, pdf: 0.0 };
         let front = self.shading.faces(to_light);
         if front {
             value.share = self.shading.value(to_light);
-            value.density = diffuse * warp::cosine_density(normal.dot(to_light));
+            value.pdf = diffuse * warp::cosine_pdf(normal.dot(to_light));
             if shiny > 0.0 {
-                value.density += shiny * highlight.density(*normal, *to_viewer, to_light);
+                value.pdf += shiny * highlight.pdf(*normal, *to_viewer, to_light);
             }
         }
         let Some(gloss) = self.gloss.filter(|_| can_be_seen) else { return value };
@@ -86,17 +86,17 @@ impl<'a> Lobes<'a> {
             [(&self.ways.mirrored, mirrored, front), (&self.ways.refracted, refracted, behind)]
         {
             if let (Some(way), true) = (way, on_its_side) {
-                let density = warp::power_density(way.direction.dot(to_light), gloss);
-                value.share += way.share * (way.scale * (PI * density) as f32);
-                value.density += chance * density;
+                let pdf = warp::power_pdf(way.direction.dot(to_light), gloss);
+                value.share += way.share * (way.scale * (PI * pdf) as f32);
+                value.pdf += chance * pdf;
             }
         }
         value
     }
 
-    /// The share of [`Lobes::lit`] by what it is: diffuse, reflected, transmitted.
+    /// The share of [`Bsdf::eval`] by what it is: diffuse, reflected, transmitted.
     pub fn parts(&self, to_light: DVec3, can_be_seen: bool) -> [Vec3; 3] {
-        let whole = self.lit(to_light, can_be_seen).share;
+        let whole = self.eval(to_light, can_be_seen).share;
         if !self.shading.faces(to_light) {
             return [Vec3::ZERO, Vec3::ZERO, whole];
         }
@@ -107,7 +107,7 @@ impl<'a> Lobes<'a> {
 
     /// A direction to go on in: `choice` (from 0 to below 1) chooses the lobe, `xi` (in the unit square) the
     /// direction. None where that leads nowhere.
-    pub fn sample(&self, choice: f64, xi: DVec2) -> Option<Scattered> {
+    pub fn sample(&self, choice: f64, xi: DVec2) -> Option<BsdfSample> {
         let Shading { normal, to_viewer, highlight, .. } = self.shading;
         let mut rest = choice;
         let last = self.chances.iter().rposition(|&chance| chance > 0.0)?;
@@ -123,21 +123,21 @@ impl<'a> Lobes<'a> {
                 let way = if lobe == 2 { self.ways.mirrored? } else { self.ways.refracted? };
                 let Some(gloss) = self.gloss else {
                     let weight = way.share * (way.scale / self.chances[lobe] as f32);
-                    return Some(Scattered { direction: way.direction, weight, density: None, scale: way.scale });
+                    return Some(BsdfSample { direction: way.direction, weight, pdf: None, scale: way.scale });
                 };
                 (warp::power(way.direction, gloss, xi), way.scale)
             }
         };
-        let Value { share, density } = self.lit(direction, true);
-        if density <= 0.0 || share == Vec3::ZERO {
+        let BsdfValue { share, pdf } = self.eval(direction, true);
+        if pdf <= 0.0 || share == Vec3::ZERO {
             return None;
         }
-        let weight = share * (1.0 / (PI * density)) as f32;
-        Some(Scattered { direction, weight, density: Some(density), scale })
+        let weight = share * (1.0 / (PI * pdf)) as f32;
+        Some(BsdfSample { direction, weight, pdf: Some(pdf), scale })
     }
 }
 
-impl Way {
+impl SpecularDirection {
     /// A direction near this one, spread by `gloss` as `xi` chooses; none where it would be on the other side of the
     /// surface. The share stays: all that is lost is what goes there.
     pub fn spread(&self, gloss: f32, xi: DVec2, shading: &Shading) -> Option<DVec3> {

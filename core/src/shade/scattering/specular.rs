@@ -12,7 +12,7 @@ use crate::shade::SurfacePoint;
 
 /// One way on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Way {
+pub struct SpecularDirection {
     /// Unit vector away from the surface.
     pub direction: DVec3,
     /// Of the light that arrives from there, what goes to the viewer.
@@ -24,14 +24,14 @@ pub struct Way {
 
 /// Both ways on from a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Ways {
+pub struct SpecularDirections {
     /// On the viewer's side.
-    pub mirrored: Option<Way>,
+    pub mirrored: Option<SpecularDirection>,
     /// Behind the surface.
-    pub refracted: Option<Way>,
+    pub refracted: Option<SpecularDirection>,
 }
 
-impl Ways {
+impl SpecularDirections {
     /// Those of light that is seen along `direction` (unit length).
     pub fn new(material: &Material, point: &SurfacePoint, direction: DVec3) -> Self {
         if !material.sends_on() {
@@ -57,7 +57,7 @@ impl Ways {
             if share == Vec3::ZERO {
                 return None;
             }
-            direction().map(|direction| Way { direction, share, scale })
+            direction().map(|direction| SpecularDirection { direction, share, scale })
         };
         Self {
             mirrored: way(reflected_share, &|| Some(reflected(direction, point)), 1.0),
