@@ -13,6 +13,7 @@ pub mod math;
 pub mod memory;
 #[doc(hidden)]
 pub mod once;
+#[doc(hidden)]
 pub mod output;
 pub mod plan;
 #[doc(hidden)]

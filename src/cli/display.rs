@@ -35,12 +35,12 @@ pub(super) struct Display {
 /// What is to be sent, and whoever waits for it.
 #[derive(Default)]
 struct Queue {
-    state: Mutex<Waiting>,
+    state: Mutex<PendingUpdate>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct Waiting {
+struct PendingUpdate {
     /// The image that is shown, and its number.
     name: String,
     image: u32,
@@ -54,12 +54,12 @@ struct Waiting {
 type Place = (u32, Option<[u32; 2]>);
 
 impl Queue {
-    fn lock(&self) -> MutexGuard<'_, Waiting> {
+    fn lock(&self) -> MutexGuard<'_, PendingUpdate> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// In place of what is still waiting about the same.
-    fn put(&self, mut waiting: MutexGuard<'_, Waiting>, tile: Option<[u32; 2]>, packet: Packet) {
+    fn put(&self, mut waiting: MutexGuard<'_, PendingUpdate>, tile: Option<[u32; 2]>, packet: Packet) {
         if !waiting.is_over {
             let place = (waiting.image, tile);
             waiting.packets.insert(place, packet.finished());
@@ -87,7 +87,7 @@ impl Queue {
     fn send_all(&self, stream: &mut TcpStream) -> std::io::Result<()> {
         let sent = std::iter::from_fn(|| self.next()).try_for_each(|packet| stream.write_all(&packet));
         if sent.is_err() {
-            *self.lock() = Waiting { is_over: true, ..Waiting::default() };
+            *self.lock() = PendingUpdate { is_over: true, ..PendingUpdate::default() };
         }
         sent
     }

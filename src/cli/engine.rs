@@ -115,8 +115,8 @@ impl Job<'_> {
     }
 
     fn native(&self) -> Result<(Bvh, Pass)> {
-        let stored: u64 = self.world.parts.iter().map(|part| part.primitives.len() as u64).sum();
-        let bar = progress::bar(stored + self.world.placements.len() as u64, "building", self.quiet);
+        let bar =
+            progress::bar(self.world.stored_primitives() + self.world.placements.len() as u64, "building", self.quiet);
         let placed = |count| bar.inc(count);
         let options = bvh::Options { preset: self.build, progress: Some(&placed), ..bvh::Options::default() };
         let mut report = None;

@@ -35,7 +35,7 @@ use crate::memory::process;
 use crate::output::AtomicWrites;
 use crate::plan;
 use crate::render::{Crop, Renderer, Settings};
-use crate::scene::{Camera, Geometry, Request, Scene};
+use crate::scene::{Camera, Request, Scene};
 use crate::trace::accel::{Accel, Options as AccelOptions};
 use crate::trace::bvh::{Preset, prepare_thread};
 
@@ -232,7 +232,7 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         let [width, height] = asked.size();
         let stats = Stats {
             scene: args.scene.scene.display().to_string(),
-            triangles: placed_triangles(scene),
+            triangles: world.placed_triangles(),
             size: [width, height],
             spp: settings.spp,
             mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
@@ -401,15 +401,6 @@ impl RenderArgs {
 
 fn no_picture() -> Error {
     Error::Usage("no picture to write: name one with --output FILE; the scene names none".to_owned())
-}
-
-fn placed_triangles(scene: &Scene) -> u64 {
-    let triangles = |geometry: &Geometry| match geometry {
-        Geometry::Mesh(mesh) => mesh.triangles.len() as u64,
-        Geometry::Shapes { .. } => 0,
-    };
-    let placed = scene.instances.iter().flat_map(|instance| scene.group_geometries(instance.group));
-    placed.map(|(_, geometry)| triangles(geometry)).sum()
 }
 
 fn parse_threshold(text: &str) -> std::result::Result<f64, String> {

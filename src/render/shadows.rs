@@ -54,13 +54,16 @@ impl Shadows {
     }
 
     /// Adds what arrives: of each ray the share that nothing is in the way of.
-    pub(super) fn settle(&self, free: impl Fn(usize) -> f32, radiance: &mut [Vec4], tally: Option<&mut Tally>) {
-        for (i, (pixel, contribution)) in self.light.iter().enumerate().filter(|(i, _)| free(*i) > 0.0) {
-            radiance[*pixel as usize] += (*contribution * free(i)).extend(0.0);
-        }
-        let Some(tally) = tally else { return };
-        for (i, ((pixel, _), parts)) in self.light.iter().zip(&self.parts).enumerate().filter(|(i, _)| free(*i) > 0.0) {
-            tally.add_parts(*pixel, parts, free(i));
+    pub(super) fn settle(&self, free: impl Fn(usize) -> f32, radiance: &mut [Vec4], mut tally: Option<&mut Tally>) {
+        for (i, &(pixel, contribution)) in self.light.iter().enumerate() {
+            let share = free(i);
+            if share <= 0.0 {
+                continue;
+            }
+            radiance[pixel as usize] += (contribution * share).extend(0.0);
+            if let Some(tally) = &mut tally {
+                tally.add_parts(pixel, &self.parts[i], share);
+            }
         }
     }
 }

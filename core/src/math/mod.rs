@@ -4,8 +4,10 @@
 //! machinery of rounding-error analysis in Higham's notation (Higham 2002, *Accuracy and Stability of Numerical
 //! Algorithms*): [`gamma`] bounds the relative error of `n` chained f32 operations, [`gamma64`] that of f64.
 
+#[doc(hidden)]
 pub mod expansion;
 pub(crate) mod integers;
+#[doc(hidden)]
 pub mod number;
 mod random;
 
@@ -77,6 +79,17 @@ pub fn can_place(transform: &DAffine3) -> bool {
     is_invertible(transform) && is_invertible(&transform.as_affine3().as_daffine3())
 }
 
+/// Why nothing [can be placed](can_place) by a transform, and what would do: what follows the name of the thing in a message.
+pub fn placement_fault(transform: &DAffine3) -> Option<&'static str> {
+    if !transform.as_affine3().is_finite() {
+        return Some(
+            "is placed, or moves, to where f32 does not reach; bring it within 3.4e38 of zero, and its scale below that",
+        );
+    }
+    let is_singular = !can_place(transform);
+    is_singular.then_some("has a singular transform; give it a scale that is neither zero nor beyond what f32 holds")
+}
+
 /// The normal of a triangle, (b - a) x (c - a): not of unit length, and on the side from which a, b, c run counterclockwise.
 #[inline(always)]
 pub fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
@@ -130,6 +143,15 @@ impl Aabb {
     /// Whether it contains points, but none without end.
     pub fn is_bounded(&self) -> bool {
         !self.is_empty() && self.min.is_finite() && self.max.is_finite()
+    }
+
+    /// Its corners: of number k, each axis whose bit is set in k has its largest coordinate, the others their smallest.
+    #[inline]
+    pub fn corners(&self) -> [Vec3; 8] {
+        std::array::from_fn(|k| {
+            let pick = |axis: usize| if k >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            Vec3::new(pick(0), pick(1), pick(2))
+        })
     }
 
     /// The middle. Halves before it adds, so that large boxes do not overflow.

@@ -101,11 +101,10 @@ pub struct Lights {
 impl Census {
     /// Counts.
     pub fn new(scene: &Scene, world: &World) -> Self {
-        let mut uses = vec![0u64; scene.groups.len()];
-        scene.instances.iter().for_each(|instance| uses[instance.group as usize] += 1);
+        let uses = scene.group_uses();
         let mut census = Self {
             instances: scene.instances.len() as u64,
-            moving: scene.instances.iter().filter(|instance| instance.transform_end.is_some()).count() as u64,
+            moving: scene.instances.iter().filter(|instance| instance.moves()).count() as u64,
             lights: Lights::new(scene, world),
             ambient: scene.ambient != Vec3::ZERO,
             environment: scene.environment.as_ref().is_some_and(|light| !light.is_black()),
@@ -115,6 +114,7 @@ impl Census {
         // How many primitives are made of each material.
         let mut made_of = BTreeMap::<u32, u64>::new();
         for (group, uses) in (0..).zip(uses).filter(|(_, uses)| *uses > 0) {
+            let uses = u64::from(uses);
             for (_, geometry) in scene.group_geometries(group) {
                 census.add(geometry, uses);
                 *made_of.entry(geometry.material()).or_default() += uses * geometry.primitive_count() as u64;

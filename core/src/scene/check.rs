@@ -32,12 +32,7 @@ impl Scene {
 
 /// What [`Scene::check`] says, as a message alone.
 pub fn fault(scene: &Scene) -> std::result::Result<(), String> {
-    if let Some(group) = scene.groups.iter().find(|group| !scene.has_geometries(group)) {
-        return Err(format!("group {:?} has geometries that do not exist", group.name));
-    }
-    if let Some(instance) = scene.instances.iter().find(|instance| instance.group as usize >= scene.groups.len()) {
-        return Err(format!("instance {:?} places a group that does not exist", instance.name));
-    }
+    references(scene)?;
     for geometry in &scene.geometries {
         if geometry.material() as usize >= scene.materials.len() {
             return Err(format!("material {} of {} does not exist", geometry.material(), scene.materials.len()));
@@ -82,6 +77,17 @@ pub fn fault(scene: &Scene) -> std::result::Result<(), String> {
         check_environment(environment).map_err(|message| format!("the environment {message}"))?;
     }
     Ok(())
+}
+
+/// Whether the groups that are placed, and their geometries, are there.
+pub fn references(scene: &Scene) -> std::result::Result<(), String> {
+    if let Some(group) = scene.groups.iter().find(|group| !scene.has_geometries(group)) {
+        return Err(format!("group {:?} has geometries that do not exist", group.name));
+    }
+    match scene.instances.iter().find(|instance| instance.group as usize >= scene.groups.len()) {
+        Some(instance) => Err(format!("instance {:?} places a group that does not exist", instance.name)),
+        None => Ok(()),
+    }
 }
 
 fn check_material(material: &Material, textures: usize) -> std::result::Result<(), &'static str> {

@@ -25,3 +25,10 @@ pub struct Instance {
     /// Of what moves, the transform at time 1. In between the entries of the matrices are interpolated.
     pub transform_end: Option<DAffine3>,
 }
+
+impl Instance {
+    /// Whether it moves while a shutter may be open.
+    pub const fn moves(&self) -> bool {
+        self.transform_end.is_some()
+    }
+}

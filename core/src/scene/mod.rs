@@ -5,7 +5,7 @@
 
 mod bounds;
 mod camera;
-mod check;
+pub(crate) mod check;
 #[doc(hidden)]
 pub mod compact;
 mod environment;
@@ -121,12 +121,8 @@ impl Geometry {
                 if b.is_empty() {
                     return all;
                 }
-                (0..8).fold(all, |all, corner| {
-                    let pick = |axis: usize| {
-                        if corner >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] }
-                    };
-                    all.include(transform.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()))
-                })
+                let corners = b.corners().map(|corner| transform.transform_point3(corner.as_dvec3()));
+                corners.into_iter().fold(all, DAabb::include)
             }),
         }
     }
@@ -148,6 +144,16 @@ impl Scene {
             materials,
             ..Self::default()
         }
+    }
+
+    /// How often each group is placed.
+    ///
+    /// # Panics
+    /// Where an instance places a group that does not exist.
+    pub fn group_uses(&self) -> Vec<u32> {
+        let mut uses = vec![0; self.groups.len()];
+        self.instances.iter().for_each(|instance| uses[instance.group as usize] += 1);
+        uses
     }
 
     /// The geometries of one group, with their indices.
@@ -188,8 +194,7 @@ impl Scene {
     /// tracing needs no turned copy of them. Such a turn rounds nothing.
     #[doc(hidden)]
     pub fn bake_turns(&mut self) {
-        let mut uses = vec![0; self.groups.len()];
-        self.instances.iter().for_each(|instance| uses[instance.group as usize] += 1);
+        let uses = self.group_uses();
         for instance in self.instances.iter_mut().filter(|instance| uses[instance.group as usize] == 1) {
             let turn = instance.transform.matrix3;
             let entries = turn.to_cols_array();
@@ -200,8 +205,7 @@ impl Scene {
             let range = &self.groups[instance.group as usize].geometries;
             let geometries = &mut self.geometries[range.start as usize..range.end as usize];
             let only_meshes = geometries.iter().all(|geometry| matches!(geometry, Geometry::Mesh(_)));
-            let is_still = instance.transform_end.is_none();
-            if !(turns && only_meshes && is_still && instance.transform.translation == DVec3::ZERO) {
+            if !(turns && only_meshes && !instance.moves() && instance.transform.translation == DVec3::ZERO) {
                 continue;
             }
             for geometry in geometries {

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use super::area::short_of;
 use super::bodies;
 use super::light::{LightSample, LightSource};
-use crate::math::{DAffine3, DMat3, DVec2, DVec3, Vec3, similarity, tangents};
+use crate::math::{Aabb, DAffine3, DMat3, DVec2, DVec3, Vec3, similarity, tangents};
 use crate::ray::Hit;
 use crate::scene::{Alpha, AreaShape, Light, Material, Scene};
 use crate::shape::Shape;
@@ -257,10 +257,8 @@ impl Search<'_> {
                 })
             }
             Shape::Cuboid(cuboid) => self.light(emission, |emission, Self { patches, .. }| {
-                let corner = |i: usize| {
-                    let pick = |axis: usize| if i >> axis & 1 == 0 { cuboid.min[axis] } else { cuboid.max[axis] };
-                    at(Vec3::new(pick(0), pick(1), pick(2)))
-                };
+                let corners = Aabb { min: cuboid.min, max: cuboid.max }.corners();
+                let corner = |i: usize| at(corners[i]);
                 for [a, b, c, d] in [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
                 {
                     patches.add_triangle([a, b, c].map(corner), emission);

@@ -2,6 +2,7 @@
 
 use super::Part;
 use super::nearest::Nearest;
+use crate::math::Affine3;
 use crate::ray::{Hit, Ray};
 use crate::shape::distance::Distance;
 use crate::shape::triangle::{self, Corners};
@@ -51,6 +52,13 @@ impl Part {
     pub(super) fn id(&self, instance: u32, primitive: u32) -> Id {
         Id { instance, geometry: self.geometry, primitive }
     }
+}
+
+/// The instance through which a ray came to an object's primitives.
+#[derive(Clone, Copy)]
+pub(super) struct InstanceTransform<'a> {
+    pub instance: u32,
+    pub to_world: &'a Affine3,
 }
 
 /// Offers where `ray`, in the world, meets a triangle.

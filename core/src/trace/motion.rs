@@ -237,10 +237,8 @@ mod tests {
                 assert!((residual * DVec3::ONE).max_element() <= motion.residual);
                 let (inverse, most) = (now.to_object.matrix3.abs(), motion.inverse);
                 assert_eq!(inverse.max_entries(&most), most, "step {step}");
-                for corner in 0..8 {
-                    let pick = |axis: usize| if corner >> axis & 1 == 0 { object.min[axis] } else { object.max[axis] };
-                    let point = Vec3::new(pick(0), pick(1), pick(2)).as_dvec3();
-                    let point = now.to_world.as_daffine3().transform_point3(point);
+                for corner in object.corners() {
+                    let point = now.to_world.as_daffine3().transform_point3(corner.as_dvec3());
                     let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
                     assert!(point.cmpge(low).all() && point.cmple(high).all(), "step {step}: {point}");
                 }

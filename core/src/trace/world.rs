@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use super::limits;
 use super::motion::{Motion, singular_on_the_way};
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, can_place, is_traceable};
+use crate::math::{Aabb, Affine3, DAabb, DAffine3, DMat3, DVec3, Vec3, is_traceable, placement_fault};
 use crate::ray::{Hit, Ray};
-use crate::scene::{Geometry, Instance, Mesh, Scene, choose_origin};
+use crate::scene::{Geometry, Instance, Mesh, Scene, check, choose_origin};
 use crate::shape::Shape;
 
 /// A scene made ready for tracing.
@@ -106,11 +106,12 @@ impl World {
 
     /// Triangles as stored: those of an object that is placed twice count once.
     pub fn stored_triangles(&self) -> u64 {
-        let triangles = self.parts.iter().map(|part| match &part.primitives {
-            Primitives::Triangles { triangles, .. } => triangles.len() as u64,
-            Primitives::Shapes(_) => 0,
-        });
-        triangles.sum()
+        self.parts.iter().map(|part| part.primitives.triangle_count()).sum()
+    }
+
+    /// Primitives as stored.
+    pub fn stored_primitives(&self) -> u64 {
+        self.parts.iter().map(|part| part.primitives.len() as u64).sum()
     }
 
     /// Whether anything in it has no end, as planes have none.
@@ -143,11 +144,11 @@ impl World {
     /// Recentres `scene` and decides what is baked.
     ///
     /// # Errors
-    /// [`Error::Scene`], or [`Error::Input`] where the scene was read from a file, for an instance whose transform is singular or not finite, with its
-    /// name; and for more primitives in one place than tracers can name.
+    /// [`Error::Scene`], or [`Error::Input`] where the scene was read from a file, for a group or a geometry that is not there; for an instance whose
+    /// transform is singular or not finite, with its name; and for more primitives in one place than tracers can name.
     ///
     /// # Panics
-    /// Where the scene names a group, a geometry or a vertex that is not there, here or when a tracer is built; [`Scene::check`] finds those.
+    /// Where a mesh names a vertex that is not there, here or when a tracer is built; [`Scene::check`] finds those.
     pub fn new(scene: &Scene) -> Result<Self> {
         Self::with(scene, true).map_err(|error| error.told_of(scene.files.first()))
     }
@@ -164,18 +165,15 @@ impl World {
     }
 
     fn with(scene: &Scene, bakes: bool) -> Result<Self> {
-        let mut uses = vec![0usize; scene.groups.len()];
-        for (i, instance) in scene.instances.iter().enumerate() {
-            uses[instance.group as usize] += 1;
-            check_transform(i, instance)?;
-        }
+        check::references(scene).map_err(Error::Scene)?;
+        scene.instances.iter().enumerate().try_for_each(|(i, instance)| check_transform(i, instance))?;
+        let uses = scene.group_uses();
         let is_baked = |instance: &Instance| {
             let is_mesh = |(_, geometry): (u32, &Geometry)| matches!(geometry, Geometry::Mesh(_));
             let only_meshes = scene.group_geometries(instance.group).all(is_mesh);
-            let is_still = instance.transform_end.is_none();
             // A scaled sphere is no sphere, so shapes are baked only where they merely move.
             bakes
-                && is_still
+                && !instance.moves()
                 && uses[instance.group as usize] == 1
                 && (only_meshes || instance.transform.matrix3 == DMat3::IDENTITY)
         };
@@ -241,9 +239,21 @@ impl World {
 
     /// Primitives as placed: those of an object that is placed twice count twice.
     pub fn primitive_count(&self) -> u64 {
-        let count = |parts: Range<usize>| -> u64 { self.parts[parts].iter().map(|p| p.primitives.len() as u64).sum() };
-        let placed = self.placements.iter().map(|p| count(self.objects[p.object as usize].clone()));
-        count(self.fixed.clone()) + placed.sum::<u64>()
+        self.placed_count(|primitives| primitives.len() as u64)
+    }
+
+    /// Triangles of meshes as placed.
+    pub fn placed_triangles(&self) -> u64 {
+        self.placed_count(Primitives::triangle_count)
+    }
+
+    /// What `count` says of the primitives of all parts, as often as each is placed.
+    fn placed_count(&self, count: impl Fn(&Primitives) -> u64) -> u64 {
+        let count =
+            |parts: &Range<usize>| -> u64 { self.parts[parts.clone()].iter().map(|p| count(&p.primitives)).sum() };
+        // Once for each object, however often it is placed.
+        let objects: Vec<u64> = self.objects.iter().map(count).collect();
+        count(&self.fixed) + self.placements.iter().map(|placement| objects[placement.object as usize]).sum::<u64>()
     }
 
     fn add_group(&mut self, scene: &Scene, group: u32, instance: u32, transform: &DAffine3) -> Lookup {
@@ -292,6 +302,14 @@ impl Primitives {
         match self {
             Self::Triangles { triangles, .. } => triangles.len(),
             Self::Shapes(shapes) => shapes.len(),
+        }
+    }
+
+    /// How many of them are triangles of a mesh.
+    fn triangle_count(&self) -> u64 {
+        match self {
+            Self::Triangles { triangles, .. } => triangles.len() as u64,
+            Self::Shapes(_) => 0,
         }
     }
 
@@ -356,18 +374,12 @@ fn group_origin(scene: &Scene, group: u32) -> DVec3 {
 
 fn check_transform(index: usize, instance: &Instance) -> Result<()> {
     let Instance { name, transform, transform_end, .. } = instance;
-    if can_place(transform) && transform_end.is_none_or(|end| end.as_affine3().is_finite()) {
-        return Ok(());
+    // Whether it passes through a singular transform at its end, as on the way there, is found later, with the time.
+    let end = transform_end.as_ref().filter(|end| !end.as_affine3().is_finite());
+    match placement_fault(transform).or_else(|| placement_fault(end?)) {
+        Some(problem) => Err(Error::Scene(format!("instance {index} ({name:?}) {problem}"))),
+        None => Ok(()),
     }
-    let is_far =
-        [Some(transform), transform_end.as_ref()].into_iter().flatten().any(|end| !end.as_affine3().is_finite());
-    let problem = match is_far {
-        true => {
-            "is placed, or moves, to where f32 does not reach; bring it within 3.4e38 of zero, and its scale below that"
-        }
-        false => "has a singular transform; give it a scale that is neither zero nor beyond what f32 holds",
-    };
-    Err(Error::Scene(format!("instance {index} ({name:?}) {problem}")))
 }
 
 #[cfg(test)]
@@ -389,6 +401,21 @@ mod tests {
         assert!(World::new(&scene(1e6)).is_ok());
         let told = World::new(&scene(1e39)).expect_err("refused").to_string();
         assert!(told.contains("moves, to where f32 does not reach"), "{told}");
+    }
+
+    /// Also where nobody has asked `Scene::check` before.
+    #[test]
+    fn what_is_not_there_is_refused() {
+        let mesh = Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        let good = Scene::from_geometries(vec![Geometry::Mesh(mesh)], vec![Material::default()]);
+        let (mut placed, mut grouped) = (good.clone(), good.clone());
+        placed.instances[0].group = 1;
+        grouped.groups[0].geometries = 0..2;
+        for (scene, expected) in [(placed, "places a group"), (grouped, "has geometries")] {
+            let told = World::new(&scene).expect_err("refused").to_string();
+            assert!(told.contains(expected) && told.contains("exist"), "{told}");
+        }
+        assert_eq!(World::new(&good).map(|world| world.placed_triangles()).expect("sound"), 1);
     }
 
     /// Wherever the scene lies, and so wherever zero is for tracers.

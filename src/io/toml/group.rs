@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::include::Placed;
 use super::table::{Fault, Read, Table, Value};
 use crate::io::suggest::suggestion_or_all;
-use crate::math::{self, DAffine3, DMat3, DVec3, can_place};
+use crate::math::{self, DAffine3, DMat3, DVec3, placement_fault};
 use crate::scene::{Instance, Scene};
 
 /// Groups within groups within groups.
@@ -162,11 +162,10 @@ impl Groups<'_> {
         }
         for child in &body.children {
             let (name, place) = (joined(path, &child.name), place.of(&child.place));
-            if !can_place(&place.start) || place.end.is_some_and(|end| !can_place(&end)) {
+            let fault = placement_fault(&place.start).or_else(|| placement_fault(&place.end?));
+            if let Some(fault) = fault {
                 let what = if child.name.is_empty() { "this".to_owned() } else { format!("{name:?}") };
-                let message =
-                    format!("{what} has a transform that nothing undoes; no scale may be 0, nor beyond what f32 holds");
-                return Err(Fault { at: child.at, message });
+                return Err(Fault { at: child.at, message: format!("{what} {fault}") });
             }
             match &child.target {
                 Target::Group(group) => self.place(self.find(group, child.at)?.1, &name, &place, scene)?,

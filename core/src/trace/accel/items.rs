@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use crate::math::{Aabb, Affine3, DVec3, Vec3, is_traceable};
+use crate::math::{Aabb, DVec3, Vec3, is_traceable};
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::shape::triangle::Placed;
-use crate::trace::leaf::{Id, Methods};
+use crate::trace::leaf::{Id, InstanceTransform, Methods};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -32,13 +32,6 @@ pub(super) struct Input<'a> {
 pub(super) struct Boxes {
     boxes: Vec<Aabb>,
     groups: Vec<Range<u32>>,
-}
-
-/// How a ray came to the items of an object.
-#[derive(Clone, Copy)]
-pub(super) struct Through<'a> {
-    pub instance: u32,
-    pub to_world: &'a Affine3,
 }
 
 impl Items {
@@ -84,7 +77,14 @@ impl Items {
 
     /// Offers what `ray`, in the world, hits of one item; `local` is the same ray in the item's coordinates.
     #[inline]
-    pub fn offer(&self, item: u32, ray: &Ray, local: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer(
+        &self,
+        item: u32,
+        ray: &Ray,
+        local: &Ray,
+        through: Option<InstanceTransform<'_>>,
+        nearest: &mut Nearest,
+    ) {
         let item = item as usize;
         let mut id = self.ids[item];
         if let Some(through) = through {
@@ -92,7 +92,7 @@ impl Items {
         }
         match (self.triangles.get(item), through) {
             (Some(corners), None) => self.methods.offer_triangle(nearest, ray, corners, id),
-            (Some(&corners), Some(Through { to_world, .. })) => {
+            (Some(&corners), Some(InstanceTransform { to_world, .. })) => {
                 self.methods.offer_triangle(nearest, ray, &Placed { corners, to_world }, id);
             }
             (None, through) => {

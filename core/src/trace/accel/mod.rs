@@ -38,10 +38,11 @@ use super::unbounded::Unbounded;
 use super::{Batch, Part, Tracer, World};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::ray::{Hit, Ray};
-use items::{Boxes, Input, Items, Through, reach};
+use items::{Boxes, Input, Items, reach};
 use placed::{Placed, stray_of_shapes};
 use ray::{IndexRay, limit};
 
+use super::leaf::InstanceTransform;
 pub use super::leaf::Methods;
 pub use crate::scene::{Accel, Resolution};
 pub use cell::Cell;
@@ -202,7 +203,7 @@ impl<I: Index> Accelerated<I> {
             None => self.fixed.items.offer(place.item, ray, ray, None, &mut nearest),
             Some(placed) => {
                 let placement = self.placed[placed as usize].placement.at(ray.moment());
-                let through = Through { instance: placement.instance, to_world: &placement.to_world };
+                let through = InstanceTransform { instance: placement.instance, to_world: &placement.to_world };
                 let items = &self.objects[placement.object as usize].items;
                 items.offer(place.item, ray, &placement.object_ray(ray), Some(through), &mut nearest);
             }
@@ -233,7 +234,7 @@ impl<I: Index> Level<I> {
     fn trace_placed(&self, ray: &Ray, placed: &Placed, any: bool, nearest: &mut Nearest, found: impl FnMut(u32)) {
         let Placed { placement, .. } = placed;
         let index_ray = placed.index_ray(ray, &self.bounds, self.items.has_shapes());
-        let through = Through { instance: placement.instance, to_world: &placement.to_world };
+        let through = InstanceTransform { instance: placement.instance, to_world: &placement.to_world };
         self.visit(&index_ray, ray, &placement.object_ray(ray), Some(through), any, nearest, found);
     }
 
@@ -244,7 +245,7 @@ impl<I: Index> Level<I> {
         index_ray: &IndexRay,
         ray: &Ray,
         local: &Ray,
-        through: Option<Through<'_>>,
+        through: Option<InstanceTransform<'_>>,
         any: bool,
         nearest: &mut Nearest,
         mut found: impl FnMut(u32),

@@ -5,10 +5,10 @@
 
 use super::Bvh;
 use super::block::LANES;
+use super::levels::Level;
 use super::levels::place::Place;
 use super::levels::placements::walk_over;
 use super::levels::triangles::TriangleTree;
-use super::levels::{Level, Through};
 use super::node::Child;
 use super::query::Closest;
 use super::reject::Blur;
@@ -21,6 +21,7 @@ use crate::ray::{Hit, Ray};
 use crate::shape::crossing;
 use crate::shape::triangle::Placed;
 use crate::trace::crossings::Crossings;
+use crate::trace::leaf::InstanceTransform;
 
 impl Bvh {
     /// All hits of `ray` with `tmin <= t <= tmax`, into `hits`, which is cleared first: ordered by t (in f64, before it
@@ -162,7 +163,7 @@ impl TriangleTree {
         leaf: Child,
         ray: &Ray,
         filter: &Filter,
-        through: Option<Through<'_>>,
+        through: Option<InstanceTransform<'_>>,
         gathered: &mut Gathered,
     ) {
         for index in leaf.blocks() {
@@ -176,7 +177,7 @@ impl TriangleTree {
                 let part = self.part(block.part[lane]);
                 let (found, instance) = match through {
                     None => (crossing::crossing(ray, &corners), part.instance),
-                    Some(Through { instance, to_world }) => {
+                    Some(InstanceTransform { instance, to_world }) => {
                         (crossing::crossing(ray, &Placed { corners, to_world }), instance)
                     }
                 };

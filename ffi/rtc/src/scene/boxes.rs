@@ -134,11 +134,7 @@ fn product([from, to]: [&Affine3; 2], [start, end]: [Aabb; 2], reach: Vec3, stra
 
 /// The box around a box in its place; what is inside goes no farther from the origin than `reach`.
 fn placed(place: &Affine3, bounds: Aabb, reach: Vec3) -> Aabb {
-    let corner = |k: usize| {
-        let pick = |axis: usize| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-        place.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
-    };
-    let around = Aabb::around((0..8).map(corner));
+    let around = Aabb::around(bounds.corners().map(|corner| place.transform_point3(corner)));
     let matrix = &place.matrix3;
     let terms = matrix.x_axis.abs() * reach.x + matrix.y_axis.abs() * reach.y + matrix.z_axis.abs() * reach.z;
     // The rounding of the transform, of what moves inside, and of rays that are taken through the inverse.

@@ -5,11 +5,11 @@ use super::quad::{Quad, QuadHits, Seen};
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::trace::bvh::block::Lane;
-use crate::trace::bvh::levels::Through;
 use crate::trace::bvh::levels::placements::FIXED;
 use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::simd::{Array, Doubles, Simd};
 use crate::trace::bvh::{Bvh, PartId};
+use crate::trace::leaf::InstanceTransform;
 use crate::trace::nearest::Nearest;
 
 /// Four rays, component by component.
@@ -153,7 +153,7 @@ impl<T> Shared<T> {
 impl Bvh {
     /// The triangles at a place, and how rays come to them.
     #[inline(always)]
-    pub(in crate::trace::bvh) fn triangles_at(&self, place: u32) -> (&TriangleTree, Option<Through<'_>>) {
+    pub(in crate::trace::bvh) fn triangles_at(&self, place: u32) -> (&TriangleTree, Option<InstanceTransform<'_>>) {
         if place == FIXED {
             return (&self.fixed.triangles, None);
         }

@@ -10,7 +10,7 @@ use crate::trace::bvh::tree::Tree;
 /// Children that wait while a tree is searched, and by how much each falls short, as [`Simd::nearest_apart`] tells it: the lowest three bits mean nothing, and without
 /// them it is a little less. Unlike where [points](crate::trace::bvh::near) wait, nobody goes through them when something farther is found: each is asked when it is its turn, since a
 /// search wants to know of those it comes to by how much they fall short.
-pub(in crate::trace::bvh) struct Waiting {
+pub(in crate::trace::bvh) struct SupportStack {
     short: [u32; ENTRIES],
     child: [Child; ENTRIES],
     len: usize,
@@ -19,7 +19,7 @@ pub(in crate::trace::bvh) struct Waiting {
 /// Every level leaves at most seven siblings waiting, and eight are written at a time.
 const ENTRIES: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 
-impl Waiting {
+impl SupportStack {
     pub fn new() -> Self {
         Self { short: [0; ENTRIES], child: [Child::NONE; ENTRIES], len: 0 }
     }
@@ -72,7 +72,7 @@ impl Tree {
         &self,
         way: Vec3,
         visits: usize,
-        waiting: &mut Waiting,
+        waiting: &mut SupportStack,
         first: &mut Option<Child>,
         of_leaf: impl Fn(Child) -> f32,
     ) -> f64 {
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_lowest_bits_of_keys_mean_nothing() {
-        let mut waiting = Waiting::new();
+        let mut waiting = SupportStack::new();
         let key = |short: f32, slot| short.to_bits() & !7 | slot;
         let (short, child) = waiting.above();
         short[..3].copy_from_slice(&[key(3.0, 7), key(1.0, 5), key(2.0, 6)]);
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn there_is_room_for_the_deepest_tree() {
-        let mut waiting = Waiting::new();
+        let mut waiting = SupportStack::new();
         for level in 0..MAX_DEPTH {
             let (short, child) = waiting.above();
             (*short, *child) = ([level as u32; WIDTH], [Child(level as u32); WIDTH]);

@@ -12,7 +12,7 @@ pub(super) mod support;
 mod table;
 pub(super) mod triangles;
 
-use self::farthest::Waiting;
+use self::farthest::SupportStack;
 use self::place::Place;
 use self::shapes::ShapeTree;
 use self::triangles::TriangleTree;
@@ -24,22 +24,16 @@ use super::reject::slab::SlabRay;
 use super::simd::Simd;
 use super::simd::isa::{self, Kernel, Present};
 use super::walk::{self, Visit};
-use crate::math::{Aabb, Affine3, Vec3};
+use crate::math::{Aabb, Vec3};
 use crate::ray::Ray;
 use crate::trace::Part;
+use crate::trace::leaf::InstanceTransform;
 use crate::trace::nearest::Nearest;
 
 /// Everything in one coordinate system.
 pub(super) struct Level {
     pub triangles: TriangleTree,
     pub shapes: ShapeTree,
-}
-
-/// How the ray came to a level: in the world, or through a placement.
-#[derive(Clone, Copy)]
-pub(super) struct Through<'a> {
-    pub instance: u32,
-    pub to_world: &'a Affine3,
 }
 
 /// [`Level::farthest`].
@@ -78,7 +72,7 @@ impl Level {
     /// [`Self::farthest`].
     #[inline(always)]
     pub fn search<S: Simd>(&self, ways: &[Vec3], visits: usize, values: &mut [f64]) {
-        let (mut waiting, mut first) = (Waiting::new(), None);
+        let (mut waiting, mut first) = (SupportStack::new(), None);
         for (value, &way) in values.iter_mut().zip(ways) {
             let of_triangles = self.triangles.farthest::<S>(way, visits, &mut waiting, &mut first);
             *value = of_triangles.max(self.shapes.farthest::<S>(way, visits, &mut waiting));
@@ -124,7 +118,7 @@ impl Level {
         &self,
         ray: &Ray,
         local: &Ray,
-        through: Option<Through<'_>>,
+        through: Option<InstanceTransform<'_>>,
         nearest: &mut Nearest,
     ) {
         let is_done = Q::ANY && nearest.hit().is_some();

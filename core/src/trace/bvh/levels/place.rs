@@ -11,13 +11,13 @@
 //! sum of that quotient and gamma(8), the moved origin is off by q |B| (|o| + |T|) + |b + B T|, and the direction by q |B| |d|. Then
 //! both are rounded to f32. For a transform that is anywhere near a rotation only this last step counts.
 
-use super::Through;
 use crate::math::{Affine3, DAffine3, DMat3, UNIT_ROUNDOFF, Vec3, gamma64};
 use crate::ray::Ray;
 use crate::trace::Placement;
 use crate::trace::bvh::reject::Blur;
 use crate::trace::bvh::reject::ready::columns_of;
 use crate::trace::bvh::simd::{Array, Doubles, Mask, PerRay, RAYS, Simd, Vector, size};
+use crate::trace::leaf::InstanceTransform;
 use crate::trace::world::object_ray;
 
 /// An object in its place, while it stands still. Rays on their way into the object need the first two cache lines, their hits the last two.
@@ -87,8 +87,8 @@ impl Place {
         Self { grain: grain * squares / 3.0, ..self }
     }
 
-    pub fn through(&self) -> Through<'_> {
-        Through { instance: self.instance, to_world: &self.to_world }
+    pub fn through(&self) -> InstanceTransform<'_> {
+        InstanceTransform { instance: self.instance, to_world: &self.to_world }
     }
 
     /// As [`Placement::object_ray`].

@@ -1,7 +1,6 @@
 //! Leaves of shapes that are not triangles.
 
-use super::Through;
-use super::farthest::Waiting;
+use super::farthest::SupportStack;
 use crate::math::Vec3;
 use crate::ray::{Hit, Ray};
 use crate::shape::Shape;
@@ -13,7 +12,7 @@ use crate::trace::bvh::node::Child;
 use crate::trace::bvh::query::{Query, SOMETHING};
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::tree::Tree;
-use crate::trace::leaf::{Id, offer_crossing};
+use crate::trace::leaf::{Id, InstanceTransform, offer_crossing};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -59,7 +58,7 @@ impl ShapeTree {
 
     /// As [`Tree::farthest`], of the boxes around shapes.
     #[inline(always)]
-    pub fn farthest<S: Simd>(&self, way: Vec3, visits: usize, waiting: &mut Waiting) -> f64 {
+    pub fn farthest<S: Simd>(&self, way: Vec3, visits: usize, waiting: &mut SupportStack) -> f64 {
         self.tree.farthest::<S>(way, visits, waiting, &mut None, |_| f32::INFINITY)
     }
 
@@ -81,7 +80,7 @@ impl ShapeTree {
         leaf: Child,
         ray: &Ray,
         local: &Ray,
-        through: Option<Through<'_>>,
+        through: Option<InstanceTransform<'_>>,
         nearest: &mut Nearest,
     ) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
@@ -98,7 +97,13 @@ impl ShapeTree {
 
     /// Adds everything that `local` (the ray in this level's coordinates) hits in a leaf, with t in f64.
     #[inline]
-    pub fn gather_leaf(&self, leaf: Child, local: &Ray, through: Option<Through<'_>>, hits: &mut Vec<(f64, Hit)>) {
+    pub fn gather_leaf(
+        &self,
+        leaf: Child,
+        local: &Ray,
+        through: Option<InstanceTransform<'_>>,
+        hits: &mut Vec<(f64, Hit)>,
+    ) {
         for Entry { shape, primitive, part } in self.leaf(leaf) {
             let instance = through.map_or(part.instance, |through| through.instance);
             let id = Id { instance, geometry: part.geometry, primitive: *primitive };

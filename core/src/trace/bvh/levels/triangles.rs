@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::Through;
 use super::clusters;
-use super::farthest::Waiting;
+use super::farthest::SupportStack;
 use super::leaves::Leaves;
 use crate::math::{Aabb, Vec3};
 use crate::ray::{Hit, Ray};
@@ -18,7 +17,7 @@ use crate::trace::bvh::node::Child;
 use crate::trace::bvh::reject::filter::Filter;
 use crate::trace::bvh::simd::Simd;
 use crate::trace::bvh::tree::Tree;
-use crate::trace::leaf::{Id, offer_triangle};
+use crate::trace::leaf::{Id, InstanceTransform, offer_triangle};
 use crate::trace::nearest::Nearest;
 use crate::trace::{Part, Primitives};
 
@@ -116,7 +115,13 @@ impl TriangleTree {
 
     /// As [`Tree::farthest`], of the triangles themselves.
     #[inline(always)]
-    pub fn farthest<S: Simd>(&self, way: Vec3, visits: usize, waiting: &mut Waiting, first: &mut Option<Child>) -> f64 {
+    pub fn farthest<S: Simd>(
+        &self,
+        way: Vec3,
+        visits: usize,
+        waiting: &mut SupportStack,
+        first: &mut Option<Child>,
+    ) -> f64 {
         self.tree.farthest::<S>(
             way,
             visits,
@@ -178,7 +183,7 @@ impl TriangleTree {
         leaf: Child,
         ray: &Ray,
         filter: &Filter,
-        through: Option<Through<'_>>,
+        through: Option<InstanceTransform<'_>>,
         nearest: &mut Nearest,
     ) {
         for index in leaf.blocks() {
@@ -195,7 +200,7 @@ impl TriangleTree {
 
     /// Offers what `ray` hits of one triangle, which may be placed: lane `id % 8` of block `id / 8`.
     #[inline]
-    pub fn offer_one(&self, id: u32, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer_one(&self, id: u32, ray: &Ray, through: Option<InstanceTransform<'_>>, nearest: &mut Nearest) {
         let mut scratch = None;
         let Lane { block, lane } = self.leaves.lane(id, &mut scratch);
         self.offer(block, lane, ray, through, nearest);
@@ -211,13 +216,20 @@ impl TriangleTree {
 
     /// Offers lane `lane` of a block, which may be placed, as [`Self::offer_one`] does.
     #[inline]
-    pub fn offer(&self, block: &Block, lane: usize, ray: &Ray, through: Option<Through<'_>>, nearest: &mut Nearest) {
+    pub fn offer(
+        &self,
+        block: &Block,
+        lane: usize,
+        ray: &Ray,
+        through: Option<InstanceTransform<'_>>,
+        nearest: &mut Nearest,
+    ) {
         let corners = block.triangle(lane);
         let part = self.parts[block.part[lane] as usize];
         let id = Id { instance: part.instance, geometry: part.geometry, primitive: block.primitive[lane] };
         match through {
             None => offer_triangle(nearest, ray, &corners, id),
-            Some(Through { instance, to_world }) => {
+            Some(InstanceTransform { instance, to_world }) => {
                 offer_triangle(nearest, ray, &Placed { corners, to_world }, Id { instance, ..id });
             }
         }

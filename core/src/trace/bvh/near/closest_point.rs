@@ -16,11 +16,11 @@ use crate::shape::closest::{TrianglePoint, closest_point};
 use crate::shape::triangle::{Corners, Placed};
 use crate::trace::Placement;
 use crate::trace::bvh::Bvh;
-use crate::trace::bvh::levels::Through;
 use crate::trace::bvh::levels::triangles::TriangleTree;
 use crate::trace::bvh::node::Child;
 use crate::trace::bvh::simd::Portable;
 use crate::trace::bvh::tree::Tree;
+use crate::trace::leaf::InstanceTransform;
 use crate::trace::motion::bounds_placed;
 
 /// A point on a triangle.
@@ -76,7 +76,7 @@ enum Level {
 }
 
 /// A node or a leaf that is yet to be opened.
-struct Waiting {
+struct QueueEntry {
     /// The distance of its box, squared.
     near: f64,
     level: Level,
@@ -84,25 +84,25 @@ struct Waiting {
 }
 
 /// The nearest is the greatest: [`BinaryHeap`] has that on top.
-impl Ord for Waiting {
+impl Ord for QueueEntry {
     fn cmp(&self, other: &Self) -> Ordering {
         other.near.total_cmp(&self.near)
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for QueueEntry {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Waiting {
+impl PartialEq for QueueEntry {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Waiting {}
+impl Eq for QueueEntry {}
 
 struct Search<'a> {
     bvh: &'a Bvh,
@@ -114,7 +114,7 @@ struct Search<'a> {
     limit: f64,
     /// The squared distance, before it is rounded, and the answer.
     best: Option<(f64, ClosestPoint)>,
-    queue: BinaryHeap<Waiting>,
+    queue: BinaryHeap<QueueEntry>,
 }
 
 impl<'a> Search<'a> {
@@ -145,21 +145,21 @@ impl<'a> Search<'a> {
                 return;
             }
             match waiting {
-                Waiting { level, child, .. } if !child.is_leaf() => self.push_children(level, child),
-                Waiting { level: Level::Placements, child, .. } => {
+                QueueEntry { level, child, .. } if !child.is_leaf() => self.push_children(level, child),
+                QueueEntry { level: Level::Placements, child, .. } => {
                     child.blocks().for_each(|index| self.push_root(Level::Placed(index)));
                 }
-                Waiting { level: Level::Moving, child, .. } => {
+                QueueEntry { level: Level::Moving, child, .. } => {
                     let first = self.bvh.placements.len();
                     child.blocks().for_each(|index| self.push_root(Level::Placed(first + index)));
                 }
-                Waiting { level, child, .. } => self.offer_leaf(level, child),
+                QueueEntry { level, child, .. } => self.offer_leaf(level, child),
             }
         }
     }
 
     /// The triangles of what is placed under this index among the leaves of the upper trees, and where they are.
-    fn placed(&self, index: u32) -> (&'a TriangleTree, Through<'a>) {
+    fn placed(&self, index: u32) -> (&'a TriangleTree, InstanceTransform<'a>) {
         let (object, through) = match index.checked_sub(self.bvh.placements.len()) {
             None => {
                 let place = self.bvh.placements.at(index);
@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
             }
             Some(moving) => {
                 let Placement { object, instance, to_world, .. } = self.bvh.moving.at(moving);
-                (*object, Through { instance: *instance, to_world })
+                (*object, InstanceTransform { instance: *instance, to_world })
             }
         };
         (&self.bvh.objects[object as usize].triangles, through)
@@ -203,7 +203,7 @@ impl<'a> Search<'a> {
     fn push(&mut self, level: Level, bounds: Aabb, child: Child) {
         let bounds = match level {
             Level::Placed(index) => {
-                let (_, Through { to_world, .. }) = self.placed(index);
+                let (_, InstanceTransform { to_world, .. }) = self.placed(index);
                 // Where it stands at time 0, as its triangles are measured.
                 bounds_placed(to_world, bounds, |rows| bounds.extents(rows))
             }
@@ -212,7 +212,7 @@ impl<'a> Search<'a> {
         let outside = (bounds.min.as_dvec3() - self.point).max(self.point - bounds.max.as_dvec3()).max(DVec3::ZERO);
         let near = outside.length_squared();
         if near <= self.limit {
-            self.queue.push(Waiting { near, level, child });
+            self.queue.push(QueueEntry { near, level, child });
         }
     }
 
@@ -226,7 +226,7 @@ impl<'a> Search<'a> {
                 let part = triangles.part(block.part[lane]);
                 let (corners, instance) = match level {
                     Level::Placed(index) => {
-                        let (_, Through { instance, to_world }) = self.placed(index);
+                        let (_, InstanceTransform { instance, to_world }) = self.placed(index);
                         (Placed { corners, to_world }.rounded(), instance)
                     }
                     Level::Fixed | Level::Placements | Level::Moving => (corners.rounded(), part.instance),

@@ -12,8 +12,8 @@ mod bounds;
 pub(super) mod closest_point;
 pub(super) mod discs;
 mod measure;
+mod point_stack;
 mod seeker;
-mod waiting;
 
 use self::discs::Discs;
 use super::Bvh;

@@ -3,7 +3,7 @@
 use super::bounds::enter;
 use super::discs::Discs;
 use super::measure::{Corners, Measured};
-use super::waiting::Waiting;
+use super::point_stack::PointStack;
 use super::{NearestTriangle, Sought};
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::shape::closest::TrianglePoint;
@@ -30,7 +30,7 @@ pub(super) struct Seeker {
     id: (u32, u32),
     /// and its corners.
     corners: Corners,
-    pub waiting: Waiting,
+    pub waiting: PointStack,
 }
 
 impl Seeker {
@@ -43,7 +43,7 @@ impl Seeker {
         square: f64::INFINITY,
         id: (u32::MAX, u32::MAX),
         corners: [[0.0; 4]; 3],
-        waiting: Waiting::EMPTY,
+        waiting: PointStack::EMPTY,
     };
 
     /// Sets out in a tree with this scale; with the triangle that was nearest to the point before, for it may be near this one too.

@@ -57,13 +57,13 @@ struct VisitBoxes<'a, 'v, Q> {
 
 /// A child, and which rays enter it.
 #[derive(Clone, Copy)]
-struct Waiting {
+struct StackEntry {
     near: f32,
     child: Child,
     lanes: u32,
 }
 
-impl Waits for Waiting {
+impl Waits for StackEntry {
     #[inline(always)]
     fn near(&self) -> f32 {
         self.near
@@ -97,8 +97,8 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
         let mut most = look::<S, Q>(&party, &limits, valid);
         let mut room = Room::new();
         let mut stack = Stack::new(&mut room);
-        stack.push(Waiting { near: 0.0, child: Child::ROOT, lanes: valid });
-        while let Some(Waiting { near, child, lanes }) = stack.pop() {
+        stack.push(StackEntry { near: 0.0, child: Child::ROOT, lanes: valid });
+        while let Some(StackEntry { near, child, lanes }) = stack.pop() {
             if near > most {
                 continue;
             }
@@ -122,7 +122,7 @@ impl<Q: Query> Kernel for VisitBoxes<'_, '_, Q> {
                 let child = node.child[slot];
                 let lanes = if child.is_leaf() { party.entering(node, slot)[0] & valid } else { valid };
                 if lanes != 0 {
-                    let waiting = Waiting { near: near.0[slot], child, lanes };
+                    let waiting = StackEntry { near: near.0[slot], child, lanes };
                     if Q::ANY { stack.push(waiting) } else { stack.insert(base, waiting) }
                 }
             }

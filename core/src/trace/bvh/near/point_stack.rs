@@ -15,7 +15,7 @@ const MAX: usize = (MAX_DEPTH * (WIDTH - 1) + 2).next_power_of_two();
 
 /// A stack of children.
 #[derive(Clone, Copy)]
-pub(super) struct Waiting {
+pub(super) struct PointStack {
     len: usize,
     /// [`Child::NONE`] at the bottom. Of two that a node leaves waiting the nearer is on top; of more nobody says which. Above the top is room for what is stored
     /// beside.
@@ -24,7 +24,7 @@ pub(super) struct Waiting {
     near: [u32; MAX + WIDTH],
 }
 
-impl Waiting {
+impl PointStack {
     /// Of a point at the end of its way.
     pub const EMPTY: Self = Self { len: 1, children: [Child::NONE; MAX + WIDTH], near: [0; MAX + WIDTH] };
 
@@ -85,7 +85,7 @@ mod tests {
     use crate::trace::bvh::random::Random;
     use crate::trace::bvh::simd::isa::{Kernel, Present, dispatch};
 
-    struct Shorten<'a>(&'a mut Waiting, f32);
+    struct Shorten<'a>(&'a mut PointStack, f32);
 
     impl Kernel for Shorten<'_> {
         type Output = ();
@@ -108,7 +108,7 @@ mod tests {
                 let mut expected = entries.clone();
                 expected.retain(|(near, _)| f32::from_bits(near & !7) <= limit);
                 for isa in Present::all() {
-                    let mut waiting = Waiting { len, ..Waiting::EMPTY };
+                    let mut waiting = PointStack { len, ..PointStack::EMPTY };
                     for (i, &(near, child)) in entries.iter().enumerate() {
                         (waiting.near[i + 1], waiting.children[i + 1]) = (near, child);
                     }
