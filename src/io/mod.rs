@@ -13,6 +13,7 @@ mod gltf;
 mod nff;
 mod number;
 mod obj;
+mod options;
 mod parts;
 mod ply;
 mod polygon;
@@ -31,139 +32,18 @@ use std::path::Path;
 
 pub(crate) use self::format::Format;
 pub use self::format::SUFFIXES;
+pub use self::options::{Animation, LoadOptions, Normals, Unit, UpAxis};
 pub use self::promised::{Promised, promised};
 pub use self::save::{SAVE_SUFFIXES, save, save_until};
 
-use self::finish::{bare, doubt_bare, make_finite, meshes};
+use self::finish::finish;
 use crate::error::{Error, Result, Warning, system_message};
-use crate::math::{DAffine3, DMat3, DVec3};
 use crate::memory::Mapped;
 use crate::output::suffix;
-use crate::scene::{Geometry, Mesh, Scene, fault};
-
-/// How a file is understood.
-#[derive(Clone, Debug, Default)]
-pub struct LoadOptions {
-    /// Which axis of the file points up; by default the format's own (+y).
-    pub up_axis: UpAxis,
-    /// Metres in one unit of the file.
-    pub unit: Unit,
-    /// Where shading normals come from.
-    pub normals: Normals,
-    /// In which pose things are; glTF alone.
-    pub animation: Animation,
-    /// Which of the sets of materials that a file offers things have; glTF alone. None is what they have by themselves.
-    pub variant: Option<String>,
-}
-
-/// In which pose things are.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Animation {
-    /// Of the file's animations, those with these names, or these numbers, counted from 0, played at once: of two that move the same, the later one counts. `all` is all
-    /// of them, where none has that name. None where the file has only one.
-    pub names: Vec<String>,
-    /// When, in seconds from the animation's start; before its first key and after its last one all stands still. None, and no
-    /// name, is the pose that the file stores.
-    pub time: Option<f64>,
-    /// Seconds from `time` on in which things go from where they are at time 0 of a picture to where they are at its time 1; 0 where
-    /// nothing is to move. What is deformed by a skin or morph targets keeps its shape.
-    pub exposure: f64,
-}
-
-/// The axis that points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum UpAxis {
-    /// +y, as in glTF.
-    #[default]
-    Y,
-    /// +z, as in CAD and scans: turned so that z becomes y and y becomes -z.
-    Z,
-}
-
-impl UpAxis {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Y, Self::Z];
-
-    /// As flags and scenes have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Y => "y",
-            Self::Z => "z",
-        }
-    }
-}
-
-/// The length unit of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Unit {
-    /// 1 m.
-    #[default]
-    Metre,
-    /// 0.01 m.
-    Centimetre,
-    /// 0.001 m.
-    Millimetre,
-    /// 0.0254 m.
-    Inch,
-}
-
-impl Unit {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Metre, Self::Centimetre, Self::Millimetre, Self::Inch];
-
-    /// As flags and scenes have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Metre => "m",
-            Self::Centimetre => "cm",
-            Self::Millimetre => "mm",
-            Self::Inch => "in",
-        }
-    }
-}
-
-/// Where shading normals come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Normals {
-    /// The file's; flat where it has none (and, in OBJ, smooth where it has smoothing groups).
-    #[default]
-    File,
-    /// Flat everywhere.
-    Flat,
-    /// Smooth everywhere, computed.
-    Smooth,
-}
-
-impl Normals {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::File, Self::Flat, Self::Smooth];
-
-    /// As flags and scenes have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::File => "file",
-            Self::Flat => "flat",
-            Self::Smooth => "smooth",
-        }
-    }
-}
+use crate::scene::Scene;
 
 /// A result whose error is a message that has no file and no place yet.
 type Placeless<T> = std::result::Result<T, String>;
-
-/// What compression may make of a colour of full strength: half a code of 256 too much, and some.
-const MOST_BY_ROUNDING: f32 = 1.0 + 1.0 / 255.0;
-
-/// Of a file without a primitive; with what was left out of it, which may be why.
-fn nothing_to_render(path: &Path, warnings: &[Warning]) -> Error {
-    let mut message =
-        "nothing to render: no ray could hit anything; give a file with at least one triangle or shape".to_owned();
-    if let Some(first) = warnings.first() {
-        let more = if warnings.len() > 1 { format!(" ({} more)", warnings.len() - 1) } else { String::new() };
-        message += &format!(". What was left out: {first}{more}");
-    }
-    Error::input(path, "", message)
-}
 
 /// Reads a scene. The suffix, in any case, decides the format: one of [`SUFFIXES`].
 ///
@@ -176,8 +56,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, Vec<Warning>)>
     load_watched(path, options, None)
 }
 
-/// The same, and tells of the bytes of the file as they are read: their number, from any thread. Bytes may be skipped, or
-/// read more than once, so that the sum may differ from the file's length.
+/// Reads a scene as [`load`] does, and calls `on_bytes` with the number of bytes of the file that were read since, from any thread. Bytes may be
+/// skipped, or read more than once, so that the sum may differ from the file's length.
 ///
 /// # Errors
 /// As [`load`].
@@ -204,72 +84,6 @@ pub fn load_watched(
     drop(file);
     scene.files.insert(0, path.to_owned());
     scene.transform(&options.transform());
-    let vague: usize = scene.geometries.iter_mut().map(make_finite).sum();
-    if vague > 0 {
-        let message = format!(
-            "{vague} colours or texture coordinates are not finite; what is not counts as 0, and as 1 where it is alpha"
-        );
-        warnings.push(Warning::new(path, "", message));
-    }
-    let brightest = meshes(&scene).map(Mesh::brightest_color).fold(0.0, f32::max);
-    // Of meshes that a scene includes it has been told.
-    if brightest > MOST_BY_ROUNDING && format != Format::Toml {
-        let message = format!(
-            "colours of vertices go up to {brightest}, where 1 is full strength; bytes have to be divided by 255"
-        );
-        warnings.push(Warning::new(path, "", message));
-    }
-    // At some time of an animation there may be nothing to see.
-    let may_be_empty = options.animation.time.is_some();
-    fault(&scene).map_err(|message| Error::input(path, "", message))?;
-    if scene.primitive_count() == 0 && !may_be_empty {
-        return Err(nothing_to_render(path, &warnings));
-    }
-    scene.bake_turns();
-    let mut bad = 0;
-    for geometry in &mut scene.geometries {
-        if let Geometry::Mesh(mesh) = geometry {
-            bad += mesh.drop_strays();
-            options.normals.apply(mesh);
-        }
-    }
-    if !format.tells_of_bare_meshes() {
-        warnings.extend(doubt_bare(path, bare(&scene.geometries, &scene.materials)));
-    }
-    if bad > 0 {
-        let message = format!("{bad} triangles have corners that are NaN, infinite or too far away; no ray hits them");
-        warnings.push(Warning::new(path, "", message));
-    }
-    let is_there = |geometry: &Geometry| match geometry {
-        Geometry::Mesh(mesh) => mesh.has_area(),
-        Geometry::Shapes { shapes, .. } => !shapes.is_empty(),
-    };
-    if !may_be_empty && !scene.geometries.iter().any(is_there) {
-        let message = "no ray hits anything: none of its triangles has an area, and corners that can be traced";
-        warnings.push(Warning::new(path, "", message));
-    }
+    finish(&mut scene, path, format, options, &mut warnings)?;
     Ok((scene, warnings))
-}
-
-impl LoadOptions {
-    /// From the file's coordinates to the scene's.
-    fn transform(&self) -> DAffine3 {
-        let turn = match self.up_axis {
-            UpAxis::Y => DMat3::IDENTITY,
-            UpAxis::Z => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
-        };
-        DAffine3::from_mat3(turn * self.unit.metres())
-    }
-}
-
-impl Unit {
-    /// How many metres it is.
-    pub const fn metres(self) -> f64 {
-        match self {
-            Self::Metre => 1.0,
-            Self::Centimetre => 0.01,
-            Self::Millimetre => 0.001,
-            Self::Inch => 0.0254,
-        }
-    }
 }

@@ -30,6 +30,7 @@ use self::look::{Render, Shading};
 use self::pieces::Cut;
 use self::primitives::{SINGLES, Singles};
 use self::table::{Fault, Read, Table, Value};
+use super::finish::{bare, doubt_bare};
 use super::parts::{Sorted, add_group};
 use super::suggest::suggestion_or_all;
 use super::texture;
@@ -83,7 +84,7 @@ pub(super) fn load(path: &Path, file: &Mapped<'_>, warnings: &mut Vec<Warning>) 
     match read().and_then(|apart| reader.read(Table::new(document.get_ref(), 0, "the file"), apart)) {
         Ok(()) => {
             let (scene, bare) = (reader.scene, reader.bare);
-            warnings.extend(super::doubt_bare(path, bare));
+            warnings.extend(doubt_bare(path, bare));
             warnings.extend(fog::doubt(&scene).map(|doubt| Warning::new(path, "[fog]", doubt)));
             file.done(file);
             Ok(scene)
@@ -279,7 +280,7 @@ impl Reader<'_> {
             }
         }
         let meshes = primitives::meshes(table, |name| self.material_of(name))?;
-        self.bare += super::bare(&meshes, &self.scene.materials);
+        self.bare += bare(&meshes, &self.scene.materials);
         near.extend(meshes);
         let mut body = Body::default();
         for mut file in table.tables("file")? {
