@@ -32,6 +32,7 @@ mod plan;
 mod progress;
 mod render;
 mod report;
+mod request;
 mod response;
 mod scaling;
 #[cfg(unix)]

@@ -1,7 +1,6 @@
 //! `twincast render`: from a scene file to finished pictures.
 
-use std::iter;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -22,7 +21,8 @@ use super::explain::ExplainArgs;
 use super::frames::{self, FrameArgs};
 use super::light::LightArgs;
 use super::picture::PictureArgs;
-use super::report::{EngineStats, Stats};
+use super::report::Stats;
+use super::request::{RenderRequest, no_picture};
 use super::response::{ResponseArgs, beyond_numbers, too_bright};
 use super::summary::Rendered;
 use super::threads::{parse_threads, pool};
@@ -33,10 +33,9 @@ use crate::image::{self, Metadata, Reference, Response, WriteOptions};
 use crate::io::Format;
 use crate::memory::process;
 use crate::output::AtomicWrites;
-use crate::plan;
-use crate::render::{Crop, Renderer, Settings};
-use crate::scene::{Camera, Request, Scene};
-use crate::trace::accel::{Accel, Options as AccelOptions};
+use crate::plan::{self, BuildChoice};
+use crate::render::Renderer;
+use crate::trace::accel::Accel;
 use crate::trace::bvh::{Preset, prepare_thread};
 
 /// Render a scene
@@ -67,13 +66,13 @@ pub(super) struct RenderArgs {
 
     /// Engine
     #[arg(long, value_enum, default_value_t)]
-    backend: BackendArg,
+    pub(super) backend: BackendArg,
 
     #[command(flatten)]
-    picture: PictureArgs,
+    pub(super) picture: PictureArgs,
 
     #[command(flatten)]
-    aov: AovArgs,
+    pub(super) aov: AovArgs,
 
     #[command(flatten)]
     denoise: DenoiseArgs,
@@ -83,7 +82,7 @@ pub(super) struct RenderArgs {
 
     /// Print the camera as flags that give it again; without --output, do nothing else
     #[arg(long)]
-    print_camera: bool,
+    pub(super) print_camera: bool,
 
     /// Picture of the same size to compare with, as its format would hold this one; exit code 1 if they differ by more than --threshold
     #[arg(long, value_name = "FILE", requires = "output")]
@@ -102,16 +101,16 @@ pub(super) struct RenderArgs {
     pub(super) stats: Option<PathBuf>,
 
     #[command(flatten)]
-    accel: AccelArgs,
+    pub(super) accel: AccelArgs,
 
     #[command(flatten)]
-    build: BuildArgs,
+    pub(super) build: BuildArgs,
 
     #[command(flatten)]
-    cache: CacheArgs,
+    pub(super) cache: CacheArgs,
 
     #[command(flatten)]
-    light: LightArgs,
+    pub(super) light: LightArgs,
 
     /// Viewer that shows the picture while it is made: where tev listens
     #[arg(long, value_name = "HOST:PORT", value_parser = parse_address)]
@@ -127,13 +126,13 @@ pub(super) struct RenderArgs {
 
     // Last, for clap puts what follows a heading under it.
     #[command(flatten)]
-    camera: CameraArgs,
+    pub(super) camera: CameraArgs,
 
     #[command(flatten)]
     response: ResponseArgs,
 
     #[command(flatten)]
-    explain: ExplainArgs,
+    pub(super) explain: ExplainArgs,
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
@@ -174,11 +173,11 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
     let display = args.display_server.as_deref().map(|address| Display::connect(address, title())).transpose()?;
 
     pool.install(|| {
-        let asked = args.ask(denoising.as_ref(), reference.as_ref())?;
-        let Asked { scene, settings, camera, accel, .. } = &asked;
+        let request = args.request(denoising.as_ref(), reference.as_ref())?;
+        let RenderRequest { scene, settings, camera, accel, .. } = &request;
         if args.print_camera {
             say(camera_flags(camera, &scene.bounds()))?;
-            if asked.pictures.is_empty() {
+            if request.pictures.is_empty() {
                 return Ok(());
             }
         }
@@ -192,25 +191,18 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
             return args.explain.run(&world, &renderer, args.backend, accel);
         }
 
-        // The plan knows native BVHs and Embree; whoever names another accelerator has chosen.
-        let build = match accel.0 {
-            Accel::Bvh => {
-                let rays = settings.expected_rays(renderer.plan());
-                args.build.choose(args.backend, world.stored_triangles(), &rays, asked.pixels(), &settings.aovs)?
-            }
-            _ => None,
-        };
+        let build = args.choose_build(&request, &renderer)?;
         let job = Job {
             world: &world,
             renderer: &renderer,
-            pixels: asked.pixels(),
+            pixels: request.pixels(),
             cancel,
             quiet: args.quiet,
             build: build.as_ref().map_or(Preset::Default, |build| build.preset),
             accel,
             cache: cache.as_ref(),
             display: display.as_ref(),
-            kept: asked.kept.as_ref(),
+            kept: request.kept.as_ref(),
         };
         let outcome = job.run(args.backend).and_then(|mut outcome| {
             let denoise =
@@ -221,161 +213,73 @@ fn produce(args: &RenderArgs, pool: &ThreadPool, cancel: &AtomicBool) -> Result<
         warn(display.and_then(Display::finish).as_slice());
         if !args.quiet
             && interrupt::is_wanted()
-            && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &asked.kept)
+            && let (Err(Error::Interrupted), Some(kept)) = (&outcome, &request.kept)
         {
             kept.tell()?;
         }
         let (outcome, denoise) = outcome?;
-        let mut files = AtomicWrites::default();
-        let pass = &outcome.passes[0];
-        let write_seconds = args.write(&mut files, &asked, pass);
-        let [width, height] = asked.size();
         let stats = Stats {
-            scene: args.scene.scene.display().to_string(),
-            triangles: world.placed_triangles(),
-            size: [width, height],
-            spp: settings.spp,
-            mean_spp: pass.picture.samples as f64 / asked.pixels() as f64,
-            threads: rayon::current_num_threads(),
-            packet: settings.batch.width.rays(),
-            load_seconds: asked.load_seconds,
             prepare_seconds,
-            write_seconds,
-            peak_memory: process::peak(),
             denoise,
-            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, world.stored_triangles())).collect(),
+            ..Stats::new(&args.scene.scene.display().to_string(), &world, &request, &outcome)
         };
-        if let Some(path) = &args.stats {
-            outputs::write_json(&mut files, path, &stats);
-        }
-        outputs::commit(files)?;
-        asked.kept.as_ref().map_or(Ok(()), Kept::remove)?;
+        let stats = args.write(&request, &outcome, stats)?;
         if !args.quiet {
-            let camera = &asked.camera_source;
+            let camera = &request.camera_source;
             let mut summary = Rendered { scene, renderer: &renderer, camera, build: build.as_ref(), stats: &stats }
                 .summary(args.verbose);
-            asked.pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
+            request.pictures.iter().chain(&args.stats).for_each(|path| summary.line("wrote", path.display()));
             say(summary)?;
         }
         args.judge(&outcome, reference.as_ref(), &args.response.choose(&scene.request))
     })
 }
 
-/// What is to be rendered, by the scene and the flags.
-struct Asked {
-    scene: Scene,
-    load_seconds: f64,
-    settings: Settings,
-    accel: (Accel, AccelOptions),
-    /// Where it goes.
-    pictures: Vec<PathBuf>,
-    kept: Option<Kept>,
-    camera: Camera,
-    /// Where the camera is from, for the summary.
-    camera_source: String,
-}
-
-impl Asked {
-    /// Width and height of what is rendered, in pixels.
-    fn size(&self) -> [u32; 2] {
-        let Crop { width, height, .. } = self.settings.window();
-        [width, height]
-    }
-
-    fn pixels(&self) -> u64 {
-        self.size().into_iter().map(u64::from).product()
-    }
-}
-
 impl RenderArgs {
-    /// Reads the scene, and says what is to be made of it. Everything that can be refused before the work is.
-    fn ask(&self, denoising: Option<&Denoising>, reference: Option<&Reference>) -> Result<Asked> {
-        let start = Instant::now();
-        let (mut scene, warnings) = self.scene.load_with_bar(self.camera.has_shutter(), self.quiet)?;
-        warn(&warnings);
-        self.light.apply(&mut scene)?;
-        let load_seconds = start.elapsed().as_secs_f64();
-        interrupt::check()?;
-
-        let accel = self.accel.choose(scene.request.search, self.backend, Some(&self.build), &self.cache)?;
-        let mut settings = self.picture.settings(&scene.request, self.backend.best_width());
-        settings.aovs = denoising.map_or_else(|| self.aov.aovs(), Denoising::aovs);
-        if settings.adaptive.is_some() && self.backend == BackendArg::Both {
-            return Err(Error::Usage(
-                "--noise is for one engine, not for --backend both: each would choose its samples".into(),
-            ));
+    /// How well the native tree is worth building for this render; none where another accelerator was named, whose choice it is.
+    fn choose_build(&self, request: &RenderRequest, renderer: &Renderer<'_>) -> Result<Option<BuildChoice>> {
+        if request.accel.0 != Accel::Bvh {
+            return Ok(None);
         }
-        let pictures = self.pictures(&scene.request)?;
-        outputs::spare(pictures.iter().chain(&self.stats), &scene.files)?;
-        self.aov.check(&pictures)?;
-        let read = [&self.inputs()[..], &scene.files].concat();
-        let kept = self.checkpoint.open(&pictures, self.stats.as_ref(), &read, self.backend)?;
-        let aspect = f64::from(settings.width) / f64::from(settings.height);
-        let (camera, camera_source) = self.camera.choose(&scene, aspect)?;
-        let asked = Asked { scene, load_seconds, settings, accel, pictures, kept, camera, camera_source };
-        asked.pictures.iter().try_for_each(|path| image::check_sides(path, asked.size()))?;
-        self.check_reference(reference, asked.size())?;
-        Ok(asked)
+        let settings = &request.settings;
+        let rays = settings.expected_rays(renderer.plan());
+        let triangles = renderer.world().stored_triangles();
+        self.build.choose(self.backend, triangles, &rays, request.pixels(), &settings.aovs)
+    }
+
+    /// Writes pictures and statistics, and puts them in place together; the statistics with the time that took.
+    fn write(&self, request: &RenderRequest, outcome: &Outcome, stats: Stats) -> Result<Stats> {
+        let mut files = AtomicWrites::default();
+        let write_seconds = self.write_pictures(&mut files, request, &outcome.passes[0]);
+        let stats = Stats { write_seconds, peak_memory: process::peak(), ..stats };
+        if let Some(path) = &self.stats {
+            outputs::write_json(&mut files, path, &stats);
+        }
+        outputs::commit(files)?;
+        request.kept.as_ref().map_or(Ok(()), Kept::remove)?;
+        Ok(stats)
     }
 
     /// Writes the pictures, to be put in place with `files`; in how many seconds.
-    fn write(&self, files: &mut AtomicWrites, asked: &Asked, pass: &Pass) -> f64 {
+    fn write_pictures(&self, files: &mut AtomicWrites, request: &RenderRequest, pass: &Pass) -> f64 {
         let start = Instant::now();
         let picture = &pass.picture;
-        let mean_spp = picture.samples as f64 / asked.pixels() as f64;
+        let mean_spp = picture.samples as f64 / request.pixels() as f64;
         let metadata = Metadata {
             samples_per_pixel: Some(mean_spp.round() as u32),
             texts: picture.texts.clone(),
             render_time_seconds: Some(pass.render_seconds),
-            ..Metadata::of_camera(&asked.camera, &asked.settings)
+            ..Metadata::of_camera(&request.camera, &request.settings)
         };
-        let response = self.response.choose(&asked.scene.request);
+        let response = self.response.choose(&request.scene.request);
         let options = WriteOptions { response, ..WriteOptions::default() };
-        outputs::write_pictures(files, &asked.pictures, &picture.image, &picture.channels, &metadata, &options);
-        let of_codes = asked.pictures.iter().find(|path| !image::keeps_radiance(path));
-        let beyond = asked.pictures.first().zip(beyond_numbers(&picture.image, &asked.settings.window()));
+        outputs::write_pictures(files, &request.pictures, &picture.image, &picture.channels, &metadata, &options);
+        let of_codes = request.pictures.iter().find(|path| !image::keeps_radiance(path));
+        let beyond = request.pictures.first().zip(beyond_numbers(&picture.image, &request.settings.window()));
         let bright = |path| Some((path, too_bright(&picture.image, &options.response)?));
         let told = beyond.or_else(|| of_codes.and_then(bright));
         warn(told.map(|(path, message)| Warning::new(path, "", message)).as_slice());
         start.elapsed().as_secs_f64()
-    }
-
-    /// The pictures to write: those of the flags, else the one that the scene names.
-    fn pictures(&self, request: &Request) -> Result<Vec<PathBuf>> {
-        if !self.output.is_empty() || self.print_camera || self.explain.is_wanted() {
-            return Ok(self.output.clone());
-        }
-        // Of what a scene names the folder is left out: a scene must not choose whose files are replaced.
-        let named = request.output.as_ref().and_then(|name| Path::new(name).file_name());
-        let Some(picture) = named.map(PathBuf::from) else {
-            return Err(no_picture());
-        };
-        image::check_suffix(&picture).map_err(|error| match error {
-            Error::Output { path, message } => {
-                let message = format!("names the picture {}: {message}; -o FILE chooses another", path.display());
-                Error::input(&self.scene.scene, "", message)
-            }
-            other => other,
-        })?;
-        let pictures = vec![picture];
-        outputs::check(&pictures, &self.stats, &self.inputs())?;
-        Ok(pictures)
-    }
-
-    /// The files it reads.
-    fn inputs(&self) -> Vec<PathBuf> {
-        let files = [self.reference.clone(), self.light.environment.clone(), self.camera.picture()];
-        iter::once(self.scene.scene.clone()).chain(files.into_iter().flatten()).collect()
-    }
-
-    fn check_reference(&self, reference: Option<&Reference>, [width, height]: [u32; 2]) -> Result<()> {
-        let (Some(Reference { image: picture, .. }), Some(path)) = (reference, &self.reference) else { return Ok(()) };
-        if [picture.width, picture.height] == [width, height] {
-            return Ok(());
-        }
-        let own = format_args!("{}x{}", picture.width, picture.height);
-        let message = format!("--reference {}: it is {own}, and the picture {width}x{height}", path.display());
-        Err(Error::Usage(message))
     }
 
     /// Says how the checks that were asked for went; an error where one did not hold.
@@ -397,10 +301,6 @@ impl RenderArgs {
         }
         Err(Error::Check(failed.into_iter().map(|(words, _)| words).collect::<Vec<_>>().join("; ")))
     }
-}
-
-fn no_picture() -> Error {
-    Error::Usage("no picture to write: name one with --output FILE; the scene names none".to_owned())
 }
 
 fn parse_threshold(text: &str) -> std::result::Result<f64, String> {

@@ -6,7 +6,9 @@ use serde::Serialize;
 
 use super::cache::CacheStats;
 use super::denoise::DenoiseStats;
-use super::engine::Pass;
+use super::engine::{Outcome, Pass};
+use super::request::RenderRequest;
+use crate::trace::World;
 
 /// What `--stats` writes. Times are seconds, sizes bytes.
 #[derive(Debug, Serialize)]
@@ -29,6 +31,29 @@ pub(super) struct Stats {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) denoise: Option<DenoiseStats>,
     pub(super) engines: Vec<EngineStats>,
+}
+
+impl Stats {
+    /// Of a render that is done; what is not known of it here is 0, or none.
+    pub(super) fn new(scene: &str, world: &World, request: &RenderRequest, outcome: &Outcome) -> Self {
+        let settings = &request.settings;
+        let stored = world.stored_triangles();
+        Self {
+            scene: scene.to_owned(),
+            triangles: world.placed_triangles(),
+            size: request.size(),
+            spp: settings.spp,
+            mean_spp: outcome.passes[0].picture.samples as f64 / request.pixels() as f64,
+            threads: rayon::current_num_threads(),
+            packet: settings.batch.width.rays(),
+            load_seconds: request.load_seconds,
+            prepare_seconds: 0.0,
+            write_seconds: 0.0,
+            peak_memory: None,
+            denoise: None,
+            engines: outcome.passes.iter().map(|pass| EngineStats::new(pass, stored)).collect(),
+        }
+    }
 }
 
 /// One engine's share.
